@@ -1,0 +1,10 @@
+//! Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler (Petit et al. 2015).
+
+pub mod chain;
+pub mod config;
+pub mod ensemble;
+pub mod io;
+pub mod log_density;
+pub mod observation;
+pub mod star;
+pub mod units;

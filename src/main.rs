@@ -1,0 +1,3 @@
+//! The command line: parse, call, print the error, exit code.
+
+fn main() {}

@@ -1,0 +1,21 @@
+//! Constants and conversions between the units at the program's boundaries (degrees, km/s, nm) and those inside (radians).
+
+/// Speed of light (km/s).
+pub const SPEED_OF_LIGHT_KMS: f64 = 299_792.458;
+
+/// FWHM of a Gaussian over its standard deviation, `2 sqrt(2 ln 2)`.
+pub const FWHM_PER_SIGMA: f64 = 2.354_820_045_030_949_3;
+
+/// Second radiation constant `h c / k` (m K), CODATA 2018.
+const SECOND_RADIATION_M_K: f64 = 1.438_776_877e-2;
+
+/// Standard deviation (km/s) of a Gaussian instrumental profile of the given resolving power, whose FWHM is c/R.
+pub fn instrumental_sigma_kms(resolving_power: f64) -> f64 {
+    SPEED_OF_LIGHT_KMS / resolving_power / FWHM_PER_SIGMA
+}
+
+/// Ratio of Planck functions `B(spot) / B(photosphere)` at one wavelength: the brightness of a pixel wholly spotted.
+pub fn planck_contrast(spot_k: f64, photosphere_k: f64, wavelength_nm: f64) -> f64 {
+    let x = SECOND_RADIATION_M_K / (wavelength_nm * 1e-9);
+    (x / photosphere_k).exp_m1() / (x / spot_k).exp_m1()
+}
