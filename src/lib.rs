@@ -5,6 +5,7 @@ pub mod config;
 pub mod ensemble;
 pub mod io;
 pub mod log_density;
+pub mod objective;
 pub mod observation;
 pub mod star;
 pub mod units;

@@ -1,0 +1,93 @@
+//! The eight parameters that may be sampled: their names, units, and values at one point of parameter space.
+//!
+//! Left out: priors (`prior`) and what a point is worth (`objective`).
+
+use crate::star::{Orbit, Rotation, StarState};
+
+/// One of the parameters that may be free. The order is that of every table and chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Parameter {
+    /// Semi-amplitude of the planet's orbit (km/s).
+    K,
+    /// Orbital period over rotation period.
+    PorbOverProt,
+    /// Orbital phase (cycles).
+    Phi,
+    /// Angular velocity of the equator (rad/d).
+    OmegaEq,
+    /// Equator-to-pole shear (rad/d).
+    DOmega,
+    /// Inclination (degrees).
+    Inclination,
+    /// Projected equatorial velocity (km/s).
+    Vsini,
+    /// Systemic velocity (km/s).
+    Vsys,
+}
+
+impl Parameter {
+    /// All of them, in order.
+    pub const ALL: [Parameter; 8] = [
+        Parameter::K,
+        Parameter::PorbOverProt,
+        Parameter::Phi,
+        Parameter::OmegaEq,
+        Parameter::DOmega,
+        Parameter::Inclination,
+        Parameter::Vsini,
+        Parameter::Vsys,
+    ];
+
+    /// The name used in config, chain, tables and plots.
+    pub fn name(self) -> &'static str {
+        match self {
+            Parameter::K => "k_kms",
+            Parameter::PorbOverProt => "porb_over_prot",
+            Parameter::Phi => "phi",
+            Parameter::OmegaEq => "omega_eq_rad_d",
+            Parameter::DOmega => "domega_rad_d",
+            Parameter::Inclination => "inclination_deg",
+            Parameter::Vsini => "vsini_kms",
+            Parameter::Vsys => "vsys_kms",
+        }
+    }
+
+    /// The parameter of that name.
+    pub fn from_name(name: &str) -> Option<Parameter> {
+        Parameter::ALL.into_iter().find(|p| p.name() == name)
+    }
+}
+
+/// Values of all eight parameters in the units of their names, free or not; index by [`Parameter`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterValues(pub [f64; 8]);
+
+impl std::ops::Index<Parameter> for ParameterValues {
+    type Output = f64;
+    fn index(&self, p: Parameter) -> &f64 {
+        &self.0[p as usize]
+    }
+}
+
+impl std::ops::IndexMut<Parameter> for ParameterValues {
+    fn index_mut(&mut self, p: Parameter) -> &mut f64 {
+        &mut self.0[p as usize]
+    }
+}
+
+impl ParameterValues {
+    /// The physical state of star and planet they stand for.
+    pub fn state(&self) -> StarState {
+        StarState {
+            rotation: Rotation { omega_eq_rad_d: self[Parameter::OmegaEq], domega_rad_d: self[Parameter::DOmega] },
+            inclination: self[Parameter::Inclination].to_radians(),
+            vsini_kms: self[Parameter::Vsini],
+            vsys_kms: self[Parameter::Vsys],
+            orbit: Orbit {
+                k_kms: self[Parameter::K],
+                porb_over_prot: self[Parameter::PorbOverProt],
+                phi: self[Parameter::Phi],
+            },
+        }
+    }
+}

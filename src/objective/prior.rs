@@ -1,0 +1,1 @@
+//! Priors of single parameters (to be written).
