@@ -3,8 +3,10 @@
 pub mod chain;
 pub mod config;
 pub mod ensemble;
+pub mod imaging;
 pub mod io;
 pub mod log_density;
+pub mod maxent;
 pub mod objective;
 pub mod observation;
 pub mod star;

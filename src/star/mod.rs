@@ -3,13 +3,21 @@
 //!
 //! Left out: priors, chi2, chains, files. Angles are radians here, velocities km/s, times days.
 
+mod convolution;
+mod deposit;
+pub mod grid;
 pub mod limb_darkening;
+mod line_profile;
 pub mod orbit;
+pub mod response;
 pub mod rotation;
 pub mod spots;
+mod view;
 
+pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use orbit::Orbit;
+pub use response::{Response, Sampling};
 pub use rotation::Rotation;
 pub use spots::Spot;
 

@@ -1,0 +1,151 @@
+//! Star and maximum entropy meet: the misfit of a map of spot filling factors to observed profiles, and the Doppler image.
+//!
+//! The map s gives the brightness `B = 1 - (1 - c) s`; the model is `D = line(B) / continuum(B)` (method section 1), whose
+//! second derivative is kept, so that the solver's Newton steps are exact. Left out: which parameters are tried, and why.
+
+use crate::maxent::Problem;
+use crate::observation::Observations;
+use crate::star::Response;
+
+/// Data in the form that the misfit needs.
+#[derive(Clone, Debug)]
+pub struct Data {
+    /// Observed depth `1 - I` of every bin.
+    pub depth: Vec<f64>,
+    /// `1 / sigma^2` of every bin.
+    pub inverse_variance: Vec<f64>,
+}
+
+impl Data {
+    /// Depths and weights of all profiles, one after the other.
+    pub fn of(observations: &Observations) -> Self {
+        let profiles = || observations.profiles.iter();
+        Data {
+            depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
+            inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
+        }
+    }
+}
+
+/// The misfit of spot maps to profiles, for one response.
+pub struct ImagingProblem<'a> {
+    area: &'a [f64],
+    data: &'a Data,
+    response: Response,
+    /// `1 - c`: what a wholly spotted pixel lacks in brightness.
+    darkness: f64,
+    passes: u32,
+    /// Model depth of every bin at the current map.
+    model: Vec<f64>,
+    /// `(model - data) / sigma^2`.
+    weighted_residual: Vec<f64>,
+    continuum: Vec<f64>,
+    brightness: Vec<f64>,
+    bins: Vec<f64>,
+    constants: Vec<f64>,
+}
+
+impl<'a> ImagingProblem<'a> {
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness `contrast`.
+    pub fn new(area: &'a [f64], data: &'a Data, response: Response, contrast: f64) -> Self {
+        let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
+        ImagingProblem {
+            area,
+            data,
+            response,
+            darkness: 1.0 - contrast,
+            passes: 0,
+            model: vec![0.0; bins],
+            weighted_residual: vec![0.0; bins],
+            continuum: vec![0.0; profiles],
+            brightness: vec![0.0; pixels],
+            bins: vec![0.0; bins],
+            constants: vec![0.0; profiles],
+        }
+    }
+
+    /// Model depth `1 - I` of every bin at the current map.
+    pub fn model(&self) -> &[f64] {
+        &self.model
+    }
+
+    /// The response that the problem was made with.
+    pub fn response(&self) -> &Response {
+        &self.response
+    }
+
+    /// Derivative of chi2 / 2 along the image direction `v` at the current map.
+    pub fn slope(&mut self, v: &[f64]) -> f64 {
+        self.passes += 1;
+        self.response.apply(v, &mut self.bins, &mut self.constants);
+        let mut slope = 0.0;
+        for k in 0..self.response.profiles() {
+            let scale = -self.darkness / self.continuum[k];
+            for j in self.response.bins(k) {
+                slope += self.weighted_residual[j] * scale * (self.bins[j] - self.model[j] * self.constants[k]);
+            }
+        }
+        slope
+    }
+}
+
+impl Problem for ImagingProblem<'_> {
+    fn area(&self) -> &[f64] {
+        self.area
+    }
+
+    fn linearise(&mut self, s: &[f64]) -> f64 {
+        self.passes += 1;
+        self.brightness.iter_mut().zip(s).for_each(|(b, s)| *b = 1.0 - self.darkness * s);
+        self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
+        let mut chi2 = 0.0;
+        for k in 0..self.response.profiles() {
+            for j in self.response.bins(k) {
+                self.model[j] /= self.continuum[k];
+                let residual = self.model[j] - self.data.depth[j];
+                self.weighted_residual[j] = residual * self.data.inverse_variance[j];
+                chi2 += residual * self.weighted_residual[j];
+            }
+        }
+        chi2
+    }
+
+    fn gradient(&mut self, out: &mut [f64]) {
+        self.passes += 1;
+        for k in 0..self.response.profiles() {
+            let scale = -self.darkness / self.continuum[k];
+            let mut constant = 0.0;
+            for j in self.response.bins(k) {
+                self.bins[j] = scale * self.weighted_residual[j];
+                constant -= self.bins[j] * self.model[j];
+            }
+            self.constants[k] = constant;
+        }
+        self.response.apply_transpose(&self.bins, &self.constants, out);
+    }
+
+    /// `J^T W J v` plus the curvature of the model: with `dD = (line(dB) - D dC) / C`, the second derivative of `D = N/C`
+    /// in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`.
+    fn curvature(&mut self, v: &[f64], out: &mut [f64]) {
+        self.passes += 2;
+        self.response.apply(v, &mut self.bins, &mut self.constants);
+        for k in 0..self.response.profiles() {
+            let scale = -self.darkness / self.continuum[k];
+            let d_continuum = self.constants[k] * scale;
+            let mut constant = 0.0;
+            for j in self.response.bins(k) {
+                let d_model = scale * self.bins[j] - self.model[j] * d_continuum;
+                let residual = self.weighted_residual[j];
+                let back = scale * (self.data.inverse_variance[j] * d_model - residual * d_continuum);
+                constant -= back * self.model[j] + scale * residual * d_model;
+                self.bins[j] = back;
+            }
+            self.constants[k] = constant;
+        }
+        self.response.apply_transpose(&self.bins, &self.constants, out);
+    }
+
+    fn passes(&self) -> u32 {
+        self.passes
+    }
+}

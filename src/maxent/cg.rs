@@ -1,0 +1,73 @@
+//! Conjugate gradients for the Newton system in the entropy's metric, `(1 + lambda M) z = b` (Hestenes & Stiefel 1952;
+//! truncated Newton as in Steihaug 1983: a direction of negative curvature ends it).
+
+/// When to stop, and what to do it with.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CgLimits {
+    /// Residual over right-hand side, in the preconditioner's norm.
+    pub tolerance: f64,
+    /// Most iterations.
+    pub iterations: usize,
+}
+
+/// Solves `A z = b` from the start `z`; returns the number of iterations.
+pub(super) fn solve(
+    mut apply: impl FnMut(&[f64], &mut [f64]),
+    precondition: impl Fn(&[f64], &mut [f64]),
+    b: &[f64],
+    z: &mut [f64],
+    limits: CgLimits,
+) -> usize {
+    let n = b.len();
+    let (mut residual, mut applied, mut preconditioned) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
+    precondition(b, &mut preconditioned);
+    let goal = limits.tolerance * limits.tolerance * dot(b, &preconditioned);
+    if z.iter().any(|&z| z != 0.0) {
+        apply(z, &mut applied);
+        residual.iter_mut().zip(&applied).for_each(|(r, a)| *r -= a);
+        precondition(&residual, &mut preconditioned);
+    }
+    let mut direction = preconditioned.clone();
+    let mut rho = dot(&residual, &preconditioned);
+    for iteration in 0..limits.iterations {
+        if rho <= goal {
+            return iteration;
+        }
+        apply(&direction, &mut applied);
+        let curvature = dot(&direction, &applied);
+        if curvature <= 0.0 {
+            if iteration == 0 && z.iter().all(|&z| z == 0.0) {
+                z.copy_from_slice(&direction);
+            }
+            return iteration + 1;
+        }
+        let length = rho / curvature;
+        axpy(length, &direction, z);
+        axpy(-length, &applied, &mut residual);
+        precondition(&residual, &mut preconditioned);
+        let next = dot(&residual, &preconditioned);
+        let beta = next / rho;
+        rho = next;
+        direction.iter_mut().zip(&preconditioned).for_each(|(d, p)| *d = p + beta * *d);
+    }
+    limits.iterations
+}
+
+/// Scalar product.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // four partial sums: a fixed order that the compiler may vectorise
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a4.zip(b4) {
+        for i in 0..4 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+}
+
+/// `y += scale * x`.
+pub(super) fn axpy(scale: f64, x: &[f64], y: &mut [f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y += scale * x);
+}

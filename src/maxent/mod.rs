@@ -1,0 +1,14 @@
+//! Maximum-entropy inversion (method section 2; Skilling & Bryan 1984, Gull & Skilling 1999): the image of greatest entropy at
+//! a given chi2, or at a given Lagrange multiplier.
+//!
+//! Knows images, data misfits and their curvature through [`Problem`] alone. Left out: stars, velocities, files.
+
+mod cg;
+pub mod entropy;
+pub mod preconditioner;
+pub mod problem;
+pub mod solver;
+
+pub use preconditioner::Preconditioner;
+pub use problem::Problem;
+pub use solver::{Goal, Image, Solution, Solver, SolverSettings, Start, Termination};

@@ -1,0 +1,143 @@
+//! A truncated eigenbasis of the misfit's curvature at a reference image (method section 2): almost the inverse of the Newton
+//! system of every nearby problem.
+//!
+//! In the entropy's metric the system is `1 + lambda M`, and M has a few hundred eigenvalues above 0.01 whatever the number
+//! of pixels; the basis is found by subspace iteration from a fixed random start (Halko et al. 2011), and lives on the
+//! pixels that carry it: the spotted part of the star. Left out: when to rebuild it.
+
+use super::cg::dot;
+use nalgebra::{DMatrix, SymmetricEigen};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// `(1 + lambda M)^-1` on the span of M's largest eigenvectors, the identity elsewhere.
+#[derive(Clone, Debug, Default)]
+pub struct Preconditioner {
+    /// Largest eigenvalues of M.
+    eigenvalues: Vec<f64>,
+    /// Pixels on which the basis lives.
+    active: Vec<u32>,
+    /// Eigenvectors, one row of `eigenvalues.len()` components an active pixel.
+    rows: Vec<f32>,
+}
+
+/// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
+const DROPPED_ENERGY: f64 = 1e-3;
+
+/// Columns beyond the wanted rank that the subspace iteration carries.
+const OVERSAMPLING: usize = 20;
+
+impl Preconditioner {
+    /// No preconditioning: the identity.
+    pub fn identity() -> Self {
+        Preconditioner::default()
+    }
+
+    /// From the operator M (`apply(v, out)`) on vectors of length `n`: at most `rank` eigenvectors, those with eigenvalues
+    /// above `smallest`.
+    pub fn build(n: usize, rank: usize, smallest: f64, mut apply: impl FnMut(&[f64], &mut [f64])) -> Self {
+        let columns = (rank + OVERSAMPLING).min(n);
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0x5eed);
+        let mut basis = DMatrix::from_fn(n, columns, |_, _| -> f64 { StandardNormal.sample(&mut rng) });
+        let mut image = DMatrix::zeros(n, columns);
+        for _ in 0..3 {
+            basis = basis.qr().q();
+            for j in 0..columns {
+                apply(basis.column(j).as_slice(), image.column_mut(j).as_mut_slice());
+            }
+            std::mem::swap(&mut basis, &mut image);
+        }
+        // `image` now holds the last orthonormal basis, `basis` what M made of it
+        let projected = image.tr_mul(&basis);
+        let eigen = SymmetricEigen::new(0.5 * (&projected + projected.transpose()));
+        let mut order: Vec<usize> = (0..columns).filter(|&i| eigen.eigenvalues[i] > smallest).collect();
+        order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+        order.truncate(rank);
+        let vectors = image * eigen.eigenvectors.select_columns(&order);
+        let eigenvalues: Vec<f64> = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
+        Preconditioner::on_active_pixels(eigenvalues, &vectors)
+    }
+
+    fn on_active_pixels(eigenvalues: Vec<f64>, vectors: &DMatrix<f64>) -> Self {
+        let energy: Vec<f64> = vectors.row_iter().map(|row| row.norm_squared()).collect();
+        let mut by_energy: Vec<u32> = (0..energy.len() as u32).collect();
+        by_energy.sort_by(|&p, &q| energy[p as usize].total_cmp(&energy[q as usize]));
+        let total: f64 = energy.iter().sum();
+        let mut dropped = 0.0;
+        let faint = by_energy.iter().take_while(|&&p| {
+            dropped += energy[p as usize];
+            dropped < DROPPED_ENERGY * total
+        });
+        let first = faint.count();
+        let mut active = by_energy.split_off(first);
+        active.sort_unstable();
+        let rows = active.iter().flat_map(|&p| vectors.row(p as usize).iter().map(|x| *x as f32).collect::<Vec<_>>());
+        Preconditioner { rows: rows.collect(), eigenvalues, active }
+    }
+
+    /// Number of eigenvectors.
+    pub fn rank(&self) -> usize {
+        self.eigenvalues.len()
+    }
+
+    /// Number of pixels on which they live.
+    pub fn active_pixels(&self) -> usize {
+        self.active.len()
+    }
+
+    /// Eigenvalues of M, largest first.
+    pub fn eigenvalues(&self) -> &[f64] {
+        &self.eigenvalues
+    }
+
+    /// Approximates `out = (1 + lambda M)^-1 r`.
+    pub fn apply(&self, lambda: f64, r: &[f64], out: &mut [f64]) {
+        out.copy_from_slice(r);
+        let rank = self.rank();
+        if rank == 0 {
+            return;
+        }
+        let mut components = vec![0.0_f64; rank];
+        for (row, &p) in self.rows.chunks_exact(rank).zip(&self.active) {
+            let r = r[p as usize];
+            components.iter_mut().zip(row).for_each(|(c, v)| *c += r * f64::from(*v));
+        }
+        for (c, e) in components.iter_mut().zip(&self.eigenvalues) {
+            *c *= lambda * e / (1.0 + lambda * e);
+        }
+        let mut row64 = vec![0.0; rank];
+        for (row, &p) in self.rows.chunks_exact(rank).zip(&self.active) {
+            row64.iter_mut().zip(row).for_each(|(wide, v)| *wide = f64::from(*v));
+            out[p as usize] -= dot(&row64, &components);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverts_a_low_rank_system() {
+        let n = 60;
+        // M = sum of two projectors on unit vectors e3 and (e10 + e20)/sqrt 2
+        let apply = |v: &[f64], out: &mut [f64]| {
+            out.fill(0.0);
+            out[3] = 50.0 * v[3];
+            let c = 0.5 * (v[10] + v[20]);
+            out[10] = 8.0 * c;
+            out[20] = 8.0 * c;
+        };
+        let preconditioner = Preconditioner::build(n, 10, 1e-6, apply);
+        assert_eq!(preconditioner.rank(), 2);
+        assert_eq!(preconditioner.active_pixels(), 3);
+        let x: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
+        let (mut mx, mut back) = (vec![0.0; n], vec![0.0; n]);
+        apply(&x, &mut mx);
+        let b: Vec<f64> = x.iter().zip(&mx).map(|(x, m)| x + 0.7 * m).collect();
+        preconditioner.apply(0.7, &b, &mut back);
+        for (x, back) in x.iter().zip(&back) {
+            assert!((x - back).abs() < 1e-5);
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! What an inversion needs to know of its data: a misfit, its gradient and its curvature, as functions of an image.
+
+/// A twice differentiable misfit `chi2(s)` of an image s.
+///
+/// The methods refer to the image last given to [`Problem::linearise`]. Each call counts the applications of the response
+/// that it takes: one for `linearise` and `gradient`, two for `curvature`.
+pub trait Problem {
+    /// Area of every pixel as a fraction of the whole; its length is that of every image.
+    fn area(&self) -> &[f64];
+
+    /// Moves to the image `s` and returns chi2.
+    fn linearise(&mut self, s: &[f64]) -> f64;
+
+    /// Gradient of chi2 / 2.
+    fn gradient(&mut self, out: &mut [f64]);
+
+    /// Second derivative of chi2 / 2 times `v`.
+    fn curvature(&mut self, v: &[f64], out: &mut [f64]);
+
+    /// Applications of the response or its transpose so far.
+    fn passes(&self) -> u32;
+}

@@ -1,0 +1,318 @@
+//! Newton's method with preconditioned conjugate gradients for `max S subject to chi2 = target`, or at a given lambda
+//! (method section 2).
+//!
+//! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: one solve gives the Newton step
+//! at fixed lambda, a second one `ds / d ln(lambda)`, and the linearised constraint says how far to go along it. Every call
+//! starts from the image it is given and from nothing else, so the answer is a function of problem and start.
+//! Left out: what the image shows.
+
+use super::Problem;
+use super::cg::{self, CgLimits, axpy, dot};
+use super::entropy::Entropy;
+use super::preconditioner::Preconditioner;
+
+/// What to solve for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// The image at this Lagrange multiplier.
+    Lambda(f64),
+    /// The image at this chi2; where that takes more than `largest_lambda`, the image at that lambda.
+    Chi2 {
+        /// Target of chi2.
+        target: f64,
+        /// Bound of the Lagrange multiplier.
+        largest_lambda: f64,
+    },
+}
+
+/// Precision and effort.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverSettings {
+    /// Error allowed in `S/lambda - chi2/2`, and in chi2/2 where chi2 is the goal.
+    pub tolerance: f64,
+    /// Residual of the Newton systems over their right-hand side.
+    pub cg_tolerance: f64,
+    /// Most iterations of conjugate gradients for one Newton system.
+    pub cg_iterations: usize,
+    /// Most Newton steps.
+    pub newton_steps: usize,
+}
+
+impl Default for SolverSettings {
+    fn default() -> Self {
+        SolverSettings { tolerance: 1e-3, cg_tolerance: 0.05, cg_iterations: 300, newton_steps: 60 }
+    }
+}
+
+impl SolverSettings {
+    /// To rounding error rather than to what a chain needs: for references and tests.
+    pub fn exact() -> Self {
+        SolverSettings { tolerance: 1e-9, cg_tolerance: 1e-3, ..SolverSettings::default() }
+    }
+}
+
+/// Why the solver stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Termination {
+    /// The goal was met.
+    Converged,
+    /// The target chi2 takes a lambda beyond the bound; the image is the one at the bound.
+    Unreachable,
+    /// The number of Newton steps ran out.
+    StepLimit,
+    /// A number that is not finite appeared.
+    NonFinite,
+}
+
+/// An image where the solver starts or stops: logits of the spot filling factors and the Lagrange multiplier.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// logit of the filling factor of every pixel.
+    pub logit: Vec<f64>,
+    /// Lagrange multiplier of chi2/2.
+    pub lambda: f64,
+}
+
+/// Where the solver starts.
+#[derive(Clone, Debug)]
+pub struct Start {
+    /// Image and lambda.
+    pub image: Image,
+    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none.
+    pub path: Vec<f64>,
+}
+
+/// What the solver found.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Why it stopped.
+    pub termination: Termination,
+    /// The image.
+    pub image: Image,
+    /// chi2 of the image.
+    pub chi2: f64,
+    /// Entropy of the image.
+    pub entropy: f64,
+    /// Spottedness `sum a s`.
+    pub spottedness: f64,
+    /// `d chi2 / d ln(lambda)` along the path of solutions (0 if the goal was a lambda).
+    pub chi2_slope: f64,
+    /// `d spottedness / d ln(lambda)` along the path (0 if the goal was a lambda).
+    pub spottedness_slope: f64,
+    /// `dz / d ln(lambda)` (empty if the goal was a lambda).
+    pub path: Vec<f64>,
+    /// Newton steps taken.
+    pub newton_steps: usize,
+}
+
+/// Largest change of a logit in one step, and of ln(lambda).
+const LOGIT_CAP: f64 = 2.0;
+const LN_LAMBDA_CAP: f64 = 1.5;
+
+/// Bounds of lambda: far beyond any use, they keep a hopeless start finite.
+const SMALLEST_LAMBDA: f64 = 1e-12;
+
+/// The solver: entropy, preconditioner and settings.
+#[derive(Clone, Debug)]
+pub struct Solver<'a> {
+    /// Entropy of the image.
+    pub entropy: Entropy,
+    /// Approximate inverse of the Newton systems.
+    pub preconditioner: &'a Preconditioner,
+    /// Precision and effort.
+    pub settings: SolverSettings,
+}
+
+/// The point where the solver is, with what has been computed there.
+struct Point {
+    u: Vec<f64>,
+    s: Vec<f64>,
+    lambda: f64,
+    chi2: f64,
+    entropy: f64,
+}
+
+/// Step at fixed lambda and path along lambda, in the metric.
+struct Newton {
+    scale: Vec<f64>,
+    step: Vec<f64>,
+    path: Vec<f64>,
+    /// Newton decrement squared at fixed lambda.
+    decrement: f64,
+    /// Slope of chi2 along `path`, and along `step`.
+    chi2_path: f64,
+    chi2_step: f64,
+}
+
+impl Solver<'_> {
+    /// An image without data, to start from: every pixel at the default, and a lambda for which data begin to matter.
+    pub fn blank(&self, pixels: usize) -> Start {
+        Start { image: Image { logit: vec![self.entropy.default_logit(); pixels], lambda: 1e-6 }, path: Vec::new() }
+    }
+
+    /// Solves `problem` for `goal` from `start`.
+    pub fn solve(&self, problem: &mut impl Problem, goal: Goal, start: &Start) -> Solution {
+        let mut at = self.arrive(problem, start.image.logit.clone(), start.image.lambda);
+        if let Goal::Lambda(lambda) = goal {
+            at.lambda = lambda;
+        }
+        let mut path = start.path.clone();
+        for newton_steps in 0..self.settings.newton_steps {
+            if !(at.chi2.is_finite() && at.entropy.is_finite()) {
+                return self.finish(problem, at, None, Termination::NonFinite, newton_steps);
+            }
+            let newton = self.newton(problem, &at, goal, path);
+            let move_lambda = self.lambda_step(&at, &newton, goal);
+            let unreachable = matches!(goal, Goal::Chi2 { target, largest_lambda }
+                if at.lambda >= largest_lambda && at.chi2 + newton.chi2_step > target && move_lambda == 0.0);
+            if let Some(last) = self.is_last(&at, &newton, move_lambda, goal) {
+                let end = if last { self.advance(problem, &at, &newton, move_lambda) } else { at };
+                let why = if unreachable { Termination::Unreachable } else { Termination::Converged };
+                return self.finish(problem, end, Some(newton), why, newton_steps + 1);
+            }
+            at = self.advance(problem, &at, &newton, move_lambda);
+            path = newton.path;
+        }
+        self.finish(problem, at, None, Termination::StepLimit, self.settings.newton_steps)
+    }
+
+    fn arrive(&self, problem: &mut impl Problem, u: Vec<f64>, lambda: f64) -> Point {
+        let mut s = vec![0.0; u.len()];
+        self.entropy.image(&u, &mut s);
+        let chi2 = problem.linearise(&s);
+        let entropy = self.entropy.value(&u, problem.area());
+        Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy }
+    }
+
+    /// The Newton step at fixed lambda and, if chi2 is the goal, the path along lambda.
+    fn newton(&self, problem: &mut impl Problem, at: &Point, goal: Goal, guess: Vec<f64>) -> Newton {
+        let n = at.u.len();
+        let (mut scale, mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        self.entropy.metric(&at.s, problem.area(), &mut scale);
+        problem.gradient(&mut chi2_gradient);
+        self.entropy.gradient(&at.u, problem.area(), &mut right);
+        for p in 0..n {
+            chi2_gradient[p] *= scale[p];
+            right[p] = -(right[p] * scale[p] + at.lambda * chi2_gradient[p]);
+        }
+        let mut step = vec![0.0; n];
+        self.solve_system(problem, at, &scale, &right, &mut step, self.settings.cg_tolerance);
+        let mut path = vec![0.0; n];
+        if let Goal::Chi2 { .. } = goal {
+            if guess.len() == n {
+                path = guess;
+            }
+            let pull: Vec<f64> = chi2_gradient.iter().map(|g| -at.lambda * g).collect();
+            self.solve_system(problem, at, &scale, &pull, &mut path, self.settings.cg_tolerance);
+        }
+        Newton {
+            decrement: dot(&step, &right).max(0.0),
+            chi2_path: 2.0 * dot(&chi2_gradient, &path),
+            chi2_step: 2.0 * dot(&chi2_gradient, &step),
+            scale,
+            step,
+            path,
+        }
+    }
+
+    fn solve_system(
+        &self,
+        problem: &mut impl Problem,
+        at: &Point,
+        scale: &[f64],
+        right: &[f64],
+        z: &mut [f64],
+        tolerance: f64,
+    ) {
+        let mut scaled = vec![0.0; right.len()];
+        let apply = |v: &[f64], out: &mut [f64]| {
+            scaled.iter_mut().zip(v).zip(scale).for_each(|((x, v), scale)| *x = v * scale);
+            problem.curvature(&scaled, out);
+            for ((out, v), scale) in out.iter_mut().zip(v).zip(scale) {
+                *out = v + at.lambda * scale * *out;
+            }
+        };
+        let precondition = |r: &[f64], out: &mut [f64]| self.preconditioner.apply(at.lambda, r, out);
+        let limits = CgLimits { tolerance, iterations: self.settings.cg_iterations };
+        cg::solve(apply, precondition, right, z, limits);
+    }
+
+    /// How far to move ln(lambda) so that the linearised chi2 meets the target.
+    fn lambda_step(&self, at: &Point, newton: &Newton, goal: Goal) -> f64 {
+        let Goal::Chi2 { target, largest_lambda } = goal else { return 0.0 };
+        let wanted = if newton.chi2_path < 0.0 {
+            ((target - at.chi2 - newton.chi2_step) / newton.chi2_path).clamp(-LN_LAMBDA_CAP, LN_LAMBDA_CAP)
+        } else {
+            LN_LAMBDA_CAP * (at.chi2 + newton.chi2_step - target).signum()
+        };
+        wanted.min((largest_lambda / at.lambda).ln().max(0.0)).max((SMALLEST_LAMBDA / at.lambda).ln())
+    }
+
+    /// Whether this Newton step is the last: `Some(true)` to take it and stop, `Some(false)` to stop where we are.
+    fn is_last(&self, at: &Point, newton: &Newton, move_lambda: f64, goal: Goal) -> Option<bool> {
+        // a step whose effect is e leaves an error of about cg_tolerance^2 e (the objective is stationary) in S/lambda -
+        // chi2/2, and of cg_tolerance e in chi2
+        let merit = 0.5 * newton.decrement / at.lambda;
+        let left = match goal {
+            Goal::Lambda(_) => merit * self.settings.cg_tolerance.powi(2),
+            Goal::Chi2 { .. } => {
+                let moved = (newton.chi2_path * move_lambda).abs() + newton.chi2_step.abs();
+                0.5 * moved * self.settings.cg_tolerance + merit * self.settings.cg_tolerance
+            }
+        };
+        if left < self.settings.tolerance {
+            return Some(merit > 1e-14 || move_lambda != 0.0);
+        }
+        None
+    }
+
+    /// Takes the step, halved until the merit function at the new lambda does not grow.
+    fn advance(&self, problem: &mut impl Problem, at: &Point, newton: &Newton, move_lambda: f64) -> Point {
+        let lambda = at.lambda * move_lambda.exp();
+        let merit = |p: &Point| -p.entropy + 0.5 * lambda * p.chi2;
+        let mut ds = newton.step.clone();
+        axpy(move_lambda, &newton.path, &mut ds);
+        ds.iter_mut().zip(&newton.scale).for_each(|(z, scale)| *z *= scale);
+        let before = merit(at);
+        let (mut length, mut cap) = (1.0, LOGIT_CAP);
+        loop {
+            let mut u = vec![0.0; at.u.len()];
+            self.entropy.step(&at.u, &at.s, &ds, length, cap, &mut u);
+            let next = self.arrive(problem, u, lambda);
+            let small = 1e-9 * before.abs() + self.settings.tolerance * lambda;
+            if merit(&next) <= before + small || length < 1e-3 {
+                return next;
+            }
+            length *= 0.5;
+            cap *= 0.5;
+        }
+    }
+
+    fn finish(
+        &self,
+        problem: &mut impl Problem,
+        at: Point,
+        newton: Option<Newton>,
+        termination: Termination,
+        newton_steps: usize,
+    ) -> Solution {
+        let area = problem.area();
+        let finite = at.chi2.is_finite() && at.entropy.is_finite() && at.lambda.is_finite();
+        let (chi2_slope, spottedness_slope, path) = newton.map_or((0.0, 0.0, Vec::new()), |newton| {
+            let weights = || newton.scale.iter().zip(area).map(|(scale, a)| scale * a);
+            let slope = weights().zip(&newton.path).map(|(w, z)| w * z).sum();
+            (newton.chi2_path, slope, newton.path)
+        });
+        Solution {
+            termination: if finite { termination } else { Termination::NonFinite },
+            chi2: at.chi2,
+            entropy: at.entropy,
+            spottedness: dot(&at.s, area),
+            image: Image { logit: at.u, lambda: at.lambda },
+            chi2_slope,
+            spottedness_slope,
+            path,
+            newton_steps,
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! The linear part of the forward model: a map of the surface to the line depth and continuum of every profile, before the
+//! division of one by the other; and its transpose.
+//!
+//! Method section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile. Left out: brightness
+//! (what x is), the division by the continuum, data.
+
+use super::convolution::{ProfileConvolution, Rows};
+use super::deposit::Deposit;
+use super::grid::SurfaceGrid;
+use super::line_profile::LineKernel;
+use super::{StarSettings, StarState};
+use crate::observation::Observations;
+use std::sync::Arc;
+
+/// When and at which velocities the star is observed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampling {
+    /// Width of a velocity bin (km/s).
+    pub step_kms: f64,
+    /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
+    pub profiles: Vec<(f64, f64, usize)>,
+}
+
+impl Sampling {
+    /// The sampling of a set of observations.
+    pub fn of(observations: &Observations) -> Self {
+        let profile = |p: &crate::observation::Profile| (p.time_d, p.first_velocity_kms, p.intensity.len());
+        Sampling { step_kms: observations.step_kms, profiles: observations.profiles.iter().map(profile).collect() }
+    }
+
+    /// Number of bins of all profiles together.
+    pub fn bins(&self) -> usize {
+        self.profiles.iter().map(|p| p.2).sum()
+    }
+}
+
+/// The response of a sampled set of profiles to a map of the star.
+#[derive(Clone, Debug)]
+pub struct Response {
+    deposit: Arc<Deposit>,
+    convolutions: Vec<ProfileConvolution>,
+    steps_per_bin: usize,
+    /// First bin of each profile, and the end.
+    starts: Vec<usize>,
+}
+
+impl Response {
+    /// The response at one state of star and planet.
+    pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+        let steps_per_bin = LineKernel::steps_per_bin(star.line, sampling.step_kms);
+        let since_epoch: Vec<f64> = sampling.profiles.iter().map(|p| p.0 - star.epoch_d).collect();
+        let step = sampling.step_kms / steps_per_bin as f64;
+        let deposit = Deposit::new(grid, state, star.limb_darkening, &since_epoch, step);
+        Response::shifted(Arc::new(deposit), star, state, sampling)
+    }
+
+    /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is shifted.
+    pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+        Response::shifted(Arc::clone(&self.deposit), star, state, sampling)
+    }
+
+    fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+        let steps_per_bin = LineKernel::steps_per_bin(star.line, sampling.step_kms);
+        let kernel = LineKernel::new(star.line, deposit.step_kms);
+        let mut starts = vec![0];
+        let mut convolutions = Vec::with_capacity(sampling.profiles.len());
+        for &(time, first_velocity, bins) in &sampling.profiles {
+            let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
+            let first_bin = first_velocity - shift - deposit.origin_kms;
+            convolutions.push(ProfileConvolution::new(&kernel, deposit.step_kms, steps_per_bin, first_bin));
+            starts.push(starts[starts.len() - 1] + bins);
+        }
+        Response { deposit, convolutions, steps_per_bin, starts }
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.deposit.pixels()
+    }
+
+    /// Number of profiles.
+    pub fn profiles(&self) -> usize {
+        self.convolutions.len()
+    }
+
+    /// Number of visible (pixel, profile) pairs.
+    pub fn pairs(&self) -> usize {
+        self.deposit.pairs()
+    }
+
+    /// Bins of profile `k` within the data.
+    pub fn bins(&self, k: usize) -> std::ops::Range<usize> {
+        self.starts[k]..self.starts[k + 1]
+    }
+
+    /// Number of data.
+    pub fn data_len(&self) -> usize {
+        self.starts[self.starts.len() - 1]
+    }
+
+    /// Line depth of every bin and continuum of every profile for the map `x`.
+    pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
+        let mut nodes = vec![0.0; self.deposit.nodes];
+        let mut rows = Rows::new(self.deposit.nodes, self.steps_per_bin);
+        for (k, convolution) in self.convolutions.iter().enumerate() {
+            self.deposit.gather(k, x, &mut nodes);
+            continuum[k] = nodes.iter().sum();
+            rows.interleave(&nodes);
+            convolution.to_bins(&rows, &mut line[self.bins(k)]);
+        }
+    }
+
+    /// Normalised depth `1 - I` of every bin for a brightness map: the observable of method section 1.
+    pub fn depths(&self, brightness: &[f64]) -> Vec<f64> {
+        let mut depths = vec![0.0; self.data_len()];
+        let mut continuum = vec![0.0; self.profiles()];
+        self.apply(brightness, &mut depths, &mut continuum);
+        for (k, continuum) in continuum.iter().enumerate() {
+            depths[self.bins(k)].iter_mut().for_each(|depth| *depth /= continuum);
+        }
+        depths
+    }
+
+    /// Transpose of [`Response::apply`]; `out` is overwritten.
+    pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        let mut nodes = vec![0.0; self.deposit.nodes];
+        let mut rows = Rows::new(self.deposit.nodes, self.steps_per_bin);
+        for (k, convolution) in self.convolutions.iter().enumerate() {
+            convolution.from_bins(&line[self.bins(k)], &mut rows);
+            rows.deinterleave(&mut nodes);
+            nodes.iter_mut().for_each(|node| *node += continuum[k]);
+            self.deposit.scatter(k, &nodes, out);
+        }
+    }
+}

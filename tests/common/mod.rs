@@ -1,0 +1,76 @@
+//! The independent reference numbers under `tests/data/oracle` (see the README there), in this crate's types.
+#![allow(dead_code)]
+
+use dimcmc::imaging::Data;
+use dimcmc::objective::{Parameter, ParameterValues};
+use dimcmc::star::{LimbDarkening, LocalLine, Sampling, StarSettings, SurfaceGrid};
+use dimcmc::units::{instrumental_sigma_kms, planck_contrast};
+use serde_json::Value;
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+
+pub fn oracle_file(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/oracle").join(name)
+}
+
+pub fn json(name: &str) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(oracle_file(name)).unwrap()).unwrap()
+}
+
+pub fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+}
+
+/// Star, pixel table, sampling and data of `oracle.json`.
+pub struct Oracle {
+    pub json: Value,
+    pub star: StarSettings,
+    pub grid: SurfaceGrid,
+    pub sampling: Sampling,
+    pub data: Data,
+    pub default_spot: f64,
+}
+
+pub fn oracle() -> Oracle {
+    let json = json("oracle.json");
+    let spec = &json["spec"];
+    let number = |key: &str| spec[key].as_f64().unwrap();
+    let sigma_kms = number("sigma_local").hypot(instrumental_sigma_kms(number("R")));
+    let star = StarSettings {
+        rotation_period_d: number("prot"),
+        epoch_d: 0.0,
+        limb_darkening: LimbDarkening::Linear(number("u")),
+        contrast: planck_contrast(number("tspot"), number("tphot"), 1000.0 * number("wavelength_um")),
+        line: LocalLine { sigma_kms, equivalent_width_kms: number("ew") },
+    };
+    let pixels = &json["pixels"];
+    let table = |key: &str| numbers(&pixels[key]);
+    let grid = SurfaceGrid::from_table(table("lon_rad"), table("lat_rad"), table("area_fraction"));
+    let velocity = numbers(&json["velocity_kms"]);
+    let cycles = numbers(&spec["cycles"]);
+    let sampling = Sampling {
+        step_kms: number("dv"),
+        profiles: cycles.iter().map(|e| (e * number("prot"), velocity[0], velocity.len())).collect(),
+    };
+    let depth: Vec<f64> = json["depth"].as_array().unwrap().iter().flat_map(numbers).collect();
+    let sigma = json["sigma"].as_f64().unwrap();
+    let data = Data { inverse_variance: vec![1.0 / (sigma * sigma); depth.len()], depth };
+    let default_spot = number("default_spot");
+    Oracle { json, star, grid, sampling, data, default_spot }
+}
+
+/// Parameter values of one of the oracle's `theta` objects.
+pub fn values(theta: &Value, rotation_period_d: f64) -> ParameterValues {
+    let number = |key: &str| theta[key].as_f64().unwrap();
+    let omega_eq = TAU / rotation_period_d * number("oeq");
+    let mut values = ParameterValues([0.0; 8]);
+    values[Parameter::K] = number("K");
+    values[Parameter::PorbOverProt] = number("P");
+    values[Parameter::Phi] = number("phi");
+    values[Parameter::OmegaEq] = omega_eq;
+    values[Parameter::DOmega] = number("gamma") * omega_eq;
+    values[Parameter::Inclination] = number("inc");
+    values[Parameter::Vsini] = number("vsini");
+    values[Parameter::Vsys] = number("vsys");
+    values
+}
