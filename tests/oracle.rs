@@ -55,11 +55,8 @@ fn solve(oracle: &common::Oracle, theta: &Value, goal: Goal) -> Solution {
     let response = Response::new(&oracle.grid, &oracle.star, &state, &oracle.sampling);
     let mut problem = ImagingProblem::new(&oracle.grid.area, &oracle.data, response, oracle.star.contrast);
     let none = Preconditioner::identity();
-    let solver = Solver {
-        entropy: Entropy::new(oracle.default_spot),
-        preconditioner: &none,
-        settings: SolverSettings::exact(),
-    };
+    let solver =
+        Solver { entropy: Entropy::new(oracle.default_spot), preconditioner: &none, settings: SolverSettings::exact() };
     let solution = solver.solve(&mut problem, goal, &solver.blank(oracle.grid.len()));
     println!("{theta}: {:?} {} Newton steps, {} passes", solution.termination, solution.newton_steps, problem.passes());
     assert_eq!(solution.termination, Termination::Converged);

@@ -1,14 +1,14 @@
 //! The sum over visible pixels: brightness deposited on a velocity grid, and its transpose. This is the hot path.
 //!
-//! Every visible (pixel, observation) pair holds four weights on consecutive nodes of a uniform velocity grid (see
-//! `line_profile`): 22 bytes and four multiply-adds a pair, whatever the shape and width of the line. The weights depend on
+//! Every visible (pixel, observation) pair holds six weights on consecutive nodes of a uniform velocity grid (see
+//! `line_profile`): 30 bytes and six multiply-adds a pair, whatever the shape and width of the line. The weights depend on
 //! the star's rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
 //! Left out: the line itself (`convolution`).
 
 use super::StarState;
 use super::grid::SurfaceGrid;
 use super::limb_darkening::LimbDarkening;
-use super::line_profile::deposit_weights;
+use super::line_profile::{DEPOSIT_NODES, deposit_weights};
 use super::view::Viewer;
 
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.
@@ -25,7 +25,7 @@ pub struct Deposit {
     starts: Vec<usize>,
     pixel: Vec<u32>,
     node: Vec<u16>,
-    weights: Vec<[f32; 4]>,
+    weights: Vec<[f32; DEPOSIT_NODES]>,
 }
 
 impl Deposit {
@@ -38,7 +38,7 @@ impl Deposit {
         step_kms: f64,
     ) -> Self {
         let viewer = Viewer::new(state, limb);
-        let reach = (viewer.largest_velocity_kms() / step_kms).ceil() + 2.0;
+        let reach = (viewer.largest_velocity_kms() / step_kms).ceil() + 3.0;
         let capacity = since_epoch_d.len() * grid.len() * 5 / 8;
         let mut deposit = Deposit {
             origin_kms: -reach * step_kms,
@@ -72,7 +72,7 @@ impl Deposit {
         let cell = position.floor();
         let spread = variance / (2.0 * self.step_kms * self.step_kms);
         self.pixel.push(pixel as u32);
-        self.node.push(cell as u16 - 1);
+        self.node.push(cell as u16 - 2);
         self.weights.push(deposit_weights(position - cell, spread).map(|w| (weight * w) as f32));
     }
 
@@ -93,7 +93,8 @@ impl Deposit {
         for i in range {
             let b = x[self.pixel[i] as usize];
             let first = usize::from(self.node[i]);
-            let target: &mut [f64; 4] = (&mut nodes[first..first + 4]).try_into().expect("four nodes");
+            let target: &mut [f64; DEPOSIT_NODES] =
+                (&mut nodes[first..first + DEPOSIT_NODES]).try_into().expect("as many nodes");
             for (t, w) in target.iter_mut().zip(self.weights[i]) {
                 *t += b * f64::from(w);
             }
@@ -105,10 +106,11 @@ impl Deposit {
         let range = self.starts[k]..self.starts[k + 1];
         for i in range {
             let first = usize::from(self.node[i]);
-            let source: &[f64; 4] = (&nodes[first..first + 4]).try_into().expect("four nodes");
+            let source: &[f64; DEPOSIT_NODES] =
+                (&nodes[first..first + DEPOSIT_NODES]).try_into().expect("as many nodes");
             let w = self.weights[i];
-            let sum = (source[0] * f64::from(w[0]) + source[1] * f64::from(w[1]))
-                + (source[2] * f64::from(w[2]) + source[3] * f64::from(w[3]));
+            let product = |j: usize| source[j] * f64::from(w[j]);
+            let sum = (product(0) + product(1)) + (product(2) + product(3)) + (product(4) + product(5));
             out[self.pixel[i] as usize] += sum;
         }
     }

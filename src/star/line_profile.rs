@@ -1,10 +1,10 @@
 //! The local line, and its form on the velocity grid that pixels are deposited on.
 //!
-//! A pixel of velocity v is deposited on a uniform grid of step h with the cubic B-spline; the sum over the grid of
+//! A pixel of velocity v is deposited on a uniform grid of step h with the quintic B-spline; the sum over the grid of
 //! `deposit x kernel` must give the local line `l(v - v_p)`. So the kernel is the line with the spline divided out: in
-//! Fourier space `l(k) / sinc(kh/2)^4`. For a Gaussian line `1/sinc^4 = exp(h^2 k^2/6 + h^4 k^4/720 + h^6 k^6/45360 + ...)`
-//! gives a closed form: a Gaussian narrowed by h^2/3, times two small Hermite corrections. What remains is aliasing,
-//! `2 l(k) (kh/2 pi)^4`, below 4e-6 of the line's depth for h = sigma/5.
+//! Fourier space `l(k) / sinc(kh/2)^6`. For a Gaussian line `1/sinc^6 = exp(h^2 k^2/4 + h^4 k^4/480 + h^6 k^6/30240 + ...)`
+//! gives a closed form: a Gaussian narrowed by h^2/2, times two small Hermite corrections. What remains is aliasing,
+//! `2 l(k) (kh/2 pi)^6`, below 3e-7 of the line's depth for h = sigma/3.5 (the cubic spline needs h = sigma/20 for that).
 
 use super::LocalLine;
 use std::f64::consts::TAU;
@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 const REACH_SIGMAS: f64 = 5.5;
 
 /// The line must span at least this many grid steps a standard deviation.
-const STEPS_PER_SIGMA: f64 = 5.0;
+const STEPS_PER_SIGMA: f64 = 3.5;
 
 /// The local line with the deposit's spline divided out.
 #[derive(Clone, Copy, Debug)]
@@ -27,13 +27,13 @@ pub struct LineKernel {
 impl LineKernel {
     /// Kernel of `line` for a grid of step `grid_step` (km/s).
     pub fn new(line: LocalLine, grid_step: f64) -> Self {
-        let sigma = (line.sigma_kms.powi(2) - grid_step * grid_step / 3.0).sqrt();
+        let sigma = (line.sigma_kms.powi(2) - grid_step * grid_step / 2.0).sqrt();
         let ratio = grid_step / sigma;
         LineKernel {
             sigma,
             norm: line.equivalent_width_kms / (sigma * TAU.sqrt()),
-            fourth: ratio.powi(4) / 720.0,
-            sixth: ratio.powi(6) / 45360.0,
+            fourth: ratio.powi(4) / 480.0,
+            sixth: ratio.powi(6) / 30240.0,
         }
     }
 
@@ -56,16 +56,24 @@ impl LineKernel {
     }
 }
 
-/// Cubic B-spline weights of a pixel at fraction `t` in [0, 1) of a grid cell, on the nodes -1, 0, 1, 2 of the cell, with
+/// Nodes that a pixel is deposited on.
+pub const DEPOSIT_NODES: usize = 6;
+
+/// Quintic B-spline weights of a pixel at fraction `t` in [0, 1) of a grid cell, on the nodes -2 to 3 of the cell, with
 /// `spread` = (variance of the pixel's velocity) / (2 h^2) added through the spline's second derivative. They sum to 1.
-pub fn deposit_weights(t: f64, spread: f64) -> [f64; 4] {
+pub fn deposit_weights(t: f64, spread: f64) -> [f64; DEPOSIT_NODES] {
+    let near = |x: f64| {
+        let x2 = x * x;
+        11.0 / 20.0 + x2 * (-0.5 + x2 * (0.25 - x / 12.0)) + spread * (-1.0 + x2 * (3.0 - 5.0 / 3.0 * x))
+    };
+    let middle = |x: f64| {
+        17.0 / 40.0
+            + x * (0.625 + x * (-1.75 + x * (1.25 + x * (-0.375 + x / 24.0))))
+            + spread * (-3.5 + x * (7.5 + x * (-4.5 + x * (5.0 / 6.0))))
+    };
+    let outer = |y: f64| y * y * y * (y * y / 120.0 + spread / 6.0);
     let s = 1.0 - t;
-    [
-        s * s * s / 6.0 + spread * s,
-        (4.0 + t * t * (3.0 * t - 6.0)) / 6.0 + spread * (3.0 * t - 2.0),
-        (4.0 + s * s * (3.0 * s - 6.0)) / 6.0 + spread * (3.0 * s - 2.0),
-        t * t * t / 6.0 + spread * t,
-    ]
+    [outer(s), middle(1.0 + t), near(t), near(s), middle(1.0 + s), outer(t)]
 }
 
 #[cfg(test)]
@@ -83,7 +91,7 @@ mod tests {
         deposit_weights(v_p / step - cell, variance / (2.0 * step * step))
             .iter()
             .enumerate()
-            .map(|(i, w)| w * kernel.at(v - (cell + i as f64 - 1.0) * step))
+            .map(|(i, w)| w * kernel.at(v - (cell + i as f64 - 2.0) * step))
             .sum()
     }
 
@@ -93,8 +101,8 @@ mod tests {
         let peak = gaussian(0.0, 9.0, 5.8);
         for i in 0..200 {
             let (v, v_p) = (-9.0 + 0.09 * i as f64, 0.037 * i as f64);
-            let error = through_grid(line, 0.6, v, v_p, 0.0) - gaussian(v - v_p, 9.0, 5.8);
-            assert!(error.abs() < 5e-6 * peak, "v {v} v_p {v_p}: {error:e}");
+            let error = through_grid(line, 0.85, v, v_p, 0.0) - gaussian(v - v_p, 9.0, 5.8);
+            assert!(error.abs() < 1e-6 * peak, "v {v} v_p {v_p}: {error:e}");
         }
     }
 
@@ -104,7 +112,7 @@ mod tests {
         let peak = gaussian(0.0, 9.0, 5.8);
         for i in 0..200 {
             let (v, v_p) = (-9.0 + 0.09 * i as f64, 0.037 * i as f64);
-            let error = through_grid(line, 0.6, v, v_p, 0.2) - gaussian(v - v_p, 9.2, 5.8);
+            let error = through_grid(line, 0.85, v, v_p, 0.2) - gaussian(v - v_p, 9.2, 5.8);
             // second order in variance: (0.2 / 9)^2 / 8 * 3, and the aliasing of the second derivative
             assert!(error.abs() < 3e-4 * peak, "v {v} v_p {v_p}: {error:e}");
         }
