@@ -4,8 +4,9 @@
 //! second derivative is kept, so that the solver's Newton steps are exact. Left out: which parameters are tried, and why.
 
 use crate::maxent::Problem;
+use crate::maxent::entropy::Entropy;
 use crate::observation::Observations;
-use crate::star::Response;
+use crate::star::{Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
 
 /// Data in the form that the misfit needs.
 #[derive(Clone, Debug)]
@@ -24,6 +25,58 @@ impl Data {
             depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
             inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
         }
+    }
+}
+
+/// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
+#[derive(Clone, Debug)]
+pub struct Imager {
+    /// Pixels of the map.
+    pub grid: SurfaceGrid,
+    /// The star, but for the eight parameters.
+    pub star: StarSettings,
+    /// Times and velocity bins.
+    pub sampling: Sampling,
+    /// Observed depths and their weights.
+    pub data: Data,
+    /// Entropy of a map.
+    pub entropy: Entropy,
+}
+
+impl Imager {
+    /// For `observations` of `star`, on about `pixels` pixels, with the entropy's default filling factor `default_spot`.
+    pub fn new(star: StarSettings, observations: &Observations, pixels: usize, default_spot: f64) -> Self {
+        Imager {
+            grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
+            star,
+            sampling: Sampling::of(observations),
+            data: Data::of(observations),
+            entropy: Entropy::new(default_spot),
+        }
+    }
+
+    /// The response at one state of star and planet.
+    pub fn response(&self, state: &StarState) -> Response {
+        Response::new(&self.grid, &self.star, state, &self.sampling)
+    }
+
+    /// The misfit of maps seen through `response`.
+    pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
+        ImagingProblem::new(&self.grid.area, &self.data, response, self.star.contrast)
+    }
+
+    /// Middle of the time base in rotation cycles.
+    pub fn mid_cycle(&self) -> f64 {
+        let cycles = self.sampling.profiles.iter().map(|p| self.star.cycle(p.0));
+        let (lo, hi) = cycles.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), e| (lo.min(e), hi.max(e)));
+        0.5 * (lo + hi)
+    }
+
+    /// Length of the time base in rotation cycles.
+    pub fn time_base_cycles(&self) -> f64 {
+        let cycles: Vec<f64> = self.sampling.profiles.iter().map(|p| self.star.cycle(p.0)).collect();
+        let lo = cycles.iter().copied().fold(f64::INFINITY, f64::min);
+        cycles.iter().copied().fold(f64::NEG_INFINITY, f64::max) - lo
     }
 }
 

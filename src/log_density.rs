@@ -79,6 +79,16 @@ pub trait LogDensity: Sync {
     }
 }
 
+/// A density whose gradient comes at the price of a few forward models.
+pub trait Gradient: LogDensity {
+    /// The evaluation at `theta`, and the gradient of its log-probability with respect to the internal coordinates
+    /// (empty where the log-probability is minus infinity).
+    fn evaluate_with_gradient(&self, theta: &[f64]) -> (Evaluation, Vec<f64>);
+
+    /// Natural steps of the internal coordinates: what a search is scaled with.
+    fn scales(&self) -> Vec<f64>;
+}
+
 /// Evaluates a batch of parameter vectors; the order of the answers is the order of the questions.
 pub trait Evaluator {
     /// One evaluation a vector.

@@ -176,6 +176,19 @@ impl Solver<'_> {
         self.finish(problem, at, None, Termination::StepLimit, self.settings.newton_steps)
     }
 
+    /// The inverse of the Newton system at `image`, applied to the image-space vector `right`; the problem must be
+    /// linearised there. For derivatives of solutions by adjoints.
+    pub fn apply_inverse(&self, problem: &mut impl Problem, image: &Image, right: &[f64]) -> Vec<f64> {
+        let n = right.len();
+        let (mut s, mut scale) = (vec![0.0; n], vec![0.0; n]);
+        self.entropy.image(&image.logit, &mut s);
+        self.entropy.metric(&s, problem.area(), &mut scale);
+        let scaled: Vec<f64> = right.iter().zip(&scale).map(|(r, d)| r * d).collect();
+        let mut z = vec![0.0; n];
+        self.solve_system(problem, image.lambda, &scale, &scaled, &mut z);
+        z.iter().zip(&scale).map(|(z, d)| z * d).collect()
+    }
+
     fn arrive(&self, problem: &mut impl Problem, u: Vec<f64>, lambda: f64) -> Point {
         let mut s = vec![0.0; u.len()];
         self.entropy.image(&u, &mut s);
@@ -196,14 +209,14 @@ impl Solver<'_> {
             right[p] = -(right[p] * scale[p] + at.lambda * chi2_gradient[p]);
         }
         let mut step = vec![0.0; n];
-        self.solve_system(problem, at, &scale, &right, &mut step, self.settings.cg_tolerance);
+        self.solve_system(problem, at.lambda, &scale, &right, &mut step);
         let mut path = vec![0.0; n];
         if let Goal::Chi2 { .. } = goal {
             if guess.len() == n {
                 path = guess;
             }
             let pull: Vec<f64> = chi2_gradient.iter().map(|g| -at.lambda * g).collect();
-            self.solve_system(problem, at, &scale, &pull, &mut path, self.settings.cg_tolerance);
+            self.solve_system(problem, at.lambda, &scale, &pull, &mut path);
         }
         Newton {
             decrement: dot(&step, &right).max(0.0),
@@ -215,25 +228,17 @@ impl Solver<'_> {
         }
     }
 
-    fn solve_system(
-        &self,
-        problem: &mut impl Problem,
-        at: &Point,
-        scale: &[f64],
-        right: &[f64],
-        z: &mut [f64],
-        tolerance: f64,
-    ) {
+    fn solve_system(&self, problem: &mut impl Problem, lambda: f64, scale: &[f64], right: &[f64], z: &mut [f64]) {
         let mut scaled = vec![0.0; right.len()];
         let apply = |v: &[f64], out: &mut [f64]| {
             scaled.iter_mut().zip(v).zip(scale).for_each(|((x, v), scale)| *x = v * scale);
             problem.curvature(&scaled, out);
             for ((out, v), scale) in out.iter_mut().zip(v).zip(scale) {
-                *out = v + at.lambda * scale * *out;
+                *out = v + lambda * scale * *out;
             }
         };
-        let precondition = |r: &[f64], out: &mut [f64]| self.preconditioner.apply(at.lambda, r, out);
-        let limits = CgLimits { tolerance, iterations: self.settings.cg_iterations };
+        let precondition = |r: &[f64], out: &mut [f64]| self.preconditioner.apply(lambda, r, out);
+        let limits = CgLimits { tolerance: self.settings.cg_tolerance, iterations: self.settings.cg_iterations };
         cg::solve(apply, precondition, right, z, limits);
     }
 

@@ -1,6 +1,16 @@
 //! What a point of parameter space is worth: parameters, priors, trade-off curve, objectives (method section 3).
 
+pub mod coordinates;
+pub mod kind;
 pub mod parameters;
+pub mod posterior;
 pub mod prior;
+pub mod reference;
+pub mod tradeoff;
 
+pub use coordinates::{FreeParameter, ParameterSpace};
+pub use kind::ObjectiveKind;
 pub use parameters::{Parameter, ParameterValues};
+pub use posterior::Posterior;
+pub use prior::Prior;
+pub use reference::{Reference, ReferenceError};

@@ -1,0 +1,29 @@
+//! The three objectives by name (method section 3).
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a reconstruction is judged by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObjectiveKind {
+    /// Spottedness at the target chi2, turned into a log-probability by the trade-off curve.
+    #[default]
+    Spottedness,
+    /// Entropy at the target chi2, turned into a log-probability in the same way.
+    Entropy,
+    /// `max_s [alpha S - chi2/2]` at the alpha of the reference solution; spelt `regularized-likelihood` too.
+    #[serde(alias = "regularized-likelihood")]
+    RegularisedLikelihood,
+}
+
+impl ObjectiveKind {
+    /// The name used in configs and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            ObjectiveKind::Spottedness => "spottedness",
+            ObjectiveKind::Entropy => "entropy",
+            ObjectiveKind::RegularisedLikelihood => "regularised-likelihood",
+        }
+    }
+}

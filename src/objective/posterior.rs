@@ -1,0 +1,249 @@
+//! The log-probability of a parameter vector: one maximum-entropy reconstruction, judged by one of three objectives (method
+//! section 3), times the prior; and its gradient.
+//!
+//! Left out: how the reference was found, and who explores the posterior.
+
+use super::coordinates::ParameterSpace;
+use super::kind::ObjectiveKind;
+use super::parameters::Parameter;
+use super::reference::Reference;
+use super::tradeoff::Measure;
+use crate::imaging::{Imager, ImagingProblem};
+use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
+use crate::maxent::{Goal, Problem, Solution, Solver, SolverSettings, Termination};
+use crate::star::Response;
+
+/// The posterior of the free parameters.
+#[derive(Clone, Debug)]
+pub struct Posterior {
+    imager: Imager,
+    space: ParameterSpace,
+    kind: ObjectiveKind,
+    reference: Reference,
+    settings: SolverSettings,
+    /// Whether only orbit and systemic velocity are free, so that pixels are looked at once for all evaluations.
+    velocities_only: bool,
+}
+
+/// Widest velocity grid (half-width in km/s over the step) that is tried; beyond it a parameter vector is absurd.
+const LARGEST_VSINI_KMS: f64 = 2000.0;
+
+/// Numerical derivatives of forward models step by this share of a coordinate's natural scale.
+const DERIVATIVE_STEP: f64 = 0.05;
+
+impl Posterior {
+    /// The posterior of `space` under `imager`'s data, judged by `kind` relative to `reference`.
+    pub fn new(imager: Imager, space: ParameterSpace, kind: ObjectiveKind, reference: Reference) -> Self {
+        let shifts =
+            |p: Parameter| matches!(p, Parameter::K | Parameter::PorbOverProt | Parameter::Phi | Parameter::Vsys);
+        // the reference's pixels serve only if its fixed parameters are those of the space
+        let here = space.values_at(&space.theta_of(&reference.values));
+        let velocities_only = Parameter::ALL.iter().all(|&p| shifts(p) || here[p] == reference.values[p])
+            && space.free().iter().all(|f| shifts(f.parameter));
+        let settings = SolverSettings::default();
+        Posterior { imager, space, kind, reference, settings, velocities_only }
+    }
+
+    /// The reference.
+    pub fn reference(&self) -> &Reference {
+        &self.reference
+    }
+
+    /// The parameter space.
+    pub fn space(&self) -> &ParameterSpace {
+        &self.space
+    }
+
+    /// What the data are imaged with.
+    pub fn imager(&self) -> &Imager {
+        &self.imager
+    }
+
+    fn response(&self, theta: &[f64]) -> Response {
+        let state = self.space.values_at(theta).state();
+        if self.velocities_only {
+            self.reference.response.with_velocities(&self.imager.star, &state, &self.imager.sampling)
+        } else {
+            self.imager.response(&state)
+        }
+    }
+
+    /// Whether profiles can be computed at all at `theta`.
+    fn is_physical(&self, theta: &[f64]) -> bool {
+        let values = self.space.values_at(theta);
+        let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
+        let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
+        values.0.iter().all(|x| x.is_finite())
+            && fastest.is_finite()
+            && fastest <= LARGEST_VSINI_KMS
+            && values[Parameter::Vsini] > 0.0
+            && values[Parameter::PorbOverProt] > 0.0
+    }
+
+    fn solver(&self) -> Solver<'_> {
+        Solver { entropy: self.imager.entropy, preconditioner: &self.reference.preconditioner, settings: self.settings }
+    }
+
+    fn goal(&self) -> Goal {
+        match self.kind {
+            ObjectiveKind::RegularisedLikelihood => Goal::Lambda(self.reference.solution.image.lambda),
+            ObjectiveKind::Spottedness | ObjectiveKind::Entropy => {
+                Goal::Chi2 { target: self.reference.chi2_target, largest_lambda: self.reference.largest_lambda }
+            }
+        }
+    }
+
+    /// The reconstruction at `theta`, whatever the prior says.
+    pub fn reconstruct(&self, theta: &[f64]) -> (Solution, ImagingProblem<'_>) {
+        let mut problem = self.imager.problem(self.response(theta));
+        let solution = self.solver().solve(&mut problem, self.goal(), &self.reference.start());
+        (solution, problem)
+    }
+
+    /// ln L of a reconstruction, and the derivative of chi2 on the trade-off curve with respect to its measure.
+    fn log_likelihood(&self, solution: &Solution) -> (f64, f64) {
+        let measure = match self.kind {
+            ObjectiveKind::RegularisedLikelihood => {
+                let lambda = solution.image.lambda;
+                return (solution.entropy / lambda - 0.5 * solution.chi2, 0.0);
+            }
+            ObjectiveKind::Spottedness => Measure::Spottedness,
+            ObjectiveKind::Entropy => Measure::NegativeEntropy,
+        };
+        let target = self.reference.chi2_target;
+        // to first order along the path to the target; where that is out of reach, its misfit counts as it is
+        let (to_target, misfit) = match solution.termination {
+            Termination::Unreachable => (0.0, solution.chi2 - target),
+            _ => (target - solution.chi2, 0.0),
+        };
+        let value = match measure {
+            Measure::Spottedness if to_target == 0.0 => solution.spottedness,
+            Measure::Spottedness => solution.spottedness + to_target * solution.spottedness_slope / solution.chi2_slope,
+            Measure::NegativeEntropy => -solution.entropy - 0.5 * solution.image.lambda * to_target,
+        };
+        let (on_curve, slope) = self.reference.tradeoff.chi2_at(measure, value);
+        (-0.5 * (target - on_curve + misfit), slope)
+    }
+
+    fn judge(&self, solution: &Solution, passes: u32, log_prior: f64) -> Evaluation {
+        let status = match solution.termination {
+            Termination::Converged => Status::Converged,
+            Termination::Unreachable => Status::Unreachable,
+            Termination::StepLimit => return Evaluation { passes, ..Evaluation::rejected(Status::StoppedShort) },
+            Termination::NonFinite => return Evaluation { passes, ..Evaluation::rejected(Status::NonFinite) },
+        };
+        let log_prob = self.log_likelihood(solution).0 + log_prior;
+        if !log_prob.is_finite() {
+            return Evaluation { passes, ..Evaluation::rejected(Status::NonFinite) };
+        }
+        Evaluation { log_prob, spottedness: solution.spottedness, chi2: solution.chi2, passes, status }
+    }
+
+    /// Prior and physics, before anything is reconstructed: the prior's log-density, or why `theta` is refused.
+    fn admit(&self, theta: &[f64]) -> Result<f64, Evaluation> {
+        let log_prior = self.space.log_prior(theta);
+        if log_prior == f64::NEG_INFINITY {
+            return Err(Evaluation::rejected(Status::OutsidePrior));
+        }
+        if !(log_prior.is_finite() && self.is_physical(theta)) {
+            return Err(Evaluation::rejected(Status::NonFinite));
+        }
+        Ok(log_prior)
+    }
+
+    /// What changes of the forward model at a fixed map do to ln L: `weight_chi2 * chi2 + slope along direction`.
+    ///
+    /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem). Spottedness
+    /// is not: with `A' = a` and the constraint chi2 = target, the adjoint system `H y = a - 2 mu g`, `g y = 0` (g the
+    /// gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`.
+    fn sensitivity(&self, solution: &Solution, problem: &mut ImagingProblem) -> (f64, Option<Vec<f64>>) {
+        let curve_slope = self.log_likelihood(solution).1;
+        let lambda = solution.image.lambda;
+        let unreachable = solution.termination == Termination::Unreachable;
+        match self.kind {
+            ObjectiveKind::RegularisedLikelihood => (-0.5, None),
+            // ln L = (chi2_curve(-S) - target)/2 and dS = -(lambda/2) dchi2
+            ObjectiveKind::Entropy if !unreachable => (0.25 * curve_slope * lambda, None),
+            // beyond the reach of the target: the leading term of its misfit
+            _ if unreachable => (-0.5, None),
+            _ => {
+                let area = self.imager.grid.area.clone();
+                let inverse = self.solver().apply_inverse(problem, &solution.image, &area);
+                let mu = solution.spottedness_slope / solution.chi2_slope;
+                let mut image = vec![0.0; area.len()];
+                self.imager.entropy.image(&solution.image.logit, &mut image);
+                let path = |p: usize| solution.path[p] * (image[p] * (1.0 - image[p]) / area[p]).sqrt();
+                let weight = -0.5 * curve_slope * lambda;
+                let adjoint = |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * path(p)) };
+                let direction = inverse.iter().enumerate().map(adjoint).collect();
+                (-0.5 * curve_slope * mu, Some(direction))
+            }
+        }
+    }
+}
+
+impl LogDensity for Posterior {
+    fn names(&self) -> &[String] {
+        self.space.names()
+    }
+
+    fn evaluate(&self, theta: &[f64]) -> Evaluation {
+        match self.admit(theta) {
+            Err(refused) => refused,
+            Ok(log_prior) => {
+                let (solution, problem) = self.reconstruct(theta);
+                self.judge(&solution, problem.passes(), log_prior)
+            }
+        }
+    }
+
+    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
+        self.space.to_internal(theta)
+    }
+
+    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+        self.space.to_written(internal)
+    }
+
+    fn log_jacobian(&self, theta: &[f64]) -> f64 {
+        self.space.log_jacobian(theta)
+    }
+}
+
+impl Gradient for Posterior {
+    fn evaluate_with_gradient(&self, theta: &[f64]) -> (Evaluation, Vec<f64>) {
+        let log_prior = match self.admit(theta) {
+            Ok(log_prior) => log_prior,
+            Err(refused) => return (refused, Vec::new()),
+        };
+        let (solution, mut problem) = self.reconstruct(theta);
+        let evaluation = self.judge(&solution, problem.passes(), log_prior);
+        if evaluation.log_prob == f64::NEG_INFINITY {
+            return (evaluation, Vec::new());
+        }
+        let (weight, direction) = self.sensitivity(&solution, &mut problem);
+        let mut image = vec![0.0; self.imager.grid.len()];
+        self.imager.entropy.image(&solution.image.logit, &mut image);
+        let internal = self.space.to_internal(theta);
+        let at_fixed_map = |i: usize, h: f64| {
+            let mut shifted = internal.clone();
+            shifted[i] += h;
+            let shifted = self.space.to_written(&shifted);
+            let mut problem = self.imager.problem(self.response(&shifted));
+            let chi2 = problem.linearise(&image);
+            let prior = Some(self.space.log_prior(&shifted)).filter(|p| p.is_finite()).unwrap_or(log_prior);
+            prior + weight * chi2 + direction.as_ref().map_or(0.0, |y| problem.slope(y))
+        };
+        let scales = self.space.scales();
+        let derivative = |i: usize| {
+            let h = DERIVATIVE_STEP * scales[i];
+            (at_fixed_map(i, h) - at_fixed_map(i, -h)) / (2.0 * h)
+        };
+        let gradient = (0..scales.len()).map(derivative).collect();
+        (evaluation, gradient)
+    }
+
+    fn scales(&self) -> Vec<f64> {
+        self.space.scales()
+    }
+}
