@@ -36,7 +36,7 @@ impl Entropy {
     pub fn step(&self, u: &[f64], s: &[f64], ds: &[f64], scale: f64, cap: f64, out: &mut [f64]) -> bool {
         let mut capped = false;
         for (((out, u), s), ds) in out.iter_mut().zip(u).zip(s).zip(ds) {
-            let du = scale * ds / (s * (1.0 - s));
+            let du = logit_step(*s, scale * ds);
             capped |= du.abs() > cap;
             *out = (u + du.clamp(-cap, cap)).clamp(-LOGIT_LIMIT, LOGIT_LIMIT);
         }
@@ -70,6 +70,17 @@ impl Entropy {
             *out = (s * (1.0 - s) / a).sqrt();
         }
     }
+}
+
+/// Change of the logit that moves s by `ds`: exact up to half way to 0 or 1, beyond that along the tangent.
+///
+/// Data are nearly linear in s, so that a step straight in s keeps what the stiff directions have gained; a step straight in
+/// the logit, equal to first order, would undo it to second order.
+fn logit_step(s: f64, ds: f64) -> f64 {
+    let room = if ds < 0.0 { s } else { 1.0 - s };
+    let straight = ds.abs().min(0.5 * room) * ds.signum();
+    let (there, rest) = (s + straight, ds - straight);
+    (straight / s).ln_1p() - (-straight / (1.0 - s)).ln_1p() + rest / (there * (1.0 - there))
 }
 
 #[cfg(test)]

@@ -163,6 +163,7 @@ impl Solver<'_> {
             }
             let newton = self.newton(problem, &at, goal, path);
             let move_lambda = self.lambda_step(&at, &newton, goal);
+            eprintln!("{newton_steps} lam {:.3e} chi2 {:.3} S {:.5} merit {:.6} decr {:.3e} move {:.3} passes {} cpath {:.2} cstep {:.2}", at.lambda, at.chi2, at.entropy, -at.entropy+0.5*at.lambda*at.chi2, newton.decrement, move_lambda, problem.passes(), newton.chi2_path, newton.chi2_step);
             let unreachable = matches!(goal, Goal::Chi2 { target, largest_lambda }
                 if at.lambda >= largest_lambda && at.chi2 + newton.chi2_step > target && move_lambda == 0.0);
             if let Some(last) = self.is_last(&at, &newton, move_lambda, goal) {
@@ -279,17 +280,17 @@ impl Solver<'_> {
         axpy(move_lambda, &newton.path, &mut ds);
         ds.iter_mut().zip(&newton.scale).for_each(|(z, scale)| *z *= scale);
         let before = merit(at);
-        let (mut length, mut cap) = (1.0, LOGIT_CAP);
+        let mut length = 1.0;
         loop {
             let mut u = vec![0.0; at.u.len()];
-            self.entropy.step(&at.u, &at.s, &ds, length, cap, &mut u);
+            self.entropy.step(&at.u, &at.s, &ds, length, LOGIT_CAP, &mut u);
             let next = self.arrive(problem, u, lambda);
             let small = 1e-9 * before.abs() + self.settings.tolerance * lambda;
-            if merit(&next) <= before + small || length < 1e-3 {
+            if length<1.0 {eprintln!("    length {length} merit {:.6} before {:.6}", merit(&next), before);}
+            if merit(&next) <= before + small || length < 1e-4 {
                 return next;
             }
             length *= 0.5;
-            cap *= 0.5;
         }
     }
 

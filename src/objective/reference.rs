@@ -19,7 +19,7 @@ const SMALLEST_CURVATURE: f64 = 0.2;
 const CURVE_STEP: f64 = 0.2;
 
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
-const CURVE_REACH: (f64, f64) = (3.4, 4.0);
+const CURVE_REACH: (f64, f64) = (1.8, 4.0);
 
 /// Lambda at which a target is given up, over the smallest lambda for which data begin to matter (1e-6).
 const HOPELESS_LAMBDA: f64 = 1e4;
