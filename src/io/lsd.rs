@@ -149,16 +149,8 @@ fn too_few(entry: &Entry, axis: &Axis, (lo, hi): (f64, f64), bins: usize) -> Lsd
         n => format!("holds {n} bins, at least {MIN_BINS} are needed"),
     };
     let problem =
-        format!("velocity range [{lo}, {hi}] km/s {what}, which reach from {from:.3} to {to:.3} km/s after VRAD");
+        format!("velocity range [{lo}, {hi}] km/s {what}; the data reach from {from:.3} to {to:.3} km/s after VRAD");
     LsdError::File { path: entry.path.clone(), problem }
-}
-
-/// SHA-256 (hex) of the bytes of the list at `list` and of every profile it names, in order; that of [`DataSet::sha256`].
-///
-/// # Errors
-/// As [`read`], which it goes through, so that only data that can be used have a fingerprint.
-pub fn sha256(list: &Path) -> Result<String, LsdError> {
-    Ok(read(list, &ReadOptions::default())?.sha256)
 }
 
 /// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The list

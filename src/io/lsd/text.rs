@@ -62,9 +62,9 @@ struct Row {
 
 /// Reads the text of a profile.
 pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
-    let mut lines =
-        text.lines().enumerate().map(|(k, line)| (k + 1, line)).filter(|(_, l)| !l.trim().is_empty()).peekable();
-    lines.next_if(|(_, line)| is_title(line));
+    let mut lines = text.lines().enumerate().map(|(k, l)| (k + 1, l)).filter(|(_, l)| !l.trim().is_empty()).peekable();
+    let counts_follow = lines.clone().nth(1).is_some_and(|(_, line)| counts(line).is_some());
+    lines.next_if(|(_, line)| counts_follow || is_title(line));
     let announced = match lines.peek().and_then(|(line, text)| Some((*line, counts(text)?))) {
         Some((line, (points, columns))) => {
             lines.next();
@@ -101,7 +101,8 @@ fn fault<T>(line: usize, problem: String) -> Result<T, Fault> {
     Err(Fault { line, problem })
 }
 
-/// A first line is a title unless it reads as numbers; one with the columns of a row and a single bad number is a bad row.
+/// A first line without `npoints ncolumns` after it is a title unless it reads as numbers; one with the columns of a row and
+/// a single bad number is a bad row.
 fn is_title(line: &str) -> bool {
     let fields: Vec<&str> = line.split_whitespace().collect();
     let bad = fields.iter().filter(|f| f.parse::<f64>().is_err()).count();
