@@ -35,7 +35,7 @@ fn with(mut config: Value, pointer: &str, value: Value) -> Value {
 }
 
 fn message(config: &Value) -> String {
-    let message = resolve(config).unwrap_err();
+    let Err(message) = resolve(config) else { panic!("accepted: {config}") };
     assert!(!message.contains('\n'), "{message}");
     message.strip_prefix("dir/x.json").unwrap_or_else(|| panic!("{message}")).to_string()
 }
@@ -83,7 +83,7 @@ fn lo_peg_resolves() {
     let list = Path::new("/work/shared/data/lopeg/observations.txt");
     if list.exists() {
         let data = dimcmc::io::lsd::read(list, options).unwrap().observations;
-        assert!((settings.star_for(&data).unwrap().line.equivalent_width_kms - 2.718).abs() < 1e-3);
+        assert!((settings.star_for(&data).unwrap().line.equivalent_width_kms - 2.7175).abs() < 1e-3);
     }
 }
 
@@ -264,7 +264,7 @@ fn senseless_values_name_their_key() {
         ("/parameters/k_kms", json!({ "prior": "normal", "mean": 0.1, "sd": 0 }), "parameters.k_kms.sd"),
         ("/parameters/k_kms", json!({ "prior": "normal", "sd": 0.1 }), "parameters.k_kms.mean"),
         ("/parameters/k_kms", json!({ "prior": "normal", "mean": -9, "sd": 0.1 }), "parameters.k_kms.mean"),
-        ("/parameters/k_kms", json!({ "prior": "normal", "mean": 1e308, "sd": 1e-308 }), "parameters.k_kms.mean"),
+        ("/parameters/k_kms", json!({ "prior": "normal", "mean": 1e308, "sd": 1e-308 }), "planet.k_kms"),
         ("/sampler/walkers", json!(31), "sampler.walkers"),
         ("/sampler/walkers", json!(4), "sampler.walkers"),
         ("/sampler/ensembles", json!(0), "sampler.ensembles"),

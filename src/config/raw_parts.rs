@@ -9,6 +9,7 @@ use std::path::PathBuf;
 /// One optional entry for each parameter that may be free.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "PerParameter_{T}")]
 pub(super) struct PerParameter<T> {
     /// Semi-amplitude of the planet's orbit (km/s).
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -68,7 +68,7 @@ fn resolve_free(raw: &mut Config, values: &mut ParameterValues) -> Result<Vec<Fr
     for (parameter, mut section) in raw.parameters.entries() {
         let prior = resolve_prior(parameter, &section, phi_free)?;
         let start = prior.wrap(values[parameter]);
-        if !prior.contains(start) {
+        if !prior.log_density(start).is_finite() {
             let (min, max) = prior.bounds();
             let problem = format!("{start} is outside its prior, [{min}, {max}] by parameters.{}", parameter.name());
             return Err(Fault::new(key(parameter), problem));
@@ -114,33 +114,12 @@ pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
 }
 
-/// Checks that need the number of free parameters, and that a chain can be held in memory at all.
 fn check_sampler(sampler: &SamplerSettings, free: usize) -> Result<(), Fault> {
-    const MOST_WALKERS: usize = 100_000;
-    let fault = |field: &str, problem: String| Err(Fault::new(format!("sampler.{field}"), problem));
-    let (walkers, least) = (sampler.walkers, 2 * free.max(1));
-    if sampler.ensembles == 0 {
-        return fault("ensembles", "0 must be at least 1".into());
-    }
-    if walkers % 2 == 1 {
-        return fault("walkers", format!("{walkers} must be even: half of them move at a time"));
-    }
-    if walkers < least {
-        return fault(
-            "walkers",
-            format!("{walkers} must be at least {least}, twice the number of free parameters ({free})"),
-        );
-    }
-    if sampler.ensembles.saturating_mul(walkers) > MOST_WALKERS {
-        return fault("walkers", format!("{walkers} in each of {} ensembles exceed {MOST_WALKERS}", sampler.ensembles));
-    }
-    if sampler.steps == 0 {
-        return fault("steps", "0 must be at least 1".into());
-    }
-    if !(sampler.rhat > 1.0 && sampler.rhat.is_finite()) {
-        return fault("rhat", format!("{} must be above 1", sampler.rhat));
-    }
-    positive("sampler.ess", sampler.ess)
+    // Commands that do not sample need no free parameter. The message starts with the key.
+    let message = |e: String| {
+        e.split_once(": ").map(|(key, problem)| Fault::new(key, problem)).unwrap_or(Fault::new("sampler", e))
+    };
+    sampler.validate(free.max(1)).map_err(|e| message(e.to_string()))
 }
 
 fn resolve_grid(grid: &Grid) -> Result<Vec<GridAxis>, Fault> {
