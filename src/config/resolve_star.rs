@@ -119,7 +119,8 @@ mod tests {
             (2.5, -1.5, false),
             (-0.2, 0.0, true),
             (0.0, 0.0, true),
-            (3.0, -2.9, false),
+            (3.0, -2.9, true),
+            (3.5, -2.9, false),
         ] {
             assert_eq!(positive_on_the_disc(a, b), fine, "{a} {b}");
             let least = (0..1000).map(|k| k as f64 / 1000.0).map(|x| 1.0 - a * x - b * x * x).fold(f64::MAX, f64::min);
