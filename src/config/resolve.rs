@@ -9,8 +9,8 @@ use super::raw::Config;
 use super::raw_parts::Grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
-use super::{FreeParameter, GridAxis, ImagingSettings, SamplerSettings, Settings};
-use crate::objective::{Parameter, ParameterValues, Prior};
+use super::{GridAxis, ImagingSettings, SamplerSettings, Settings};
+use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
 use std::path::Path;
 
 /// Fewest and most pixels of an image or a simulated star.

@@ -3,7 +3,7 @@
 use super::raw_parts::EquivalentWidth;
 use super::{ConfigError, SamplerSettings};
 use crate::io::lsd::ReadOptions;
-use crate::objective::{ObjectiveKind, Parameter, ParameterValues, Prior};
+use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues};
 use crate::observation::Observations;
 use crate::star::{Spot, StarSettings};
 use schemars::JsonSchema;
@@ -36,15 +36,6 @@ pub struct Settings {
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`, and
     /// `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
     pub sha256: String,
-}
-
-/// A free parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FreeParameter {
-    /// Which.
-    pub parameter: Parameter,
-    /// Its prior, in the units of its name.
-    pub prior: Prior,
 }
 
 /// Where the profiles come from.
