@@ -1,1 +1,53 @@
-//! (to be written)
+//! The config file: JSON as users write it -> checked, resolved [`Settings`]; and its JSON Schema.
+//!
+//! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for), and every
+//! error names the file and the key. Left out: reading the observations (`io::lsd`), and anything done with the settings.
+
+mod domain;
+mod error;
+mod identity;
+mod raw;
+mod raw_parts;
+mod resolve;
+mod resolve_observations;
+mod resolve_star;
+mod sampler;
+mod settings;
+mod suggest;
+
+pub use error::ConfigError;
+pub use raw_parts::EquivalentWidth;
+// The one line to swap for `pub use crate::ensemble::SamplerSettings;`, then `sampler.rs` and `mod sampler` go.
+pub use sampler::SamplerSettings;
+pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings, Simulation};
+
+use std::path::Path;
+
+/// Reads and resolves the config at `path`. Paths in it start from its folder.
+///
+/// # Errors
+/// A file that cannot be read, is not JSON, or has a key that is unknown, missing, or does not make sense.
+pub fn load(path: &Path) -> Result<Settings, ConfigError> {
+    let bytes = std::fs::read(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
+    from_json(&bytes, path)
+}
+
+/// Resolves a config already read; `path` is what errors name and whose folder paths start from.
+///
+/// # Errors
+/// As [`load`], but for reading.
+pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
+    // Editors on Windows put a byte-order mark first.
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let mut deserializer = serde_json::Deserializer::from_slice(json);
+    let raw = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
+    deserializer.end().map_err(|e| ConfigError::json(path, &e))?;
+    resolve::resolve(raw, path).map_err(|fault| fault.within(path))
+}
+
+/// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.
+pub fn schema() -> String {
+    let schema = schemars::schema_for!(raw::Config);
+    // `{:#}` of a `Value` is its pretty-printed JSON.
+    format!("{:#}\n", schema.as_value())
+}

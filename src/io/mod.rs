@@ -1,1 +1,3 @@
-//! (to be written)
+//! Files in and out: LSD profiles, the chain's journal, maps, exports. No decisions are taken here.
+
+pub mod lsd;

@@ -221,8 +221,10 @@ mod tests {
             draws.sort_by(f64::total_cmp);
             let distance = draws.iter().enumerate().map(|(k, x)| {
                 assert!(prior.contains(*x), "{prior:?}: {x}");
-                let cell = ((x - lo) / (hi - lo) * cdf.len() as f64) as usize;
-                let expected = cdf[cell.min(cdf.len() - 1)];
+                let position = (x - lo) / (hi - lo) * cdf.len() as f64;
+                let cell = (position as usize).min(cdf.len() - 1);
+                let before = if cell == 0 { 0.0 } else { cdf[cell - 1] };
+                let expected = before + (position - cell as f64) * (cdf[cell] - before);
                 (expected - k as f64 / DRAWS as f64).abs().max((expected - (k + 1) as f64 / DRAWS as f64).abs())
             });
             // Kolmogorov-Smirnov: sqrt(n) D exceeds 1.95 once in a thousand.

@@ -1,0 +1,253 @@
+//! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
+
+use crate::objective::Parameter;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::borrow::Cow;
+use std::path::PathBuf;
+
+/// One optional entry for each parameter that may be free.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "PerParameter_{T}")]
+pub(super) struct PerParameter<T> {
+    /// Semi-amplitude of the planet's orbit (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k_kms: Option<T>,
+    /// Orbital period over the rotation period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub porb_over_prot: Option<T>,
+    /// Orbital phase (cycles).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phi: Option<T>,
+    /// Angular velocity of the equator (rad/d).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub omega_eq_rad_d: Option<T>,
+    /// Angular velocity of the equator minus that of the pole (rad/d).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub domega_rad_d: Option<T>,
+    /// Inclination (degrees).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inclination_deg: Option<T>,
+    /// Projected equatorial rotation velocity (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vsini_kms: Option<T>,
+    /// Systemic radial velocity (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vsys_kms: Option<T>,
+}
+
+impl<T> Default for PerParameter<T> {
+    fn default() -> Self {
+        PerParameter {
+            k_kms: None,
+            porb_over_prot: None,
+            phi: None,
+            omega_eq_rad_d: None,
+            domega_rad_d: None,
+            inclination_deg: None,
+            vsini_kms: None,
+            vsys_kms: None,
+        }
+    }
+}
+
+impl<T> PerParameter<T> {
+    /// The entry of one parameter.
+    pub fn slot(&mut self, parameter: Parameter) -> &mut Option<T> {
+        match parameter {
+            Parameter::K => &mut self.k_kms,
+            Parameter::PorbOverProt => &mut self.porb_over_prot,
+            Parameter::Phi => &mut self.phi,
+            Parameter::OmegaEq => &mut self.omega_eq_rad_d,
+            Parameter::DOmega => &mut self.domega_rad_d,
+            Parameter::Inclination => &mut self.inclination_deg,
+            Parameter::Vsini => &mut self.vsini_kms,
+            Parameter::Vsys => &mut self.vsys_kms,
+        }
+    }
+}
+
+impl<T: Clone> PerParameter<T> {
+    /// The entries that are there, in the order of [`Parameter::ALL`].
+    pub fn entries(&self) -> Vec<(Parameter, T)> {
+        let mut all = self.clone();
+        Parameter::ALL.into_iter().filter_map(|p| Some((p, all.slot(p).take()?))).collect()
+    }
+}
+
+/// A prior. Which of the other keys belong to it depends on its kind.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PriorSection {
+    /// Kind of the prior.
+    pub prior: PriorKind,
+    /// Lower bound; needed for uniform and log-uniform (there above 0), optional for normal and isotropic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min: Option<f64>,
+    /// Upper bound, above the lower one; needed for uniform and log-uniform, optional for normal and isotropic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
+    /// Mean of a normal prior.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean: Option<f64>,
+    /// Standard deviation of a normal prior, above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd: Option<f64>,
+}
+
+/// Kinds of priors.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum PriorKind {
+    /// Constant between `min` and `max`.
+    Uniform,
+    /// Proportional to 1/x between `min` and `max`.
+    LogUniform,
+    /// A Gaussian of `mean` and `sd`, cut off at `min` and `max` if given.
+    Normal,
+    /// For `inclination_deg`: proportional to sin i, between `min` (0 if not given) and `max` (90).
+    Isotropic,
+    /// For `phi`: constant on the circle from 0 to 1.
+    Periodic,
+}
+
+/// The line profiles: either `path` (with its two options), or `simulate`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ObservationsSection {
+    /// The list of profiles, `FILE TIME_DAYS [VRAD_KMS]` a line, relative to the folder of this config.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<PathBuf>,
+    /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_range_kms: Option<[f64; 2]>,
+    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_scale: Option<f64>,
+    /// Simulated profiles of the star and planet of this config.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulate: Option<SimulateSection>,
+}
+
+/// Simulated profiles.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SimulateSection {
+    /// Hard-edged circular spots `[longitude, latitude, radius, filling]`: degrees, and the filling factor from 0 to 1. The
+    /// larger filling counts where they overlap.
+    #[serde(default)]
+    pub spots: Vec<[f64; 4]>,
+    /// Rotation cycles of the profiles, counted from `epoch_d`.
+    pub cycles: Vec<f64>,
+    /// Velocity bins.
+    pub velocity_kms: VelocitySection,
+    /// Signal-to-noise ratio of each bin, above 0; null for no noise.
+    #[serde(default = "default_snr")]
+    pub snr: Option<f64>,
+    /// Seed of the noise.
+    #[serde(default = "default_seed")]
+    pub seed: u64,
+    /// Pixels of the star that is simulated, 100 to 2,000,000; more than of the image, for honesty.
+    #[serde(default = "default_simulation_pixels")]
+    pub pixels: usize,
+    /// Values of parameters that are simulated in place of those under `star` and `planet`, so that the start of an
+    /// inference may be wrong.
+    #[serde(default)]
+    pub truth: PerParameter<f64>,
+}
+
+fn default_snr() -> Option<f64> {
+    Some(1000.0)
+}
+
+fn default_seed() -> u64 {
+    1
+}
+
+fn default_simulation_pixels() -> usize {
+    20_000
+}
+
+/// Centres of the velocity bins: `min`, `min + step`, ... up to `max` (km/s).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct VelocitySection {
+    /// First velocity (km/s).
+    pub min: f64,
+    /// Last velocity (km/s).
+    pub max: f64,
+    /// Width of a bin (km/s), above 0.
+    pub step: f64,
+}
+
+/// The landscape that `dimcmc grid` computes.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Grid {
+    /// One to three axes `[min, max, n]`: n nodes from min to max, both included.
+    pub axes: PerParameter<(f64, f64, usize)>,
+}
+
+/// Equivalent width of the local line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EquivalentWidth {
+    /// A number (km/s).
+    Fixed(f64),
+    /// The mean area of the observed profiles.
+    Auto,
+}
+
+impl Serialize for EquivalentWidth {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            EquivalentWidth::Fixed(width) => serializer.serialize_f64(*width),
+            EquivalentWidth::Auto => serializer.serialize_str("auto"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for EquivalentWidth {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(EquivalentWidthVisitor)
+    }
+}
+
+struct EquivalentWidthVisitor;
+
+impl de::Visitor<'_> for EquivalentWidthVisitor {
+    type Value = EquivalentWidth;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("a number or \"auto\"")
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<EquivalentWidth, E> {
+        Ok(EquivalentWidth::Fixed(value))
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<EquivalentWidth, E> {
+        Ok(EquivalentWidth::Fixed(value as f64))
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<EquivalentWidth, E> {
+        Ok(EquivalentWidth::Fixed(value as f64))
+    }
+
+    fn visit_str<E: de::Error>(self, value: &str) -> Result<EquivalentWidth, E> {
+        match value {
+            "auto" => Ok(EquivalentWidth::Auto),
+            _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
+        }
+    }
+}
+
+impl JsonSchema for EquivalentWidth {
+    fn schema_name() -> Cow<'static, str> {
+        "EquivalentWidth".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "const": "auto" }] })
+    }
+}

@@ -1,0 +1,114 @@
+//! Where the profiles come from: files, or a simulation of the config's own star and planet.
+
+use super::domain::check_value;
+use super::error::Fault;
+use super::raw::Config;
+use super::raw_parts::{SimulateSection, VelocitySection};
+use super::resolve::{check_pixels, positive};
+use super::{ObservationSource, Simulation};
+use crate::io::lsd::ReadOptions;
+use crate::objective::ParameterValues;
+use crate::star::{Spot, StarSettings};
+use std::path::Path;
+
+/// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start from.
+pub(super) fn resolve_observations(
+    raw: &mut Config,
+    star: &StarSettings,
+    values: &ParameterValues,
+    config: &Path,
+) -> Result<ObservationSource, Fault> {
+    let section = &mut raw.observations;
+    let path = match (&section.path, &section.simulate) {
+        (Some(path), None) => path,
+        (None, Some(simulate)) => {
+            let file_only = [
+                ("velocity_range_kms", section.velocity_range_kms.is_some()),
+                ("sigma_scale", section.sigma_scale.is_some()),
+            ];
+            if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
+                return Err(Fault::new(format!("observations.{name}"), "for observations from files only"));
+            }
+            if star.line.equivalent_width_kms.is_nan() {
+                return Err(Fault::new("star.line.equivalent_width_kms", "auto is for observations from files only"));
+            }
+            return Ok(ObservationSource::Simulate(simulation(simulate, star, values)?));
+        }
+        (Some(_), Some(_)) => return Err(Fault::new("observations", "give either path or simulate, not both")),
+        (None, None) => return Err(Fault::new("observations", "give path (of the list of profiles) or simulate")),
+    };
+    if path.as_os_str().is_empty() {
+        return Err(Fault::new("observations.path", "is empty"));
+    }
+    let sigma_scale = *section.sigma_scale.get_or_insert(ReadOptions::default().sigma_scale);
+    positive("observations.sigma_scale", sigma_scale)?;
+    if let Some([min, max]) = section.velocity_range_kms
+        && min >= max
+    {
+        let problem = format!("first velocity {min} must be below last velocity {max}");
+        return Err(Fault::new("observations.velocity_range_kms", problem));
+    }
+    let options = ReadOptions { velocity_range_kms: section.velocity_range_kms.map(Into::into), sigma_scale };
+    Ok(ObservationSource::Files { path: config.parent().unwrap_or(Path::new("")).join(path), options })
+}
+
+fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {
+    let at = |field: &str| format!("observations.simulate.{field}");
+    let spots = section.spots.iter().enumerate().map(|(k, s)| spot(s, &at(&format!("spots[{k}]"))));
+    if section.cycles.is_empty() {
+        return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
+    }
+    let times_d: Vec<f64> = section.cycles.iter().map(|c| star.epoch_d + c * star.rotation_period_d).collect();
+    if let Some(k) = times_d.iter().position(|t| !t.is_finite()) {
+        return Err(Fault::new(at(&format!("cycles[{k}]")), "its time leaves the range of double precision"));
+    }
+    if let Some(snr) = section.snr {
+        positive(&at("snr"), snr)?;
+    }
+    check_pixels(&at("pixels"), section.pixels)?;
+    let mut truth = *values;
+    for (parameter, value) in section.truth.entries() {
+        check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
+        truth[parameter] = value;
+    }
+    Ok(Simulation {
+        spots: spots.collect::<Result<_, _>>()?,
+        truth,
+        times_d,
+        first_velocity_kms: section.velocity_kms.min,
+        step_kms: section.velocity_kms.step,
+        bins: bins(&section.velocity_kms, &at("velocity_kms"))?,
+        snr: section.snr,
+        seed: section.seed,
+        pixels: section.pixels,
+    })
+}
+
+fn spot(&[longitude, latitude, radius, filling]: &[f64; 4], key: &str) -> Result<Spot, Fault> {
+    let problem = match () {
+        _ if latitude.abs() > 90.0 => format!("latitude {latitude} must be from -90 to 90"),
+        _ if !(radius > 0.0 && radius <= 180.0) => format!("radius {radius} must be above 0 and up to 180"),
+        _ if !(0.0..=1.0).contains(&filling) => format!("filling {filling} must be from 0 to 1"),
+        _ => {
+            let [longitude, latitude, radius] = [longitude, latitude, radius].map(f64::to_radians);
+            return Ok(Spot { longitude, latitude, radius, filling });
+        }
+    };
+    Err(Fault::new(key, problem))
+}
+
+/// Number of velocity bins; the last lies at or below `max`.
+fn bins(axis: &VelocitySection, key: &str) -> Result<usize, Fault> {
+    const LEAST: f64 = 5.0;
+    const MOST: f64 = 100_000.0;
+    positive(&format!("{key}.step"), axis.step)?;
+    if axis.min >= axis.max {
+        return Err(Fault::new(format!("{key}.min"), format!("{} must be below max, which is {}", axis.min, axis.max)));
+    }
+    // Where max is meant to be a bin, rounding must not lose it.
+    let bins = ((axis.max - axis.min) / axis.step + 1e-6).floor() + 1.0;
+    if !(LEAST..=MOST).contains(&bins) {
+        return Err(Fault::new(format!("{key}.step"), format!("makes {bins} bins, they must be {LEAST} to {MOST}")));
+    }
+    Ok(bins as usize)
+}

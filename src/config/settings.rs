@@ -1,0 +1,161 @@
+//! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
+
+use super::raw_parts::EquivalentWidth;
+use super::{ConfigError, SamplerSettings};
+use crate::io::lsd::ReadOptions;
+use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues};
+use crate::observation::Observations;
+use crate::star::{Spot, StarSettings};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A whole config, resolved.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The config file.
+    pub path: PathBuf,
+    /// The star. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through [`Settings::star_for`].
+    pub star: StarSettings,
+    /// Where the equivalent width of the line comes from.
+    pub equivalent_width: EquivalentWidth,
+    /// All eight parameters as the config gives them: the fixed ones, and the start of the free ones.
+    pub values: ParameterValues,
+    /// Where the profiles come from.
+    pub source: ObservationSource,
+    /// The Doppler image.
+    pub imaging: ImagingSettings,
+    /// The free parameters in the order of [`Parameter::ALL`]; may be empty, see [`Settings::require_free`].
+    pub free: Vec<FreeParameter>,
+    /// The chain.
+    pub sampler: SamplerSettings,
+    /// Axes of the landscape in the order of [`Parameter::ALL`].
+    pub grid: Option<Vec<GridAxis>>,
+    /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
+    pub resolved: serde_json::Value,
+    /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`, and
+    /// `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    pub sha256: String,
+}
+
+/// Where the profiles come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ObservationSource {
+    /// Files.
+    Files {
+        /// The list, relative to the working directory.
+        path: PathBuf,
+        /// Cut and scaling.
+        options: ReadOptions,
+    },
+    /// A simulation.
+    Simulate(Simulation),
+}
+
+/// Observations to be simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation {
+    /// The spots (radians).
+    pub spots: Vec<Spot>,
+    /// All eight parameters as simulated: those of the config, but for `truth`.
+    pub truth: ParameterValues,
+    /// Times of the profiles (d).
+    pub times_d: Vec<f64>,
+    /// Velocity of the first bin (km/s).
+    pub first_velocity_kms: f64,
+    /// Width of a bin (km/s).
+    pub step_kms: f64,
+    /// Number of bins.
+    pub bins: usize,
+    /// Signal-to-noise ratio of each bin; no noise if `None`.
+    pub snr: Option<f64>,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Pixels of the star.
+    pub pixels: usize,
+}
+
+/// The Doppler image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImagingSettings {
+    /// Pixels of the image, 100 to 2,000,000 (approximately: rings hold whole numbers of pixels).
+    pub pixels: usize,
+    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5.
+    pub default_spot: f64,
+    /// Target chi2 per datum, above 0.
+    pub chi2_target: f64,
+    /// What a reconstruction is judged by.
+    pub objective: ObjectiveKind,
+}
+
+impl Default for ImagingSettings {
+    fn default() -> Self {
+        ImagingSettings { pixels: 2000, default_spot: 1e-4, chi2_target: 0.97, objective: ObjectiveKind::default() }
+    }
+}
+
+/// One axis of the landscape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridAxis {
+    /// Which parameter.
+    pub parameter: Parameter,
+    /// First node.
+    pub min: f64,
+    /// Last node.
+    pub max: f64,
+    /// Number of nodes, at least 1.
+    pub nodes: usize,
+}
+
+impl GridAxis {
+    /// Value at node `k`; a single node lies in the middle.
+    pub fn at(&self, k: usize) -> f64 {
+        match self.nodes {
+            1 => self.min + 0.5 * (self.max - self.min),
+            n => self.min + (self.max - self.min) * (k as f64 / (n - 1) as f64),
+        }
+    }
+}
+
+impl Settings {
+    /// The free parameters, for commands that cannot do without.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn require_free(&self) -> Result<&[FreeParameter], ConfigError> {
+        match &self.free[..] {
+            [] => Err(self.fault("parameters", "no parameter is free: give at least one of them a prior")),
+            free => Ok(free),
+        }
+    }
+
+    /// The axes of the landscape, for the command that cannot do without.
+    ///
+    /// # Errors
+    /// If the config has no `grid`.
+    pub fn require_grid(&self) -> Result<&[GridAxis], ConfigError> {
+        self.grid.as_deref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
+    }
+
+    /// The star, its equivalent width measured on `observations` if that is [`EquivalentWidth::Auto`].
+    ///
+    /// # Errors
+    /// If the equivalent width so measured is not positive.
+    pub fn star_for(&self, observations: &Observations) -> Result<StarSettings, ConfigError> {
+        let mut star = self.star.clone();
+        if self.equivalent_width == EquivalentWidth::Auto {
+            let width = observations.mean_equivalent_width_kms();
+            if !(width.is_finite() && width > 0.0) {
+                let problem = format!("auto gives {width} km/s: the observed profiles are no absorption line");
+                return Err(self.fault("star.line.equivalent_width_kms", &problem));
+            }
+            star.line.equivalent_width_kms = width;
+        }
+        Ok(star)
+    }
+
+    fn fault(&self, key: &str, problem: &str) -> ConfigError {
+        ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
+    }
+}

@@ -1,0 +1,185 @@
+//! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment), and the LSD
+//! profiles it names (Donati text format, Donati et al. 1997), relative to its folder.
+//!
+//! VRAD is subtracted from the velocity axis first; the velocity range is cut in that frame. Left out: Stokes V and N.
+
+mod error;
+mod text;
+
+pub use error::LsdError;
+
+use crate::observation::{Observations, Profile};
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use text::{Axis, MIN_BINS, RawProfile, shown};
+
+/// What to do with the profiles on reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReadOptions {
+    /// First and last velocity to keep (km/s, after subtraction of VRAD); all bins if `None`.
+    pub velocity_range_kms: Option<(f64, f64)>,
+    /// Factor on every sigma.
+    pub sigma_scale: f64,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        ReadOptions { velocity_range_kms: None, sigma_scale: 1.0 }
+    }
+}
+
+/// Observations together with the fingerprint of the files they came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DataSet {
+    /// The profiles after subtraction of VRAD, cut and scaling.
+    pub observations: Observations,
+    /// SHA-256 (hex) of the bytes of the list and of every profile, in the order of the list.
+    pub sha256: String,
+}
+
+/// One line of the list.
+struct Entry {
+    line: usize,
+    path: PathBuf,
+    time_d: f64,
+    vrad_kms: f64,
+}
+
+/// Reads the list at `list` and all profiles it names.
+///
+/// # Errors
+/// A file that cannot be read, a line that makes no sense, profiles on different velocity axes, or a velocity range that
+/// leaves fewer than five bins of a profile.
+pub fn read(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
+    let mut hash = Sha256::new();
+    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
+    hash.update(&bytes);
+    let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
+    let mut first: Option<(&Path, Axis)> = None;
+    let mut profiles = Vec::with_capacity(entries.len());
+    for entry in &entries {
+        let bytes = read_profile(list, entry)?;
+        hash.update(&bytes);
+        let raw = text::parse(&String::from_utf8_lossy(&bytes)).map_err(|fault| match fault.line {
+            0 => LsdError::File { path: entry.path.clone(), problem: fault.problem },
+            line => LsdError::Line { path: entry.path.clone(), line, problem: fault.problem },
+        })?;
+        let (first_path, axis) = *first.get_or_insert((&entry.path, raw.axis));
+        if !axis.agrees_with(&raw.axis) {
+            return Err(LsdError::Axis {
+                path: entry.path.clone(),
+                axis: raw.axis.to_string(),
+                first: first_path.into(),
+                expected: axis.to_string(),
+            });
+        }
+        profiles.push(in_star_frame(entry, RawProfile { axis, ..raw }, options)?);
+    }
+    match first {
+        Some((_, axis)) => Ok(DataSet {
+            observations: Observations { step_kms: axis.step, profiles },
+            sha256: format!("{:x}", hash.finalize()),
+        }),
+        None => Err(LsdError::File { path: list.into(), problem: "lists no profile".into() }),
+    }
+}
+
+fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {
+    std::fs::read(&entry.path).map_err(|source| LsdError::Profile {
+        list: list.into(),
+        line: entry.line,
+        profile: entry.path.clone(),
+        source,
+    })
+}
+
+fn parse_list(list: &Path, text: &str) -> Result<Vec<Entry>, LsdError> {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    let mut entries = Vec::new();
+    for (line, text) in text.lines().enumerate().map(|(k, text)| (k + 1, text)) {
+        let fields: Vec<&str> = text.split_whitespace().take_while(|f| !f.starts_with('#')).collect();
+        let fail = |problem| LsdError::Line { path: list.into(), line, problem };
+        let number = |name: &str, field: &str| match field.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(fail(format!("{name} {} is not a finite number", shown(field)))),
+        };
+        let (file, time_d, vrad_kms) = match fields[..] {
+            [] => continue,
+            [file, time] => (file, number("time", time)?, 0.0),
+            [file, time, vrad] => (file, number("time", time)?, number("radial velocity", vrad)?),
+            _ => return Err(fail(format!("{} columns where FILE TIME_DAYS [VRAD_KMS] is due", fields.len()))),
+        };
+        entries.push(Entry { line, path: folder.join(file), time_d, vrad_kms });
+    }
+    Ok(entries)
+}
+
+/// Subtracts VRAD, cuts the velocity range, scales sigma.
+fn in_star_frame(entry: &Entry, raw: RawProfile, options: &ReadOptions) -> Result<Profile, LsdError> {
+    let axis = Axis { first: raw.axis.first - entry.vrad_kms, ..raw.axis };
+    let (lo, hi) = options.velocity_range_kms.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    // A bin on the edge of the range belongs to it, whatever the rounding of VRAD and step.
+    let slack = 1e-6 * axis.step;
+    let kept: Vec<usize> = (0..axis.bins).filter(|j| (lo - slack..=hi + slack).contains(&axis.at(*j))).collect();
+    let (Some(&begin), Some(&last)) = (kept.first(), kept.last()) else {
+        return Err(too_few(entry, &axis, (lo, hi), 0));
+    };
+    if kept.len() < MIN_BINS {
+        return Err(too_few(entry, &axis, (lo, hi), kept.len()));
+    }
+    let sigma: Vec<f64> = raw.sigma[begin..=last].iter().map(|s| s * options.sigma_scale).collect();
+    if let Some(sigma) = sigma.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+        let problem = format!("sigma becomes {sigma} when scaled by {}", options.sigma_scale);
+        return Err(LsdError::File { path: entry.path.clone(), problem });
+    }
+    Ok(Profile {
+        time_d: entry.time_d,
+        first_velocity_kms: axis.at(begin),
+        intensity: raw.intensity[begin..=last].to_vec(),
+        sigma,
+    })
+}
+
+fn too_few(entry: &Entry, axis: &Axis, (lo, hi): (f64, f64), bins: usize) -> LsdError {
+    let (from, to) = (axis.at(0), axis.at(axis.bins - 1));
+    let what = match bins {
+        0 if hi < from || lo > to => "lies outside the data".to_string(),
+        0 => "holds no bin".to_string(),
+        n => format!("holds {n} bins, at least {MIN_BINS} are needed"),
+    };
+    let problem =
+        format!("velocity range [{lo}, {hi}] km/s {what}; the data reach from {from:.3} to {to:.3} km/s after VRAD");
+    LsdError::File { path: entry.path.clone(), problem }
+}
+
+/// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The list
+/// comes last, so that where it is the profiles are; files of these names are replaced.
+///
+/// Times are exact, intensities good to 5e-13. Profiles that do not share one velocity axis can be written, but not read back.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
+    let mut list = String::from("# file  time_d\n");
+    for (k, profile) in observations.profiles.iter().enumerate() {
+        let name = format!("p{k:03}.prof");
+        save(&folder.join(&name), &profile_text(k, profile, observations.step_kms))?;
+        // Writing to a String cannot fail.
+        let _ = writeln!(list, "{name} {}", profile.time_d);
+    }
+    save(&folder.join("observations.txt"), &list)
+}
+
+fn profile_text(k: usize, profile: &Profile, step_kms: f64) -> String {
+    let mut text = format!("*** Synthetic Stokes I profile {k}\n {} 2\n", profile.intensity.len());
+    for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
+        let velocity = profile.velocity_kms(j, step_kms);
+        let _ = writeln!(text, "{velocity:16.9} {intensity:.12} {sigma:.12e}");
+    }
+    text
+}
+
+fn save(path: &Path, text: &str) -> Result<(), LsdError> {
+    std::fs::write(path, text).map_err(|source| LsdError::Write { path: path.into(), source })
+}

@@ -1,0 +1,372 @@
+//! Configs: those that ship resolve, their resolved form is stable, and every mistake gets one line that names file and key.
+
+use dimcmc::config::{self, EquivalentWidth, ObservationSource, Settings};
+use dimcmc::objective::{Parameter, Prior};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name)
+}
+
+fn demo() -> Value {
+    serde_json::from_slice(&std::fs::read(shipped("demo.json")).unwrap()).unwrap()
+}
+
+fn lopeg() -> Value {
+    serde_json::from_slice(&std::fs::read(shipped("lopeg.json")).unwrap()).unwrap()
+}
+
+fn resolve(config: &Value) -> Result<Settings, String> {
+    config::from_json(config.to_string().as_bytes(), Path::new("dir/x.json")).map_err(|e| e.to_string())
+}
+
+/// `config` with the value at `pointer` replaced, inserted, or (by `Value::Null`) taken away.
+fn with(mut config: Value, pointer: &str, value: Value) -> Value {
+    let (parent, key) = pointer.rsplit_once('/').unwrap();
+    let parent = config.pointer_mut(parent).unwrap_or_else(|| panic!("{pointer}"));
+    match (parent, value) {
+        (Value::Object(map), Value::Null) => drop(map.remove(key)),
+        (Value::Object(map), value) => drop(map.insert(key.into(), value)),
+        (Value::Array(items), value) => items[key.parse::<usize>().unwrap()] = value,
+        _ => panic!("{pointer}"),
+    }
+    config
+}
+
+fn message(config: &Value) -> String {
+    let Err(message) = resolve(config) else { panic!("accepted: {config}") };
+    assert!(!message.contains('\n'), "{message}");
+    message.strip_prefix("dir/x.json").unwrap_or_else(|| panic!("{message}")).to_string()
+}
+
+#[test]
+fn the_demo_resolves() {
+    let settings = config::load(&shipped("demo.json")).unwrap();
+    let parameters: Vec<Parameter> = settings.free.iter().map(|f| f.parameter).collect();
+    assert_eq!(parameters, [Parameter::K, Parameter::PorbOverProt, Parameter::Phi]);
+    assert_eq!(settings.free[2].prior, Prior::Periodic);
+    assert_eq!(settings.values[Parameter::OmegaEq], std::f64::consts::TAU / 3.0);
+    // Planck at 550 nm, 3500 K over 5500 K, and 2.5 km/s with c / 65000 / 2.3548 = 1.9586 km/s in quadrature.
+    assert!((settings.star.contrast - 0.0654).abs() < 1e-3, "{}", settings.star.contrast);
+    assert!((settings.star.line.sigma_kms - 3.1759).abs() < 1e-3);
+    let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
+    assert_eq!((simulation.spots.len(), simulation.times_d.len(), simulation.bins), (12, 50, 57));
+    assert!((simulation.times_d[49] - 2.94 * 3.0).abs() < 1e-12);
+    assert_eq!(simulation.truth, settings.values);
+    let grid = settings.require_grid().unwrap();
+    assert_eq!((grid.len(), grid[1].at(0), grid[1].at(14)), (3, 1.2, 2.2));
+}
+
+#[test]
+fn the_seven_dimensional_config_starts_off_the_truth() {
+    let settings = config::load(&shipped("paper_7d.json")).unwrap();
+    assert_eq!(settings.free.len(), 7);
+    let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
+    let demo = config::load(&shipped("demo.json")).unwrap();
+    assert_eq!(simulation.truth, demo.values);
+    // Widths of method section 5; gamma times Omega_eq for the shear.
+    let sigma = [0.0106, 0.073, 0.041, 0.00038 * 2.0944, 0.00093 * 2.0944, 0.46, 0.022];
+    for (k, sigma) in sigma.into_iter().enumerate() {
+        let off = (settings.values.0[k] - simulation.truth.0[k]) / sigma;
+        assert!((off - 3.0).abs() < 0.01, "{}: {off}", Parameter::ALL[k].name());
+    }
+}
+
+#[test]
+fn lo_peg_resolves() {
+    let settings = config::load(&shipped("lopeg.json")).unwrap();
+    assert_eq!(settings.equivalent_width, EquivalentWidth::Auto);
+    let ObservationSource::Files { path, options } = &settings.source else { panic!() };
+    assert!(path.ends_with("configs/../../shared/data/lopeg/observations.txt"));
+    assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-90.0, 90.0)), 0.4));
+    let list = Path::new("/work/shared/data/lopeg/observations.txt");
+    if list.exists() {
+        let data = dimcmc::io::lsd::read(list, options).unwrap().observations;
+        assert!((settings.star_for(&data).unwrap().line.equivalent_width_kms - 2.7175).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn the_resolved_form_is_a_config_with_the_same_fingerprint() {
+    let minimal = json!({
+        "star": { "rotation_period_d": 3, "inclination_deg": 38, "vsini_kms": 40, "contrast": 0.1,
+                  "line": { "sigma_kms": 2.5, "equivalent_width_kms": "auto" } },
+        "observations": { "path": "observations.txt" },
+        "parameters": { "inclination_deg": { "prior": "isotropic" },
+                        "k_kms": { "prior": "normal", "mean": 0.1, "sd": 0.1 } }
+    });
+    for config in [minimal.clone(), demo(), lopeg()] {
+        let settings = resolve(&config).unwrap();
+        let again = resolve(&settings.resolved).unwrap();
+        assert_eq!(again.resolved, settings.resolved);
+        assert_eq!(again.sha256, settings.sha256);
+        assert_eq!(again.free, settings.free);
+    }
+    let resolved = resolve(&minimal).unwrap().resolved;
+    assert_eq!(resolved["imaging"]["chi2_target"], 0.97);
+    assert_eq!(resolved["sampler"]["walkers"], 32);
+    assert_eq!(resolved["observations"], json!({ "path": "observations.txt", "sigma_scale": 1.0 }));
+    assert_eq!(resolved["parameters"]["inclination_deg"]["max"], 90.0);
+}
+
+/// The contract with users, word for word.
+const INTERFACE_EXAMPLE: &str = r#"{
+  "star": {
+    "rotation_period_d": 3.0, "epoch_d": 0.0,
+    "inclination_deg": 38.0, "vsini_kms": 40.0, "vsys_kms": 0.0, "domega_rad_d": 0.0,
+    "limb_darkening": { "law": "linear", "coefficients": [0.65] },
+    "photosphere_k": 5500.0, "spot_k": 3500.0, "wavelength_nm": 550.0,
+    "line": { "shape": "gaussian", "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }
+  },
+  "instrument": { "resolving_power": 65000.0 },
+  "planet": { "k_kms": 0.1, "porb_over_prot": 1.7, "phi": 0.5 },
+  "observations": { "path": "observations.txt", "velocity_range_kms": [-50.4, 50.4] },
+  "imaging": { "pixels": 5000, "default_spot": 1e-4, "chi2_target": 0.97, "objective": "spottedness" },
+  "parameters": {
+    "k_kms":          { "prior": "uniform", "min": 0.0, "max": 0.3 },
+    "porb_over_prot": { "prior": "uniform", "min": 0.5, "max": 4.0 },
+    "phi":            { "prior": "periodic" }
+  },
+  "sampler": { "ensembles": 4, "walkers": 32, "steps": 2000, "seed": 1, "rhat": 1.01, "ess": 1000 },
+  "grid": { "axes": { "k_kms": [0.0, 0.2, 15], "porb_over_prot": [1.2, 2.2, 15], "phi": [0.3, 0.7, 15] } }
+}"#;
+
+#[test]
+fn the_example_of_the_interface_resolves() {
+    let settings = config::from_json(INTERFACE_EXAMPLE.as_bytes(), Path::new("dir/x.json")).unwrap();
+    assert!(
+        matches!(&settings.source, ObservationSource::Files { path, .. } if path == Path::new("dir/observations.txt"))
+    );
+    assert_eq!((settings.imaging.pixels, settings.free.len()), (5000, 3));
+}
+
+#[test]
+fn only_what_may_change_on_resuming_leaves_the_fingerprint() {
+    let before = resolve(&demo()).unwrap().sha256;
+    let after = |pointer: &str, value: Value| resolve(&with(demo(), pointer, value)).unwrap().sha256;
+    for (pointer, value) in [
+        ("/sampler/steps", json!(5000)),
+        ("/sampler/rhat", json!(1.1)),
+        ("/sampler/ess", json!(10)),
+        ("/grid", Value::Null),
+        ("/star/wavelength_nm", json!(550)),
+    ] {
+        assert_eq!(after(pointer, value), before, "{pointer}");
+    }
+    for (pointer, value) in [
+        ("/sampler/walkers", json!(34)),
+        ("/sampler/seed", json!(2)),
+        ("/imaging/objective", json!("entropy")),
+        ("/parameters/k_kms/max", json!(0.4)),
+        ("/observations/simulate/snr", json!(900)),
+    ] {
+        assert_ne!(after(pointer, value), before, "{pointer}");
+    }
+}
+
+#[test]
+fn accepted_spellings() {
+    for (pointer, value) in [
+        ("/imaging/objective", json!("regularized-likelihood")),
+        ("/imaging/objective", json!("regularised-likelihood")),
+        ("/$schema", json!("dimcmc.schema.json")),
+        ("/instrument", Value::Null),
+        ("/star/limb_darkening", json!({ "law": "quadratic", "coefficients": [0.4, 0.3] })),
+        ("/grid/axes/phi", json!([0.5, 0.5, 1])),
+        ("/parameters/phi", json!({ "prior": "uniform", "min": 0.2, "max": 0.8 })),
+    ] {
+        resolve(&with(demo(), pointer, value)).unwrap_or_else(|e| panic!("{e}"));
+    }
+    let noiseless = demo().to_string().replace("\"snr\":1000.0", "\"snr\":null");
+    let settings = config::from_json(noiseless.as_bytes(), Path::new("x")).unwrap();
+    assert!(matches!(&settings.source, ObservationSource::Simulate(s) if s.snr.is_none()));
+    assert!(settings.resolved["observations"]["simulate"]["snr"].is_null());
+}
+
+#[test]
+fn the_text_of_errors() {
+    let cases = [
+        ("/star/vsinni_kms", json!(40), ": unknown key star.vsinni_kms: did you mean vsini_kms?"),
+        ("/plannet", json!({}), ": unknown key plannet: did you mean planet?"),
+        ("/parameters/vsini", json!({}), ": unknown key parameters.vsini: did you mean vsini_kms?"),
+        ("/sampler/walker", json!(32), ": unknown key sampler.walker: did you mean walkers?"),
+        (
+            "/imaging/objective",
+            json!("spotedness"),
+            ": imaging.objective: unknown value spotedness: did you mean spottedness?",
+        ),
+        ("/star/vsini_kms", json!("forty"), ": star.vsini_kms: expected a number, found string \"forty\""),
+        ("/star/vsini_kms", Value::Null, ": star.vsini_kms: missing"),
+        (
+            "/imaging/pixels",
+            json!(2000.5),
+            ": imaging.pixels: expected a whole number, 0 or more, found floating point `2000.5`",
+        ),
+        ("/imaging/pixels", json!(-5), ": imaging.pixels: expected a whole number, 0 or more, found integer `-5`"),
+        ("/planet", json!(3), ": planet: expected an object in braces, found integer `3`"),
+        (
+            "/observations/simulate/spots/2",
+            json!([1, 2, 3]),
+            ": observations.simulate.spots[2]: expected an array of length 4, found length 3",
+        ),
+        ("/grid/axes/phi", json!([0.1, 0.2]), ": grid.axes.phi: expected an array of length 3, found length 2"),
+        ("/planet/k_kms", json!(0.5), ": planet.k_kms: 0.5 is outside its prior, [0, 0.3] by parameters.k_kms"),
+        (
+            "/parameters/k_kms/min",
+            json!(-0.1),
+            ": parameters.k_kms.min: -0.1 must not be below 0 while phi is free: -K at phi is K at phi + 0.5",
+        ),
+        ("/parameters/k_kms/min", Value::Null, ": parameters.k_kms.min: missing, a uniform prior needs it"),
+    ];
+    for (pointer, value, expected) in cases {
+        assert_eq!(message(&with(demo(), pointer, value)), expected);
+    }
+}
+
+#[test]
+fn senseless_values_name_their_key() {
+    let cases = [
+        ("/star/vsini_kms", json!(0), "star.vsini_kms"),
+        ("/star/vsini_kms", json!(-40), "star.vsini_kms"),
+        ("/star/inclination_deg", json!(0), "star.inclination_deg"),
+        ("/star/inclination_deg", json!(90.1), "star.inclination_deg"),
+        ("/star/rotation_period_d", json!(0), "star.rotation_period_d"),
+        ("/star/rotation_period_d", json!(1e-310), "star.rotation_period_d"),
+        ("/star/omega_eq_rad_d", json!(-2), "star.omega_eq_rad_d"),
+        ("/star/contrast", json!(0.1), "star.contrast"),
+        ("/star/spot_k", json!(6000), "star.spot_k"),
+        ("/star/spot_k", json!(0), "star.spot_k"),
+        ("/star/photosphere_k", Value::Null, "star.photosphere_k"),
+        ("/star/wavelength_nm", json!(0), "star.wavelength_nm"),
+        ("/star/line/sigma_kms", json!(0), "star.line.sigma_kms"),
+        ("/star/line/equivalent_width_kms", json!(-1), "star.line.equivalent_width_kms"),
+        ("/star/line/equivalent_width_kms", json!("auto"), "star.line.equivalent_width_kms"),
+        ("/star/line/equivalent_width_kms", json!("Auto"), "star.line.equivalent_width_kms"),
+        ("/star/limb_darkening/coefficients", json!([0.3, 0.3]), "star.limb_darkening.coefficients"),
+        ("/star/limb_darkening/coefficients", json!([1.2]), "star.limb_darkening.coefficients"),
+        ("/star/limb_darkening/law", json!("linea"), "star.limb_darkening.law"),
+        ("/instrument/resolving_power", json!(0), "instrument.resolving_power"),
+        ("/planet/k_kms", json!(-0.1), "planet.k_kms"),
+        ("/planet/porb_over_prot", json!(0), "planet.porb_over_prot"),
+        ("/imaging/pixels", json!(99), "imaging.pixels"),
+        ("/imaging/pixels", json!(3_000_000), "imaging.pixels"),
+        ("/imaging/default_spot", json!(0.5), "imaging.default_spot"),
+        ("/imaging/chi2_target", json!(0), "imaging.chi2_target"),
+        ("/parameters/k_kms/min", json!(0.3), "parameters.k_kms.min"),
+        ("/parameters/k_kms/min", json!(0.5), "parameters.k_kms.min"),
+        ("/parameters/k_kms/prior", json!("periodic"), "parameters.k_kms.prior"),
+        ("/parameters/k_kms/prior", json!("isotropic"), "parameters.k_kms.prior"),
+        ("/parameters/k_kms/prior", json!("log-uniform"), "parameters.k_kms.min"),
+        ("/parameters/k_kms/sd", json!(1), "parameters.k_kms.sd"),
+        ("/parameters/phi/prior", json!("normal"), "parameters.phi.prior"),
+        ("/parameters/phi/min", json!(0), "parameters.phi.min"),
+        ("/parameters/k_kms", json!({ "prior": "normal", "mean": 0.1, "sd": 0 }), "parameters.k_kms.sd"),
+        ("/parameters/k_kms", json!({ "prior": "normal", "sd": 0.1 }), "parameters.k_kms.mean"),
+        ("/parameters/k_kms", json!({ "prior": "normal", "mean": -9, "sd": 0.1 }), "parameters.k_kms.mean"),
+        ("/parameters/k_kms", json!({ "prior": "normal", "mean": 1e308, "sd": 1e-308 }), "planet.k_kms"),
+        ("/sampler/walkers", json!(31), "sampler.walkers"),
+        ("/sampler/walkers", json!(4), "sampler.walkers"),
+        ("/sampler/ensembles", json!(0), "sampler.ensembles"),
+        ("/sampler/steps", json!(0), "sampler.steps"),
+        ("/grid/axes/k_kms", json!([0.2, 0.1, 5]), "grid.axes.k_kms"),
+        ("/grid/axes/k_kms", json!([0.1, 0.2, 0]), "grid.axes.k_kms"),
+        ("/grid/axes/vsini_kms", json!([39, 41, 5]), "grid.axes"),
+        ("/grid/axes", json!({}), "grid.axes"),
+        ("/observations/path", json!("observations.txt"), "observations"),
+        ("/observations/sigma_scale", json!(0.4), "observations.sigma_scale"),
+        ("/observations/simulate", Value::Null, "observations"),
+        ("/observations/simulate/spots/1", json!([0, 0, 10, 1.1]), "observations.simulate.spots[1]"),
+        ("/observations/simulate/cycles", json!([]), "observations.simulate.cycles"),
+        ("/observations/simulate/cycles/1", json!(1e308), "observations.simulate.cycles[1]"),
+        ("/observations/simulate/snr", json!(0), "observations.simulate.snr"),
+        ("/observations/simulate/pixels", json!(10), "observations.simulate.pixels"),
+        ("/observations/simulate/velocity_kms/min", json!(60), "observations.simulate.velocity_kms.min"),
+        ("/observations/simulate/velocity_kms/step", json!(90), "observations.simulate.velocity_kms.step"),
+        ("/observations/simulate/truth", json!({ "vsini_kms": -1 }), "observations.simulate.truth.vsini_kms"),
+    ];
+    for (pointer, value, key) in cases {
+        let message = message(&with(demo(), pointer, value));
+        assert!(message.starts_with(&format!(": {key}: ")), "{pointer}: {message}");
+    }
+    for (pointer, value, key) in [
+        ("/observations/velocity_range_kms", json!([90, -90]), "observations.velocity_range_kms"),
+        ("/observations/sigma_scale", json!(0), "observations.sigma_scale"),
+        ("/observations/path", json!(""), "observations.path"),
+    ] {
+        let message = message(&with(lopeg(), pointer, value));
+        assert!(message.starts_with(&format!(": {key}: ")), "{message}");
+    }
+}
+
+#[test]
+fn phase_and_period_mean_nothing_without_a_planet() {
+    let fixed = with(with(demo(), "/planet/k_kms", json!(0)), "/parameters/k_kms", Value::Null);
+    assert!(message(&with(fixed.clone(), "/parameters/porb_over_prot", Value::Null)).starts_with(": parameters.phi: "));
+    let none = with(fixed, "/parameters", Value::Null);
+    let error = resolve(&none).unwrap().require_free().unwrap_err().to_string();
+    assert!(error.starts_with("dir/x.json: parameters: no parameter is free"), "{error}");
+    let error = resolve(&with(none, "/grid", Value::Null)).unwrap().require_grid().unwrap_err().to_string();
+    assert!(error.starts_with("dir/x.json: grid: missing"), "{error}");
+}
+
+#[test]
+fn text_that_is_no_config() {
+    let error = |text: &[u8]| config::from_json(text, Path::new("x.json")).unwrap_err().to_string();
+    assert_eq!(error(b"{\n  \"star\": {,\n}"), "x.json:2:12: invalid JSON: key must be a string");
+    assert!(error(b"").starts_with("x.json:1:0: invalid JSON: EOF"));
+    assert!(error(format!("{} x", demo()).as_bytes()).contains("trailing characters"));
+    assert!(error(b"[1]").starts_with("x.json: "));
+    let twice = demo().to_string().replacen("\"star\":{", "\"star\":{\"epoch_d\":1,", 1);
+    assert_eq!(error(twice.as_bytes()), "x.json: star.epoch_d: given twice");
+    assert!(error(b"{\"star\": {\"a\\n\\u0007b\": 1}}").starts_with("x.json: unknown key star.a  b: must be one of "));
+    assert!(error(&b"[".repeat(100_000)).len() < 500);
+    let absent = config::load(Path::new("/nowhere/x.json")).unwrap_err().to_string();
+    assert!(absent.starts_with("/nowhere/x.json: cannot read: No such file"), "{absent}");
+}
+
+#[test]
+fn no_text_makes_it_panic() {
+    let pieces =
+        ["", "1e308", "-1", "0", "null", "\"auto\"", "{}", "[]", "\n", "é", "1e-320", "18446744073709551615", "}"];
+    let bases = [demo().to_string(), lopeg().to_string()];
+    for k in 0..4000usize {
+        let base = &bases[k % 2].as_bytes();
+        let (at, piece) = ((k * 7919 + k / 5) % base.len(), pieces[k % pieces.len()].as_bytes());
+        let text = match k / 2 % 3 {
+            0 => base[..at].to_vec(),
+            1 => [&base[..at], piece, &base[(at + k % 9).min(base.len())..]].concat(),
+            _ => replace_number(base, at, piece),
+        };
+        if let Err(error) = config::from_json(&text, Path::new("x.json")) {
+            let error = error.to_string();
+            assert!(error.starts_with("x.json") && !error.contains('\n') && error.len() < 1000, "{error}");
+        }
+    }
+}
+
+/// Puts `piece` in place of the first number after `at`: texts that are still JSON, and reach the checks of the values.
+fn replace_number(base: &[u8], at: usize, piece: &[u8]) -> Vec<u8> {
+    let part_of_number = |b: &u8| b.is_ascii_digit() || b"-.".contains(b);
+    let starts = |k: &usize| b":,[".contains(&base[*k]) && base.get(k + 1).is_some_and(part_of_number);
+    let Some(start) = (at..base.len()).find(starts) else { return base.to_vec() };
+    let end = (start + 1..base.len()).find(|k| !part_of_number(&base[*k])).unwrap_or(base.len());
+    [&base[..=start], piece, &base[end..]].concat()
+}
+
+#[test]
+fn the_shipped_schema_is_the_generated_one() {
+    let path = shipped("dimcmc.schema.json");
+    if std::env::var_os("DIMCMC_WRITE_SCHEMA").is_some() {
+        std::fs::write(&path, config::schema()).unwrap();
+    }
+    let shipped: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let generated: Value = serde_json::from_str(&config::schema()).unwrap();
+    assert_eq!(shipped, generated, "run the tests once with DIMCMC_WRITE_SCHEMA=1");
+    // Every key of every section has a description.
+    for (name, section) in generated["$defs"].as_object().unwrap() {
+        for (key, property) in section["properties"].as_object().into_iter().flatten() {
+            assert!(property["description"].is_string(), "{name}.{key}");
+        }
+    }
+}
