@@ -3,8 +3,8 @@
 //! The map s gives the brightness `B = 1 - (1 - c) s`; the model is `D = line(B) / continuum(B)` (method section 1), whose
 //! second derivative is kept, so that the solver's Newton steps are exact. Left out: which parameters are tried, and why.
 
-use crate::maxent::Problem;
 use crate::maxent::entropy::Entropy;
+use crate::maxent::{Curvature, Problem};
 use crate::observation::Observations;
 use crate::star::{Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
 
@@ -179,8 +179,9 @@ impl Problem for ImagingProblem<'_> {
 
     /// `J^T W J v` plus the curvature of the model: with `dD = (line(dB) - D dC) / C`, the second derivative of `D = N/C`
     /// in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`.
-    fn curvature(&mut self, v: &[f64], out: &mut [f64]) {
+    fn curvature(&mut self, which: Curvature, v: &[f64], out: &mut [f64]) {
         self.passes += 2;
+        let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
         self.response.apply(v, &mut self.bins, &mut self.constants);
         for k in 0..self.response.profiles() {
             let scale = -self.darkness / self.continuum[k];
@@ -188,7 +189,7 @@ impl Problem for ImagingProblem<'_> {
             let mut constant = 0.0;
             for j in self.response.bins(k) {
                 let d_model = scale * self.bins[j] - self.model[j] * d_continuum;
-                let residual = self.weighted_residual[j];
+                let residual = second_order * self.weighted_residual[j];
                 let back = scale * (self.data.inverse_variance[j] * d_model - residual * d_continuum);
                 constant -= back * self.model[j] + scale * residual * d_model;
                 self.bins[j] = back;

@@ -10,5 +10,5 @@ pub mod problem;
 pub mod solver;
 
 pub use preconditioner::Preconditioner;
-pub use problem::Problem;
+pub use problem::{Curvature, Problem};
 pub use solver::{Goal, Image, Solution, Solver, SolverSettings, Start, Termination};

@@ -1,5 +1,14 @@
 //! What an inversion needs to know of its data: a misfit, its gradient and its curvature, as functions of an image.
 
+/// Which second derivative of the misfit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Curvature {
+    /// Of the misfit itself: Newton steps converge quadratically.
+    Exact,
+    /// Of the misfit of the linearised model: never negative, however bad the fit.
+    GaussNewton,
+}
+
 /// A twice differentiable misfit `chi2(s)` of an image s.
 ///
 /// The methods refer to the image last given to [`Problem::linearise`]. Each call counts the applications of the response
@@ -15,7 +24,7 @@ pub trait Problem {
     fn gradient(&mut self, out: &mut [f64]);
 
     /// Second derivative of chi2 / 2 times `v`.
-    fn curvature(&mut self, v: &[f64], out: &mut [f64]);
+    fn curvature(&mut self, which: Curvature, v: &[f64], out: &mut [f64]);
 
     /// Applications of the response or its transpose so far.
     fn passes(&self) -> u32;

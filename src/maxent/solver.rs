@@ -6,10 +6,10 @@
 //! starts from the image it is given and from nothing else, so the answer is a function of problem and start.
 //! Left out: what the image shows.
 
-use super::Problem;
 use super::cg::{self, CgLimits, axpy, dot};
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
+use super::problem::{Curvature, Problem};
 
 /// What to solve for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,6 +109,9 @@ pub struct Solution {
 const LOGIT_CAP: f64 = 2.0;
 const LN_LAMBDA_CAP: f64 = 1.5;
 
+/// The exact curvature is used once a step is worth less than this in `S/lambda - chi2/2`.
+const EXACT_BELOW: f64 = 100.0;
+
 /// Bounds of lambda: far beyond any use, they keep a hopeless start finite.
 const SMALLEST_LAMBDA: f64 = 1e-12;
 
@@ -132,6 +135,14 @@ struct Point {
     entropy: f64,
 }
 
+/// A Newton system in the entropy's metric.
+#[derive(Clone, Copy)]
+struct System<'a> {
+    lambda: f64,
+    scale: &'a [f64],
+    curvature: Curvature,
+}
+
 /// Step at fixed lambda and path along lambda, in the metric.
 struct Newton {
     scale: Vec<f64>,
@@ -142,6 +153,9 @@ struct Newton {
     /// Slope of chi2 along `path`, and along `step`.
     chi2_path: f64,
     chi2_step: f64,
+    /// Slope of spottedness along `path`, and along `step`.
+    spottedness_path: f64,
+    spottedness_step: f64,
 }
 
 impl Solver<'_> {
@@ -157,13 +171,13 @@ impl Solver<'_> {
             at.lambda = lambda;
         }
         let mut path = start.path.clone();
+        let mut curvature = Curvature::GaussNewton;
         for newton_steps in 0..self.settings.newton_steps {
             if !(at.chi2.is_finite() && at.entropy.is_finite()) {
                 return self.finish(problem, at, None, Termination::NonFinite, newton_steps);
             }
-            let newton = self.newton(problem, &at, goal, path);
+            let newton = self.newton(problem, &at, goal, path, curvature);
             let move_lambda = self.lambda_step(&at, &newton, goal);
-            eprintln!("{newton_steps} lam {:.3e} chi2 {:.3} S {:.5} merit {:.6} decr {:.3e} move {:.3} passes {} cpath {:.2} cstep {:.2}", at.lambda, at.chi2, at.entropy, -at.entropy+0.5*at.lambda*at.chi2, newton.decrement, move_lambda, problem.passes(), newton.chi2_path, newton.chi2_step);
             let unreachable = matches!(goal, Goal::Chi2 { target, largest_lambda }
                 if at.lambda >= largest_lambda && at.chi2 + newton.chi2_step > target && move_lambda == 0.0);
             if let Some(last) = self.is_last(&at, &newton, move_lambda, goal) {
@@ -172,6 +186,9 @@ impl Solver<'_> {
                 return self.finish(problem, end, Some(newton), why, newton_steps + 1);
             }
             at = self.advance(problem, &at, &newton, move_lambda);
+            // far away the curvature of the model may make the system indefinite, near by it makes the steps exact
+            let near = 0.5 * newton.decrement < EXACT_BELOW * at.lambda;
+            curvature = if near { Curvature::Exact } else { Curvature::GaussNewton };
             path = newton.path;
         }
         self.finish(problem, at, None, Termination::StepLimit, self.settings.newton_steps)
@@ -186,7 +203,8 @@ impl Solver<'_> {
         self.entropy.metric(&s, problem.area(), &mut scale);
         let scaled: Vec<f64> = right.iter().zip(&scale).map(|(r, d)| r * d).collect();
         let mut z = vec![0.0; n];
-        self.solve_system(problem, image.lambda, &scale, &scaled, &mut z);
+        let system = System { lambda: image.lambda, scale: &scale, curvature: Curvature::Exact };
+        self.solve_system(problem, system, &scaled, &mut z);
         z.iter().zip(&scale).map(|(z, d)| z * d).collect()
     }
 
@@ -199,7 +217,14 @@ impl Solver<'_> {
     }
 
     /// The Newton step at fixed lambda and, if chi2 is the goal, the path along lambda.
-    fn newton(&self, problem: &mut impl Problem, at: &Point, goal: Goal, guess: Vec<f64>) -> Newton {
+    fn newton(
+        &self,
+        problem: &mut impl Problem,
+        at: &Point,
+        goal: Goal,
+        guess: Vec<f64>,
+        curvature: Curvature,
+    ) -> Newton {
         let n = at.u.len();
         let (mut scale, mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         self.entropy.metric(&at.s, problem.area(), &mut scale);
@@ -210,16 +235,20 @@ impl Solver<'_> {
             right[p] = -(right[p] * scale[p] + at.lambda * chi2_gradient[p]);
         }
         let mut step = vec![0.0; n];
-        self.solve_system(problem, at.lambda, &scale, &right, &mut step);
+        let system = System { lambda: at.lambda, scale: &scale, curvature };
+        self.solve_system(problem, system, &right, &mut step);
         let mut path = vec![0.0; n];
         if let Goal::Chi2 { .. } = goal {
             if guess.len() == n {
                 path = guess;
             }
             let pull: Vec<f64> = chi2_gradient.iter().map(|g| -at.lambda * g).collect();
-            self.solve_system(problem, at.lambda, &scale, &pull, &mut path);
+            self.solve_system(problem, system, &pull, &mut path);
         }
+        let weight: Vec<f64> = scale.iter().zip(problem.area()).map(|(scale, a)| scale * a).collect();
         Newton {
+            spottedness_path: dot(&weight, &path),
+            spottedness_step: dot(&weight, &step),
             decrement: dot(&step, &right).max(0.0),
             chi2_path: 2.0 * dot(&chi2_gradient, &path),
             chi2_step: 2.0 * dot(&chi2_gradient, &step),
@@ -229,11 +258,12 @@ impl Solver<'_> {
         }
     }
 
-    fn solve_system(&self, problem: &mut impl Problem, lambda: f64, scale: &[f64], right: &[f64], z: &mut [f64]) {
+    fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f64], z: &mut [f64]) {
+        let System { lambda, scale, curvature } = system;
         let mut scaled = vec![0.0; right.len()];
         let apply = |v: &[f64], out: &mut [f64]| {
             scaled.iter_mut().zip(v).zip(scale).for_each(|((x, v), scale)| *x = v * scale);
-            problem.curvature(&scaled, out);
+            problem.curvature(curvature, &scaled, out);
             for ((out, v), scale) in out.iter_mut().zip(v).zip(scale) {
                 *out = v + lambda * scale * *out;
             }
@@ -256,16 +286,19 @@ impl Solver<'_> {
 
     /// Whether this Newton step is the last: `Some(true)` to take it and stop, `Some(false)` to stop where we are.
     fn is_last(&self, at: &Point, newton: &Newton, move_lambda: f64, goal: Goal) -> Option<bool> {
-        // a step whose effect is e leaves an error of about cg_tolerance^2 e (the objective is stationary) in S/lambda -
-        // chi2/2, and of cg_tolerance e in chi2
+        // a step of effect e leaves an error of about cg_tolerance x e; the effect is measured in chi2/2: of the step in the
+        // merit, in chi2 itself and, where chi2 is the goal, in what the change of spottedness is worth along the path
         let merit = 0.5 * newton.decrement / at.lambda;
-        let left = match goal {
-            Goal::Lambda(_) => merit * self.settings.cg_tolerance.powi(2),
+        let effect = match goal {
+            Goal::Lambda(_) => merit,
             Goal::Chi2 { .. } => {
-                let moved = (newton.chi2_path * move_lambda).abs() + newton.chi2_step.abs();
-                0.5 * moved * self.settings.cg_tolerance + merit * self.settings.cg_tolerance
+                let worth = newton.chi2_path / newton.spottedness_path;
+                let spottedness = newton.spottedness_step * if worth.is_finite() { worth } else { 0.0 };
+                let moved = (newton.chi2_path * move_lambda).abs() + newton.chi2_step.abs() + spottedness.abs();
+                0.5 * moved + merit
             }
         };
+        let left = effect * self.settings.cg_tolerance;
         if left < self.settings.tolerance {
             return Some(merit > 1e-14 || move_lambda != 0.0);
         }
@@ -286,7 +319,6 @@ impl Solver<'_> {
             self.entropy.step(&at.u, &at.s, &ds, length, LOGIT_CAP, &mut u);
             let next = self.arrive(problem, u, lambda);
             let small = 1e-9 * before.abs() + self.settings.tolerance * lambda;
-            if length<1.0 {eprintln!("    length {length} merit {:.6} before {:.6}", merit(&next), before);}
             if merit(&next) <= before + small || length < 1e-4 {
                 return next;
             }
@@ -304,11 +336,8 @@ impl Solver<'_> {
     ) -> Solution {
         let area = problem.area();
         let finite = at.chi2.is_finite() && at.entropy.is_finite() && at.lambda.is_finite();
-        let (chi2_slope, spottedness_slope, path) = newton.map_or((0.0, 0.0, Vec::new()), |newton| {
-            let weights = || newton.scale.iter().zip(area).map(|(scale, a)| scale * a);
-            let slope = weights().zip(&newton.path).map(|(w, z)| w * z).sum();
-            (newton.chi2_path, slope, newton.path)
-        });
+        let (chi2_slope, spottedness_slope, path) =
+            newton.map_or((0.0, 0.0, Vec::new()), |newton| (newton.chi2_path, newton.spottedness_path, newton.path));
         Solution {
             termination: if finite { termination } else { Termination::NonFinite },
             chi2: at.chi2,

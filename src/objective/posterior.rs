@@ -10,7 +10,7 @@ use super::reference::Reference;
 use super::tradeoff::Measure;
 use crate::imaging::{Imager, ImagingProblem};
 use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
-use crate::maxent::{Goal, Problem, Solution, Solver, SolverSettings, Termination};
+use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Termination};
 use crate::star::Response;
 
 /// The posterior of the free parameters.
@@ -28,6 +28,12 @@ pub struct Posterior {
 /// Widest velocity grid (half-width in km/s over the step) that is tried; beyond it a parameter vector is absurd.
 const LARGEST_VSINI_KMS: f64 = 2000.0;
 
+/// Newton steps from the reference before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
+const NEWTON_STEPS: usize = 15;
+
+/// A chi2 this many times the target is far from any fit.
+const FAR: f64 = 1.05;
+
 /// Numerical derivatives of forward models step by this share of a coordinate's natural scale.
 const DERIVATIVE_STEP: f64 = 0.05;
 
@@ -42,6 +48,11 @@ impl Posterior {
             && space.free().iter().all(|f| shifts(f.parameter));
         let settings = SolverSettings::default();
         Posterior { imager, space, kind, reference, settings, velocities_only }
+    }
+
+    /// The same posterior with other solver settings than those that a chain needs.
+    pub fn with_settings(self, settings: SolverSettings) -> Self {
+        Posterior { settings, ..self }
     }
 
     /// The reference.
@@ -96,7 +107,15 @@ impl Posterior {
     /// The reconstruction at `theta`, whatever the prior says.
     pub fn reconstruct(&self, theta: &[f64]) -> (Solution, ImagingProblem<'_>) {
         let mut problem = self.imager.problem(self.response(theta));
-        let solution = self.solver().solve(&mut problem, self.goal(), &self.reference.start());
+        let near = Solver { settings: SolverSettings { newton_steps: NEWTON_STEPS, ..self.settings }, ..self.solver() };
+        let solution = near.solve(&mut problem, self.goal(), &self.reference.start());
+        if solution.termination != Termination::StepLimit {
+            return (solution, problem);
+        }
+        // so far from the reference that a blank star is the better start
+        let none = Preconditioner::identity();
+        let far = Solver { preconditioner: &none, ..self.solver() };
+        let solution = far.solve(&mut problem, self.goal(), &far.blank(self.imager.grid.len()));
         (solution, problem)
     }
 
@@ -113,8 +132,8 @@ impl Posterior {
         let target = self.reference.chi2_target;
         // to first order along the path to the target; where that is out of reach, its misfit counts as it is
         let (to_target, misfit) = match solution.termination {
-            Termination::Unreachable => (0.0, solution.chi2 - target),
-            _ => (target - solution.chi2, 0.0),
+            Termination::Converged => (target - solution.chi2, 0.0),
+            _ => (0.0, solution.chi2 - target),
         };
         let value = match measure {
             Measure::Spottedness if to_target == 0.0 => solution.spottedness,
@@ -129,7 +148,11 @@ impl Posterior {
         let status = match solution.termination {
             Termination::Converged => Status::Converged,
             Termination::Unreachable => Status::Unreachable,
-            Termination::StepLimit => return Evaluation { passes, ..Evaluation::rejected(Status::StoppedShort) },
+            Termination::StepLimit if solution.chi2 < FAR * self.reference.chi2_target => {
+                return Evaluation { passes, ..Evaluation::rejected(Status::StoppedShort) };
+            }
+            // a lower bound of the log-probability, good enough where it is hundreds below the best
+            Termination::StepLimit => Status::Unreachable,
             Termination::NonFinite => return Evaluation { passes, ..Evaluation::rejected(Status::NonFinite) },
         };
         let log_prob = self.log_likelihood(solution).0 + log_prior;
@@ -159,7 +182,7 @@ impl Posterior {
     fn sensitivity(&self, solution: &Solution, problem: &mut ImagingProblem) -> (f64, Option<Vec<f64>>) {
         let curve_slope = self.log_likelihood(solution).1;
         let lambda = solution.image.lambda;
-        let unreachable = solution.termination == Termination::Unreachable;
+        let unreachable = solution.termination != Termination::Converged;
         match self.kind {
             ObjectiveKind::RegularisedLikelihood => (-0.5, None),
             // ln L = (chi2_curve(-S) - target)/2 and dS = -(lambda/2) dchi2
@@ -168,7 +191,8 @@ impl Posterior {
             _ if unreachable => (-0.5, None),
             _ => {
                 let area = self.imager.grid.area.clone();
-                let inverse = self.solver().apply_inverse(problem, &solution.image, &area);
+                let exact = Solver { settings: SolverSettings::exact(), ..self.solver() };
+                let inverse = exact.apply_inverse(problem, &solution.image, &area);
                 let mu = solution.spottedness_slope / solution.chi2_slope;
                 let mut image = vec![0.0; area.len()];
                 self.imager.entropy.image(&solution.image.logit, &mut image);

@@ -6,7 +6,7 @@
 use super::parameters::ParameterValues;
 use super::tradeoff::{Node, TradeOff};
 use crate::imaging::Imager;
-use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
+use crate::maxent::{Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
 use crate::star::Response;
 
 /// Rank of the preconditioner; directions beyond it have lambda x curvature below 1 on the paper's setup.
@@ -138,7 +138,7 @@ fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> P
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = v * d);
-        problem.curvature(&scaled, out);
+        problem.curvature(Curvature::Exact, &scaled, out);
         out.iter_mut().zip(&scale).for_each(|(x, d)| *x *= d);
     })
 }

@@ -118,8 +118,8 @@ mod tests {
             let chi2 = 1.01 + 0.0198 * i as f64;
             for (measure, x) in [(Measure::Spottedness, (-chi2).exp()), (Measure::NegativeEntropy, 1.0 / chi2)] {
                 let (value, slope) = curve.chi2_at(measure, x);
-                // error of a cubic: h^4 / 384 times a fourth derivative of order 6
-                assert!((value - chi2).abs() < 5e-6, "{measure:?} {chi2} {value}");
+                // error of a cubic: h^4 / 384 times a fourth derivative, 24 / x^5 for chi2 = 1/x: 1.1e-5 at the end
+                assert!((value - chi2).abs() < 1.2e-5, "{measure:?} {chi2} {value}");
                 let numerical =
                     (curve.chi2_at(measure, x * 1.0001).0 - curve.chi2_at(measure, x * 0.9999).0) / (2e-4 * x);
                 assert!((slope / numerical - 1.0).abs() < 1e-4);

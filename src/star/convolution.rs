@@ -42,7 +42,7 @@ impl ProfileConvolution {
     }
 
     /// Line depth in every bin (overwritten) from the rows of the grid.
-    pub fn to_bins(&self, rows: &Rows, bins: &mut [f64]) {
+    pub fn sum_to_bins(&self, rows: &Rows, bins: &mut [f64]) {
         bins.fill(0.0);
         self.each_entry(rows.columns, bins.len(), |line, row, column, range| {
             let source = &rows.row(row)[column..column + range.len()];
@@ -52,8 +52,8 @@ impl ProfileConvolution {
         });
     }
 
-    /// Transpose of [`ProfileConvolution::to_bins`]: sets the rows of the grid from the bins.
-    pub fn from_bins(&self, bins: &[f64], rows: &mut Rows) {
+    /// Transpose of [`ProfileConvolution::sum_to_bins`]: sets the rows of the grid from the bins.
+    pub fn spread_bins(&self, bins: &[f64], rows: &mut Rows) {
         rows.values.fill(0.0);
         let columns = rows.columns;
         self.each_entry(columns, bins.len(), |line, row, column, range| {

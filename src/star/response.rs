@@ -106,7 +106,7 @@ impl Response {
             self.deposit.gather(k, x, &mut nodes);
             continuum[k] = nodes.iter().sum();
             rows.interleave(&nodes);
-            convolution.to_bins(&rows, &mut line[self.bins(k)]);
+            convolution.sum_to_bins(&rows, &mut line[self.bins(k)]);
         }
     }
 
@@ -127,7 +127,7 @@ impl Response {
         let mut nodes = vec![0.0; self.deposit.nodes];
         let mut rows = Rows::new(self.deposit.nodes, self.steps_per_bin);
         for (k, convolution) in self.convolutions.iter().enumerate() {
-            convolution.from_bins(&line[self.bins(k)], &mut rows);
+            convolution.spread_bins(&line[self.bins(k)], &mut rows);
             rows.deinterleave(&mut nodes);
             nodes.iter_mut().for_each(|node| *node += continuum[k]);
             self.deposit.scatter(k, &nodes, out);
