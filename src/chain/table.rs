@@ -1,0 +1,91 @@
+//! The summary as text, aligned, one line a parameter, and a last line that says plainly whether it can be trusted.
+
+use crate::chain::{ParameterSummary, Summary};
+use std::collections::BTreeMap;
+
+/// The table. With `truth` (injected values by name) there is a column for it.
+pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
+    let mut head = vec!["parameter", "median", "- 68%", "+ 68%", "95% interval", "95% HDI", "R-hat", "ESS", "tau"];
+    if truth.is_some() {
+        head.insert(1, "truth");
+    }
+    let mut rows: Vec<Vec<String>> = vec![head.into_iter().map(str::to_owned).collect()];
+    for name in &summary.names {
+        let Some(one) = summary.parameters.get(name) else { continue };
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let text = truth.get(name).map_or_else(|| "-".to_owned(), |value| number(*value, decimals(one)));
+            row.insert(1, text);
+        }
+        rows.push(row);
+    }
+    let mut text = aligned(&rows);
+    for name in &summary.names {
+        if let Some((one, upper)) = summary.parameters.get(name).and_then(|one| Some((one, one.upper95?))) {
+            text += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
+        }
+    }
+    text += &format!(
+        "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} passes each, best log_prob {:.3}\n",
+        summary.steps,
+        summary.discarded_steps,
+        summary.acceptance_fraction,
+        summary.evaluations,
+        summary.failures,
+        summary.passes_median,
+        summary.best.log_prob
+    );
+    text + &verdict(summary) + "\n"
+}
+
+fn verdict(summary: &Summary) -> String {
+    let advice = summary.advice.join("; ");
+    match (summary.converged, advice.is_empty()) {
+        (true, true) => "converged".to_owned(),
+        (true, false) => format!("converged, but {advice}"),
+        (false, _) => format!("NOT converged: {advice}"),
+    }
+}
+
+fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
+    let digits = decimals(one);
+    let interval = |[low, high]: [f64; 2]| format!("[{}, {}]", number(low, digits), number(high, digits));
+    let optional =
+        |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
+    // Differences from the median as the interval has it: a periodic one may be in another turn than a wrapped estimate.
+    vec![
+        name.to_owned(),
+        number(one.median, digits),
+        number(one.median - one.ci68[0], digits),
+        number(one.ci68[1] - one.median, digits),
+        interval(one.ci95),
+        interval(one.hdi95),
+        optional(one.rhat, 3),
+        optional(one.ess, 0),
+        optional(one.tau, 1),
+    ]
+}
+
+/// Decimals that show two digits of the standard deviation.
+fn decimals(one: &ParameterSummary) -> usize {
+    if one.sd > 0.0 && one.sd.is_finite() { (1.0 - one.sd.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 }
+}
+
+fn number(value: f64, digits: usize) -> String {
+    format!("{value:.digits$}")
+}
+
+/// Columns under each other: the first to the left, the others to the right.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let columns = rows.first().map_or(0, Vec::len);
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, width))| match column {
+            0 => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ") + "\n"
+    };
+    rows.iter().map(line).collect()
+}

@@ -1,0 +1,102 @@
+//! When a chain ends: goals reached, step limit, or asked to.
+//!
+//! The goals are looked at every so many steps and depend on the chain's content alone, so a chain that was interrupted
+//! and resumed ends at the same step as one that was not. Left out: the diagnostics themselves (`chain::convergence`).
+
+use crate::chain::{Chain, ChainError, Convergence, Goals, ParameterKind, Record};
+use crate::ensemble::{EnsembleError, Sampler, SamplerSettings, State};
+use std::sync::atomic::AtomicBool;
+
+/// When to end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StopPolicy {
+    /// Step limit: the number of the last step.
+    pub steps: usize,
+    /// What every parameter must reach.
+    pub goals: Goals,
+    /// The goals are looked at when the step is a multiple of this.
+    pub every: usize,
+}
+
+/// Why a chain ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopReason {
+    /// Every parameter has reached the goals.
+    Converged,
+    /// The step limit is reached and the goals are not.
+    StepLimit,
+    /// It was asked to stop; the chain can be resumed.
+    Interrupted,
+}
+
+/// What can go wrong in [`run`].
+#[derive(Debug, thiserror::Error)]
+pub enum RunError<E> {
+    /// The sampler refused.
+    #[error(transparent)]
+    Ensemble(#[from] EnsembleError),
+    /// The chain refused a step.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// The caller's callback failed.
+    #[error("{0}")]
+    Callback(E),
+}
+
+impl StopPolicy {
+    /// The policy of the settings, looking at the goals every 50 steps.
+    pub fn new(settings: &SamplerSettings) -> Self {
+        let goals = Goals { rhat: settings.rhat, ess: settings.ess };
+        StopPolicy { steps: settings.steps, goals, every: 50 }
+    }
+
+    /// Whether the chain ends where it is now, with the diagnostics if they were due.
+    ///
+    /// # Errors
+    /// [`ChainError::Kinds`] when `kinds` does not match the chain.
+    pub fn verdict(
+        &self,
+        chain: &Chain,
+        kinds: &[ParameterKind],
+    ) -> Result<(Option<StopReason>, Option<Convergence>), ChainError> {
+        let Some(step) = chain.steps().checked_sub(1) else { return Ok((None, None)) };
+        let due = step > 0 && (step.is_multiple_of(self.every.max(1)) || step >= self.steps);
+        let convergence = if due { Some(Convergence::of(chain, kinds)?) } else { None };
+        let reason = match &convergence {
+            Some(convergence) if convergence.reached(&self.goals) => Some(StopReason::Converged),
+            _ if step >= self.steps => Some(StopReason::StepLimit),
+            _ => None,
+        };
+        Ok((reason, convergence))
+    }
+}
+
+/// Steps from the end of `chain` until the policy or `stop` says so.
+///
+/// `chain` holds step 0 at least ([`Sampler::start`]) or whatever was read back. Each step is handed to `on_step` (which
+/// writes it, and shows progress) together with the diagnostics when they were due, before the next one begins.
+///
+/// # Errors
+/// [`RunError`]: a chain that does not fit the sampler, or a callback that failed.
+pub fn run<E>(
+    sampler: &Sampler,
+    chain: &mut Chain,
+    kinds: &[ParameterKind],
+    policy: &StopPolicy,
+    stop: &AtomicBool,
+    on_step: &mut dyn FnMut(&[Record], Option<&Convergence>) -> Result<(), E>,
+) -> Result<StopReason, RunError<E>> {
+    let mut state: State = sampler.resume(chain)?;
+    if let (Some(reason), _) = policy.verdict(chain, kinds)? {
+        return Ok(reason);
+    }
+    loop {
+        let Some(records) = sampler.step(&mut state, stop) else { return Ok(StopReason::Interrupted) };
+        chain.push_step(&records)?;
+        let (reason, convergence) = policy.verdict(chain, kinds)?;
+        on_step(&records, convergence.as_ref()).map_err(RunError::Callback)?;
+        if let Some(reason) = reason {
+            return Ok(reason);
+        }
+    }
+}
