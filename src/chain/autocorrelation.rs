@@ -95,7 +95,9 @@ pub(crate) mod tests {
             let noise = (1.0 - coefficient * coefficient).sqrt();
             let mut next = || {
                 let kick: f64 = rng.sample(StandardNormal);
-                std::mem::replace(&mut x, coefficient * x + noise * kick)
+                let now = x;
+                x = coefficient * x + noise * kick;
+                now
             };
             (0..steps).map(|_| next()).collect::<Vec<f64>>()
         };
