@@ -3,7 +3,7 @@
 use dimcmc::chain::{Chain, ParameterKind, Record, Shape, summarise};
 use dimcmc::ensemble::moves::{DifferentialEvolution, Stretch};
 use dimcmc::ensemble::{
-    EnsembleError, Mix, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start, run,
+    EnsembleError, Mix, Positions, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start, run,
 };
 use dimcmc::io::journal::{self, Journal};
 use dimcmc::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
@@ -58,6 +58,15 @@ impl LogDensity for Orbit {
     }
 }
 
+/// One evaluation after the other: for densities that cost less than handing them to a thread.
+struct Serial<'a>(&'a dyn LogDensity);
+
+impl Evaluator for Serial<'_> {
+    fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation> {
+        batch.iter().map(|theta| self.0.evaluate(theta)).collect()
+    }
+}
+
 const KINDS: [ParameterKind; 3] = [ParameterKind::Amplitude, ParameterKind::Periodic, ParameterKind::Linear];
 
 fn settings(ensembles: usize, walkers: usize, steps: usize) -> SamplerSettings {
@@ -68,7 +77,7 @@ fn shape(density: &dyn LogDensity, settings: &SamplerSettings) -> Shape {
     Shape { names: density.names().to_vec(), ensembles: settings.ensembles, walkers: settings.walkers }
 }
 
-fn start(density: &dyn LogDensity, settings: &SamplerSettings) -> Vec<Vec<Vec<f64>>> {
+fn start(density: &dyn LogDensity, settings: &SamplerSettings) -> Positions {
     let covariance = DMatrix::from_diagonal(&nalgebra::dvector![0.03f64.powi(2), 0.03f64.powi(2), 64.0]);
     let SamplerSettings { ensembles, walkers, seed, .. } = *settings;
     let centre = [0.1, 0.97, 0.0];
@@ -114,7 +123,7 @@ fn cut_anywhere_and_resumed_is_the_uninterrupted_chain() {
     assert_eq!(through_journal(&whole, &density, &settings, None), StopReason::StepLimit);
     let bytes = std::fs::read(&whole).unwrap();
     assert_eq!(bytes.iter().filter(|byte| **byte == b'\n').count(), 2 * 6 * 41);
-    for cut in [0, 1, 500, bytes.len() / 3, bytes.len() / 2 + 7, bytes.len() - 1, bytes.len()] {
+    for cut in [0, 1, 500, bytes.len() / 3, bytes.len() / 2 + 7, 54321, 100_003, bytes.len() - 1, bytes.len()] {
         let path = folder.path().join(format!("cut{cut}.jsonl"));
         std::fs::write(&path, &bytes[..cut]).unwrap();
         through_journal(&path, &density, &settings, None);
@@ -125,6 +134,31 @@ fn cut_anywhere_and_resumed_is_the_uninterrupted_chain() {
     assert_eq!(through_journal(&path, &density, &settings, Some(1)), StopReason::Interrupted);
     assert_eq!(through_journal(&path, &density, &settings, None), StopReason::StepLimit);
     assert!(std::fs::read(&path).unwrap() == bytes, "stopped and resumed");
+}
+
+#[test]
+fn a_resumed_chain_converges_at_the_same_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = SamplerSettings { ess: 150.0, rhat: 1.1, ..settings(3, 8, 2000) };
+    let density = Orbit::new(false);
+    let whole = folder.path().join("whole.jsonl");
+    assert_eq!(through_journal(&whole, &density, &settings, None), StopReason::Converged);
+    let bytes = std::fs::read(&whole).unwrap();
+    let cut = folder.path().join("cut.jsonl");
+    for share in [0.37, 0.71, 0.999, 1.0] {
+        std::fs::write(&cut, &bytes[..(share * bytes.len() as f64) as usize]).unwrap();
+        assert_eq!(through_journal(&cut, &density, &settings, None), StopReason::Converged);
+        assert!(std::fs::read(&cut).unwrap() == bytes, "cut at {share}");
+    }
+    // An extension goes on although the goals are reached.
+    let (_, mut chain) = Journal::recover(&cut, shape(&density, &settings)).unwrap();
+    let last = chain.steps() - 1;
+    let evaluator = Serial(&density);
+    let sampler = Sampler::new(&density, &evaluator, &settings).unwrap();
+    let policy = StopPolicy { steps: last + 30, least: last + 30, ..StopPolicy::new(&settings) };
+    let mut none = |_: &[Record], _: Option<&_>| Ok::<(), Infallible>(());
+    run(&sampler, &mut chain, &KINDS, &policy, &AtomicBool::new(false), &mut none).unwrap();
+    assert_eq!(chain.steps() - 1, last + 30);
 }
 
 #[test]
@@ -142,18 +176,18 @@ fn the_number_of_threads_does_not_show() {
 
 #[test]
 fn an_orbit_is_recovered_and_failures_are_counted() {
-    let (density, settings) = (Orbit::new(true), SamplerSettings { ess: 8000.0, ..settings(4, 16, 4000) });
-    let evaluator = Threads(&density);
+    let (density, settings) = (Orbit::new(true), SamplerSettings { ess: 8000.0, ..settings(4, 16, 6000) });
+    let evaluator = Serial(&density);
     let sampler = Sampler::new(&density, &evaluator, &settings).unwrap();
     let mut chain = Chain::new(shape(&density, &settings));
     chain.push_step(&sampler.start(&start(&density, &settings)).unwrap().1).unwrap();
-    let policy = StopPolicy::new(&settings);
+    let policy = StopPolicy { every: 500, ..StopPolicy::new(&settings) };
     let mut none = |_: &[Record], _: Option<&_>| Ok::<(), Infallible>(());
     let reason = run(&sampler, &mut chain, &KINDS, &policy, &AtomicBool::new(false), &mut none).unwrap();
     assert_eq!(reason, StopReason::Converged);
     let summary = summarise(&chain, &KINDS, &policy.goals).unwrap();
     assert!(summary.converged);
-    // Mean and variance of the Gaussian of K, cut at 0 and 0.3, i.e. -2 and +4 sigma: mean -2 + 2.0552, see below.
+    // Mean and variance of the Gaussian of K, cut at 0 and 0.3, i.e. -2 and +4 sigma: mean from the densities at the walls.
     let (lower, mass) = ((-2.0f64).powi(2), 0.977250 - 3.17e-5);
     let density_at = |square: f64| (-0.5 * square).exp() / TAU.sqrt();
     let mean = 0.1 + 0.05 * (density_at(lower) - density_at(16.0)) / mass;
@@ -196,9 +230,9 @@ impl LogDensity for Phase {
 #[test]
 fn a_wrapped_coordinate_keeps_the_balance_of_every_move() {
     let density = Phase(vec!["phi".to_owned()]);
-    let evaluator = Threads(&density);
+    let evaluator = Serial(&density);
     let settings = settings(8, 10, 1);
-    let positions: Vec<Vec<Vec<f64>>> =
+    let positions: Positions =
         (0..8).map(|e| (0..10).map(|w| vec![((e * 10 + w) as f64 * 0.618034).fract()]).collect()).collect();
     let mixes = [
         Mix::default().with(1.0, Box::new(Stretch::default())),
@@ -228,7 +262,7 @@ fn degenerate_and_forbidden_starts_name_the_culprit() {
     let settings = settings(2, 8, 10);
     let sampler = Sampler::new(&density, &evaluator, &settings).unwrap();
     let good = start(&density, &settings);
-    let refused = |change: &dyn Fn(&mut Vec<Vec<Vec<f64>>>)| {
+    let refused = |change: &dyn Fn(&mut Positions)| {
         let mut positions = good.clone();
         change(&mut positions);
         sampler.start(&positions).unwrap_err()

@@ -131,7 +131,7 @@ fn parameter_summary(mut values: Vec<f64>, kind: ParameterKind, diagnostic: &Dia
     values.sort_unstable_by(f64::total_cmp);
     let median = quantile(&values, 0.5);
     // Whole periods that bring the median, and the intervals with it, to [0, 1).
-    let turns = if periodic { median - wrap(median) } else { 0.0 };
+    let turns = if periodic { (median - wrap(median)).round() } else { 0.0 };
     let point = |x: f64| if periodic { wrap(x) } else { x };
     let shift = |[low, high]: [f64; 2]| [low - turns, high - turns];
     let centre = mean(values.iter());

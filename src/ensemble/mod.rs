@@ -13,8 +13,8 @@ pub mod stop;
 pub use moves::{Mix, Move, MoveWeights, Proposal};
 pub use sampler::{Sampler, State, Walker};
 pub use settings::SamplerSettings;
-pub use start::{StartDraw, draw_start};
-pub use stop::{StopPolicy, StopReason, run};
+pub use start::{Positions, StartDraw, draw_start};
+pub use stop::{OnStep, RunError, StopPolicy, StopReason, run};
 
 use crate::log_density::Status;
 

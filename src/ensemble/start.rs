@@ -14,6 +14,9 @@ use rand_distr::StandardNormal;
 /// Draws tried for a walker before giving up.
 const TRIES: usize = 2000;
 
+/// Positions of walkers in written coordinates, `[ensemble][walker][parameter]`.
+pub type Positions = Vec<Vec<Vec<f64>>>;
+
 /// What a start is drawn from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartDraw<'a> {
@@ -43,7 +46,7 @@ pub fn draw_start(
     density: &dyn LogDensity,
     draw: &StartDraw,
     allowed: &dyn Fn(&[f64]) -> bool,
-) -> Result<Vec<Vec<Vec<f64>>>, EnsembleError> {
+) -> Result<Positions, EnsembleError> {
     let dimension = density.names().len();
     if draw.centre.len() != dimension {
         let what = "parameters of the centre of the start".to_owned();

@@ -16,7 +16,12 @@ pub struct StopPolicy {
     pub goals: Goals,
     /// The goals are looked at when the step is a multiple of this.
     pub every: usize,
+    /// Steps to make in any case: the goals end no chain before this step (for `--extend`).
+    pub least: usize,
 }
+
+/// What is done with each step: the records, and the diagnostics when they were due.
+pub type OnStep<'a, E> = dyn FnMut(&[Record], Option<&Convergence>) -> Result<(), E> + 'a;
 
 /// Why a chain ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +52,7 @@ impl StopPolicy {
     /// The policy of the settings, looking at the goals every 50 steps.
     pub fn new(settings: &SamplerSettings) -> Self {
         let goals = Goals { rhat: settings.rhat, ess: settings.ess };
-        StopPolicy { steps: settings.steps, goals, every: 50 }
+        StopPolicy { steps: settings.steps, goals, every: 50, least: 0 }
     }
 
     /// Whether the chain ends where it is now, with the diagnostics if they were due.
@@ -63,7 +68,7 @@ impl StopPolicy {
         let due = step > 0 && (step.is_multiple_of(self.every.max(1)) || step >= self.steps);
         let convergence = if due { Some(Convergence::of(chain, kinds)?) } else { None };
         let reason = match &convergence {
-            Some(convergence) if convergence.reached(&self.goals) => Some(StopReason::Converged),
+            Some(convergence) if step >= self.least && convergence.reached(&self.goals) => Some(StopReason::Converged),
             _ if step >= self.steps => Some(StopReason::StepLimit),
             _ => None,
         };
@@ -84,7 +89,7 @@ pub fn run<E>(
     kinds: &[ParameterKind],
     policy: &StopPolicy,
     stop: &AtomicBool,
-    on_step: &mut dyn FnMut(&[Record], Option<&Convergence>) -> Result<(), E>,
+    on_step: &mut OnStep<E>,
 ) -> Result<StopReason, RunError<E>> {
     let mut state: State = sampler.resume(chain)?;
     if let (Some(reason), _) = policy.verdict(chain, kinds)? {

@@ -2,8 +2,8 @@
 //!
 //! The error is measured, from the scatter between independent ensembles.
 
-use crate::ensemble::{Mix, Sampler, SamplerSettings};
-use crate::log_density::{Evaluation, LogDensity, Status, Threads};
+use crate::ensemble::{Mix, Positions, Sampler, SamplerSettings};
+use crate::log_density::{Evaluation, Evaluator, LogDensity, Status};
 use std::sync::atomic::AtomicBool;
 
 const ENSEMBLES: usize = 16;
@@ -33,11 +33,23 @@ impl<F: Fn(&[f64]) -> f64 + Sync> LogDensity for Toy<F> {
     }
 }
 
+/// A function of a position.
+type Function = Box<dyn Fn(&[f64]) -> f64>;
+
+/// One evaluation after the other: for densities that cost less than handing them to a thread.
+struct Serial<'a>(&'a dyn LogDensity);
+
+impl Evaluator for Serial<'_> {
+    fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation> {
+        batch.iter().map(|theta| self.0.evaluate(theta)).collect()
+    }
+}
+
 /// An expectation of known value.
 struct Truth {
     what: String,
     value: f64,
-    of: Box<dyn Fn(&[f64]) -> f64>,
+    of: Function,
 }
 
 fn truth(what: &str, value: f64, of: impl Fn(&[f64]) -> f64 + 'static) -> Truth {
@@ -119,11 +131,11 @@ fn recover<F: Fn(&[f64]) -> f64 + Sync>(
     start: &dyn Fn([f64; 3]) -> Vec<f64>,
 ) -> Result<(), String> {
     let settings = SamplerSettings { ensembles: ENSEMBLES, walkers: 12, seed: 7, ..SamplerSettings::default() };
-    let evaluator = Threads(density);
+    let evaluator = Serial(density);
     let sampler = Sampler::new(density, &evaluator, &settings).map_err(|e| e.to_string())?.with_mix(mix);
     let unit = |n: usize, root: f64| 2.0 * ((n as f64 + 1.0) * root).fract() - 1.0;
     let place = |n: usize| start([unit(n, 0.754878), unit(n, 0.569840), unit(n, 0.414214)]);
-    let positions: Vec<Vec<Vec<f64>>> =
+    let positions: Positions =
         (0..ENSEMBLES).map(|e| (0..settings.walkers).map(|w| place(e * settings.walkers + w)).collect()).collect();
     let (mut state, _) = sampler.start(&positions).map_err(|e| e.to_string())?;
     let mut sums = vec![[0.0; ENSEMBLES]; truths.len()];
