@@ -1,4 +1,4 @@
-//! Journal and summary from outside: torn tails against corruption, exact floats, circular statistics, advice, speed.
+//! Journal and summary from outside: torn tails against corruption, exact floats, circular statistics, advice.
 
 use dimcmc::chain::{Chain, Goals, ParameterKind, Record, Shape, Summary, summarise, table};
 use dimcmc::io::journal::{self, Journal};
@@ -199,6 +199,18 @@ fn a_good_chain_is_summarised() {
     assert!(rows.iter().all(|row| row.chars().count() == rows[0].chars().count()), "{text}");
     assert!(rows[1].contains("0.100") && rows[0].contains("truth") && text.contains("k_kms touches zero"), "{text}");
     assert!(text.lines().last().unwrap().starts_with("converged"), "{text}");
+}
+
+#[test]
+fn whole_turns_of_a_periodic_parameter_mean_nothing() {
+    let chain = chain(&["phi"], [4, 16, 300], &mut |rng, [ensemble, ..]| vec![ensemble as f64 + 0.02 * normal(rng)]);
+    let summary = summarise(&chain, &[ParameterKind::Periodic], &GOALS).unwrap();
+    assert!(summary.converged, "{:?}", summary.advice);
+    let phi = &summary.parameters["phi"];
+    // sd of 0.02 over sqrt(19200) draws: 1.4e-4.
+    assert!((phi.median - 0.0).abs().min((phi.median - 1.0).abs()) < 1e-3 && (phi.sd - 0.02).abs() < 1e-3, "{phi:?}");
+    assert!(phi.ci68[0] < phi.median && phi.median < phi.ci68[1] && (phi.ci68[1] - phi.ci68[0] - 0.0398).abs() < 2e-3);
+    assert!(!summarise(&chain, &[ParameterKind::Linear], &GOALS).unwrap().converged);
 }
 
 #[test]
