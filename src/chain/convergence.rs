@@ -277,6 +277,15 @@ mod tests {
     }
 
     #[test]
+    fn a_small_displacement_costs_what_the_scatter_says() {
+        // Too small for the window to see; Var(grand mean) >= B_E / (E q) = (0.13^2 / 4) / (4 x 3.8), so ESS <= 3600 or so.
+        let mut series = ar1(0.0, [4, 16, 1000], 17);
+        series[3].iter_mut().flatten().for_each(|x| *x += 0.13);
+        let found = effective_sample_size(&series).unwrap();
+        assert!((2000.0..6000.0).contains(&found), "{found}");
+    }
+
+    #[test]
     fn a_wider_ensemble_and_a_drift_are_flagged() {
         let mut wide = ar1(0.5, [4, 16, 1000], 15);
         wide[1].iter_mut().flatten().for_each(|x| *x *= 3.0);
