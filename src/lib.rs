@@ -9,5 +9,7 @@ pub mod log_density;
 pub mod maxent;
 pub mod objective;
 pub mod observation;
+pub mod optimise;
+pub mod search;
 pub mod star;
 pub mod units;

@@ -5,7 +5,7 @@ mod common;
 use common::{json, numbers, oracle, values};
 use dimcmc::imaging::ImagingProblem;
 use dimcmc::maxent::entropy::Entropy;
-use dimcmc::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Termination};
+use dimcmc::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
 use dimcmc::star::spots::filling_at;
 use dimcmc::star::{Quadrature, Response, Sampling, Spot, SurfaceGrid};
 use serde_json::Value;
@@ -57,7 +57,7 @@ fn solve(oracle: &common::Oracle, theta: &Value, goal: Goal) -> Solution {
     let none = Preconditioner::identity();
     let solver =
         Solver { entropy: Entropy::new(oracle.default_spot), preconditioner: &none, settings: SolverSettings::exact() };
-    let solution = solver.solve(&mut problem, goal, &solver.blank(oracle.grid.len()));
+    let solution = solver.solve(&mut problem, goal, &Start::blank(&solver.entropy, oracle.grid.len(), 1e-6));
     println!("{theta}: {:?} {} Newton steps, {} passes", solution.termination, solution.newton_steps, problem.passes());
     assert_eq!(solution.termination, Termination::Converged);
     solution

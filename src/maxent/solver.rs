@@ -82,6 +82,13 @@ pub struct Start {
     pub path: Vec<f64>,
 }
 
+impl Start {
+    /// An image without data: every pixel at the default, and a lambda for which data begin to matter.
+    pub fn blank(entropy: &Entropy, pixels: usize, lambda: f64) -> Self {
+        Start { image: Image { logit: vec![entropy.default_logit(); pixels], lambda }, path: Vec::new() }
+    }
+}
+
 /// What the solver found.
 #[derive(Clone, Debug)]
 pub struct Solution {
@@ -159,11 +166,6 @@ struct Newton {
 }
 
 impl Solver<'_> {
-    /// An image without data, to start from: every pixel at the default, and a lambda for which data begin to matter.
-    pub fn blank(&self, pixels: usize) -> Start {
-        Start { image: Image { logit: vec![self.entropy.default_logit(); pixels], lambda: 1e-6 }, path: Vec::new() }
-    }
-
     /// Solves `problem` for `goal` from `start`.
     pub fn solve(&self, problem: &mut impl Problem, goal: Goal, start: &Start) -> Solution {
         let mut at = self.arrive(problem, start.image.logit.clone(), start.image.lambda);

@@ -115,7 +115,7 @@ impl Posterior {
         // so far from the reference that a blank star is the better start
         let none = Preconditioner::identity();
         let far = Solver { preconditioner: &none, ..self.solver() };
-        let solution = far.solve(&mut problem, self.goal(), &far.blank(self.imager.grid.len()));
+        let solution = far.solve(&mut problem, self.goal(), &self.reference.blank(&self.imager));
         (solution, problem)
     }
 

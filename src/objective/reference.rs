@@ -16,13 +16,22 @@ const PRECONDITIONER_RANK: usize = 120;
 const SMALLEST_CURVATURE: f64 = 0.2;
 
 /// Step in ln(lambda) between nodes of the trade-off curve.
-const CURVE_STEP: f64 = 0.2;
+const CURVE_STEP: f64 = 0.25;
 
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
-const CURVE_REACH: (f64, f64) = (1.8, 4.0);
+const CURVE_REACH: (f64, f64) = (1.8, 1.0);
 
-/// Lambda at which a target is given up, over the smallest lambda for which data begin to matter (1e-6).
-const HOPELESS_LAMBDA: f64 = 1e4;
+/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2.
+const BLANK_LAMBDA: f64 = 3e-3;
+
+/// A first preconditioner is built at this many times the target chi2, where images are cheap.
+const FIRST_CHI2: f64 = 1.5;
+
+/// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
+const HOPELESS_LAMBDA: f64 = 40.0;
+
+/// A provisional reference takes what it gets at lambda = this over the number of data.
+const PROVISIONAL_LAMBDA: f64 = 3.0;
 
 /// The reference image and what belongs to it.
 #[derive(Clone, Debug)]
@@ -75,48 +84,89 @@ pub enum ReferenceError {
 
 impl Reference {
     /// The reference at `values` for the target `chi2_per_datum`.
+    ///
+    /// # Errors
+    /// If no map comes down to the target, or a blank star is below it already.
     pub fn build(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
         let data = imager.data.depth.len() as f64;
-        let chi2_target = chi2_per_datum * data;
+        let mut reference = Reference::approach(imager, values, chi2_per_datum, HOPELESS_LAMBDA)?;
+        match reference.solution.termination {
+            Termination::Converged => {}
+            Termination::Unreachable => {
+                let floor = reference.solution.chi2 / data;
+                return Err(ReferenceError::TargetBelowFloor { target: chi2_per_datum, floor });
+            }
+            other => return Err(ReferenceError::Solver(other)),
+        }
+        let mut problem = imager.problem(reference.response.clone());
+        let solver = Solver {
+            entropy: imager.entropy,
+            preconditioner: &reference.preconditioner,
+            settings: SolverSettings::exact(),
+        };
+        let goal = Goal::Chi2 { target: reference.chi2_target, largest_lambda: f64::INFINITY };
+        let solution = solver.solve(&mut problem, goal, &reference.start());
+        if solution.termination != Termination::Converged {
+            return Err(ReferenceError::Solver(solution.termination));
+        }
+        let solver = Solver { settings: SolverSettings { tolerance: 1e-5, ..SolverSettings::default() }, ..solver };
+        reference.tradeoff = follow(&solver, &mut problem, &solution);
+        reference.largest_lambda = reference.tradeoff.nodes().last().expect("the reference itself").lambda;
+        reference.solution = solution;
+        Ok(reference)
+    }
+
+    /// A reference to begin a search with: without a trade-off curve (the regularised likelihood needs none), and with the
+    /// lambda it got where the target cannot be reached.
+    ///
+    /// # Errors
+    /// If a blank star is below the target already, or the solver fails.
+    pub fn provisional(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
+        let reference = Reference::approach(imager, values, chi2_per_datum, PROVISIONAL_LAMBDA)?;
+        match reference.solution.termination {
+            Termination::NonFinite => Err(ReferenceError::Solver(Termination::NonFinite)),
+            _ => Ok(reference),
+        }
+    }
+
+    /// The image at the target, or at `largest_lambda` over the number of data, from a blank star.
+    fn approach(
+        imager: &Imager,
+        values: ParameterValues,
+        chi2_per_datum: f64,
+        largest_lambda: f64,
+    ) -> Result<Self, ReferenceError> {
+        let data = imager.data.depth.len() as f64;
+        let (chi2_target, largest_lambda) = (chi2_per_datum * data, largest_lambda / data);
         let response = imager.response(&values.state());
         let mut problem = imager.problem(response.clone());
         let none = Preconditioner::identity();
         let coarse = Solver {
             entropy: imager.entropy,
             preconditioner: &none,
-            settings: SolverSettings { cg_tolerance: 0.1, ..SolverSettings::default() },
+            settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::default() },
         };
-        let blank = coarse.blank(imager.grid.len());
+        let blank = Start::blank(&imager.entropy, imager.grid.len(), BLANK_LAMBDA / data);
         let mut unspotted = vec![0.0; imager.grid.len()];
         imager.entropy.image(&blank.image.logit, &mut unspotted);
         let blank_chi2 = problem.linearise(&unspotted);
         if blank_chi2 <= chi2_target {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
         }
-        let goal = |largest_lambda| Goal::Chi2 { target: chi2_target, largest_lambda };
-        let first = coarse.solve(&mut problem, goal(HOPELESS_LAMBDA * blank.image.lambda), &blank);
-        match first.termination {
-            Termination::Converged => {}
-            Termination::Unreachable => {
-                return Err(ReferenceError::TargetBelowFloor { target: chi2_per_datum, floor: first.chi2 / data });
-            }
-            other => return Err(ReferenceError::Solver(other)),
-        }
-        let preconditioner = precondition(imager, &mut problem, &first);
-        let exact = Solver { preconditioner: &preconditioner, settings: SolverSettings::exact(), ..coarse };
-        let solution = exact.solve(&mut problem, goal(f64::INFINITY), &start(&first));
-        if solution.termination != Termination::Converged {
-            return Err(ReferenceError::Solver(solution.termination));
-        }
+        let goal = |target| Goal::Chi2 { target, largest_lambda };
+        let easy = coarse.solve(&mut problem, goal((FIRST_CHI2 * chi2_target).min(blank_chi2)), &blank);
+        let preconditioner = precondition(imager, &mut problem, &easy);
+        let fine =
+            Solver { preconditioner: &preconditioner, settings: SolverSettings::default(), entropy: imager.entropy };
+        let solution = fine.solve(&mut problem, goal(chi2_target), &start(&easy));
         let preconditioner = precondition(imager, &mut problem, &solution);
-        let solver = Solver {
-            preconditioner: &preconditioner,
-            settings: SolverSettings { tolerance: 1e-5, ..SolverSettings::default() },
-            ..exact
-        };
-        let tradeoff = follow(&solver, &mut problem, &solution);
-        let end = tradeoff.nodes().last().expect("the reference itself").lambda;
-        Ok(Reference { values, response, largest_lambda: end, solution, preconditioner, tradeoff, chi2_target })
+        let tradeoff = TradeOff::new(vec![node(&solution)], 0);
+        Ok(Reference { values, response, largest_lambda, solution, preconditioner, tradeoff, chi2_target })
+    }
+
+    /// A blank star, where an evaluation far from the reference starts.
+    pub fn blank(&self, imager: &Imager) -> Start {
+        Start::blank(&imager.entropy, imager.grid.len(), BLANK_LAMBDA / imager.data.depth.len() as f64)
     }
 
     /// Where every evaluation starts.
@@ -125,6 +175,7 @@ impl Reference {
     }
 }
 
+/// Where the next solution starts from this one.
 fn start(solution: &Solution) -> Start {
     Start { image: solution.image.clone(), path: solution.path.clone() }
 }

@@ -1,0 +1,120 @@
+//! The way to the reference: from the config's values and from several starts over the prior to the best parameters, and to
+//! the maximum-entropy image there (method section 3, step 1).
+//!
+//! The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last climb is on
+//! the objective asked for. Left out: the maximum-entropy solver, argmin.
+
+use crate::imaging::Imager;
+use crate::objective::{ObjectiveKind, ParameterSpace, Posterior, Reference, ReferenceError};
+use crate::optimise::{OptimiseError, Optimum, climb};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// What to search for, and from where.
+#[derive(Clone, Copy, Debug)]
+pub struct SearchSettings {
+    /// Target of chi2 per datum.
+    pub chi2_target: f64,
+    /// The objective.
+    pub objective: ObjectiveKind,
+    /// Number of starts drawn from the prior, beside the config's values.
+    pub prior_starts: usize,
+    /// Seed of those draws.
+    pub seed: u64,
+}
+
+/// One start of the search and where it led.
+#[derive(Clone, Debug)]
+pub struct Attempt {
+    /// Where it started (written coordinates); the first attempt is from the config's values.
+    pub start: Vec<f64>,
+    /// Where it ended, or why it did not.
+    pub end: Result<Optimum, OptimiseError>,
+}
+
+/// The result of a search.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The posterior relative to the reference at the optimum.
+    pub posterior: Posterior,
+    /// The optimum of the objective asked for.
+    pub optimum: Optimum,
+    /// All starts, by regularised likelihood at the first reference's lambda.
+    pub attempts: Vec<Attempt>,
+}
+
+/// Why a search failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// No reference image.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// No start led anywhere.
+    #[error("{0}")]
+    Optimise(#[from] OptimiseError),
+}
+
+/// Stages of a search, for progress reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Reconstruction at the config's values.
+    FirstImage,
+    /// Climbs from all starts.
+    Climbing {
+        /// Number of starts.
+        starts: usize,
+    },
+    /// Reconstruction and trade-off curve at the best parameters.
+    Reference,
+}
+
+/// The reference is rebuilt until the optimum stays within this many standard deviations of it.
+const REFERENCE_SHIFT: f64 = 0.3;
+
+/// Most rebuilds of the reference.
+const ROUNDS: usize = 4;
+
+/// Finds the best parameters and the reference there.
+///
+/// # Errors
+/// If the target is out of reach even there, or no start leads to a finite log-probability.
+pub fn find(
+    imager: &Imager,
+    space: &ParameterSpace,
+    settings: SearchSettings,
+    mut progress: impl FnMut(Stage),
+) -> Result<Found, SearchError> {
+    progress(Stage::FirstImage);
+    let start = space.start();
+    let first = Reference::provisional(imager, space.values_at(&start), settings.chi2_target)?;
+    let smooth = Posterior::new(imager.clone(), space.clone(), ObjectiveKind::RegularisedLikelihood, first);
+    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+    let mut starts = vec![start];
+    starts.extend((0..settings.prior_starts).map(|_| space.sample_prior(&mut rng)));
+    progress(Stage::Climbing { starts: starts.len() });
+    let attempts: Vec<Attempt> =
+        starts.into_par_iter().with_max_len(1).map(|start| Attempt { end: climb(&smooth, &start), start }).collect();
+    let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
+    let best = attempts.iter().max_by(|a, b| height(a).total_cmp(&height(b))).expect("at least the config's values");
+    let mut optimum = best.end.clone()?;
+    for round in 0.. {
+        progress(Stage::Reference);
+        let reference = Reference::build(imager, space.values_at(&optimum.theta), settings.chi2_target)?;
+        let posterior = Posterior::new(imager.clone(), space.clone(), settings.objective, reference);
+        let next = climb(&posterior, &optimum.theta)?;
+        let moved = shift(space, &optimum.theta, &next);
+        optimum = next;
+        if moved < REFERENCE_SHIFT || round + 1 == ROUNDS {
+            return Ok(Found { posterior, optimum, attempts });
+        }
+    }
+    unreachable!("the loop returns")
+}
+
+/// Distance of an optimum from `theta`, in standard deviations of the curvature.
+fn shift(space: &ParameterSpace, theta: &[f64], to: &Optimum) -> f64 {
+    let (a, b) = (space.to_internal(theta), space.to_internal(&to.theta));
+    let d = nalgebra::DVector::from_iterator(a.len(), a.iter().zip(&b).map(|(a, b)| b - a));
+    (&to.curvature * &d).dot(&d).max(0.0).sqrt()
+}
