@@ -41,7 +41,7 @@ fn main() {
             v[Parameter::Vsini] = 40.066;
         }
         let space = ParameterSpace::new(free.clone(), v, imager.mid_cycle(), imager.time_base_cycles(), 3.0);
-        for n in [0] {
+        for n in [0, 6] {
             let t = Instant::now();
             let f = find(
                 &imager,

@@ -51,7 +51,7 @@ pub enum OptimiseError {
 }
 
 /// Most trust-region steps of a search.
-const ITERATIONS: u64 = 40;
+const ITERATIONS: u64 = 25;
 
 /// A search ends when a Newton step would gain less than this in log-probability.
 const GAIN: f64 = 2e-3;

@@ -5,7 +5,7 @@
 //! the objective asked for. Left out: the maximum-entropy solver, argmin.
 
 use crate::imaging::Imager;
-use crate::objective::{ObjectiveKind, ParameterSpace, Posterior, Reference, ReferenceError};
+use crate::objective::{FreeParameter, ObjectiveKind, ParameterSpace, Posterior, Reference, ReferenceError};
 use crate::optimise::{OptimiseError, Optimum, climb};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -18,7 +18,7 @@ pub struct SearchSettings {
     pub chi2_target: f64,
     /// The objective.
     pub objective: ObjectiveKind,
-    /// Number of starts drawn from the prior, beside the config's values.
+    /// Number of orbits drawn from the prior to start from, beside the config's values.
     pub prior_starts: usize,
     /// Seed of those draws.
     pub seed: u64,
@@ -89,12 +89,13 @@ pub fn find(
     let start = space.start();
     let first = Reference::provisional(imager, space.values_at(&start), settings.chi2_target)?;
     let smooth = Posterior::new(imager.clone(), space.clone(), ObjectiveKind::RegularisedLikelihood, first);
+    progress(Stage::Climbing { starts: 1 + settings.prior_starts });
+    let mut attempts = vec![Attempt { end: climb(&smooth, &start), start }];
+    let from = attempts[0].end.as_ref().map_or(attempts[0].start.clone(), |optimum| optimum.theta.clone());
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    let mut starts = vec![start];
-    starts.extend((0..settings.prior_starts).map(|_| space.sample_prior(&mut rng)));
-    progress(Stage::Climbing { starts: starts.len() });
-    let attempts: Vec<Attempt> =
-        starts.into_par_iter().with_max_len(1).map(|start| Attempt { end: climb(&smooth, &start), start }).collect();
+    let starts: Vec<Vec<f64>> = (0..settings.prior_starts).map(|_| with_other_orbit(space, &from, &mut rng)).collect();
+    let ends = starts.into_par_iter().with_max_len(1).map(|start| Attempt { end: climb(&smooth, &start), start });
+    attempts.extend(ends.collect::<Vec<_>>());
     let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
     let best = attempts.iter().max_by(|a, b| height(a).total_cmp(&height(b))).expect("at least the config's values");
     let mut optimum = best.end.clone()?;
@@ -110,6 +111,16 @@ pub fn find(
         }
     }
     unreachable!("the loop returns")
+}
+
+/// `theta` with an orbit drawn from the prior: it is in the orbit that the landscape has several maxima, one for every alias
+/// of the sampling; the star's own parameters have one, which the climb from the config's values has found.
+fn with_other_orbit(space: &ParameterSpace, theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let draw = space.sample_prior(rng);
+    let choose = |((f, drawn), kept): ((&FreeParameter, f64), &f64)| {
+        if f.parameter.is_orbital() { drawn } else { *kept }
+    };
+    space.free().iter().zip(draw).zip(theta).map(choose).collect()
 }
 
 /// Distance of an optimum from `theta`, in standard deviations of the curvature.

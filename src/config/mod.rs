@@ -11,14 +11,12 @@ mod raw_parts;
 mod resolve;
 mod resolve_observations;
 mod resolve_star;
-mod sampler;
 mod settings;
 mod suggest;
 
+pub use crate::ensemble::SamplerSettings;
 pub use error::ConfigError;
 pub use raw_parts::EquivalentWidth;
-// The one line to swap for `pub use crate::ensemble::SamplerSettings;`, then `sampler.rs` and `mod sampler` go.
-pub use sampler::SamplerSettings;
 pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings, Simulation};
 
 use std::path::Path;

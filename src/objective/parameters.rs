@@ -52,6 +52,16 @@ impl Parameter {
         }
     }
 
+    /// Whether it belongs to the planet's orbit.
+    pub fn is_orbital(self) -> bool {
+        matches!(self, Parameter::K | Parameter::PorbOverProt | Parameter::Phi)
+    }
+
+    /// Whether it only shifts whole profiles, so that what a pixel looks like does not depend on it.
+    pub fn only_shifts(self) -> bool {
+        self.is_orbital() || self == Parameter::Vsys
+    }
+
     /// The parameter of that name.
     pub fn from_name(name: &str) -> Option<Parameter> {
         Parameter::ALL.into_iter().find(|p| p.name() == name)

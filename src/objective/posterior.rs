@@ -40,12 +40,10 @@ const DERIVATIVE_STEP: f64 = 0.05;
 impl Posterior {
     /// The posterior of `space` under `imager`'s data, judged by `kind` relative to `reference`.
     pub fn new(imager: Imager, space: ParameterSpace, kind: ObjectiveKind, reference: Reference) -> Self {
-        let shifts =
-            |p: Parameter| matches!(p, Parameter::K | Parameter::PorbOverProt | Parameter::Phi | Parameter::Vsys);
         // the reference's pixels serve only if its fixed parameters are those of the space
         let here = space.values_at(&space.theta_of(&reference.values));
-        let velocities_only = Parameter::ALL.iter().all(|&p| shifts(p) || here[p] == reference.values[p])
-            && space.free().iter().all(|f| shifts(f.parameter));
+        let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here[p] == reference.values[p])
+            && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
         Posterior { imager, space, kind, reference, settings, velocities_only }
     }
@@ -249,11 +247,18 @@ impl Gradient for Posterior {
         let mut image = vec![0.0; self.imager.grid.len()];
         self.imager.entropy.image(&solution.image.logit, &mut image);
         let internal = self.space.to_internal(theta);
+        let response = problem.response().clone();
         let at_fixed_map = |i: usize, h: f64| {
             let mut shifted = internal.clone();
             shifted[i] += h;
             let shifted = self.space.to_written(&shifted);
-            let mut problem = self.imager.problem(self.response(&shifted));
+            let response = if self.space.free()[i].parameter.only_shifts() {
+                let state = self.space.values_at(&shifted).state();
+                response.with_velocities(&self.imager.star, &state, &self.imager.sampling)
+            } else {
+                self.response(&shifted)
+            };
+            let mut problem = self.imager.problem(response);
             let chi2 = problem.linearise(&image);
             let prior = Some(self.space.log_prior(&shifted)).filter(|p| p.is_finite()).unwrap_or(log_prior);
             prior + weight * chi2 + direction.as_ref().map_or(0.0, |y| problem.slope(y))

@@ -19,7 +19,7 @@ const SMALLEST_CURVATURE: f64 = 0.2;
 const CURVE_STEP: f64 = 0.25;
 
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
-const CURVE_REACH: (f64, f64) = (1.8, 1.0);
+const CURVE_REACH: (f64, f64) = (1.1, 0.8);
 
 /// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2.
 const BLANK_LAMBDA: f64 = 3e-3;
@@ -109,7 +109,7 @@ impl Reference {
         if solution.termination != Termination::Converged {
             return Err(ReferenceError::Solver(solution.termination));
         }
-        let solver = Solver { settings: SolverSettings { tolerance: 1e-5, ..SolverSettings::default() }, ..solver };
+        let solver = Solver { settings: SolverSettings { tolerance: 1e-4, ..SolverSettings::default() }, ..solver };
         reference.tradeoff = follow(&solver, &mut problem, &solution);
         reference.largest_lambda = reference.tradeoff.nodes().last().expect("the reference itself").lambda;
         reference.solution = solution;
