@@ -19,7 +19,7 @@ pub use error::ConfigError;
 pub use raw_parts::EquivalentWidth;
 // The one line to swap for `pub use crate::ensemble::SamplerSettings;`, then `sampler.rs` and `mod sampler` go.
 pub use sampler::SamplerSettings;
-pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings, Simulation};
+pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;
 

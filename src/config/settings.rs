@@ -5,7 +5,8 @@ use super::{ConfigError, SamplerSettings};
 use crate::io::lsd::ReadOptions;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues};
 use crate::observation::Observations;
-use crate::star::{Spot, StarSettings};
+use crate::simulate::Simulation;
+use crate::star::StarSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -50,29 +51,6 @@ pub enum ObservationSource {
     },
     /// A simulation.
     Simulate(Simulation),
-}
-
-/// Observations to be simulated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Simulation {
-    /// The spots (radians).
-    pub spots: Vec<Spot>,
-    /// All eight parameters as simulated: those of the config, but for `truth`.
-    pub truth: ParameterValues,
-    /// Times of the profiles (d).
-    pub times_d: Vec<f64>,
-    /// Velocity of the first bin (km/s).
-    pub first_velocity_kms: f64,
-    /// Width of a bin (km/s).
-    pub step_kms: f64,
-    /// Number of bins.
-    pub bins: usize,
-    /// Signal-to-noise ratio of each bin; no noise if `None`.
-    pub snr: Option<f64>,
-    /// Seed of the noise.
-    pub seed: u64,
-    /// Pixels of the star.
-    pub pixels: usize,
 }
 
 /// The Doppler image.
