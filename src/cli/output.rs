@@ -23,10 +23,11 @@ impl Output {
         let folder = self.folder.display();
         let wrong = |problem: String| Err(Failure::input(format!("--out {folder}: {problem}")));
         match std::fs::read_dir(&self.folder) {
-            Ok(entries) if !self.force && entries.count() > 0 => {
-                wrong("the folder is not empty; give another one, or --force to replace the files in it".into())
-            }
-            Ok(_) => Ok(()),
+            Ok(entries) => match entries.count() {
+                0 => Ok(()),
+                _ if self.force => Ok(()),
+                _ => wrong("the folder is not empty; give another one, or --force to replace the files in it".into()),
+            },
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => match obstacle(&self.folder) {
                 Some(file) => wrong(format!("{} is not a folder", file.display())),
                 None => Ok(()),
