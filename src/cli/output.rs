@@ -28,12 +28,12 @@ impl Output {
                 _ if self.force => Ok(()),
                 _ => wrong("the folder is not empty; give another one, or --force to replace the files in it".into()),
             },
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => match obstacle(&self.folder) {
+            Err(e) => match obstacle(&self.folder) {
+                Some(file) if file == self.folder => wrong("is not a folder".into()),
                 Some(file) => wrong(format!("{} is not a folder", file.display())),
-                None => Ok(()),
+                None if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+                None => wrong(format!("cannot be used: {e}")),
             },
-            Err(e) if e.kind() == std::io::ErrorKind::NotADirectory => wrong("is not a folder".into()),
-            Err(e) => wrong(format!("cannot be used: {e}")),
         }
     }
 
@@ -46,7 +46,7 @@ impl Output {
     }
 }
 
-/// The nearest existing parent, if that is no folder.
+/// What exists of the path, if that is no folder.
 fn obstacle(folder: &Path) -> Option<&Path> {
-    folder.ancestors().skip(1).find(|parent| parent.exists()).filter(|parent| !parent.is_dir())
+    folder.ancestors().find(|parent| parent.exists()).filter(|parent| !parent.is_dir())
 }
