@@ -62,11 +62,13 @@ impl Scene {
                 (data.observations, data.sha256, None)
             }
             ObservationSource::Simulate(simulation) => {
+                settings.check_velocity_grid(&simulation.truth, simulation.step_kms)?;
                 let observations = simulation.observe(&settings.star);
                 let sha256 = fingerprint(&observations);
                 (observations, sha256, Some(simulation.truth))
             }
         };
+        settings.check_velocity_grid(&settings.values, observations.step_kms)?;
         let star = settings.star_for(&observations)?;
         let rotation_period_d = star.rotation_period_d;
         let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);

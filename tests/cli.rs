@@ -327,6 +327,8 @@ fn bad_configs_are_refused_by_key() {
         ("/planet/k_kms", json!(0.5), &["planet.k_kms", "outside its prior"]),
         ("/star/vsini_kms", json!(0.0), &["star.vsini_kms", "above 0"]),
         ("/star/vsini_kms", json!(1e9), &["star.vsini_kms", "up to"]),
+        ("/star/domega_rad_d", json!(1e6), &["star.vsini_kms", "star.domega_rad_d"]),
+        ("/star/line", json!({ "sigma_kms": 1e-6, "equivalent_width_kms": 5.8 }), &["star.line.sigma_kms", "narrow"]),
         ("/star/inclination_deg", json!(-5.0), &["star.inclination_deg", "-5"]),
         ("/star/inclination_deg", json!(95.0), &["star.inclination_deg", "95"]),
         ("/sampler/walkers", json!(2), &["sampler.walkers", "twice"]),
