@@ -3,6 +3,7 @@
 pub mod chain;
 pub mod config;
 pub mod ensemble;
+pub mod fit;
 pub mod imaging;
 pub mod io;
 pub mod log_density;
@@ -10,6 +11,8 @@ pub mod maxent;
 pub mod objective;
 pub mod observation;
 pub mod optimise;
+pub mod scene;
 pub mod search;
+pub mod simulate;
 pub mod star;
 pub mod units;

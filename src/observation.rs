@@ -1,6 +1,7 @@
 //! Observed (or simulated) line profiles: times, velocity bins, intensities and their errors.
 //!
-//! Left out: where they came from (see `io::lsd` and `simulate`), and what they are compared with.
+//! Also what they measure by themselves: areas and first-moment velocities. Left out: where they came from (see `io::lsd` and
+//! `simulate`), and what they are compared with.
 
 /// One line profile on a uniform velocity axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,15 @@ pub struct Profile {
     pub intensity: Vec<f64>,
     /// Standard error of each intensity (positive).
     pub sigma: Vec<f64>,
+}
+
+/// A radial velocity with its standard error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadialVelocity {
+    /// Velocity (km/s, positive receding).
+    pub value_kms: f64,
+    /// Standard error (km/s).
+    pub sigma_kms: f64,
 }
 
 /// A set of line profiles that share the width of their velocity bins.
@@ -49,6 +59,11 @@ impl Observations {
         0.5 * (lo + hi)
     }
 
+    /// Radial velocity of every profile by its first moment, see [`Profile::first_moment`].
+    pub fn first_moments(&self) -> Vec<RadialVelocity> {
+        self.profiles.iter().map(|p| p.first_moment(self.step_kms)).collect()
+    }
+
     /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that the velocity
     /// range holds whole, whatever the spots, because every pixel's line has the same one (method section 1).
     pub fn mean_equivalent_width_kms(&self) -> f64 {
@@ -61,5 +76,21 @@ impl Profile {
     /// Velocity of bin `j` (km/s).
     pub fn velocity_kms(&self, j: usize, step_kms: f64) -> f64 {
         self.first_velocity_kms + j as f64 * step_kms
+    }
+
+    /// Radial velocity `sum v (1-I) / sum (1-I)` over all bins, and its error from those of the bins,
+    /// `sqrt(sum sigma^2 (v - RV)^2) / |sum (1-I)|`. Not finite where the profile has no area.
+    pub fn first_moment(&self, step_kms: f64) -> RadialVelocity {
+        let depth: Vec<f64> = self.intensity.iter().map(|i| 1.0 - i).collect();
+        let value_kms = self.first_moment_of(&depth, step_kms);
+        let arm = |(j, sigma): (usize, &f64)| (sigma * (self.velocity_kms(j, step_kms) - value_kms)).powi(2);
+        let variance: f64 = self.sigma.iter().enumerate().map(arm).sum();
+        RadialVelocity { value_kms, sigma_kms: variance.sqrt() / depth.iter().sum::<f64>().abs() }
+    }
+
+    /// First moment (km/s) of other depths `1 - I`, a model's say, in the bins of this profile.
+    pub fn first_moment_of(&self, depth: &[f64], step_kms: f64) -> f64 {
+        let moment = |(j, depth): (usize, &f64)| self.velocity_kms(j, step_kms) * depth;
+        depth.iter().enumerate().map(moment).sum::<f64>() / depth.iter().sum::<f64>()
     }
 }

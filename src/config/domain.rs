@@ -13,11 +13,15 @@ pub(super) fn key(parameter: Parameter) -> String {
     format!("{section}.{}", parameter.name())
 }
 
+/// Beyond this a rotation velocity is a mistake, and velocity axes grow absurdly long.
+const LARGEST_VELOCITY_KMS: f64 = 2000.0;
+
 /// Whether a value makes sense at all, whatever the prior.
 pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result<(), Fault> {
     let (fine, allowed) = match parameter {
         Parameter::K => (value >= 0.0, "0 or more"),
-        Parameter::PorbOverProt | Parameter::OmegaEq | Parameter::Vsini => (value > 0.0, "above 0"),
+        Parameter::PorbOverProt | Parameter::OmegaEq => (value > 0.0, "above 0"),
+        Parameter::Vsini => (value > 0.0 && value <= LARGEST_VELOCITY_KMS, "above 0 and up to 2000"),
         Parameter::Inclination => (value > 0.0 && value <= 90.0, "above 0 and up to 90"),
         Parameter::Phi | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
     };

@@ -17,7 +17,7 @@ mod suggest;
 pub use crate::ensemble::SamplerSettings;
 pub use error::ConfigError;
 pub use raw_parts::EquivalentWidth;
-pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings, Simulation};
+pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;
 

@@ -1,13 +1,14 @@
 //! Where the profiles come from: files, or a simulation of the config's own star and planet.
 
+use super::ObservationSource;
 use super::domain::check_value;
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
 use super::resolve::{check_pixels, positive};
-use super::{ObservationSource, Simulation};
 use crate::io::lsd::ReadOptions;
 use crate::objective::ParameterValues;
+use crate::simulate::Simulation;
 use crate::star::{Spot, StarSettings};
 use std::path::Path;
 

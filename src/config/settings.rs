@@ -5,7 +5,9 @@ use super::{ConfigError, SamplerSettings};
 use crate::io::lsd::ReadOptions;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues};
 use crate::observation::Observations;
-use crate::star::{Spot, StarSettings};
+use crate::simulate::Simulation;
+use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
+use crate::star::{Response, StarSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -50,29 +52,6 @@ pub enum ObservationSource {
     },
     /// A simulation.
     Simulate(Simulation),
-}
-
-/// Observations to be simulated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Simulation {
-    /// The spots (radians).
-    pub spots: Vec<Spot>,
-    /// All eight parameters as simulated: those of the config, but for `truth`.
-    pub truth: ParameterValues,
-    /// Times of the profiles (d).
-    pub times_d: Vec<f64>,
-    /// Velocity of the first bin (km/s).
-    pub first_velocity_kms: f64,
-    /// Width of a bin (km/s).
-    pub step_kms: f64,
-    /// Number of bins.
-    pub bins: usize,
-    /// Signal-to-noise ratio of each bin; no noise if `None`.
-    pub snr: Option<f64>,
-    /// Seed of the noise.
-    pub seed: u64,
-    /// Pixels of the star.
-    pub pixels: usize,
 }
 
 /// The Doppler image.
@@ -153,6 +132,28 @@ impl Settings {
             star.line.equivalent_width_kms = width;
         }
         Ok(star)
+    }
+
+    /// Whether profiles in velocity bins of `step_kms` can be computed at `values`.
+    ///
+    /// # Errors
+    /// If the local line is so narrow, or the star so fast, that the velocity grid grows out of hand.
+    pub fn check_velocity_grid(&self, values: &ParameterValues, step_kms: f64) -> Result<(), ConfigError> {
+        let (steps, nodes) = Response::velocity_grid(&self.star, &values.state(), step_kms);
+        if steps.is_nan() || steps > MOST_STEPS_PER_BIN {
+            let sigma = self.star.line.sigma_kms;
+            let problem = format!("{sigma} (with the instrument) is too narrow for velocity bins of {step_kms} km/s");
+            return Err(self.fault("star.line.sigma_kms", &problem));
+        }
+        if nodes.is_nan() || nodes > MOST_NODES {
+            let vsini = values[Parameter::Vsini];
+            let problem = format!(
+                "{vsini} km/s, at the pole or the equator, takes {nodes:.1e} steps of a fraction of the line's width, over \
+                 {MOST_NODES}: see star.domega_rad_d, star.line.sigma_kms and the velocity bins too"
+            );
+            return Err(self.fault("star.vsini_kms", &problem));
+        }
+        Ok(())
     }
 
     fn fault(&self, key: &str, problem: &str) -> ConfigError {

@@ -8,6 +8,7 @@ mod text;
 
 pub use error::LsdError;
 
+use super::atomic;
 use crate::observation::{Observations, Profile};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
@@ -181,5 +182,5 @@ fn profile_text(k: usize, profile: &Profile, step_kms: f64) -> String {
 }
 
 fn save(path: &Path, text: &str) -> Result<(), LsdError> {
-    std::fs::write(path, text).map_err(|source| LsdError::Write { path: path.into(), source })
+    Ok(atomic::write(path, text.as_bytes())?)
 }

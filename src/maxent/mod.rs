@@ -5,10 +5,12 @@
 
 mod cg;
 pub mod entropy;
+mod parallelism;
 pub mod preconditioner;
 pub mod problem;
 pub mod solver;
 
+pub use parallelism::parallelism;
 pub use preconditioner::Preconditioner;
 pub use problem::{Curvature, Problem};
 pub use solver::{Goal, Image, Solution, Solver, SolverSettings, Start, Termination};

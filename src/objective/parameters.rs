@@ -3,6 +3,7 @@
 //! Left out: priors (`prior`) and what a point is worth (`objective`).
 
 use crate::star::{Orbit, Rotation, StarState};
+use serde::{Serialize, Serializer};
 
 /// One of the parameters that may be free. The order is that of every table and chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -99,5 +100,12 @@ impl ParameterValues {
                 phi: self[Parameter::Phi],
             },
         }
+    }
+}
+
+/// An object of name and value, in the order of [`Parameter::ALL`].
+impl Serialize for ParameterValues {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(Parameter::ALL.map(|p| (p.name(), self[p])))
     }
 }

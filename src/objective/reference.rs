@@ -50,6 +50,8 @@ pub struct Reference {
     pub chi2_target: f64,
     /// Largest lambda of an evaluation: the end of the trade-off curve.
     pub largest_lambda: f64,
+    /// Applications of the response or its transpose that all this took.
+    pub passes: u32,
 }
 
 /// Why there is no reference.
@@ -113,6 +115,7 @@ impl Reference {
         reference.tradeoff = follow(&solver, &mut problem, &solution);
         reference.largest_lambda = reference.tradeoff.nodes().last().expect("the reference itself").lambda;
         reference.solution = solution;
+        reference.passes += problem.passes();
         Ok(reference)
     }
 
@@ -161,7 +164,8 @@ impl Reference {
         let solution = fine.solve(&mut problem, goal(chi2_target), &start(&easy));
         let preconditioner = precondition(imager, &mut problem, &solution);
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
-        Ok(Reference { values, response, largest_lambda, solution, preconditioner, tradeoff, chi2_target })
+        let passes = problem.passes();
+        Ok(Reference { values, response, largest_lambda, solution, preconditioner, tradeoff, chi2_target, passes })
     }
 
     /// A blank star, where an evaluation far from the reference starts.

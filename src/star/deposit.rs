@@ -38,7 +38,7 @@ impl Deposit {
         step_kms: f64,
     ) -> Self {
         let viewer = Viewer::new(state, limb);
-        let reach = (viewer.largest_velocity_kms() / step_kms).ceil() + 3.0;
+        let reach = reach(&viewer, step_kms);
         let capacity = since_epoch_d.len() * grid.len() * 5 / 8;
         let mut deposit = Deposit {
             origin_kms: -reach * step_kms,
@@ -65,6 +65,11 @@ impl Deposit {
             deposit.starts.push(deposit.pixel.len());
         }
         deposit
+    }
+
+    /// Number of nodes in steps of `step_kms` that a state takes.
+    pub fn nodes_at(state: &StarState, limb: LimbDarkening, step_kms: f64) -> f64 {
+        2.0 * reach(&Viewer::new(state, limb), step_kms) + 1.0
     }
 
     fn push(&mut self, pixel: usize, weight: f64, velocity: f64, variance: f64) {
@@ -114,4 +119,9 @@ impl Deposit {
             out[self.pixel[i] as usize] += sum;
         }
     }
+}
+
+/// Nodes on either side of the line's centre.
+fn reach(viewer: &Viewer, step_kms: f64) -> f64 {
+    (viewer.largest_velocity_kms() / step_kms).ceil() + 3.0
 }

@@ -34,6 +34,12 @@ impl Sampling {
     }
 }
 
+/// Most nodes of the velocity grid, which spans twice the fastest velocity in steps of a fraction of the local line's width.
+pub const MOST_NODES: f64 = u16::MAX as f64;
+
+/// Most grid steps in a velocity bin; beyond it the line is so much narrower than a bin that it hides between two of them.
+pub const MOST_STEPS_PER_BIN: f64 = 200.0;
+
 /// The response of a sampled set of profiles to a map of the star.
 #[derive(Clone, Debug)]
 pub struct Response {
@@ -52,6 +58,13 @@ impl Response {
         let step = sampling.step_kms / steps_per_bin as f64;
         let deposit = Deposit::new(grid, state, star.limb_darkening, &since_epoch, step);
         Response::shifted(Arc::new(deposit), star, state, sampling)
+    }
+
+    /// Size of the velocity grid that a response takes: grid steps a bin, and nodes. Refuse more than [`MOST_STEPS_PER_BIN`] or
+    /// [`MOST_NODES`] before a response is asked for.
+    pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
+        let steps = LineKernel::steps_per_bin(star.line, step_kms) as f64;
+        (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
     }
 
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is shifted.

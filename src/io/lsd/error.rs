@@ -1,5 +1,6 @@
 //! What can be wrong with a list of observations or a profile: one line each, naming file and line.
 
+use crate::io::atomic::WriteError;
 use std::path::PathBuf;
 
 /// Why observations could not be read or written.
@@ -56,11 +57,6 @@ pub enum LsdError {
         expected: String,
     },
     /// A file could not be written.
-    #[error("{}: cannot write: {source}", .path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

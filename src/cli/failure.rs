@@ -1,0 +1,74 @@
+//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 1 for anything else.
+
+use dimcmc::config::ConfigError;
+use dimcmc::io::atomic::WriteError;
+use dimcmc::io::lsd::LsdError;
+use dimcmc::objective::ReferenceError;
+use dimcmc::scene::SceneError;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// A message of one line for the user, with its exit code.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub struct Failure {
+    code: u8,
+    message: String,
+}
+
+impl Failure {
+    /// Bad usage or input: the user can put it right.
+    pub fn input(message: impl std::fmt::Display) -> Self {
+        Failure { code: 2, message: message.to_string() }
+    }
+
+    /// The input was right, and yet it did not work.
+    pub fn failed(message: impl std::fmt::Display) -> Self {
+        Failure { code: 1, message: message.to_string() }
+    }
+
+    /// No reference image at the values of the config at `path`.
+    pub fn reference(path: &Path, error: ReferenceError) -> Self {
+        match error {
+            ReferenceError::TargetBelowFloor { .. } | ReferenceError::NothingToFit { .. } => {
+                Failure::input(format!("{}: imaging.chi2_target: {error}", path.display()))
+            }
+            ReferenceError::Solver(_) => Failure::failed(format!("{}: {error}", path.display())),
+        }
+    }
+
+    /// The code for the shell.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(self.code)
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<LsdError> for Failure {
+    fn from(error: LsdError) -> Self {
+        match error {
+            LsdError::Write(error) => Failure::failed(error),
+            error => Failure::input(error),
+        }
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        match error {
+            SceneError::Config(error) => error.into(),
+            SceneError::Observations(error) => error.into(),
+        }
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Failure::failed(error)
+    }
+}

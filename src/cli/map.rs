@@ -1,0 +1,60 @@
+//! `dimcmc map`: one reconstruction at the config's parameter values.
+
+use super::output::Output;
+use super::report::Report;
+use super::{Failure, Global, progress};
+use dimcmc::fit::{Fit, FitSummary};
+use dimcmc::io::map::{FILES, MapResult};
+use dimcmc::objective::Reference;
+use dimcmc::scene::Scene;
+use std::path::PathBuf;
+
+/// Reconstruct the spots at the config's parameter values
+///
+/// The map of greatest entropy whose chi2 is `imaging.chi2_target`. Writes map.json (the map), profiles.csv (observed and model
+/// profiles), rv.csv (radial velocities before and after the model is taken out of them) and fit.json (how good the fit is).
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
+pub struct Args {
+    /// Config file (JSON)
+    config: PathBuf,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    args.output.check()?;
+    let scene = Scene::load(&args.config)?;
+    let spinner = progress::bar(global, None, "reconstructing");
+    let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target);
+    spinner.finish_and_clear();
+    let reference = reference.map_err(|e| Failure::reference(&args.config, e))?;
+    let fit = Fit::new(&scene.imager, &scene.observations, &reference);
+    let true_spot_filling = scene.true_spot_filling();
+    let result = MapResult {
+        imager: &scene.imager,
+        observations: &scene.observations,
+        fit: &fit,
+        true_spot_filling: true_spot_filling.as_deref(),
+        truth: scene.truth,
+        provenance: &scene.provenance(),
+    };
+    let folder = args.output.create()?;
+    result.write(folder)?;
+    report(&fit.summary).written(folder, FILES.join(", ")).print();
+    Ok(())
+}
+
+fn report(fit: &FitSummary) -> Report {
+    let FitSummary { chi2, chi2_per_datum, data, profiles, .. } = fit;
+    Report::default()
+        .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"))
+        .line("spottedness", format!("{:.5}", fit.spottedness))
+        .line("entropy", format!("{:.5} at lambda = {:.4e}", fit.entropy, fit.lambda))
+        .line("TEST", format!("{:.1e}", fit.test))
+        .line("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core))
+        .line("RV observed", format!("{:.4} km/s rms", fit.observed_rv_rms_kms))
+        .line("RV filtered", format!("{:.4} km/s rms", fit.filtered_rv_rms_kms))
+        .line("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms))
+}

@@ -1,0 +1,24 @@
+//! Progress on a terminal, and only there.
+
+use super::Global;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal as _;
+use std::time::Duration;
+
+/// A bar of `total` steps, or a spinner where their number is not known; hidden with `--quiet` or when stderr is no terminal.
+/// Clear it with `finish_and_clear` before anything is printed.
+pub fn bar(global: &Global, total: Option<u64>, message: &'static str) -> ProgressBar {
+    if global.quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let (bar, template) = match total {
+        Some(total) => (ProgressBar::new(total), "{msg} {wide_bar} {pos}/{len} [{elapsed} < {eta}]"),
+        None => (ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]"),
+    };
+    // A template is a constant of this file; where it is wrong, indicatif's own does.
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    bar.set_style(style);
+    bar.set_message(message);
+    bar.enable_steady_tick(Duration::from_millis(120));
+    bar
+}

@@ -1,0 +1,45 @@
+//! `dimcmc simulate`: synthetic observations from a spot list and an orbit.
+
+use super::Failure;
+use super::output::Output;
+use super::report::Report;
+use dimcmc::io::{lsd, truth};
+use dimcmc::scene::Scene;
+use dimcmc::{config, config::ObservationSource};
+use std::path::PathBuf;
+
+/// Simulate observations of a spotted star with a planet
+///
+/// Reads `observations.simulate` of the config. Writes observations.txt and the profiles it lists, which other commands read
+/// by `observations.path`, and truth.json: what they were made with.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc simulate configs/demo.json --out demo_data")]
+pub struct Args {
+    /// Config file (JSON)
+    config: PathBuf,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    args.output.check()?;
+    let settings = config::load(&args.config)?;
+    let ObservationSource::Simulate(simulation) = settings.source.clone() else {
+        let problem = "missing, a simulation needs its spots, cycles and velocities";
+        return Err(Failure::input(format!("{}: observations.simulate: {problem}", args.config.display())));
+    };
+    let scene = Scene::new(settings)?;
+    let truth = scene.truth_of(&simulation);
+    let folder = args.output.create()?;
+    lsd::write(folder, &scene.observations)?;
+    truth::write(folder, &truth)?;
+    let bins = simulation.bins;
+    let snr = simulation.snr.map_or("without noise".into(), |snr| format!("S/N {snr}, seed {}", simulation.seed));
+    Report::default()
+        .line("profiles", format!("{} of {bins} bins, {snr}", scene.observations.profiles.len()))
+        .line("spottedness", format!("{:.5}", truth.spottedness))
+        .written(folder, "observations.txt, p000.prof ..., truth.json")
+        .print();
+    Ok(())
+}

@@ -1,0 +1,84 @@
+//! Synthetic observations: a spotted star with its planet through the forward model, and photon noise (Petit et al. 2015,
+//! section 2).
+//!
+//! The spots are hard-edged discs, each pixel of the star holding the fraction of it that they cover. The same simulation gives
+//! the same numbers on every machine and with any number of threads. Left out: where the settings come from (`config`).
+
+use crate::objective::ParameterValues;
+use crate::observation::{Observations, Profile};
+use crate::star::spots::filling_at;
+use crate::star::{Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Standard error that observations without noise are given: that of a signal-to-noise ratio of 1000.
+pub const SIGMA_WITHOUT_NOISE: f64 = 1e-3;
+
+/// Points along each side of a pixel at which it is asked whether a spot covers them.
+const COVERAGE_POINTS: usize = 8;
+
+/// Observations to be simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation {
+    /// The spots (radians).
+    pub spots: Vec<Spot>,
+    /// All eight parameters as simulated: those of the config, but for `truth`.
+    pub truth: ParameterValues,
+    /// Times of the profiles (d).
+    pub times_d: Vec<f64>,
+    /// Velocity of the first bin (km/s).
+    pub first_velocity_kms: f64,
+    /// Width of a bin (km/s).
+    pub step_kms: f64,
+    /// Number of bins.
+    pub bins: usize,
+    /// Signal-to-noise ratio of each bin; no noise if `None`.
+    pub snr: Option<f64>,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Pixels of the star.
+    pub pixels: usize,
+}
+
+impl Simulation {
+    /// Standard error of each bin, in units of the continuum.
+    pub fn sigma(&self) -> f64 {
+        self.snr.map_or(SIGMA_WITHOUT_NOISE, |snr| 1.0 / snr)
+    }
+
+    /// The observations of `star`.
+    pub fn observe(&self, star: &StarSettings) -> Observations {
+        let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
+        let filling = self.spot_filling(&grid);
+        let brightness: Vec<f64> = filling.iter().map(|s| 1.0 - (1.0 - star.contrast) * s).collect();
+        let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
+        let sampling = Sampling { step_kms: self.step_kms, profiles };
+        let depths = Response::new(&grid, star, &self.truth.state(), &sampling).depths(&brightness);
+        let noise = self.noise(depths.len());
+        let intensity: Vec<f64> = depths.iter().zip(noise).map(|(depth, noise)| 1.0 - depth + noise).collect();
+        let profile = |(intensity, time_d): (&[f64], &f64)| Profile {
+            time_d: *time_d,
+            first_velocity_kms: self.first_velocity_kms,
+            intensity: intensity.to_vec(),
+            sigma: vec![self.sigma(); self.bins],
+        };
+        let profiles = intensity.chunks_exact(self.bins).zip(&self.times_d).map(profile).collect();
+        Observations { step_kms: self.step_kms, profiles }
+    }
+
+    /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own filling.
+    pub fn spot_filling(&self, grid: &SurfaceGrid) -> Vec<f64> {
+        grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
+    }
+
+    /// Gaussian noise of `n` bins, all profiles one after the other.
+    fn noise(&self, n: usize) -> Vec<f64> {
+        if self.snr.is_none() {
+            return vec![0.0; n];
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        (0..n).map(|_| self.sigma() * draw()).collect()
+    }
+}
