@@ -2,9 +2,13 @@
 
 use dimcmc::config::ConfigError;
 use dimcmc::io::atomic::WriteError;
+use dimcmc::io::journal::JournalError;
 use dimcmc::io::lsd::LsdError;
+use dimcmc::manifest::ManifestError;
 use dimcmc::objective::ReferenceError;
+use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
+use dimcmc::search::SearchError;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -34,6 +38,30 @@ impl Failure {
                 Failure::input(format!("{}: imaging.chi2_target: {error}", path.display()))
             }
             ReferenceError::Solver(_) => Failure::failed(format!("{}: {error}", path.display())),
+        }
+    }
+
+    /// A search in the config at `path` that found nothing.
+    pub fn search(path: &Path, error: SearchError) -> Self {
+        match error {
+            SearchError::Reference(error) => Failure::reference(path, error),
+            SearchError::Optimise(error) => Failure::failed(format!("{}: {error}", path.display())),
+        }
+    }
+
+    /// A run of the config at `path` that cannot begin or go on.
+    pub fn run(path: &Path, error: RunError) -> Self {
+        match error {
+            RunError::Search(error) => Failure::search(path, error),
+            RunError::Reference(error) => Failure::reference(path, error),
+            RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) | RunError::Irreproducible { .. } => {
+                Failure::failed(error)
+            }
+            RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
+            RunError::PriorStart => Failure::input(format!("{}: {error}", path.display())),
+            RunError::Manifest(error) => error.into(),
+            RunError::Journal(error) => error.into(),
+            RunError::Changed { .. } => Failure::input(error),
         }
     }
 
@@ -70,5 +98,17 @@ impl From<SceneError> for Failure {
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
         Failure::failed(error)
+    }
+}
+
+impl From<ManifestError> for Failure {
+    fn from(error: ManifestError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<JournalError> for Failure {
+    fn from(error: JournalError) -> Self {
+        Failure::input(error)
     }
 }

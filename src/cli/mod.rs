@@ -3,11 +3,14 @@
 //! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`, and one
 //! line each in [`Command`] and [`run`]. Both spellings of a name: `#[command(alias = "analyze")]`.
 
+mod analyse;
 mod failure;
 mod map;
+mod optimise;
 mod output;
 mod progress;
 mod report;
+mod sample;
 mod simulate;
 
 pub use failure::Failure;
@@ -40,6 +43,11 @@ pub struct Global {
 enum Command {
     Simulate(simulate::Args),
     Map(map::Args),
+    #[command(alias = "optimize")]
+    Optimise(optimise::Args),
+    Sample(sample::Args),
+    #[command(alias = "analyze")]
+    Analyse(analyse::Args),
 }
 
 /// Runs the command.
@@ -53,6 +61,9 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
     match &cli.command {
         Command::Simulate(args) => simulate::run(args),
         Command::Map(args) => map::run(args, &cli.global),
+        Command::Optimise(args) => optimise::run(args, &cli.global),
+        Command::Sample(args) => sample::run(args, &cli.global),
+        Command::Analyse(args) => analyse::run(args, &cli.global),
     }
 }
 

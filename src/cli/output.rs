@@ -37,6 +37,11 @@ impl Output {
         }
     }
 
+    /// The folder as given.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// The folder, created if need be.
     pub fn create(&self) -> Result<&Path, Failure> {
         self.check()?;

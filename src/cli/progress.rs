@@ -15,10 +15,13 @@ pub fn bar(global: &Global, total: Option<u64>, message: &'static str) -> Progre
         Some(total) => (ProgressBar::new(total), "{msg} {wide_bar} {pos}/{len} [{elapsed} < {eta}]"),
         None => (ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]"),
     };
-    // A template is a constant of this file; where it is wrong, indicatif's own does.
-    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    bar.set_style(style);
+    bar.set_style(style(template));
     bar.set_message(message);
     bar.enable_steady_tick(Duration::from_millis(120));
     bar
+}
+
+/// The style of a template; a template is a constant of this program, and where it is wrong, indicatif's own style does.
+pub fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

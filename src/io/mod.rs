@@ -5,5 +5,6 @@ pub mod csv;
 pub mod journal;
 pub mod lsd;
 pub mod map;
+pub mod optimum;
 pub mod provenance;
 pub mod truth;

@@ -1,0 +1,38 @@
+//! `dimcmc analyse`: credible intervals and convergence of a run.
+
+use super::{Failure, Global};
+use dimcmc::chain::{Chain, summarise, table};
+use dimcmc::io::atomic::write_json;
+use dimcmc::io::journal;
+use dimcmc::manifest::{Manifest, kinds_and_goals};
+use dimcmc::run::CHAIN;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Credible intervals and convergence of a run
+///
+/// Prints a table (with the injected values where they are known) and writes summary.json into the run's folder, replacing the
+/// one of an earlier look at the same chain.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc analyse runs/demo")]
+pub struct Args {
+    /// Folder of the run
+    run: PathBuf,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let manifest = Manifest::read(&args.run)?;
+    let chain = journal::read(&args.run.join(CHAIN), &manifest.shape())?;
+    report(&args.run, &manifest, &chain)
+}
+
+/// Writes the summary of `chain` into `folder` and prints its table.
+pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), Failure> {
+    let (kinds, goals) = kinds_and_goals(&manifest.settings(folder)?);
+    let summary = summarise(chain, &kinds, &goals)
+        .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
+    write_json(&folder.join("summary.json"), &summary)?;
+    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.truth.as_ref()));
+    Ok(())
+}

@@ -1,0 +1,40 @@
+//! `dimcmc optimise`: the best parameters and their curvature.
+
+use super::output::Output;
+use super::{Failure, Global, progress};
+use dimcmc::io::atomic::write_json;
+use dimcmc::io::optimum::OptimumFile;
+use dimcmc::run::search_settings;
+use dimcmc::scene::Scene;
+use dimcmc::search::find;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Find the best parameters and their error bars
+///
+/// Climbs from the config's values and from other orbits of the prior, with the gradient of the log-probability; the error
+/// bars are those of its curvature. Writes optimum.json.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc optimise configs/demo.json --out runs/demo_optimum")]
+pub struct Args {
+    /// Config file (JSON)
+    config: PathBuf,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    args.output.check()?;
+    let scene = Scene::load(&args.config)?;
+    scene.settings.require_free()?;
+    let spinner = progress::bar(global, None, "searching for the best parameters");
+    let found = find(&scene.imager, &scene.space, search_settings(&scene), |_| {});
+    spinner.finish_and_clear();
+    let found = found.map_err(|e| Failure::search(&args.config, e))?;
+    let file = OptimumFile::new(&scene, &found);
+    let folder = args.output.create()?;
+    write_json(&folder.join("optimum.json"), &file)?;
+    let _ = write!(std::io::stdout(), "{}", file.table());
+    Ok(())
+}

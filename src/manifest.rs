@@ -1,0 +1,196 @@
+//! What a run was begun with: `manifest.json`, beside the chain it belongs to.
+//!
+//! Written once, before the first step; only `--extend` changes it (its `extend_to`). Everything that a chain is a function
+//! of is in it or checked against it. Left out: the chain itself (`io::journal`).
+
+use crate::chain::{Goals, ParameterKind, Shape};
+use crate::config::{self, ConfigError, Settings};
+use crate::ensemble::Positions;
+use crate::io::atomic::{WriteError, write_json};
+use crate::objective::{Parameter, ParameterValues, Prior, Reference};
+use crate::optimise::Optimum;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Name of the file in a run's folder.
+pub const FILE: &str = "manifest.json";
+
+/// The content of `manifest.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Version of the program.
+    pub version: String,
+    /// SHA-256 (hex) of the part of the config that decides the chain.
+    pub config_sha256: String,
+    /// SHA-256 (hex) of the observations.
+    pub data_sha256: String,
+    /// The config with all defaults filled in.
+    pub config: serde_json::Value,
+    /// Names of the sampled parameters, in the order of the chain.
+    pub names: Vec<String>,
+    /// Their priors.
+    pub priors: BTreeMap<String, serde_json::Value>,
+    /// Number of independent ensembles.
+    pub ensembles: usize,
+    /// Walkers of each.
+    pub walkers: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Step that the chain goes on to in any case, where it was extended.
+    pub extend_to: Option<usize>,
+    /// Injected values of all parameters, for simulated data.
+    pub truth: Option<BTreeMap<String, f64>>,
+    /// The image that every evaluation starts from.
+    pub reference: ReferenceRecord,
+    /// The best parameters before sampling.
+    pub optimum: OptimumRecord,
+    /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
+    pub start: Positions,
+}
+
+/// The reference solution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceRecord {
+    /// All eight parameters.
+    pub parameters: BTreeMap<String, f64>,
+    /// Target of chi2.
+    pub chi2_target: f64,
+    /// chi2 of the image.
+    pub chi2: f64,
+    /// Lagrange multiplier.
+    pub lambda: f64,
+    /// Entropy.
+    pub entropy: f64,
+    /// Spottedness.
+    pub spottedness: f64,
+}
+
+/// The optimum and its error bars.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OptimumRecord {
+    /// Value of each sampled parameter.
+    pub parameters: BTreeMap<String, f64>,
+    /// Standard deviation of each from the curvature.
+    pub sd: BTreeMap<String, f64>,
+    /// Log-probability.
+    pub log_prob: f64,
+}
+
+/// A manifest that cannot be used: one line naming the file.
+#[derive(Debug, thiserror::Error)]
+pub enum ManifestError {
+    /// There is none.
+    #[error("{}: no {FILE}: this is not the folder of a run, or the run had not begun", folder.display())]
+    Missing {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// It cannot be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no manifest.
+    #[error("{}: {source}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// The config in it does not resolve.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+impl ReferenceRecord {
+    /// The record of a reference.
+    pub fn of(reference: &Reference) -> Self {
+        let solution = &reference.solution;
+        ReferenceRecord {
+            parameters: by_name(&reference.values),
+            chi2_target: reference.chi2_target,
+            chi2: solution.chi2,
+            lambda: solution.image.lambda,
+            entropy: solution.entropy,
+            spottedness: solution.spottedness,
+        }
+    }
+
+    /// All eight parameters; those missing in the record are taken from `others`.
+    pub fn values(&self, others: &ParameterValues) -> ParameterValues {
+        let mut values = *others;
+        for p in Parameter::ALL {
+            values[p] = self.parameters.get(p.name()).copied().unwrap_or(values[p]);
+        }
+        values
+    }
+}
+
+impl OptimumRecord {
+    /// The record of an optimum of the named parameters.
+    pub fn of(names: &[String], optimum: &Optimum) -> Self {
+        let sd = |i: usize| optimum.written_covariance[(i, i)].max(0.0).sqrt();
+        OptimumRecord {
+            parameters: names.iter().cloned().zip(optimum.theta.iter().copied()).collect(),
+            sd: names.iter().cloned().enumerate().map(|(i, name)| (name, sd(i))).collect(),
+            log_prob: optimum.evaluation.log_prob,
+        }
+    }
+}
+
+impl Manifest {
+    /// Reads the manifest in a run's folder.
+    ///
+    /// # Errors
+    /// A folder without one, or one that cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, ManifestError> {
+        let path = folder.join(FILE);
+        let text = std::fs::read(&path).map_err(|source| match source.kind() {
+            std::io::ErrorKind::NotFound => ManifestError::Missing { folder: folder.into() },
+            _ => ManifestError::Read { path: path.clone(), source },
+        })?;
+        serde_json::from_slice(&text).map_err(|source| ManifestError::Json { path, source })
+    }
+
+    /// Writes it into a run's folder.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_json(&folder.join(FILE), self)
+    }
+
+    /// Shape of the chain.
+    pub fn shape(&self) -> Shape {
+        Shape { names: self.names.clone(), ensembles: self.ensembles, walkers: self.walkers }
+    }
+
+    /// The settings that the run was begun with.
+    ///
+    /// # Errors
+    /// A config that this version does not understand.
+    pub fn settings(&self, folder: &Path) -> Result<Settings, ManifestError> {
+        Ok(config::from_json(self.config.to_string().as_bytes(), &folder.join(FILE))?)
+    }
+}
+
+/// All eight values by name.
+pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
+    Parameter::ALL.iter().map(|&p| (p.name().to_string(), values[p])).collect()
+}
+
+/// What sort of number each free parameter is, and the goals of the chain.
+pub fn kinds_and_goals(settings: &Settings) -> (Vec<ParameterKind>, Goals) {
+    let kind = |f: &crate::objective::FreeParameter| match (f.parameter, f.prior) {
+        (_, Prior::Periodic) => ParameterKind::Periodic,
+        (Parameter::K, _) => ParameterKind::Amplitude,
+        _ => ParameterKind::Linear,
+    };
+    let goals = Goals { rhat: settings.sampler.rhat, ess: settings.sampler.ess };
+    (settings.free.iter().map(kind).collect(), goals)
+}

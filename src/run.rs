@@ -1,0 +1,291 @@
+//! A sampling run: search, start, chain on disk; begun afresh or resumed to the same bytes.
+//!
+//! Left out: how progress is shown, and the analysis of the chain (`chain`).
+
+use crate::chain::{Chain, Convergence, ParameterKind, Record};
+use crate::ensemble::{
+    self, EnsembleError, Positions, RunError as StepError, Sampler, StartDraw, StopPolicy, StopReason, draw_start,
+};
+use crate::io::atomic::WriteError;
+use crate::io::journal::{Journal, JournalError};
+use crate::log_density::{LogDensity, Threads};
+use crate::manifest::{Manifest, ManifestError, OptimumRecord, ReferenceRecord, by_name, kinds_and_goals};
+use crate::objective::{Posterior, Reference, ReferenceError};
+use crate::scene::Scene;
+use crate::search::{Found, SearchError, SearchSettings, Stage, find};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Name of the chain in a run's folder.
+pub const CHAIN: &str = "chain.jsonl";
+
+/// Where the walkers start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartFrom {
+    /// Around the optimum, somewhat wider than its curvature.
+    #[default]
+    Optimum,
+    /// All over the prior.
+    Prior,
+}
+
+/// Orbits drawn from the prior that the search starts from, beside the config's.
+const SEARCH_STARTS: usize = 4;
+
+/// Starts are wider than the curvature by this factor, so that R-hat can tell whether the chain has forgotten them.
+const OVERDISPERSION: f64 = 1.5;
+
+/// Draws from the prior tried for one walker.
+const PRIOR_TRIES: usize = 100;
+
+/// A run with its chain so far.
+pub struct Run {
+    /// Where it is kept.
+    pub folder: PathBuf,
+    /// What it was begun with.
+    pub manifest: Manifest,
+    /// The posterior that is sampled.
+    pub posterior: Posterior,
+    /// The chain so far.
+    pub chain: Chain,
+    kinds: Vec<ParameterKind>,
+    policy: StopPolicy,
+    settings: ensemble::SamplerSettings,
+    journal: Journal,
+}
+
+/// Why a run cannot begin, or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The search for the reference failed.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    /// The start is no start, or the sampler's settings are wrong.
+    #[error(transparent)]
+    Ensemble(#[from] EnsembleError),
+    /// A walker found no place in the prior where a reconstruction succeeds.
+    #[error(
+        "start from the prior: no reconstruction succeeds at {PRIOR_TRIES} draws; narrow the priors under `parameters`"
+    )]
+    PriorStart,
+    /// The manifest is missing or wrong.
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
+    /// Config or data are not those that the run was begun with.
+    #[error("{}: the {what} changed since this run began ({} there, {} now); start a new run instead", .folder.display(), &.then[..12.min(.then.len())], &.now[..12.min(.now.len())])]
+    Changed {
+        /// The folder.
+        folder: PathBuf,
+        /// Config or data.
+        what: &'static str,
+        /// Hash in the manifest.
+        then: String,
+        /// Hash now.
+        now: String,
+    },
+    /// The reference comes out differently: another version of the program, or another kind of processor.
+    #[error("{}: the reference image comes out differently here (lambda {now:e} instead of {then:e}): resume with the version and on the kind of machine it was begun with", folder.display())]
+    Irreproducible {
+        /// The folder.
+        folder: PathBuf,
+        /// lambda in the manifest.
+        then: f64,
+        /// lambda now.
+        now: f64,
+    },
+    /// No reference at the manifest's parameters.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The chain on disk is wrong or locked.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The folder cannot be made.
+    #[error("{}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The chain refused a step: a fault of the program.
+    #[error(transparent)]
+    Chain(#[from] crate::chain::ChainError),
+}
+
+/// The settings of the search that a scene asks for.
+pub fn search_settings(scene: &Scene) -> SearchSettings {
+    SearchSettings {
+        chi2_target: scene.settings.imaging.chi2_target,
+        objective: scene.settings.imaging.objective,
+        prior_starts: SEARCH_STARTS,
+        seed: scene.settings.sampler.seed,
+    }
+}
+
+impl Run {
+    /// Begins a run: searches, draws the start, makes the folder with manifest and step 0.
+    ///
+    /// # Errors
+    /// [`RunError`]; the folder is made only once the search has succeeded.
+    pub fn begin(scene: &Scene, folder: &Path, from: StartFrom, progress: impl FnMut(Stage)) -> Result<Self, RunError> {
+        let settings = &scene.settings.sampler;
+        settings.validate(scene.space.dimension())?;
+        let found = find(&scene.imager, &scene.space, search_settings(scene), progress)?;
+        let start = match from {
+            StartFrom::Optimum => around_optimum(&found, scene)?,
+            StartFrom::Prior => over_prior(&found.posterior, scene)?,
+        };
+        let manifest = manifest(scene, &found, start);
+        // an earlier chain in the folder is there only if the user insists on overwriting it
+        let source = |source| RunError::Folder { path: folder.into(), source };
+        std::fs::create_dir_all(folder).map_err(source)?;
+        match std::fs::remove_file(folder.join(CHAIN)) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(source(e)),
+            _ => manifest.write(folder)?,
+        }
+        Run::open(scene, folder, manifest, found.posterior)
+    }
+
+    /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
+    ///
+    /// # Errors
+    /// [`RunError`]: no run there, changed config or data, a broken chain.
+    pub fn resume(scene: &Scene, folder: &Path, extend: Option<usize>) -> Result<Self, RunError> {
+        let manifest = Manifest::read(folder)?;
+        let unchanged = |what, then: &String, now: &String| match then == now {
+            true => Ok(()),
+            false => Err(RunError::Changed { folder: folder.into(), what, then: then.clone(), now: now.clone() }),
+        };
+        unchanged("config", &manifest.config_sha256, &scene.settings.sha256)?;
+        unchanged("data", &manifest.data_sha256, &scene.data_sha256)?;
+        let values = manifest.reference.values(&scene.settings.values);
+        let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target)?;
+        let (then, now) = (manifest.reference.lambda, reference.solution.image.lambda);
+        if then.to_bits() != now.to_bits() {
+            return Err(RunError::Irreproducible { folder: folder.into(), then, now });
+        }
+        let kind = scene.settings.imaging.objective;
+        let posterior = Posterior::new(scene.imager.clone(), scene.space.clone(), kind, reference);
+        let mut run = Run::open(scene, folder, manifest, posterior)?;
+        if let Some(steps) = extend {
+            run.manifest.extend_to = Some(run.chain.steps().saturating_sub(1) + steps);
+            run.manifest.write(folder)?;
+            run.policy = policy(scene, &run.manifest);
+        }
+        Ok(run)
+    }
+
+    /// Opens the chain, recovering what a crash left, and makes step 0 if it is not there.
+    fn open(scene: &Scene, folder: &Path, manifest: Manifest, posterior: Posterior) -> Result<Self, RunError> {
+        let path = folder.join(CHAIN);
+        let (mut journal, mut chain) = match path.exists() {
+            true => Journal::recover(&path, manifest.shape())?,
+            false => (Journal::create(&path, manifest.shape())?, Chain::new(manifest.shape())),
+        };
+        let settings = scene.settings.sampler.clone();
+        if chain.steps() == 0 {
+            let evaluator = Threads(&posterior);
+            let (_, records) = Sampler::new(&posterior, &evaluator, &settings)?.start(&manifest.start)?;
+            journal.append(&records)?;
+            chain.push_step(&records)?;
+        }
+        let (kinds, _) = kinds_and_goals(&scene.settings);
+        let policy = policy(scene, &manifest);
+        Ok(Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, journal })
+    }
+
+    /// The step at which the run ends if its goals are not reached before.
+    pub fn last_step(&self) -> usize {
+        self.policy.steps
+    }
+
+    /// The effective sample size that every parameter must reach.
+    pub fn ess_goal(&self) -> f64 {
+        self.policy.goals.ess
+    }
+
+    /// Steps until the goals are reached, the step limit, or `stop`; every step is on disk before the next begins.
+    ///
+    /// # Errors
+    /// A chain that cannot be written.
+    pub fn go(
+        &mut self,
+        stop: &AtomicBool,
+        mut on_step: impl FnMut(&[Record], Option<&Convergence>),
+    ) -> Result<StopReason, RunError> {
+        let Run { posterior, chain, kinds, policy, settings, journal, .. } = self;
+        let evaluator = Threads(&*posterior);
+        let sampler = Sampler::new(&*posterior, &evaluator, settings)?;
+        let result = ensemble::run(&sampler, chain, kinds, policy, stop, &mut |records, convergence| {
+            journal.append(records)?;
+            on_step(records, convergence);
+            Ok::<(), JournalError>(())
+        });
+        result.map_err(|error| match error {
+            StepError::Ensemble(error) => error.into(),
+            StepError::Chain(error) => error.into(),
+            StepError::Callback(error) => error.into(),
+        })
+    }
+}
+
+fn policy(scene: &Scene, manifest: &Manifest) -> StopPolicy {
+    let policy = StopPolicy::new(&scene.settings.sampler);
+    match manifest.extend_to {
+        Some(step) => StopPolicy { steps: step, least: step, ..policy },
+        None => policy,
+    }
+}
+
+fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
+    let provenance = scene.provenance();
+    let prior = |f: &crate::objective::FreeParameter| {
+        (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
+    };
+    let names = scene.space.names();
+    Manifest {
+        version: provenance.version.to_string(),
+        config_sha256: provenance.config_sha256,
+        data_sha256: provenance.data_sha256,
+        config: provenance.config,
+        names: names.to_vec(),
+        priors: scene.space.free().iter().map(prior).collect(),
+        ensembles: scene.settings.sampler.ensembles,
+        walkers: scene.settings.sampler.walkers,
+        seed: scene.settings.sampler.seed,
+        extend_to: None,
+        truth: scene.truth.map(|values| by_name(&values)),
+        reference: ReferenceRecord::of(found.posterior.reference()),
+        optimum: OptimumRecord::of(names, &found.optimum),
+        start,
+    }
+}
+
+fn around_optimum(found: &Found, scene: &Scene) -> Result<Positions, EnsembleError> {
+    let sampler = &scene.settings.sampler;
+    let draw = StartDraw {
+        centre: &found.optimum.theta,
+        covariance: &found.optimum.covariance,
+        scale: OVERDISPERSION,
+        ensembles: sampler.ensembles,
+        walkers: sampler.walkers,
+        seed: sampler.seed,
+    };
+    draw_start(&found.posterior, &draw, &|theta| scene.space.log_prior(theta).is_finite())
+}
+
+/// Draws from the prior at which the reconstruction succeeds.
+fn over_prior(posterior: &Posterior, scene: &Scene) -> Result<Positions, RunError> {
+    let sampler = &scene.settings.sampler;
+    let mut rng = ChaCha8Rng::seed_from_u64(sampler.seed);
+    let mut draw = || {
+        let mut draws = (0..PRIOR_TRIES).map(|_| scene.space.sample_prior(&mut rng));
+        draws.find(|theta| posterior.evaluate(theta).log_prob.is_finite()).ok_or(RunError::PriorStart)
+    };
+    (0..sampler.ensembles).map(|_| (0..sampler.walkers).map(|_| draw()).collect()).collect()
+}
