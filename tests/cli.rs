@@ -360,7 +360,6 @@ fn lo_peg_has_a_map() {
     // the shipped config, whose own path to the data holds where the repository lies beside them
     let mut config: Value = serde_json::from_slice(&std::fs::read(root.join("configs/lopeg.json")).unwrap()).unwrap();
     config["observations"]["path"] = json!(data);
-    config["imaging"]["pixels"] = json!(800);
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("lopeg.json"), config.to_string()).unwrap();
     let output = dimcmc(&["map", "lopeg.json", "--out", "map"], folder.path());
