@@ -50,7 +50,7 @@ pub(super) struct Star {
     pub epoch_d: f64,
     /// Inclination of the rotation axis to the line of sight (degrees), above 0 and up to 90.
     pub inclination_deg: f64,
-    /// Projected equatorial rotation velocity (km/s), above 0.
+    /// Projected equatorial rotation velocity (km/s), above 0 and up to 2000.
     pub vsini_kms: f64,
     /// Systemic radial velocity (km/s) that remains after the subtraction of each profile's VRAD.
     #[serde(default)]

@@ -142,7 +142,7 @@ pub(super) struct SimulateSection {
     pub cycles: Vec<f64>,
     /// Velocity bins.
     pub velocity_kms: VelocitySection,
-    /// Signal-to-noise ratio of each bin, above 0; null for no noise.
+    /// Signal-to-noise ratio of each bin, above 0; null for no noise (standard errors as for 1000).
     #[serde(default = "default_snr")]
     pub snr: Option<f64>,
     /// Seed of the noise.

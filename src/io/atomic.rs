@@ -37,7 +37,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 /// Writes `value` as indented JSON; what is not a finite number becomes null.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
     let mut json = serde_json::to_vec_pretty(value)
         .map_err(|e| WriteError { path: path.into(), source: std::io::Error::other(e) })?;
