@@ -4,6 +4,7 @@
 //! and the systemic velocity only shift that table. The grid is kept as m interleaved rows, which makes both directions
 //! plain vector updates. Left out: pixels.
 
+use super::deposit::multiply_add;
 use super::line_profile::LineKernel;
 
 /// The local line, sampled for one profile.
@@ -28,6 +29,7 @@ impl ProfileConvolution {
     }
 
     /// Calls `f(line, row, column, bins)` for every entry of the table: bins `bins` see it at `row[column..]`.
+    #[inline(always)]
     fn each_entry(&self, columns: usize, bins: usize, mut f: impl FnMut(f64, usize, usize, std::ops::Range<usize>)) {
         let m = self.steps_per_bin as isize;
         for (i, &line) in self.table.iter().enumerate() {
@@ -42,24 +44,26 @@ impl ProfileConvolution {
     }
 
     /// Line depth in every bin (overwritten) from the rows of the grid.
-    pub fn sum_to_bins(&self, rows: &Rows, bins: &mut [f64]) {
+    #[inline(always)]
+    pub fn sum_to_bins<const FMA: bool>(&self, rows: &Rows, bins: &mut [f64]) {
         bins.fill(0.0);
         self.each_entry(rows.columns, bins.len(), |line, row, column, range| {
             let source = &rows.row(row)[column..column + range.len()];
             for (bin, x) in bins[range].iter_mut().zip(source) {
-                *bin += line * x;
+                *bin = multiply_add::<FMA>(line, *x, *bin);
             }
         });
     }
 
     /// Transpose of [`ProfileConvolution::sum_to_bins`]: sets the rows of the grid from the bins.
-    pub fn spread_bins(&self, bins: &[f64], rows: &mut Rows) {
+    #[inline(always)]
+    pub fn spread_bins<const FMA: bool>(&self, bins: &[f64], rows: &mut Rows) {
         rows.values.fill(0.0);
         let columns = rows.columns;
         self.each_entry(columns, bins.len(), |line, row, column, range| {
             let target = &mut rows.row_mut(row)[column..column + range.len()];
             for (t, bin) in target.iter_mut().zip(&bins[range]) {
-                *t += line * bin;
+                *t = multiply_add::<FMA>(line, *bin, *t);
             }
         });
     }

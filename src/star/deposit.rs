@@ -1,7 +1,7 @@
 //! The sum over visible pixels: brightness deposited on a velocity grid, and its transpose. This is the hot path.
 //!
 //! Every visible (pixel, observation) pair holds six weights on consecutive nodes of a uniform velocity grid (see
-//! `line_profile`): 30 bytes and six multiply-adds a pair, whatever the shape and width of the line. The weights depend on
+//! `line_profile`): 40 bytes and eight multiply-adds (two of them by zero, to fill a vector register) a pair, whatever the shape and width of the line. The weights depend on
 //! the star's rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
 //! Left out: the line itself (`convolution`).
 
@@ -23,9 +23,21 @@ pub struct Deposit {
     pixels: usize,
     /// First pair of each observation, and the end.
     starts: Vec<usize>,
-    pixel: Vec<u32>,
-    node: Vec<u16>,
-    weights: Vec<[f32; DEPOSIT_NODES]>,
+    pairs: Vec<Pair>,
+}
+
+/// Nodes that are read or written for a pair: those with a weight, and zeros up to a whole number of vector registers.
+const WINDOW: usize = 8;
+
+/// Grids that are summed side by side.
+pub const LANES: usize = 4;
+
+/// One visible pixel of one observation.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    weights: [f32; WINDOW],
+    pixel: u32,
+    node: u16,
 }
 
 impl Deposit {
@@ -46,9 +58,7 @@ impl Deposit {
             nodes: 2 * reach as usize + 1,
             pixels: grid.len(),
             starts: vec![0],
-            pixel: Vec::with_capacity(capacity),
-            node: Vec::with_capacity(capacity),
-            weights: Vec::with_capacity(capacity),
+            pairs: Vec::with_capacity(capacity),
         };
         assert!(deposit.nodes <= usize::from(u16::MAX), "velocity grid of {} nodes", deposit.nodes);
         let mut views = Vec::new();
@@ -62,7 +72,7 @@ impl Deposit {
                     }
                 }
             }
-            deposit.starts.push(deposit.pixel.len());
+            deposit.starts.push(deposit.pairs.len());
         }
         deposit
     }
@@ -76,14 +86,16 @@ impl Deposit {
         let position = (velocity - self.origin_kms) / self.step_kms;
         let cell = position.floor();
         let spread = variance / (2.0 * self.step_kms * self.step_kms);
-        self.pixel.push(pixel as u32);
-        self.node.push(cell as u16 - 2);
-        self.weights.push(deposit_weights(position - cell, spread).map(|w| (weight * w) as f32));
+        let mut weights = [0.0; WINDOW];
+        for (w, share) in weights.iter_mut().zip(deposit_weights(position - cell, spread)) {
+            *w = (weight * share) as f32;
+        }
+        self.pairs.push(Pair { weights, pixel: pixel as u32, node: cell as u16 - 2 });
     }
 
     /// Number of visible (pixel, observation) pairs.
     pub fn pairs(&self) -> usize {
-        self.pixel.len()
+        self.pairs.len()
     }
 
     /// Number of pixels of the map.
@@ -91,34 +103,53 @@ impl Deposit {
         self.pixels
     }
 
-    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid `nodes`.
-    pub fn gather(&self, k: usize, x: &[f64], nodes: &mut [f64]) {
-        nodes.fill(0.0);
-        let range = self.starts[k]..self.starts[k + 1];
-        for i in range {
-            let b = x[self.pixel[i] as usize];
-            let first = usize::from(self.node[i]);
-            let target: &mut [f64; DEPOSIT_NODES] =
-                (&mut nodes[first..first + DEPOSIT_NODES]).try_into().expect("as many nodes");
-            for (t, w) in target.iter_mut().zip(self.weights[i]) {
-                *t += b * f64::from(w);
+    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid: the sum over `lanes` of
+    /// [`LANES`] grids of [`Deposit::stride`] nodes each.
+    #[inline(always)]
+    pub fn gather<const FMA: bool>(&self, k: usize, x: &[f64], lanes: &mut [f64]) {
+        lanes.fill(0.0);
+        let stride = self.stride();
+        // neighbours in a ring hit overlapping nodes: with a grid each, none waits for the other's sums to reach memory
+        for (i, pair) in self.pairs_of(k).enumerate() {
+            let first = (i % LANES) * stride + usize::from(pair.node);
+            let brightness = x[pair.pixel as usize];
+            let target: &mut [f64; WINDOW] = (&mut lanes[first..first + WINDOW]).try_into().expect("a whole window");
+            for (t, w) in target.iter_mut().zip(pair.weights) {
+                *t = multiply_add::<FMA>(brightness, f64::from(w), *t);
             }
         }
     }
 
     /// Transpose of [`Deposit::gather`]: adds to map `out` what observation `k` gives back from the grid `nodes`.
-    pub fn scatter(&self, k: usize, nodes: &[f64], out: &mut [f64]) {
-        let range = self.starts[k]..self.starts[k + 1];
-        for i in range {
-            let first = usize::from(self.node[i]);
-            let source: &[f64; DEPOSIT_NODES] =
-                (&nodes[first..first + DEPOSIT_NODES]).try_into().expect("as many nodes");
-            let w = self.weights[i];
-            let product = |j: usize| source[j] * f64::from(w[j]);
-            let sum = (product(0) + product(1)) + (product(2) + product(3)) + (product(4) + product(5));
-            out[self.pixel[i] as usize] += sum;
+    #[inline(always)]
+    pub fn scatter<const FMA: bool>(&self, k: usize, nodes: &[f64], out: &mut [f64]) {
+        for pair in self.pairs_of(k) {
+            let first = usize::from(pair.node);
+            let source: &[f64; WINDOW] = (&nodes[first..first + WINDOW]).try_into().expect("a whole window");
+            let mut sums = [0.0; WINDOW / 2];
+            for j in 0..WINDOW / 2 {
+                let low = source[j] * f64::from(pair.weights[j]);
+                sums[j] = multiply_add::<FMA>(source[j + WINDOW / 2], f64::from(pair.weights[j + WINDOW / 2]), low);
+            }
+            out[pair.pixel as usize] += (sums[0] + sums[2]) + (sums[1] + sums[3]);
         }
     }
+
+    #[inline(always)]
+    fn pairs_of(&self, k: usize) -> impl Iterator<Item = &Pair> {
+        self.pairs[self.starts[k]..self.starts[k + 1]].iter()
+    }
+
+    /// Nodes of the grid and a margin, so that every window lies inside.
+    pub fn stride(&self) -> usize {
+        self.nodes + WINDOW - DEPOSIT_NODES
+    }
+}
+
+/// `a b + c`, fused where the processor can.
+#[inline(always)]
+pub fn multiply_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FMA { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// Nodes on either side of the line's centre.

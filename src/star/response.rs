@@ -5,7 +5,7 @@
 //! (what x is), the division by the continuum, data.
 
 use super::convolution::{ProfileConvolution, Rows};
-use super::deposit::Deposit;
+use super::deposit::{Deposit, LANES};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
@@ -113,13 +113,67 @@ impl Response {
 
     /// Line depth of every bin and continuum of every profile for the map `x`.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
-        let mut nodes = vec![0.0; self.deposit.nodes];
-        let mut rows = Rows::new(self.deposit.nodes, self.steps_per_bin);
+        if has_avx2() {
+            // safe: the processor has what the function needs
+            #[allow(unsafe_code)]
+            unsafe {
+                self.apply_avx2(x, line, continuum);
+            }
+        } else {
+            self.apply_with::<false>(x, line, continuum);
+        }
+    }
+
+    /// Transpose of [`Response::apply`]; `out` is overwritten.
+    pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
+        if has_avx2() {
+            // safe: the processor has what the function needs
+            #[allow(unsafe_code)]
+            unsafe {
+                self.apply_transpose_avx2(line, continuum, out);
+            }
+        } else {
+            self.apply_transpose_with::<false>(line, continuum, out);
+        }
+    }
+
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
+    fn apply_avx2(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
+        self.apply_with::<true>(x, line, continuum);
+    }
+
+    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
+    fn apply_transpose_avx2(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
+        self.apply_transpose_with::<true>(line, continuum, out);
+    }
+
+    #[inline(always)]
+    fn apply_with<const FMA: bool>(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
+        let stride = self.deposit.stride();
+        let mut lanes = vec![0.0; LANES * stride];
+        let mut rows = Rows::new(stride, self.steps_per_bin);
         for (k, convolution) in self.convolutions.iter().enumerate() {
-            self.deposit.gather(k, x, &mut nodes);
+            self.deposit.gather::<FMA>(k, x, &mut lanes);
+            let (nodes, others) = lanes.split_at_mut(stride);
+            for other in others.chunks_exact(stride) {
+                nodes.iter_mut().zip(other).for_each(|(node, x)| *node += x);
+            }
             continuum[k] = nodes.iter().sum();
-            rows.interleave(&nodes);
-            convolution.sum_to_bins(&rows, &mut line[self.bins(k)]);
+            rows.interleave(nodes);
+            convolution.sum_to_bins::<FMA>(&rows, &mut line[self.bins(k)]);
+        }
+    }
+
+    #[inline(always)]
+    fn apply_transpose_with<const FMA: bool>(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        let mut nodes = vec![0.0; self.deposit.stride()];
+        let mut rows = Rows::new(nodes.len(), self.steps_per_bin);
+        for (k, convolution) in self.convolutions.iter().enumerate() {
+            convolution.spread_bins::<FMA>(&line[self.bins(k)], &mut rows);
+            rows.deinterleave(&mut nodes);
+            nodes.iter_mut().for_each(|node| *node += continuum[k]);
+            self.deposit.scatter::<FMA>(k, &nodes, out);
         }
     }
 
@@ -133,17 +187,12 @@ impl Response {
         }
         depths
     }
+}
 
-    /// Transpose of [`Response::apply`]; `out` is overwritten.
-    pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
-        out.fill(0.0);
-        let mut nodes = vec![0.0; self.deposit.nodes];
-        let mut rows = Rows::new(self.deposit.nodes, self.steps_per_bin);
-        for (k, convolution) in self.convolutions.iter().enumerate() {
-            convolution.spread_bins(&line[self.bins(k)], &mut rows);
-            rows.deinterleave(&mut nodes);
-            nodes.iter_mut().for_each(|node| *node += continuum[k]);
-            self.deposit.scatter(k, &nodes, out);
-        }
-    }
+/// Whether the vector instructions that the hot loops are compiled for as well are there (looked up once, then remembered).
+fn has_avx2() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
+    #[cfg(not(target_arch = "x86_64"))]
+    return false;
 }
