@@ -27,7 +27,7 @@ pub struct Deposit {
 }
 
 /// Nodes that are read or written for a pair: those with a weight, and zeros up to a whole number of vector registers.
-const WINDOW: usize = 8;
+const WINDOW: usize = 6;
 
 /// Grids that are summed side by side.
 pub const LANES: usize = 4;
@@ -126,11 +126,10 @@ impl Deposit {
         for pair in self.pairs_of(k) {
             let first = usize::from(pair.node);
             let source: &[f64; WINDOW] = (&nodes[first..first + WINDOW]).try_into().expect("a whole window");
-            let mut sums = [0.0; WINDOW / 2];
-            for j in 0..WINDOW / 2 {
-                let low = source[j] * f64::from(pair.weights[j]);
-                sums[j] = multiply_add::<FMA>(source[j + WINDOW / 2], f64::from(pair.weights[j + WINDOW / 2]), low);
-            }
+            let w = pair.weights.map(f64::from);
+            let mut sums = [source[0] * w[0], source[1] * w[1], source[2] * w[2], source[3] * w[3]];
+            sums[0] = multiply_add::<FMA>(source[4], w[4], sums[0]);
+            sums[1] = multiply_add::<FMA>(source[5], w[5], sums[1]);
             out[pair.pixel as usize] += (sums[0] + sums[2]) + (sums[1] + sums[3]);
         }
     }
