@@ -80,12 +80,18 @@ pub struct Start {
     pub image: Image,
     /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none.
     pub path: Vec<f64>,
+    /// A guess of `d chi2 / d ln(lambda)` to go with it.
+    pub chi2_slope: f64,
 }
 
 impl Start {
     /// An image without data: every pixel at the default, and a lambda for which data begin to matter.
     pub fn blank(entropy: &Entropy, pixels: usize, lambda: f64) -> Self {
-        Start { image: Image { logit: vec![entropy.default_logit(); pixels], lambda }, path: Vec::new() }
+        Start {
+            image: Image { logit: vec![entropy.default_logit(); pixels], lambda },
+            path: Vec::new(),
+            chi2_slope: 0.0,
+        }
     }
 }
 
@@ -115,6 +121,9 @@ pub struct Solution {
 /// Largest change of a logit in one step, and of ln(lambda).
 const LOGIT_CAP: f64 = 2.0;
 const LN_LAMBDA_CAP: f64 = 1.5;
+
+/// Largest change of ln(lambda) that is made before the first Newton step.
+const RESTORE_REACH: f64 = 0.3;
 
 /// The exact curvature is used once a step is worth less than this in `S/lambda - chi2/2`.
 const EXACT_BELOW: f64 = 100.0;
@@ -172,6 +181,7 @@ impl Solver<'_> {
         if let Goal::Lambda(lambda) = goal {
             at.lambda = lambda;
         }
+        let mut at = self.restore(problem, at, goal, start);
         let mut path = start.path.clone();
         let mut curvature = Curvature::GaussNewton;
         for newton_steps in 0..self.settings.newton_steps {
@@ -216,6 +226,22 @@ impl Solver<'_> {
         let chi2 = problem.linearise(&s);
         let entropy = self.entropy.value(&u, problem.area());
         Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy }
+    }
+
+    /// Moves along the start's path to where its slope says that chi2 meets the goal: one pass that spares a Newton step.
+    fn restore(&self, problem: &mut impl Problem, at: Point, goal: Goal, start: &Start) -> Point {
+        let Goal::Chi2 { target, .. } = goal else { return at };
+        let move_lambda = (target - at.chi2) / start.chi2_slope;
+        let worth_it = 0.5 * (target - at.chi2).abs() * self.settings.cg_tolerance > self.settings.tolerance;
+        if start.path.len() != at.u.len() || !worth_it || move_lambda.is_nan() || move_lambda.abs() > RESTORE_REACH {
+            return at;
+        }
+        let mut ds = vec![0.0; at.u.len()];
+        self.entropy.metric(&at.s, problem.area(), &mut ds);
+        ds.iter_mut().zip(&start.path).for_each(|(d, z)| *d *= z);
+        let mut u = vec![0.0; at.u.len()];
+        self.entropy.step(&at.u, &at.s, &ds, move_lambda, LOGIT_CAP, &mut u);
+        self.arrive(problem, u, at.lambda * move_lambda.exp())
     }
 
     /// The Newton step at fixed lambda and, if chi2 is the goal, the path along lambda.

@@ -4,6 +4,7 @@ pub mod coordinates;
 pub mod kind;
 pub mod parameters;
 pub mod posterior;
+mod prediction;
 pub mod prior;
 pub mod reference;
 pub mod tradeoff;

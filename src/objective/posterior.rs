@@ -6,6 +6,7 @@
 use super::coordinates::ParameterSpace;
 use super::kind::ObjectiveKind;
 use super::parameters::Parameter;
+use super::prediction::Prediction;
 use super::reference::Reference;
 use super::tradeoff::Measure;
 use crate::imaging::{Imager, ImagingProblem};
@@ -21,6 +22,7 @@ pub struct Posterior {
     kind: ObjectiveKind,
     reference: Reference,
     settings: SolverSettings,
+    prediction: Option<Prediction>,
     /// Whether only orbit and systemic velocity are free, so that pixels are looked at once for all evaluations.
     velocities_only: bool,
 }
@@ -45,7 +47,11 @@ impl Posterior {
         let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here[p] == reference.values[p])
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
-        Posterior { imager, space, kind, reference, settings, velocities_only }
+        let mut posterior = Posterior { imager, space, kind, reference, settings, prediction: None, velocities_only };
+        let response = |theta: &[f64]| posterior.response(theta);
+        let Posterior { imager, space, reference, .. } = &posterior;
+        posterior.prediction = Some(Prediction::new(imager, space, reference, posterior.goal(), response));
+        posterior
     }
 
     /// The same posterior with other solver settings than those that a chain needs.
@@ -106,7 +112,11 @@ impl Posterior {
     pub fn reconstruct(&self, theta: &[f64]) -> (Solution, ImagingProblem<'_>) {
         let mut problem = self.imager.problem(self.response(theta));
         let near = Solver { settings: SolverSettings { newton_steps: NEWTON_STEPS, ..self.settings }, ..self.solver() };
-        let solution = near.solve(&mut problem, self.goal(), &self.reference.start());
+        let start = match &self.prediction {
+            Some(prediction) => prediction.start(&self.imager, &self.reference, &self.space.to_internal(theta)),
+            None => self.reference.start(),
+        };
+        let solution = near.solve(&mut problem, self.goal(), &start);
         if solution.termination != Termination::StepLimit {
             return (solution, problem);
         }

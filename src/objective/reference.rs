@@ -181,7 +181,7 @@ impl Reference {
 
 /// Where the next solution starts from this one.
 fn start(solution: &Solution) -> Start {
-    Start { image: solution.image.clone(), path: solution.path.clone() }
+    Start { image: solution.image.clone(), path: solution.path.clone(), chi2_slope: solution.chi2_slope }
 }
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.

@@ -1,0 +1,111 @@
+//! A first-order prediction of image and lambda from the reference: how both change with each parameter (method section 2).
+//!
+//! At the reference the solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term
+//! set so that chi2 stays at the target (or left out at a fixed lambda). It is where an evaluation starts, and saves it a
+//! Newton step or two; what it ends at does not depend on it beyond the solver's tolerance. Left out: the solver.
+
+use super::coordinates::ParameterSpace;
+use super::reference::Reference;
+use crate::imaging::Imager;
+use crate::maxent::{Goal, Problem, Solver, SolverSettings, Start};
+use crate::star::Response;
+
+/// Derivatives of the reference solution with respect to internal coordinates.
+#[derive(Clone, Debug)]
+pub struct Prediction {
+    /// Internal coordinates of the reference.
+    origin: Vec<f64>,
+    /// Natural scales of the coordinates.
+    scales: Vec<f64>,
+    /// Image step per unit of each coordinate.
+    image: Vec<Vec<f64>>,
+    /// Change of ln(lambda) per unit of each coordinate.
+    ln_lambda: Vec<f64>,
+}
+
+/// Numerical derivatives step by this share of a coordinate's natural scale.
+const STEP: f64 = 0.05;
+
+/// Predictions reach this many natural scales in any coordinate; beyond, they are followed no further.
+const REACH: f64 = 3.0;
+
+/// Largest change of ln(lambda) that is predicted.
+const LN_LAMBDA_REACH: f64 = 1.0;
+
+impl Prediction {
+    /// Of the solutions around `reference` for `goal`, with `response(theta)` at points of `space` (written coordinates).
+    pub fn new(
+        imager: &Imager,
+        space: &ParameterSpace,
+        reference: &Reference,
+        goal: Goal,
+        response: impl Fn(&[f64]) -> Response,
+    ) -> Self {
+        let origin = space.to_internal(&space.theta_of(&reference.values));
+        let scales = space.scales();
+        let solver = Solver {
+            entropy: imager.entropy,
+            preconditioner: &reference.preconditioner,
+            settings: SolverSettings { cg_tolerance: 0.01, ..SolverSettings::default() },
+        };
+        let solution = &reference.solution;
+        let n = imager.grid.len();
+        let mut map = vec![0.0; n];
+        imager.entropy.image(&solution.image.logit, &mut map);
+        let mut scale = vec![0.0; n];
+        imager.entropy.metric(&map, &imager.grid.area, &mut scale);
+        let mut problem = imager.problem(reference.response.clone());
+        problem.linearise(&map);
+        let mut gradient = vec![0.0; n];
+        problem.gradient(&mut gradient);
+        let (mut image, mut ln_lambda) = (Vec::new(), Vec::new());
+        for (i, scale_i) in scales.iter().enumerate() {
+            let h = STEP * scale_i;
+            let at = |h: f64| {
+                let mut x = origin.clone();
+                x[i] += h;
+                let mut problem = imager.problem(response(&space.to_written(&x)));
+                let chi2 = problem.linearise(&map);
+                let mut gradient = vec![0.0; n];
+                problem.gradient(&mut gradient);
+                (chi2, gradient)
+            };
+            let ((chi2_plus, plus), (chi2_minus, minus)) = (at(h), at(-h));
+            let pull = |(p, m): (&f64, &f64)| -solution.image.lambda * (p - m) / (2.0 * h);
+            let right: Vec<f64> = plus.iter().zip(&minus).map(pull).collect();
+            let mut step = solver.apply_inverse(&mut problem, &solution.image, &right);
+            let mut along = 0.0;
+            if let Goal::Chi2 { .. } = goal {
+                let chi2_step: f64 = 2.0 * gradient.iter().zip(&step).map(|(g, s)| g * s).sum::<f64>();
+                let chi2_change = (chi2_plus - chi2_minus) / (2.0 * h) + chi2_step;
+                along = -chi2_change / solution.chi2_slope;
+                let path = solution.path.iter().zip(&scale).map(|(z, d)| z * d);
+                step.iter_mut().zip(path).for_each(|(s, p)| *s += along * p);
+            }
+            image.push(step);
+            ln_lambda.push(along);
+        }
+        Prediction { origin, scales, image, ln_lambda }
+    }
+
+    /// Where an evaluation at the internal coordinates `x` starts.
+    pub fn start(&self, imager: &Imager, reference: &Reference, x: &[f64]) -> Start {
+        let mut start = reference.start();
+        let shifts: Vec<f64> = x.iter().zip(&self.origin).map(|(x, x0)| x - x0).collect();
+        let farthest = shifts.iter().zip(&self.scales).map(|(d, s)| (d / s).abs()).fold(0.0, f64::max);
+        let shrink = (REACH / farthest).min(1.0);
+        let n = start.image.logit.len();
+        let (mut ds, mut ln_lambda) = (vec![0.0; n], 0.0);
+        for ((shift, image), along) in shifts.iter().zip(&self.image).zip(&self.ln_lambda) {
+            let shift = shift * shrink;
+            ln_lambda += shift * along;
+            ds.iter_mut().zip(image).for_each(|(ds, step)| *ds += shift * step);
+        }
+        let mut map = vec![0.0; n];
+        imager.entropy.image(&start.image.logit, &mut map);
+        let logit = start.image.logit.clone();
+        imager.entropy.step(&logit, &map, &ds, 1.0, 1.0, &mut start.image.logit);
+        start.image.lambda *= ln_lambda.clamp(-LN_LAMBDA_REACH, LN_LAMBDA_REACH).exp();
+        start
+    }
+}
