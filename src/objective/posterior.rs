@@ -13,6 +13,7 @@ use crate::imaging::{Imager, ImagingProblem};
 use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
 use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Termination};
 use crate::star::Response;
+use crate::star::response::MOST_NODES;
 
 /// The posterior of the free parameters.
 #[derive(Clone, Debug)]
@@ -88,7 +89,11 @@ impl Posterior {
         let values = self.space.values_at(theta);
         let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
         let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
-        values.0.iter().all(|x| x.is_finite())
+        if !values.0.iter().all(|x| x.is_finite()) {
+            return false;
+        }
+        let (_, nodes) = Response::velocity_grid(&self.imager.star, &values.state(), self.imager.sampling.step_kms);
+        nodes <= MOST_NODES
             && fastest.is_finite()
             && fastest <= LARGEST_VSINI_KMS
             && values[Parameter::Vsini] > 0.0

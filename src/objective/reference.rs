@@ -59,8 +59,8 @@ pub struct Reference {
 pub enum ReferenceError {
     /// No map fits the data that well.
     #[error(
-        "the target chi2 of {target:.4} per datum is below the reachable floor: no map at these parameters gets below \
-         {floor:.4} per datum"
+        "the target chi2 of {target:.4} per datum is below the reachable floor: at these parameters the fit comes down to \
+         {floor:.4} per datum and no further"
     )]
     TargetBelowFloor {
         /// Target, per datum.
@@ -94,7 +94,8 @@ impl Reference {
         let mut reference = Reference::approach(imager, values, chi2_per_datum, HOPELESS_LAMBDA)?;
         match reference.solution.termination {
             Termination::Converged => {}
-            Termination::Unreachable => {
+            // a search for the floor that runs out of steps has found it to within what a message needs
+            Termination::Unreachable | Termination::StepLimit => {
                 let floor = reference.solution.chi2 / data;
                 return Err(ReferenceError::TargetBelowFloor { target: chi2_per_datum, floor });
             }

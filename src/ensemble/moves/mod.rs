@@ -49,7 +49,7 @@ pub struct MoveWeights {
 
 impl Default for MoveWeights {
     fn default() -> Self {
-        MoveWeights { stretch: 0.5, differential_evolution: 0.5 }
+        MoveWeights { stretch: 0.25, differential_evolution: 0.75 }
     }
 }
 
