@@ -1,0 +1,134 @@
+//! Truths about the forward model: symmetry, limit cases, adjointness, convergence with the number of pixels.
+
+mod common;
+
+use common::{oracle, values};
+use dimcmc::star::{LimbDarkening, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid};
+
+fn state() -> StarState {
+    StarState {
+        rotation: Rotation { omega_eq_rad_d: 2.0, domega_rad_d: 0.0 },
+        inclination: 38.0_f64.to_radians(),
+        vsini_kms: 40.0,
+        vsys_kms: 0.0,
+        orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.7, phi: 0.5 },
+    }
+}
+
+fn sampling(times: &[f64]) -> Sampling {
+    Sampling { step_kms: 1.8, profiles: times.iter().map(|&t| (t, -59.4, 67)).collect() }
+}
+
+fn unspotted(grid: &SurfaceGrid, state: &StarState, sampling: &Sampling, limb: LimbDarkening) -> Vec<f64> {
+    let mut star = oracle().star;
+    star.limb_darkening = limb;
+    Response::new(grid, &star, state, sampling).depths(&vec![1.0; grid.len()])
+}
+
+const LINEAR: LimbDarkening = LimbDarkening::Linear(0.65);
+
+#[test]
+fn an_unspotted_profile_is_symmetric_and_has_the_equivalent_width_of_the_line() {
+    for quadrature in [Quadrature::Centre, Quadrature::Gauss2x2] {
+        let grid = SurfaceGrid::equal_area(5000, quadrature);
+        let depth = unspotted(&grid, &state(), &sampling(&[0.0]), LINEAR);
+        let deepest = depth.iter().copied().fold(0.0, f64::max);
+        for j in 0..33 {
+            // pixels of a ring lie symmetrically about longitude 0; weights are stored in single precision
+            assert!((depth[j] - depth[66 - j]).abs() < 1e-6 * deepest, "bin {j}");
+        }
+        let width: f64 = depth.iter().sum::<f64>() * 1.8;
+        assert!((width - 5.8).abs() < 1e-4, "equivalent width {width}");
+    }
+}
+
+#[test]
+fn an_unspotted_profile_converges_as_the_method_says() {
+    // rms errors of the method's table for moment matching, times three
+    let truth = {
+        let grid = SurfaceGrid::equal_area(300_000, Quadrature::Gauss2x2);
+        unspotted(&grid, &state(), &sampling(&[0.3]), LINEAR)
+    };
+    let rms = |pixels, quadrature| {
+        let depth = unspotted(&SurfaceGrid::equal_area(pixels, quadrature), &state(), &sampling(&[0.3]), LINEAR);
+        let sum: f64 = depth.iter().zip(&truth).map(|(a, b)| (a - b) * (a - b)).sum();
+        (sum / truth.len() as f64).sqrt()
+    };
+    for (pixels, wanted) in [(2000, 3.4e-6), (5000, 9.7e-7), (20_000, 2.5e-7)] {
+        let (moments, centre) = (rms(pixels, Quadrature::Gauss2x2), rms(pixels, Quadrature::Centre));
+        println!("{pixels} pixels: moments {moments:.1e}, centre {centre:.1e}");
+        assert!(moments < 3.0 * wanted, "{pixels} pixels: {moments:.1e}");
+        assert!(centre > 5.0 * moments, "moment matching brings nothing at {pixels} pixels");
+    }
+}
+
+#[test]
+fn a_star_seen_pole_on_shows_its_local_line() {
+    let pole_on = StarState { inclination: 1e-9, vsini_kms: 1e-6, ..state() };
+    let grid = SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2);
+    let depth = unspotted(&grid, &pole_on, &sampling(&[0.0]), LimbDarkening::Quadratic(0.4, 0.3));
+    let line = oracle().star.line;
+    for (j, depth) in depth.iter().enumerate() {
+        let v = -59.4 + 1.8 * j as f64;
+        let gaussian = (-0.5 * (v / line.sigma_kms).powi(2)).exp() * line.equivalent_width_kms
+            / (line.sigma_kms * std::f64::consts::TAU.sqrt());
+        // aliasing of the deposit
+        assert!((depth - gaussian).abs() < 1e-6, "{v} km/s: {depth} instead of {gaussian}");
+    }
+}
+
+#[test]
+fn orbit_and_systemic_velocity_shift_the_profile_as_a_whole() {
+    let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
+    let sampling = sampling(&[0.7]);
+    let orbit = Orbit { k_kms: 0.9, porb_over_prot: 1.3, phi: 0.2 };
+    let cycle = 0.7 / oracle().star.rotation_period_d;
+    let moved = unspotted(&grid, &StarState { orbit, vsys_kms: 0.4, ..state() }, &sampling, LINEAR);
+    let shift = 0.4 + orbit.velocity_kms(cycle);
+    let shifted = Sampling { profiles: vec![(0.7, -59.4 - shift, 67)], ..sampling };
+    let at_rest = unspotted(&grid, &state(), &shifted, LINEAR);
+    for (a, b) in moved.iter().zip(&at_rest) {
+        assert!((a - b).abs() < 1e-12);
+    }
+    // phi = 0 is the largest receding velocity at cycle 0
+    assert!((Orbit { phi: 0.0, ..orbit }.velocity_kms(0.0) - 0.9).abs() < 1e-15);
+}
+
+#[test]
+fn a_spot_crosses_from_blue_to_red_and_shear_delays_high_latitudes() {
+    let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);
+    let spotted: Vec<f64> = (0..grid.len())
+        .map(|p| {
+            let near = grid.latitude[p] > 0.7 && grid.latitude[p] < 0.9;
+            let longitude = (grid.longitude[p] + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
+            if near && (longitude - std::f64::consts::PI).abs() < 0.15 { 0.0 } else { 1.0 }
+        })
+        .collect();
+    // first moment of what is missing in the line at a given time
+    let bump = |domega: f64, time: f64| {
+        let state = StarState { rotation: Rotation { omega_eq_rad_d: 2.0, domega_rad_d: domega }, ..state() };
+        let response = Response::new(&grid, &oracle().star, &state, &sampling(&[time]));
+        let (bright, dark) = (response.depths(&vec![1.0; grid.len()]), response.depths(&spotted));
+        let missing: Vec<f64> = bright.iter().zip(&dark).map(|(a, b)| a - b).collect();
+        let moment: f64 = missing.iter().enumerate().map(|(j, m)| m * (-59.4 + 1.8 * j as f64)).sum();
+        moment / missing.iter().map(|m| m.abs()).sum::<f64>()
+    };
+    assert!(bump(0.0, -0.3) < -1.0 && bump(0.0, 0.3) > 1.0);
+    assert!(bump(0.5, 0.3) < bump(0.0, 0.3) - 0.5, "the spot lags where the star turns more slowly");
+}
+
+#[test]
+fn the_transpose_is_the_transpose() {
+    let oracle = oracle();
+    let truth = values(&oracle.json["results"]["fixed_lambda"][6]["theta"], 3.0).state();
+    let grid = SurfaceGrid::equal_area(1500, Quadrature::Gauss2x2);
+    let response = Response::new(&grid, &oracle.star, &truth, &oracle.sampling);
+    let noise = |n: usize, a: f64| (0..n).map(|i| (a * (i * i) as f64).sin()).collect::<Vec<f64>>();
+    let (x, y, z) = (noise(grid.len(), 0.7), noise(response.data_len(), 1.3), noise(response.profiles(), 2.1));
+    let (mut line, mut continuum, mut back) = (vec![0.0; y.len()], vec![0.0; z.len()], vec![0.0; x.len()]);
+    response.apply(&x, &mut line, &mut continuum);
+    response.apply_transpose(&y, &z, &mut back);
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (there, here) = (dot(&line, &y) + dot(&continuum, &z), dot(&x, &back));
+    assert!((there / here - 1.0).abs() < 1e-11, "{there} {here}");
+}

@@ -1,0 +1,120 @@
+//! Truths about the maximum-entropy image: derivatives of the misfit, the solver's optimality conditions, and that the answer
+//! does not depend on the way to it.
+
+mod common;
+
+use common::{Oracle, oracle, values};
+use dimcmc::imaging::{Imager, ImagingProblem};
+use dimcmc::maxent::entropy::Entropy;
+use dimcmc::maxent::{Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
+use dimcmc::objective::{Parameter, Reference};
+use dimcmc::star::{Quadrature, SurfaceGrid};
+
+fn imager(oracle: &Oracle) -> Imager {
+    Imager {
+        grid: SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2),
+        star: oracle.star.clone(),
+        sampling: oracle.sampling.clone(),
+        data: oracle.data.clone(),
+        entropy: Entropy::new(oracle.default_spot),
+    }
+}
+
+fn problem<'a>(oracle: &Oracle, imager: &'a Imager) -> ImagingProblem<'a> {
+    let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
+    imager.problem(imager.response(&truth.state()))
+}
+
+fn wave(n: usize, a: f64) -> Vec<f64> {
+    (0..n).map(|i| (a * (i * i) as f64).sin()).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[test]
+fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
+    let oracle = oracle();
+    let imager = imager(&oracle);
+    let mut problem = problem(&oracle, &imager);
+    let n = imager.grid.len();
+    let s: Vec<f64> = wave(n, 0.37).iter().map(|x| 0.3 + 0.2 * x).collect();
+    let (v, w) = (wave(n, 0.9), wave(n, 1.7));
+    let (mut gradient, mut curved) = (vec![0.0; n], vec![0.0; n]);
+    let h = 1e-5;
+    let shifted = |h: f64| s.iter().zip(&v).map(|(s, v)| s + h * v).collect::<Vec<f64>>();
+    let mut at = |h: f64| {
+        let chi2 = problem.linearise(&shifted(h));
+        problem.gradient(&mut gradient);
+        (chi2, dot(&gradient, &w))
+    };
+    let ((chi2_plus, slope_plus), (chi2_minus, slope_minus)) = (at(h), at(-h));
+    problem.linearise(&s);
+    problem.gradient(&mut gradient);
+    problem.curvature(Curvature::Exact, &v, &mut curved);
+    let slope = (chi2_plus - chi2_minus) / (4.0 * h);
+    assert!((dot(&gradient, &v) / slope - 1.0).abs() < 1e-6);
+    assert!((problem.slope(&v) / slope - 1.0).abs() < 1e-6);
+    let second = (slope_plus - slope_minus) / (2.0 * h);
+    assert!((dot(&curved, &w) / second - 1.0).abs() < 1e-6, "{} {second}", dot(&curved, &w));
+}
+
+#[test]
+fn the_solution_meets_its_optimality_conditions() {
+    let oracle = oracle();
+    let imager = imager(&oracle);
+    let mut problem = problem(&oracle, &imager);
+    let none = Preconditioner::identity();
+    let solver = Solver { entropy: imager.entropy, preconditioner: &none, settings: SolverSettings::exact() };
+    let target = 0.97 * imager.data.depth.len() as f64;
+    let blank = Start::blank(&imager.entropy, imager.grid.len(), 1e-6);
+    let solution = solver.solve(&mut problem, Goal::Chi2 { target, largest_lambda: 1.0 }, &blank);
+    assert_eq!(solution.termination, Termination::Converged);
+    assert!((solution.chi2 - target).abs() < 1e-5);
+    let n = imager.grid.len();
+    let (mut s, mut misfit, mut order) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    imager.entropy.image(&solution.image.logit, &mut s);
+    problem.linearise(&s);
+    problem.gradient(&mut misfit);
+    imager.entropy.gradient(&solution.image.logit, &imager.grid.area, &mut order);
+    // the gradient of -S + (lambda/2) chi2 vanishes, in the entropy's metric, against either of its terms
+    let norm = |g: &[f64]| g.iter().zip(&s).map(|(g, s)| g * g * s * (1.0 - s)).sum::<f64>().sqrt();
+    let sum: Vec<f64> = order.iter().zip(&misfit).map(|(a, b)| a + solution.image.lambda * b).collect();
+    assert!(norm(&sum) < 1e-6 * norm(&order), "{:e} of {:e}", norm(&sum), norm(&order));
+    let area: f64 = s.iter().zip(&imager.grid.area).map(|(s, a)| s * a).sum();
+    assert!((area / solution.spottedness - 1.0).abs() < 1e-12);
+}
+
+fn same(a: &Solution, b: &Solution, tolerance: f64) {
+    assert!((a.spottedness / b.spottedness - 1.0).abs() < tolerance, "{} {}", a.spottedness, b.spottedness);
+    assert!((a.image.lambda / b.image.lambda - 1.0).abs() < 100.0 * tolerance);
+}
+
+#[test]
+fn the_answer_does_not_depend_on_start_and_preconditioner() {
+    let oracle = oracle();
+    let imager = imager(&oracle);
+    let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
+    let mut elsewhere = truth;
+    elsewhere[Parameter::K] = 0.13;
+    elsewhere[Parameter::Inclination] = 38.5;
+    let here = Reference::build(&imager, truth, 0.97).unwrap();
+    let there = Reference::build(&imager, elsewhere, 0.97).unwrap();
+    let mut problem = problem(&oracle, &imager);
+    let settings = SolverSettings::exact();
+    let solver = Solver { entropy: imager.entropy, preconditioner: &there.preconditioner, settings };
+    let goal = Goal::Chi2 { target: here.chi2_target, largest_lambda: 1.0 };
+    same(&solver.solve(&mut problem, goal, &there.start()), &here.solution, 1e-6);
+}
+
+#[test]
+fn a_target_out_of_reach_is_said_so_with_the_floor() {
+    let oracle = oracle();
+    let imager = imager(&oracle);
+    let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
+    let error = Reference::build(&imager, truth, 0.5).unwrap_err().to_string();
+    assert!(error.contains("below the reachable floor"), "{error}");
+    let error = Reference::build(&imager, truth, 1e6).unwrap_err().to_string();
+    assert!(error.contains("without spots already fits"), "{error}");
+}

@@ -1,0 +1,125 @@
+//! Truths about the objectives: gradients, agreement near the optimum, precision, and a monotone fall far from it.
+
+mod common;
+
+use common::{oracle, values};
+use dimcmc::imaging::Imager;
+use dimcmc::log_density::{Gradient, LogDensity};
+use dimcmc::maxent::SolverSettings;
+use dimcmc::maxent::entropy::Entropy;
+use dimcmc::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference};
+use dimcmc::star::{Quadrature, SurfaceGrid};
+
+const KINDS: [ObjectiveKind; 3] =
+    [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];
+
+/// All eight parameters free, with the reference near the optimum of the oracle's data.
+fn posteriors() -> Vec<Posterior> {
+    let oracle = oracle();
+    let imager = Imager {
+        grid: SurfaceGrid::equal_area(1200, Quadrature::Gauss2x2),
+        star: oracle.star.clone(),
+        sampling: oracle.sampling.clone(),
+        data: oracle.data.clone(),
+        entropy: Entropy::new(oracle.default_spot),
+    };
+    let mut values = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
+    (values[Parameter::K], values[Parameter::PorbOverProt], values[Parameter::Phi]) = (0.088, 1.763, 0.486);
+    let uniform = |parameter, min, max| FreeParameter { parameter, prior: Prior::Uniform { min, max } };
+    let free = vec![
+        uniform(Parameter::K, 0.0, 2.0),
+        uniform(Parameter::PorbOverProt, 0.5, 4.0),
+        FreeParameter { parameter: Parameter::Phi, prior: Prior::Periodic },
+        uniform(Parameter::OmegaEq, 1.5, 2.5),
+        uniform(Parameter::DOmega, -0.5, 0.5),
+        uniform(Parameter::Inclination, 10.0, 80.0),
+        uniform(Parameter::Vsini, 30.0, 50.0),
+        uniform(Parameter::Vsys, -2.0, 2.0),
+    ];
+    let space = ParameterSpace::new(free, values, imager.mid_cycle(), imager.time_base_cycles(), 3.0);
+    let reference = Reference::build(&imager, values, 0.97).unwrap();
+    KINDS.map(|kind| Posterior::new(imager.clone(), space.clone(), kind, reference.clone())).to_vec()
+}
+
+/// Offsets of all parameters by about one standard deviation each, in varying directions.
+fn nearby(start: &[f64], i: usize) -> Vec<f64> {
+    let sigma = [0.01, 0.06, 0.035, 0.0005, 0.0014, 0.3, 0.015, 0.008];
+    start.iter().enumerate().map(|(j, x)| x + 0.7 * sigma[j] * ((7 * j + 13 * i) as f64).sin()).collect()
+}
+
+#[test]
+fn gradients_match_differences_of_reconstructions() {
+    for posterior in posteriors() {
+        let exact = posterior.with_settings(SolverSettings::exact());
+        let theta = nearby(&exact.space().start(), 1);
+        let (_, gradient) = exact.evaluate_with_gradient(&theta);
+        let x = exact.to_internal(&theta);
+        for (j, scale) in exact.scales().iter().enumerate() {
+            let h = 0.05 * scale;
+            let at = |h: f64| {
+                let mut y = x.clone();
+                y[j] += h;
+                exact.evaluate(&exact.to_written(&y)).log_prob
+            };
+            let difference = (at(h) - at(-h)) / (2.0 * h);
+            let size = difference.abs() + 0.3 / scale;
+            // numerical derivatives: h^2 terms, and pixels that appear at the limb
+            assert!((gradient[j] - difference).abs() < 0.01 * size, "{j}: {} {difference}", gradient[j]);
+        }
+    }
+}
+
+#[test]
+fn objectives_agree_near_the_optimum_and_are_precise() {
+    let posteriors = posteriors();
+    let start = posteriors[0].space().start();
+    let at_start: Vec<f64> = posteriors.iter().map(|p| p.evaluate(&start).log_prob).collect();
+    for i in 0..6 {
+        // orbit and systemic velocity alone, where the method's table has the three agree to a few per cent
+        let mut theta = nearby(&start, i);
+        theta[3..7].copy_from_slice(&start[3..7]);
+        let drops: Vec<f64> =
+            posteriors.iter().zip(&at_start).map(|(p, p0)| p.evaluate(&theta).log_prob - p0).collect();
+        for (posterior, (drop, p0)) in posteriors.iter().zip(drops.iter().zip(&at_start)) {
+            assert!((drop - drops[2]).abs() < 0.05 + 0.05 * drops[2].abs(), "{drops:?}");
+            let exact = posterior.clone().with_settings(SolverSettings::exact()).evaluate(&theta).log_prob - p0;
+            assert!((exact - drop).abs() < 1e-3, "{exact} {drop}");
+        }
+    }
+}
+
+#[test]
+fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
+    let walks = [
+        (Parameter::K, vec![0.0, 0.1, 0.3, 0.8, 1.8]),
+        (Parameter::Vsys, vec![0.0, 0.05, 0.2, 0.6, 1.5]),
+        (Parameter::Vsini, vec![0.0, 0.3, 1.0, 3.0, 8.0]),
+        (Parameter::Vsini, vec![0.0, -0.3, -1.0, -3.0, -8.0]),
+        (Parameter::Inclination, vec![0.0, 5.0, 15.0, 40.0]),
+        (Parameter::OmegaEq, vec![0.0, 0.01, 0.05, 0.3]),
+    ];
+    for posterior in posteriors() {
+        for (parameter, offsets) in &walks {
+            let at = |offset: &f64| {
+                let mut theta = posterior.space().start();
+                theta[*parameter as usize] += offset;
+                posterior.evaluate(&theta)
+            };
+            let values: Vec<f64> = offsets.iter().map(|offset| at(offset).log_prob).collect();
+            println!("{parameter:?} {offsets:?}: {values:.1?}");
+            assert!(values.iter().all(|v| v.is_finite()), "{parameter:?}: {values:?}");
+            assert!(values.windows(2).all(|w| w[1] < w[0]), "{parameter:?}: {values:?}");
+        }
+    }
+}
+
+#[test]
+fn absurd_parameters_are_refused_not_computed() {
+    let posterior = &posteriors()[0];
+    for (parameter, value) in [(Parameter::K, f64::NAN), (Parameter::K, -0.1), (Parameter::Vsini, 1e9)] {
+        let mut theta = posterior.space().start();
+        theta[parameter as usize] = value;
+        let evaluation = posterior.evaluate(&theta);
+        assert_eq!((evaluation.log_prob, evaluation.passes), (f64::NEG_INFINITY, 0), "{parameter:?} {value}");
+    }
+}
