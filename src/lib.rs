@@ -12,6 +12,7 @@ pub mod maxent;
 pub mod objective;
 pub mod observation;
 pub mod optimise;
+pub mod optimum;
 pub mod run;
 pub mod scene;
 pub mod search;

@@ -1,12 +1,13 @@
 //! What a run was begun with: `manifest.json`, beside the chain it belongs to.
 //!
-//! Written once, before the first step; only `--extend` changes it (its `extend_to`). Everything that a chain is a function
-//! of is in it or checked against it. Left out: the chain itself (`io::journal`).
+//! Written before the first step; afterwards only length and goals of the run change (`--extend`, or `steps`, `rhat` and `ess`
+//! of the config). Everything that a chain is a function of is in it or checked against it. Left out: the chain itself (`io::journal`).
 
 use crate::chain::{Goals, ParameterKind, Shape};
 use crate::config::{self, ConfigError, Settings};
 use crate::ensemble::Positions;
 use crate::io::atomic::{WriteError, write_json};
+use crate::io::provenance::Provenance;
 use crate::objective::{Parameter, ParameterValues, Prior, Reference};
 use crate::optimise::Optimum;
 use serde::{Deserialize, Serialize};
@@ -81,7 +82,7 @@ pub struct OptimumRecord {
 #[derive(Debug, thiserror::Error)]
 pub enum ManifestError {
     /// There is none.
-    #[error("{}: no {FILE}: this is not the folder of a run, or the run had not begun", folder.display())]
+    #[error("{}: no {FILE}: not the folder of a run, or of one that ended before its first step", folder.display())]
     Missing {
         /// The folder.
         folder: PathBuf,
@@ -163,6 +164,27 @@ impl Manifest {
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
         write_json(&folder.join(FILE), self)
+    }
+
+    /// What decides the chain and is not as it was when the run began; `None` if the run can go on.
+    pub fn change(&self, now: &Provenance) -> Option<String> {
+        if self.config_sha256 != now.config_sha256 {
+            let key = config::first_difference(&self.config, &now.config);
+            return Some(format!("{} of the config changed", key.as_deref().unwrap_or("something")));
+        }
+        (self.data_sha256 != now.data_sha256).then(|| "the observations changed".to_string())
+    }
+
+    /// Takes over settings that may change between the parts of a run (its length and goals), and the step that it goes on
+    /// to in any case. A new step limit ends an extension. Returns whether anything changed.
+    pub fn update(&mut self, settings: &Settings, extend_to: Option<usize>) -> bool {
+        let before = (self.extend_to, self.config.clone());
+        let steps = |config: &serde_json::Value| config.pointer("/sampler/steps").cloned();
+        if extend_to.is_some() || steps(&self.config) != steps(&settings.resolved) {
+            self.extend_to = extend_to;
+        }
+        self.config = settings.resolved.clone();
+        before != (self.extend_to, self.config.clone())
     }
 
     /// Shape of the chain.

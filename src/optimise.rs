@@ -62,13 +62,13 @@ const HESSIAN_STEP: f64 = 0.25;
 /// Directions in which the curvature is less than this, in units of 1 / (natural scale)^2, count as left open by the data.
 const OPEN_CURVATURE: f64 = 1e-3;
 
-/// Climbs from `start` (written coordinates) to a local maximum of `density`.
+/// Climbs from `start` (written coordinates) to a local maximum of `density`; `tick` is called at every evaluation.
 ///
 /// # Errors
 /// If the log-probability at the start is minus infinity.
-pub fn climb<D: Gradient>(density: &D, start: &[f64]) -> Result<Optimum, OptimiseError> {
-    let landscape = Landscape { density, scales: density.scales(), evaluations: AtomicUsize::new(0) };
-    let first = density.evaluate(start);
+pub fn climb<D: Gradient>(density: &D, start: &[f64], tick: &(dyn Fn() + Sync)) -> Result<Optimum, OptimiseError> {
+    let landscape = Landscape { density, scales: density.scales(), evaluations: AtomicUsize::new(0), tick };
+    let first = landscape.evaluate(start);
     if first.log_prob == f64::NEG_INFINITY {
         return Err(OptimiseError::Start(first.status));
     }
@@ -95,7 +95,7 @@ pub fn climb<D: Gradient>(density: &D, start: &[f64]) -> Result<Optimum, Optimis
     let covariance = &unscale * covariance * &unscale;
     let jacobian = landscape.jacobian(&theta);
     Ok(Optimum {
-        evaluation: density.evaluate(&theta),
+        evaluation: landscape.evaluate(&theta),
         curvature: &rescale * hessian * &rescale,
         written_covariance: &jacobian * &covariance * jacobian.transpose(),
         covariance,
@@ -104,7 +104,7 @@ pub fn climb<D: Gradient>(density: &D, start: &[f64]) -> Result<Optimum, Optimis
             state.get_termination_status(),
             TerminationStatus::Terminated(TerminationReason::SolverConverged)
         ),
-        evaluations: landscape.evaluations.load(Ordering::Relaxed) + 2,
+        evaluations: landscape.evaluations.load(Ordering::Relaxed),
         iterations: state.get_iter(),
         theta,
     })
@@ -122,9 +122,20 @@ struct Landscape<'a, D: Gradient> {
     density: &'a D,
     scales: Vec<f64>,
     evaluations: AtomicUsize,
+    tick: &'a (dyn Fn() + Sync),
 }
 
 impl<D: Gradient> Landscape<'_, D> {
+    fn count(&self) {
+        self.evaluations.fetch_add(1, Ordering::Relaxed);
+        (self.tick)();
+    }
+
+    fn evaluate(&self, theta: &[f64]) -> Evaluation {
+        self.count();
+        self.density.evaluate(theta)
+    }
+
     fn scaled(&self, theta: &[f64]) -> Vector {
         let internal = self.density.to_internal(theta);
         Vector::from_iterator(theta.len(), internal.iter().zip(&self.scales).map(|(x, s)| x / s))
@@ -137,7 +148,7 @@ impl<D: Gradient> Landscape<'_, D> {
 
     /// Gradient of the cost; `None` where the density is zero.
     fn slope(&self, x: &Vector) -> Option<Vector> {
-        self.evaluations.fetch_add(1, Ordering::Relaxed);
+        self.count();
         let (_, gradient) = self.density.evaluate_with_gradient(&self.written(x));
         if gradient.is_empty() || gradient.iter().any(|g| !g.is_finite()) {
             return None;
@@ -171,8 +182,7 @@ impl<D: Gradient> CostFunction for &Landscape<'_, D> {
     type Param = Vector;
     type Output = f64;
     fn cost(&self, x: &Vector) -> Result<f64, Error> {
-        self.evaluations.fetch_add(1, Ordering::Relaxed);
-        Ok(-self.density.evaluate(&self.written(x)).log_prob)
+        Ok(-self.evaluate(&self.written(x)).log_prob)
     }
 }
 
@@ -282,7 +292,7 @@ mod tests {
     #[test]
     fn finds_the_maximum_and_its_covariance() {
         let density = Rosenbrock(vec!["a".into(), "b".into()]);
-        let optimum = climb(&density, &[-1.2, 1.0]).unwrap();
+        let optimum = climb(&density, &[-1.2, 1.0], &|| ()).unwrap();
         assert!(optimum.converged && optimum.well_defined);
         assert!((optimum.theta[0] - 1.0).abs() < 0.07 && (optimum.theta[1] - 1.0).abs() < 0.14, "{optimum:?}");
         // curvature at (1, 1) is [[17, -8], [-8, 4]]: variances 1 and 4.25; the search may end 0.06 sigma away, in a curved

@@ -1,10 +1,11 @@
-//! A sampling run: search, start, chain on disk; begun afresh or resumed to the same bytes.
+//! A sampling run: start, chain on disk; begun afresh or resumed to the same bytes.
 //!
-//! Left out: how progress is shown, and the analysis of the chain (`chain`).
+//! Left out: the search before it (`search`), how progress is shown, and the analysis of the chain (`chain`).
 
-use crate::chain::{Chain, Convergence, ParameterKind, Record};
+use crate::chain::{Chain, Convergence, Goals, ParameterKind, Record};
 use crate::ensemble::{
     self, EnsembleError, Positions, RunError as StepError, Sampler, StartDraw, StopPolicy, StopReason, draw_start,
+    start_numbers,
 };
 use crate::io::atomic::WriteError;
 use crate::io::journal::{Journal, JournalError};
@@ -12,14 +13,16 @@ use crate::log_density::{LogDensity, Threads};
 use crate::manifest::{Manifest, ManifestError, OptimumRecord, ReferenceRecord, by_name, kinds_and_goals};
 use crate::objective::{Posterior, Reference, ReferenceError};
 use crate::scene::Scene;
-use crate::search::{Found, SearchError, SearchSettings, Stage, find};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use crate::search::Found;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Name of the chain in a run's folder.
 pub const CHAIN: &str = "chain.jsonl";
+
+/// Name of its analysis.
+pub const SUMMARY: &str = "summary.json";
 
 /// Where the walkers start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,9 +33,6 @@ pub enum StartFrom {
     /// All over the prior.
     Prior,
 }
-
-/// Orbits drawn from the prior that the search starts from, beside the config's.
-const SEARCH_STARTS: usize = 4;
 
 /// Starts are wider than the curvature by this factor, so that R-hat can tell whether the chain has forgotten them.
 const OVERDISPERSION: f64 = 1.5;
@@ -59,9 +59,6 @@ pub struct Run {
 /// Why a run cannot begin, or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The search for the reference failed.
-    #[error(transparent)]
-    Search(#[from] SearchError),
     /// The start is no start, or the sampler's settings are wrong.
     #[error(transparent)]
     Ensemble(#[from] EnsembleError),
@@ -74,16 +71,12 @@ pub enum RunError {
     #[error(transparent)]
     Manifest(#[from] ManifestError),
     /// Config or data are not those that the run was begun with.
-    #[error("{}: the {what} changed since this run began ({} there, {} now); start a new run instead", .folder.display(), &.then[..12.min(.then.len())], &.now[..12.min(.now.len())])]
+    #[error("{}: {what} since this run began; begin another run for it", .folder.display())]
     Changed {
         /// The folder.
         folder: PathBuf,
-        /// Config or data.
-        what: &'static str,
-        /// Hash in the manifest.
-        then: String,
-        /// Hash now.
-        now: String,
+        /// What changed.
+        what: String,
     },
     /// The reference comes out differently: another version of the program, or another kind of processor.
     #[error("{}: the reference image comes out differently here (lambda {now:e} instead of {then:e}): resume with the version and on the kind of machine it was begun with", folder.display())]
@@ -104,7 +97,7 @@ pub enum RunError {
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The folder cannot be made.
+    /// The folder cannot be made, or not cleared.
     #[error("{}: {source}", path.display())]
     Folder {
         /// The folder.
@@ -117,38 +110,30 @@ pub enum RunError {
     Chain(#[from] crate::chain::ChainError),
 }
 
-/// The settings of the search that a scene asks for.
-pub fn search_settings(scene: &Scene) -> SearchSettings {
-    SearchSettings {
-        chi2_target: scene.settings.imaging.chi2_target,
-        objective: scene.settings.imaging.objective,
-        prior_starts: SEARCH_STARTS,
-        seed: scene.settings.sampler.seed,
-    }
-}
-
 impl Run {
-    /// Begins a run: searches, draws the start, makes the folder with manifest and step 0.
+    /// Begins a run at what a search `found`: draws the start, makes the folder with chain, manifest and step 0. A run that is
+    /// in the folder already is replaced if `replace`, and refused otherwise.
     ///
     /// # Errors
-    /// [`RunError`]; the folder is made only once the search has succeeded.
-    pub fn begin(scene: &Scene, folder: &Path, from: StartFrom, progress: impl FnMut(Stage)) -> Result<Self, RunError> {
-        let settings = &scene.settings.sampler;
-        settings.validate(scene.space.dimension())?;
-        let found = find(&scene.imager, &scene.space, search_settings(scene), progress)?;
+    /// [`RunError`]; nothing is written where there is no start.
+    pub fn begin(scene: &Scene, folder: &Path, found: Found, from: StartFrom, replace: bool) -> Result<Self, RunError> {
+        scene.settings.sampler.validate(scene.space.dimension())?;
         let start = match from {
             StartFrom::Optimum => around_optimum(&found, scene)?,
             StartFrom::Prior => over_prior(&found.posterior, scene)?,
         };
         let manifest = manifest(scene, &found, start);
-        // an earlier chain in the folder is there only if the user insists on overwriting it
-        let source = |source| RunError::Folder { path: folder.into(), source };
-        std::fs::create_dir_all(folder).map_err(source)?;
-        match std::fs::remove_file(folder.join(CHAIN)) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(source(e)),
+        std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
+        // the chain first: whoever holds it may write the manifest
+        let journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
+        match std::fs::remove_file(folder.join(SUMMARY)) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(RunError::Folder { path: folder.join(SUMMARY), source });
+            }
             _ => manifest.write(folder)?,
         }
-        Run::open(scene, folder, manifest, found.posterior)
+        let chain = Chain::new(manifest.shape());
+        Run::new(scene, folder, manifest, found.posterior, (journal, chain))
     }
 
     /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
@@ -156,13 +141,11 @@ impl Run {
     /// # Errors
     /// [`RunError`]: no run there, changed config or data, a broken chain.
     pub fn resume(scene: &Scene, folder: &Path, extend: Option<usize>) -> Result<Self, RunError> {
-        let manifest = Manifest::read(folder)?;
-        let unchanged = |what, then: &String, now: &String| match then == now {
-            true => Ok(()),
-            false => Err(RunError::Changed { folder: folder.into(), what, then: then.clone(), now: now.clone() }),
-        };
-        unchanged("config", &manifest.config_sha256, &scene.settings.sha256)?;
-        unchanged("data", &manifest.data_sha256, &scene.data_sha256)?;
+        let mut manifest = Manifest::read(folder)?;
+        if let Some(what) = manifest.change(&scene.provenance()) {
+            return Err(RunError::Changed { folder: folder.into(), what });
+        }
+        let journal = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
         let values = manifest.reference.values(&scene.settings.values);
         let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target)?;
         let (then, now) = (manifest.reference.lambda, reference.solution.image.lambda);
@@ -171,22 +154,21 @@ impl Run {
         }
         let kind = scene.settings.imaging.objective;
         let posterior = Posterior::new(scene.imager.clone(), scene.space.clone(), kind, reference);
-        let mut run = Run::open(scene, folder, manifest, posterior)?;
-        if let Some(steps) = extend {
-            run.manifest.extend_to = Some(run.chain.steps().saturating_sub(1) + steps);
-            run.manifest.write(folder)?;
-            run.policy = policy(scene, &run.manifest);
+        let last_step = journal.1.steps().saturating_sub(1);
+        if manifest.update(&scene.settings, extend.map(|steps| last_step + steps)) {
+            manifest.write(folder)?;
         }
-        Ok(run)
+        Run::new(scene, folder, manifest, posterior, journal)
     }
 
-    /// Opens the chain, recovering what a crash left, and makes step 0 if it is not there.
-    fn open(scene: &Scene, folder: &Path, manifest: Manifest, posterior: Posterior) -> Result<Self, RunError> {
-        let path = folder.join(CHAIN);
-        let (mut journal, mut chain) = match path.exists() {
-            true => Journal::recover(&path, manifest.shape())?,
-            false => (Journal::create(&path, manifest.shape())?, Chain::new(manifest.shape())),
-        };
+    /// The run with its chain so far, and step 0 if that is not there.
+    fn new(
+        scene: &Scene,
+        folder: &Path,
+        manifest: Manifest,
+        posterior: Posterior,
+        (mut journal, mut chain): (Journal, Chain),
+    ) -> Result<Self, RunError> {
         let settings = scene.settings.sampler.clone();
         if chain.steps() == 0 {
             let evaluator = Threads(&posterior);
@@ -195,7 +177,11 @@ impl Run {
             chain.push_step(&records)?;
         }
         let (kinds, _) = kinds_and_goals(&scene.settings);
-        let policy = policy(scene, &manifest);
+        let policy = StopPolicy::new(&settings);
+        let policy = match manifest.extend_to {
+            Some(step) => StopPolicy { steps: step, least: step, ..policy },
+            None => policy,
+        };
         Ok(Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, journal })
     }
 
@@ -204,9 +190,9 @@ impl Run {
         self.policy.steps
     }
 
-    /// The effective sample size that every parameter must reach.
-    pub fn ess_goal(&self) -> f64 {
-        self.policy.goals.ess
+    /// What every parameter must reach.
+    pub fn goals(&self) -> &Goals {
+        &self.policy.goals
     }
 
     /// Steps until the goals are reached, the step limit, or `stop`; every step is on disk before the next begins.
@@ -231,14 +217,6 @@ impl Run {
             StepError::Chain(error) => error.into(),
             StepError::Callback(error) => error.into(),
         })
-    }
-}
-
-fn policy(scene: &Scene, manifest: &Manifest) -> StopPolicy {
-    let policy = StopPolicy::new(&scene.settings.sampler);
-    match manifest.extend_to {
-        Some(step) => StopPolicy { steps: step, least: step, ..policy },
-        None => policy,
     }
 }
 
@@ -282,10 +260,12 @@ fn around_optimum(found: &Found, scene: &Scene) -> Result<Positions, EnsembleErr
 /// Draws from the prior at which the reconstruction succeeds.
 fn over_prior(posterior: &Posterior, scene: &Scene) -> Result<Positions, RunError> {
     let sampler = &scene.settings.sampler;
-    let mut rng = ChaCha8Rng::seed_from_u64(sampler.seed);
-    let mut draw = || {
+    let draw = |index: usize| {
+        let mut rng = start_numbers(sampler.seed, index / sampler.walkers, index % sampler.walkers);
         let mut draws = (0..PRIOR_TRIES).map(|_| scene.space.sample_prior(&mut rng));
         draws.find(|theta| posterior.evaluate(theta).log_prob.is_finite()).ok_or(RunError::PriorStart)
     };
-    (0..sampler.ensembles).map(|_| (0..sampler.walkers).map(|_| draw()).collect()).collect()
+    let walkers = 0..sampler.ensembles * sampler.walkers;
+    let positions: Vec<Vec<f64>> = walkers.into_par_iter().with_max_len(1).map(draw).collect::<Result<_, _>>()?;
+    Ok(positions.chunks(sampler.walkers).map(<[_]>::to_vec).collect())
 }

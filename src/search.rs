@@ -4,12 +4,14 @@
 //! The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last climb is on
 //! the objective asked for. Left out: the maximum-entropy solver, argmin.
 
+use crate::config::{ImagingSettings, Settings};
 use crate::imaging::Imager;
 use crate::objective::{FreeParameter, ObjectiveKind, ParameterSpace, Posterior, Reference, ReferenceError};
 use crate::optimise::{OptimiseError, Optimum, climb};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// What to search for, and from where.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +25,17 @@ pub struct SearchSettings {
     /// Seed of those draws.
     pub seed: u64,
 }
+
+impl SearchSettings {
+    /// The search that a config asks for.
+    pub fn new(settings: &Settings) -> Self {
+        let ImagingSettings { chi2_target, objective, .. } = settings.imaging;
+        SearchSettings { chi2_target, objective, prior_starts: PRIOR_STARTS, seed: settings.sampler.seed }
+    }
+}
+
+/// Orbits drawn from the prior that a search starts from, beside the config's.
+const PRIOR_STARTS: usize = 4;
 
 /// One start of the search and where it led.
 #[derive(Clone, Debug)]
@@ -55,18 +68,31 @@ pub enum SearchError {
     Optimise(#[from] OptimiseError),
 }
 
-/// Stages of a search, for progress reports.
+/// How far a search has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// What it is at.
+    pub stage: Stage,
+    /// Evaluations made by all climbs so far.
+    pub evaluations: usize,
+}
+
+/// Stages of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Reconstruction at the config's values.
     FirstImage,
     /// Climbs from all starts.
     Climbing {
+        /// Climbs that have ended.
+        done: usize,
         /// Number of starts.
         starts: usize,
     },
     /// Reconstruction and trade-off curve at the best parameters.
     Reference,
+    /// The last climb, on the objective asked for.
+    Refining,
 }
 
 /// The reference is rebuilt until the optimum stays within this many standard deviations of it.
@@ -75,7 +101,7 @@ const REFERENCE_SHIFT: f64 = 0.3;
 /// Most rebuilds of the reference.
 const ROUNDS: usize = 4;
 
-/// Finds the best parameters and the reference there.
+/// Finds the best parameters and the reference there; `report` is called at every evaluation, from any thread.
 ///
 /// # Errors
 /// If the target is out of reach even there, or no start leads to a finite log-probability.
@@ -83,27 +109,43 @@ pub fn find(
     imager: &Imager,
     space: &ParameterSpace,
     settings: SearchSettings,
-    mut progress: impl FnMut(Stage),
+    report: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, SearchError> {
-    progress(Stage::FirstImage);
+    let SearchSettings { chi2_target, objective, prior_starts, seed } = settings;
+    let (evaluations, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let at = |stage| report(Progress { stage, evaluations: evaluations.load(Relaxed) });
+    at(Stage::FirstImage);
     let start = space.start();
-    let first = Reference::provisional(imager, space.values_at(&start), settings.chi2_target)?;
+    let first = Reference::provisional(imager, space.values_at(&start), chi2_target)?;
     let smooth = Posterior::new(imager.clone(), space.clone(), ObjectiveKind::RegularisedLikelihood, first);
-    progress(Stage::Climbing { starts: 1 + settings.prior_starts });
-    let mut attempts = vec![Attempt { end: climb(&smooth, &start), start }];
+    let climbing = || at(Stage::Climbing { done: done.load(Relaxed), starts: 1 + prior_starts });
+    let attempt = |start: Vec<f64>| {
+        let tick = || {
+            evaluations.fetch_add(1, Relaxed);
+            climbing();
+        };
+        let end = climb(&smooth, &start, &tick);
+        done.fetch_add(1, Relaxed);
+        climbing();
+        Attempt { start, end }
+    };
+    let mut attempts = vec![attempt(start)];
     let from = attempts[0].end.as_ref().map_or(attempts[0].start.clone(), |optimum| optimum.theta.clone());
-    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    let starts: Vec<Vec<f64>> = (0..settings.prior_starts).map(|_| with_other_orbit(space, &from, &mut rng)).collect();
-    let ends = starts.into_par_iter().with_max_len(1).map(|start| Attempt { end: climb(&smooth, &start), start });
-    attempts.extend(ends.collect::<Vec<_>>());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let starts: Vec<Vec<f64>> = (0..prior_starts).map(|_| with_other_orbit(space, &from, &mut rng)).collect();
+    attempts.extend(starts.into_par_iter().with_max_len(1).map(attempt).collect::<Vec<_>>());
     let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
     let best = attempts.iter().max_by(|a, b| height(a).total_cmp(&height(b))).expect("at least the config's values");
     let mut optimum = best.end.clone()?;
     for round in 0.. {
-        progress(Stage::Reference);
-        let reference = Reference::build(imager, space.values_at(&optimum.theta), settings.chi2_target)?;
-        let posterior = Posterior::new(imager.clone(), space.clone(), settings.objective, reference);
-        let next = climb(&posterior, &optimum.theta)?;
+        at(Stage::Reference);
+        let reference = Reference::build(imager, space.values_at(&optimum.theta), chi2_target)?;
+        let posterior = Posterior::new(imager.clone(), space.clone(), objective, reference);
+        let tick = || {
+            evaluations.fetch_add(1, Relaxed);
+            at(Stage::Refining);
+        };
+        let next = climb(&posterior, &optimum.theta, &tick)?;
         let moved = shift(space, &optimum.theta, &next);
         optimum = next;
         if moved < REFERENCE_SHIFT || round + 1 == ROUNDS {

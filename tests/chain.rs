@@ -52,7 +52,7 @@ fn small() -> Chain {
 }
 
 fn written(path: &Path, chain: &Chain) -> Vec<u8> {
-    let mut journal = Journal::create(path, chain.shape().clone()).unwrap();
+    let mut journal = Journal::create(path, chain.shape().clone(), false).unwrap();
     for step in 0..chain.steps() {
         journal.append(chain.step(step).unwrap()).unwrap();
     }
@@ -148,7 +148,7 @@ fn a_journal_and_a_chain_take_the_next_whole_step_only() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("chain.jsonl");
     let source = small();
-    let mut journal = Journal::create(&path, source.shape().clone()).unwrap();
+    let mut journal = Journal::create(&path, source.shape().clone(), false).unwrap();
     let first = source.step(0).unwrap();
     assert!(journal.append(&first[..5]).is_err());
     assert!(journal.append(source.step(1).unwrap()).is_err());

@@ -97,7 +97,7 @@ fn through_journal(path: &Path, density: &Orbit, settings: &SamplerSettings, sto
         Journal::recover(path, shape(density, settings)).unwrap()
     } else {
         let shape = shape(density, settings);
-        (Journal::create(path, shape.clone()).unwrap(), Chain::new(shape))
+        (Journal::create(path, shape.clone(), false).unwrap(), Chain::new(shape))
     };
     if chain.steps() == 0 {
         let (_, records) = sampler.start(&start(density, settings)).unwrap();
@@ -363,12 +363,12 @@ fn reading_while_writing_is_allowed_and_writing_twice_is_not() {
     let evaluator = Threads(&density);
     let sampler = Sampler::new(&density, &evaluator, &settings).unwrap();
     let shape = shape(&density, &settings);
-    let mut journal = Journal::create(&path, shape.clone()).unwrap();
+    let mut journal = Journal::create(&path, shape.clone(), false).unwrap();
     journal.append(&sampler.start(&start(&density, &settings)).unwrap().1).unwrap();
     assert_eq!(journal::read(&path, &shape).unwrap().steps(), 1);
     let error = Journal::recover(&path, shape.clone()).unwrap_err().to_string();
     assert!(error.contains("another process is writing"), "{error}");
     drop(journal);
     assert!(Journal::recover(&path, shape.clone()).is_ok());
-    assert!(Journal::create(&path, shape).is_err(), "nothing is overwritten");
+    assert!(Journal::create(&path, shape, false).is_err(), "nothing is overwritten");
 }

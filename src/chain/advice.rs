@@ -47,21 +47,30 @@ fn parameter_advice(name: &str, one: &Diagnostic, kept: usize, goals: &Goals) ->
         ));
     };
     let mut lacks = Vec::new();
-    let mut growth: f64 = 1.0;
     if rhat > goals.rhat {
         lacks.push(format!("R-hat {rhat:.3} > {}", goals.rhat));
-        growth = growth.max((rhat * rhat - 1.0) / (goals.rhat * goals.rhat - 1.0));
     }
     if ess < goals.ess {
         lacks.push(format!("ESS {ess:.0} < {}", goals.ess));
-        growth = growth.max(goals.ess / ess);
     }
     if lacks.is_empty() {
         return None;
     }
+    let growth = growth(one, goals)?;
     let more = round_up(kept as f64 * (growth - 1.0).min(MOST));
     let bound = if growth - 1.0 > MOST { "at least" } else { "about" };
     Some(format!("{name}: {}: run `--extend {more}` ({bound} {more} steps more needed)", lacks.join(", ")))
+}
+
+/// Factor by which the chain must still grow for every parameter to reach the goals; `None` if one cannot tell yet.
+pub fn growth_needed(convergence: &Convergence, goals: &Goals) -> Option<f64> {
+    convergence.diagnostics.iter().map(|one| growth(one, goals)).try_fold(1.0, |most: f64, one| Some(most.max(one?)))
+}
+
+/// The same for one parameter.
+fn growth(one: &Diagnostic, goals: &Goals) -> Option<f64> {
+    let (rhat, ess) = (one.rhat?, one.ess?);
+    Some(((rhat * rhat - 1.0) / (goals.rhat * goals.rhat - 1.0)).max(goals.ess / ess).max(1.0))
 }
 
 /// Up to a multiple of 50, the interval at which goals are looked at.

@@ -5,7 +5,7 @@ use dimcmc::chain::{Chain, summarise, table};
 use dimcmc::io::atomic::write_json;
 use dimcmc::io::journal;
 use dimcmc::manifest::{Manifest, kinds_and_goals};
-use dimcmc::run::CHAIN;
+use dimcmc::run::{CHAIN, SUMMARY};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), F
     let (kinds, goals) = kinds_and_goals(&manifest.settings(folder)?);
     let summary = summarise(chain, &kinds, &goals)
         .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
-    write_json(&folder.join("summary.json"), &summary)?;
+    write_json(&folder.join(SUMMARY), &summary)?;
     let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.truth.as_ref()));
     Ok(())
 }

@@ -52,7 +52,6 @@ impl Failure {
     /// A run of the config at `path` that cannot begin or go on.
     pub fn run(path: &Path, error: RunError) -> Self {
         match error {
-            RunError::Search(error) => Failure::search(path, error),
             RunError::Reference(error) => Failure::reference(path, error),
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) | RunError::Irreproducible { .. } => {
                 Failure::failed(error)

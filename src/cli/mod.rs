@@ -11,6 +11,8 @@ mod output;
 mod progress;
 mod report;
 mod sample;
+mod search;
+mod signals;
 mod simulate;
 
 pub use failure::Failure;

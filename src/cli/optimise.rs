@@ -1,12 +1,11 @@
 //! `dimcmc optimise`: the best parameters and their curvature.
 
 use super::output::Output;
-use super::{Failure, Global, progress};
+use super::search::search;
+use super::{Failure, Global};
 use dimcmc::io::atomic::write_json;
-use dimcmc::io::optimum::OptimumFile;
-use dimcmc::run::search_settings;
+use dimcmc::optimum::OptimumFile;
 use dimcmc::scene::Scene;
-use dimcmc::search::find;
 use std::io::Write as _;
 use std::path::PathBuf;
 
@@ -28,10 +27,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     scene.settings.require_free()?;
-    let spinner = progress::bar(global, None, "searching for the best parameters");
-    let found = find(&scene.imager, &scene.space, search_settings(&scene), |_| {});
-    spinner.finish_and_clear();
-    let found = found.map_err(|e| Failure::search(&args.config, e))?;
+    let found = search(global, &args.config, &scene)?;
     let file = OptimumFile::new(&scene, &found);
     let folder = args.output.create()?;
     write_json(&folder.join("optimum.json"), &file)?;

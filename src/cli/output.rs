@@ -37,6 +37,11 @@ impl Output {
         }
     }
 
+    /// Whether what is in the folder is to be replaced.
+    pub fn replaces(&self) -> bool {
+        self.force
+    }
+
     /// The folder as given.
     pub fn folder(&self) -> &Path {
         &self.folder

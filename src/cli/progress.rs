@@ -11,17 +11,14 @@ pub fn bar(global: &Global, total: Option<u64>, message: &'static str) -> Progre
     if global.quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
+    // the message is cut where the terminal ends
     let (bar, template) = match total {
-        Some(total) => (ProgressBar::new(total), "{msg} {wide_bar} {pos}/{len} [{elapsed} < {eta}]"),
-        None => (ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]"),
+        Some(total) => (ProgressBar::new(total), "{bar:10} {wide_msg}"),
+        None => (ProgressBar::new_spinner(), "{spinner} [{elapsed}] {wide_msg}"),
     };
-    bar.set_style(style(template));
+    // a template is a constant of this program, and where it is wrong, indicatif's own style does
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.set_message(message);
     bar.enable_steady_tick(Duration::from_millis(120));
     bar
-}
-
-/// The style of a template; a template is a constant of this program, and where it is wrong, indicatif's own style does.
-pub fn style(template: &str) -> ProgressStyle {
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

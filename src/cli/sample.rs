@@ -1,18 +1,17 @@
 //! `dimcmc sample`: the ensemble chain.
 
 use super::output::Output;
+use super::search::search;
+use super::signals::Signals;
 use super::{Failure, Global, analyse, progress};
-use dimcmc::chain::{Convergence, Record};
+use dimcmc::chain::advice::growth_needed;
+use dimcmc::chain::{Convergence, Goals, Record};
 use dimcmc::ensemble::StopReason;
 use dimcmc::log_density::Status;
 use dimcmc::run::{Run, StartFrom};
 use dimcmc::scene::Scene;
-use dimcmc::search::Stage;
-use signal_hook::consts::{SIGINT, SIGTERM};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Sample the posterior of the free parameters
 ///
@@ -56,27 +55,28 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     scene.settings.require_free()?;
     let folder = args.output.folder();
     let failed = |e| Failure::run(&args.config, e);
+    let signals = Signals::catch()?;
     let mut run = if resume {
-        Run::resume(&scene, folder, args.extend).map_err(failed)?
+        let spinner = progress::bar(global, None, "reading the chain, reference image");
+        let run = Run::resume(&scene, folder, args.extend);
+        spinner.finish_and_clear();
+        run.map_err(failed)?
     } else {
         let from = match args.start {
             Start::Optimum => StartFrom::Optimum,
             Start::Prior => StartFrom::Prior,
         };
-        let spinner = progress::bar(global, None, "reconstructing");
-        let run = Run::begin(&scene, folder, from, |stage| {
-            spinner.set_message(match stage {
-                Stage::FirstImage => "reconstructing at the config's values".to_string(),
-                Stage::Climbing { starts } => format!("searching for the best parameters from {starts} starts"),
-                Stage::Reference => "reference image and trade-off curve".to_string(),
-            });
-        });
+        let found = search(global, &args.config, &scene)?;
+        let spinner = progress::bar(global, None, "start of the walkers");
+        args.output.check()?;
+        signals.defer();
+        let run = Run::begin(&scene, folder, found, from, args.output.replaces());
         spinner.finish_and_clear();
         run.map_err(failed)?
     };
-    let stop = stop_on_signals()?;
+    signals.defer();
     let mut meter = Meter::new(global, &run);
-    let reason = run.go(&stop, |records, convergence| meter.step(records, convergence));
+    let reason = run.go(signals.flag(), |records, convergence| meter.step(records, convergence));
     meter.bar.finish_and_clear();
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
@@ -90,49 +90,40 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
 }
 
-/// A flag that the first Ctrl-C (or SIGTERM) sets; the second one ends the program at once.
-fn stop_on_signals() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 1, Arc::clone(&stop))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
-            .map_err(|e| Failure::failed(format!("signal {signal}: {e}")))?;
-    }
-    Ok(stop)
-}
-
 /// What is shown while a chain grows.
 struct Meter {
     bar: indicatif::ProgressBar,
     names: Vec<String>,
+    goals: Goals,
     began: Instant,
     first_step: usize,
+    last_step: usize,
     evaluations: usize,
     accepted: usize,
     moved: usize,
-    convergence: String,
-    ess_goal: f64,
-    /// Fraction of the ESS goal reached, at the last look.
-    done: f64,
+    /// R-hat and ESS of the parameters farthest from their goals, at the last look.
+    convergence: Option<String>,
+    /// The step at which the goals should be reached, if one can tell.
+    goal_step: Option<f64>,
 }
+
+/// Divisions of the bar.
+const BAR: u64 = 1000;
 
 impl Meter {
     fn new(global: &Global, run: &Run) -> Self {
-        let bar = progress::bar(global, Some(run.last_step() as u64), "");
-        bar.set_style(progress::style("{wide_bar} {pos}/{len} {msg}"));
-        let first_step = run.chain.steps().saturating_sub(1);
-        bar.set_position(first_step as u64);
         Meter {
-            bar,
+            bar: progress::bar(global, Some(BAR), "first step"),
             names: run.manifest.names.clone(),
+            goals: *run.goals(),
             began: Instant::now(),
-            first_step,
+            first_step: run.chain.steps().saturating_sub(1),
+            last_step: run.last_step(),
             evaluations: 0,
             accepted: 0,
             moved: 0,
-            convergence: "R-hat -".into(),
-            ess_goal: run.ess_goal(),
-            done: 0.0,
+            convergence: None,
+            goal_step: None,
         }
     }
 
@@ -142,30 +133,37 @@ impl Meter {
         self.moved += records.len();
         let step = records.first().map_or(0, |r| r.step);
         if let Some(convergence) = convergence {
-            self.look(convergence);
+            self.look(step, convergence);
         }
         let elapsed = self.began.elapsed().as_secs_f64();
-        let per_step = elapsed / (step.saturating_sub(self.first_step)).max(1) as f64;
-        let to_limit = (self.bar.length().unwrap_or(0) as f64 - step as f64).max(0.0);
-        let to_goal = if self.done > 0.0 { step as f64 * (1.0 / self.done.min(1.0) - 1.0) } else { to_limit };
-        let left = indicatif::HumanDuration(std::time::Duration::from_secs_f64(per_step * to_limit.min(to_goal)));
-        self.bar.set_position(step as u64);
-        self.bar.set_message(format!(
-            "{:.0} rec/s, acceptance {:.2}, {}, {left:#} left",
+        let per_step = elapsed / step.saturating_sub(self.first_step).max(1) as f64;
+        let limit = self.last_step as f64;
+        let end = self.goal_step.map_or(limit, |goal| goal.min(limit));
+        let left = Duration::from_secs_f64(per_step * (end - step as f64).max(0.0));
+        self.bar.set_position((BAR as f64 * step as f64 / end.max(1.0)) as u64);
+        let mut message = format!(
+            "{step}/{}, {}{:#} left, {:.0} rec/s, acceptance {:.2}",
+            self.last_step,
+            // until the goals are in sight, the step limit is all that is known
+            if self.goal_step.is_none() { "at most " } else { "" },
+            indicatif::HumanDuration(left),
             self.evaluations as f64 / elapsed.max(1e-9),
             self.accepted as f64 / self.moved as f64,
-            self.convergence,
-        ));
+        );
+        if let Some(convergence) = &self.convergence {
+            message = format!("{message}, {convergence}");
+        }
+        self.bar.set_message(message);
     }
 
     /// The parameter that is farthest from its goals.
-    fn look(&mut self, convergence: &Convergence) {
-        let worst = convergence.diagnostics.iter().zip(&self.names);
-        let rhat = worst.clone().filter_map(|(d, name)| Some((d.rhat?, name))).max_by(|a, b| a.0.total_cmp(&b.0));
-        let ess = worst.filter_map(|(d, _)| d.ess).fold(f64::INFINITY, f64::min);
-        if let Some((rhat, name)) = rhat.filter(|_| ess.is_finite()) {
-            self.convergence = format!("R-hat {rhat:.3} ({name}), ESS {ess:.0}");
-            self.done = ess / self.ess_goal;
+    fn look(&mut self, step: usize, convergence: &Convergence) {
+        let named = || convergence.diagnostics.iter().zip(&self.names);
+        let rhat = named().filter_map(|(d, name)| Some((d.rhat?, name))).max_by(|a, b| a.0.total_cmp(&b.0));
+        let ess = named().filter_map(|(d, _)| d.ess).reduce(f64::min);
+        if let Some(((rhat, name), ess)) = rhat.zip(ess) {
+            self.convergence = Some(format!("R-hat {rhat:.3} ({name}), ESS {ess:.0} of {:.0}", self.goals.ess));
+            self.goal_step = growth_needed(convergence, &self.goals).map(|growth| growth * step as f64);
         }
     }
 }

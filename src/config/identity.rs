@@ -6,6 +6,40 @@ use sha2::{Digest, Sha256};
 /// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, and the sampler's `steps`,
 /// `rhat` and `ess`. Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
+    let mut text = String::new();
+    canonical(&decisive(resolved), &mut text);
+    format!("{:x}", Sha256::digest(text))
+}
+
+/// The first key that matters for the fingerprint and is not the same in both resolved configs, with both values.
+pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
+    difference("", &decisive(then), &decisive(now))
+}
+
+fn difference(key: &str, then: &Value, now: &Value) -> Option<String> {
+    let (Value::Object(a), Value::Object(b)) = (then, now) else {
+        return (then != now).then(|| format!("{key} ({} then, {} now)", brief(then), brief(now)));
+    };
+    let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
+    names.sort();
+    names.into_iter().find_map(|name| {
+        let inner = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+        difference(&inner, a.get(name).unwrap_or(&Value::Null), b.get(name).unwrap_or(&Value::Null))
+    })
+}
+
+/// A value for a message: numbers and words whole, lists and sections by what they are.
+fn brief(value: &Value) -> String {
+    match value {
+        Value::Null => "absent".into(),
+        Value::Array(_) => "a list".into(),
+        Value::Object(_) => "a section".into(),
+        scalar => scalar.to_string(),
+    }
+}
+
+/// The part of a resolved config that decides the posterior and the chain.
+fn decisive(resolved: &Value) -> Value {
     let mut value = resolved.clone();
     if let Some(top) = value.as_object_mut() {
         top.remove("$schema");
@@ -14,9 +48,7 @@ pub(super) fn fingerprint(resolved: &Value) -> String {
             sampler.retain(|key, _| !["steps", "rhat", "ess"].contains(&key.as_str()));
         }
     }
-    let mut text = String::new();
-    canonical(&value, &mut text);
-    format!("{:x}", Sha256::digest(text))
+    value
 }
 
 /// Compact JSON with sorted keys, whatever the features serde_json was built with.

@@ -16,6 +16,7 @@ mod suggest;
 
 pub use crate::ensemble::SamplerSettings;
 pub use error::ConfigError;
+pub use identity::first_difference;
 pub use raw_parts::EquivalentWidth;
 pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings};
 

@@ -9,6 +9,7 @@ use crate::ensemble::{EnsembleError, describe};
 use crate::log_density::LogDensity;
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
+use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 /// Draws tried for a walker before giving up.
@@ -32,6 +33,11 @@ pub struct StartDraw<'a> {
     pub walkers: usize,
     /// Seed of the draw.
     pub seed: u64,
+}
+
+/// The random numbers that the start of a walker is drawn with.
+pub fn start_numbers(seed: u64, ensemble: usize, walker: usize) -> ChaCha8Rng {
+    random_numbers(seed, stream(Purpose::Start, ensemble, walker), 0)
 }
 
 /// Draws start positions, `[ensemble][walker]`, in written coordinates.
@@ -59,7 +65,7 @@ pub fn draw_start(
         .unpack();
     let centre = DVector::from_vec(density.to_internal(draw.centre));
     let walker = |ensemble: usize, walker: usize| {
-        let mut rng = random_numbers(draw.seed, stream(Purpose::Start, ensemble, walker), 0);
+        let mut rng = start_numbers(draw.seed, ensemble, walker);
         let mut position = || {
             let normal = DVector::from_fn(dimension, |_, _| rng.sample::<f64, _>(StandardNormal));
             density.to_written((&centre + &factor * normal).as_slice())

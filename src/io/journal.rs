@@ -70,14 +70,22 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Makes a new, empty journal.
+    /// Makes a new, empty journal; one that is there already is emptied if `replace`, and refused otherwise.
     ///
     /// # Errors
     /// [`JournalError::Io`] (the file is there already, for one), [`JournalError::Locked`], [`JournalError::Name`].
-    pub fn create(path: &Path, shape: Shape) -> Result<Self, JournalError> {
+    pub fn create(path: &Path, shape: Shape, replace: bool) -> Result<Self, JournalError> {
         check_names(&shape)?;
-        let file = OpenOptions::new().read(true).write(true).create_new(true).open(path).map_err(at(path))?;
+        let mut options = OpenOptions::new();
+        options.read(true).write(true);
+        if replace {
+            options.create(true)
+        } else {
+            options.create_new(true)
+        };
+        let file = options.open(path).map_err(at(path))?;
         lock(&file, path)?;
+        file.set_len(0).map_err(at(path))?;
         Ok(Journal { writer: BufWriter::new(file), path: path.to_owned(), shape, lines: 0 })
     }
 

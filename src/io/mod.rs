@@ -5,6 +5,5 @@ pub mod csv;
 pub mod journal;
 pub mod lsd;
 pub mod map;
-pub mod optimum;
 pub mod provenance;
 pub mod truth;

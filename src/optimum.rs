@@ -1,6 +1,6 @@
 //! What `optimise` found: `optimum.json`, and the same as a table.
 
-use super::provenance::Provenance;
+use crate::io::provenance::Provenance;
 use crate::manifest::{OptimumRecord, ReferenceRecord, by_name};
 use crate::scene::Scene;
 use crate::search::{Attempt, Found};
