@@ -97,7 +97,7 @@ pub fn climb<D: Gradient>(density: &D, start: &[f64], tick: &(dyn Fn() + Sync)) 
     Ok(Optimum {
         evaluation: landscape.evaluate(&theta),
         curvature: &rescale * hessian * &rescale,
-        written_covariance: &jacobian * &covariance * jacobian.transpose(),
+        written_covariance: symmetric(&(&jacobian * &covariance * jacobian.transpose())),
         covariance,
         well_defined: Cholesky::new(hessian.clone()).is_some(),
         converged: matches!(
@@ -110,11 +110,15 @@ pub fn climb<D: Gradient>(density: &D, start: &[f64], tick: &(dyn Fn() + Sync)) 
     })
 }
 
-/// Inverse of a symmetric matrix, its eigenvalues kept above [`OPEN_CURVATURE`].
+fn symmetric(matrix: &Matrix) -> Matrix {
+    0.5 * (matrix + matrix.transpose())
+}
+
+/// Inverse of a symmetric matrix, symmetric to the last bit, its eigenvalues kept above [`OPEN_CURVATURE`].
 fn bounded_inverse(hessian: &Matrix) -> Matrix {
     let eigen = SymmetricEigen::new(hessian.clone());
     let inverse = eigen.eigenvalues.map(|e| 1.0 / e.max(OPEN_CURVATURE));
-    &eigen.eigenvectors * Matrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
+    symmetric(&(&eigen.eigenvectors * Matrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()))
 }
 
 /// Minus the log-density over scaled internal coordinates, as argmin sees it.
@@ -217,7 +221,7 @@ impl<D: Gradient> Hessian for &Landscape<'_, D> {
             })
             .collect();
         let hessian = Matrix::from_columns(&columns);
-        Ok(0.5 * (&hessian + hessian.transpose()))
+        Ok(symmetric(&hessian))
     }
 }
 

@@ -1,15 +1,12 @@
 //! The program as users run it: what commands write, and one clear line for everything that can be wrong.
 
+mod common;
+
+use common::desk::{Desk, dimcmc, says, text, with_line};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
-/// A folder with a config and simulated observations of a small star.
-struct Desk {
-    folder: tempfile::TempDir,
-    config: Value,
-}
-
+/// A small star, simulated.
 fn simulated() -> Value {
     json!({
         "star": {
@@ -39,109 +36,12 @@ fn from_files() -> Value {
     config
 }
 
-fn dimcmc(args: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dimcmc")).args(args).current_dir(folder).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
-
-impl Desk {
-    fn new(config: Value) -> Self {
-        let desk = Desk { folder: tempfile::tempdir().unwrap(), config };
-        desk.write("simulated.json", &simulated().to_string());
-        desk.write("config.json", &desk.config.to_string());
-        desk.succeed(&["simulate", "simulated.json", "--out", "data"]);
-        desk
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path(name), text).unwrap();
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
-    }
-
-    fn json(&self, name: &str) -> Value {
-        serde_json::from_str(&self.read(name)).unwrap()
-    }
-
-    fn edit(&self, name: &str, change: impl Fn(String) -> String) {
-        let (before, after) = (self.read(name), change(self.read(name)));
-        assert_ne!(before, after, "{name} was not changed");
-        self.write(name, &after);
-    }
-
-    /// Sets a value of the config, or removes it by null.
-    fn set(&self, pointer: &str, value: Value) {
-        let mut config = self.config.clone();
-        let (parent, key) = pointer.rsplit_once('/').unwrap();
-        let parent = config.pointer_mut(parent).unwrap().as_object_mut().unwrap();
-        parent.insert(key.into(), value);
-        self.write("config.json", &config.to_string());
-    }
-
-    fn succeed(&self, args: &[&str]) -> String {
-        let output = dimcmc(args, self.folder.path());
-        let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(0), "{args:?}: {stderr}");
-        assert_eq!(stderr, "", "silent when stderr is no terminal");
-        stdout
-    }
-
-    /// Everything in the folder, with its content.
-    fn inventory(&self) -> Vec<(PathBuf, Vec<u8>)> {
-        let mut found = Vec::new();
-        let mut folders = vec![self.folder.path().to_path_buf()];
-        while let Some(folder) = folders.pop() {
-            for entry in std::fs::read_dir(&folder).unwrap() {
-                let path = entry.unwrap().path();
-                match path.is_dir() {
-                    true => {
-                        found.push((path.clone(), Vec::new()));
-                        folders.push(path);
-                    }
-                    false => found.push((path.clone(), std::fs::read(&path).unwrap())),
-                }
-            }
-        }
-        found.sort();
-        found
-    }
-
-    /// The message of a command that must be refused and leave nothing.
-    fn refusal(&self, args: &[&str]) -> String {
-        let before = self.inventory();
-        let output = dimcmc(args, self.folder.path());
-        let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(2), "{stdout}{stderr}");
-        assert_eq!(stdout, "");
-        assert!(self.inventory() == before, "something was written: {stderr}");
-        let message = stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{stderr}"));
-        assert_eq!(message.matches('\n').count(), 1, "more than one line: {message}");
-        message.trim_end().to_string()
-    }
-}
-
-/// Whether every part stands in the message.
-fn says(message: &str, parts: &[&str]) {
-    println!("{message}");
-    for part in parts {
-        assert!(message.contains(part), "{part:?} is missing in: {message}");
-    }
-}
-
-/// `text` with line `number` (from 1) replaced.
-fn with_line(text: &str, number: usize, line: &str) -> String {
-    let mut lines: Vec<&str> = text.lines().collect();
-    lines[number - 1] = line;
-    lines.join("\n") + "\n"
+/// A desk with simulated observations in `data`.
+fn desk(config: Value) -> Desk {
+    let desk = Desk::new(config);
+    desk.write("simulated.json", &simulated().to_string());
+    desk.succeed(&["simulate", "simulated.json", "--out", "data"]);
+    desk
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -157,7 +57,7 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
 
 #[test]
 fn simulated_files_give_the_map_of_the_simulation() {
-    let desk = Desk::new(from_files());
+    let desk = desk(from_files());
     let truth = desk.json("data/truth.json");
     assert_eq!(truth["spots"], json!([[30.0, 40.0, 25.0, 0.8], [200.0, 10.0, 15.0, 0.9]]));
     assert_eq!(truth["parameters"]["k_kms"], 0.1);
@@ -186,7 +86,7 @@ fn simulated_files_give_the_map_of_the_simulation() {
 
 #[test]
 fn a_map_is_a_fit() {
-    let desk = Desk::new(simulated());
+    let desk = desk(simulated());
     desk.succeed(&["map", "config.json", "--out", "a"]);
     let fit = desk.json("a/fit.json");
     let data = 8.0 * 33.0;
@@ -233,7 +133,7 @@ fn help_shows_an_example() {
 
 #[test]
 fn nothing_is_overwritten_without_force() {
-    let desk = Desk::new(simulated());
+    let desk = desk(simulated());
     desk.write("data/mine.txt", "precious");
     for command in ["map", "simulate"] {
         let message = desk.refusal(&[command, "config.json", "--out", "data"]);
@@ -300,7 +200,7 @@ fn bad_profiles_are_refused_by_file_and_line() {
             &["data/observations.txt:3:", "tonight"],
         ),
     ];
-    let desk = Desk::new(from_files());
+    let desk = desk(from_files());
     for (name, file, change, parts) in cases {
         println!("-- {name}");
         let file = format!("data/{file}");
@@ -318,7 +218,7 @@ fn bad_profiles_are_refused_by_file_and_line() {
 
 #[test]
 fn bad_configs_are_refused_by_key() {
-    let desk = Desk::new(from_files());
+    let desk = desk(from_files());
     for (pointer, value, parts) in [
         ("/star/vsinni_kms", json!(20.0), &["star.vsinni_kms", "did you mean vsini_kms?"][..]),
         ("/colour", json!("red"), &["unknown key colour"]),

@@ -3,6 +3,7 @@
 use super::Failure;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals as Incoming;
+use std::io::IsTerminal as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -23,7 +24,9 @@ impl Signals {
         std::thread::spawn(move || {
             for _ in &mut incoming {
                 if !deferred.load(Ordering::SeqCst) {
-                    eprintln!("\nerror: interrupted before the first new step; nothing was written");
+                    // a terminal is in the middle of the progress line
+                    let line_break = if std::io::stderr().is_terminal() { "\n" } else { "" };
+                    eprintln!("{line_break}error: interrupted before the first step; nothing was written");
                     std::process::exit(1);
                 }
                 if stop.swap(true, Ordering::SeqCst) {

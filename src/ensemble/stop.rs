@@ -55,7 +55,7 @@ impl StopPolicy {
         StopPolicy { steps: settings.steps, goals, every: 50, least: 0 }
     }
 
-    /// Whether the chain ends where it is now, with the diagnostics if they were due.
+    /// Whether the chain ends where it is now, with the diagnostics if they were made.
     ///
     /// # Errors
     /// [`ChainError::Kinds`] when `kinds` does not match the chain.
@@ -66,9 +66,13 @@ impl StopPolicy {
     ) -> Result<(Option<StopReason>, Option<Convergence>), ChainError> {
         let Some(step) = chain.steps().checked_sub(1) else { return Ok((None, None)) };
         let due = step > 0 && (step.is_multiple_of(self.every.max(1)) || step >= self.steps);
-        let convergence = if due { Some(Convergence::of(chain, kinds)?) } else { None };
+        // early on, whoever watches is told five times as often
+        let early = step > 0 && step < 2 * self.every && step.is_multiple_of((self.every / 5).max(1));
+        let convergence = if due || early { Some(Convergence::of(chain, kinds)?) } else { None };
         let reason = match &convergence {
-            Some(convergence) if step >= self.least && convergence.reached(&self.goals) => Some(StopReason::Converged),
+            Some(convergence) if due && step >= self.least && convergence.reached(&self.goals) => {
+                Some(StopReason::Converged)
+            }
             _ if step >= self.steps => Some(StopReason::StepLimit),
             _ => None,
         };

@@ -1,0 +1,114 @@
+//! The program as users run it, in a folder of its own.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of its own with a config.
+pub struct Desk {
+    folder: tempfile::TempDir,
+    pub config: Value,
+}
+
+pub fn dimcmc(args: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_dimcmc")).args(args).current_dir(folder).output().unwrap()
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+impl Desk {
+    pub fn new(config: Value) -> Self {
+        let desk = Desk { folder: tempfile::tempdir().unwrap(), config };
+        desk.write("config.json", &desk.config.to_string());
+        desk
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    pub fn json(&self, name: &str) -> Value {
+        serde_json::from_str(&self.read(name)).unwrap()
+    }
+
+    pub fn edit(&self, name: &str, change: impl Fn(String) -> String) {
+        let (before, after) = (self.read(name), change(self.read(name)));
+        assert_ne!(before, after, "{name} was not changed");
+        self.write(name, &after);
+    }
+
+    /// Sets a value of the config, or removes it by null.
+    pub fn set(&self, pointer: &str, value: Value) {
+        let mut config = self.config.clone();
+        let (parent, key) = pointer.rsplit_once('/').unwrap();
+        let parent = config.pointer_mut(parent).unwrap().as_object_mut().unwrap();
+        parent.insert(key.into(), value);
+        self.write("config.json", &config.to_string());
+    }
+
+    pub fn succeed(&self, args: &[&str]) -> String {
+        let output = dimcmc(args, self.folder.path());
+        let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(0), "{args:?}: {stderr}");
+        assert_eq!(stderr, "", "silent when stderr is no terminal");
+        stdout
+    }
+
+    /// Everything in the folder, with its content.
+    pub fn inventory(&self) -> Vec<(PathBuf, Vec<u8>)> {
+        let mut found = Vec::new();
+        let mut folders = vec![self.folder.path().to_path_buf()];
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(&folder).unwrap() {
+                let path = entry.unwrap().path();
+                match path.is_dir() {
+                    true => {
+                        found.push((path.clone(), Vec::new()));
+                        folders.push(path);
+                    }
+                    false => found.push((path.clone(), std::fs::read(&path).unwrap())),
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+
+    /// The message of a command that must be refused and leave nothing.
+    pub fn refusal(&self, args: &[&str]) -> String {
+        let before = self.inventory();
+        let output = dimcmc(args, self.folder.path());
+        let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(2), "{stdout}{stderr}");
+        assert_eq!(stdout, "");
+        assert!(self.inventory() == before, "something was written: {stderr}");
+        let message = stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{stderr}"));
+        assert_eq!(message.matches('\n').count(), 1, "more than one line: {message}");
+        message.trim_end().to_string()
+    }
+}
+
+/// Whether every part stands in the message.
+pub fn says(message: &str, parts: &[&str]) {
+    println!("{message}");
+    for part in parts {
+        assert!(message.contains(part), "{part:?} is missing in: {message}");
+    }
+}
+
+/// `text` with line `number` (from 1) replaced.
+pub fn with_line(text: &str, number: usize, line: &str) -> String {
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines[number - 1] = line;
+    lines.join("\n") + "\n"
+}
