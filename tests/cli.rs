@@ -1,18 +1,16 @@
 //! The program as users run it: what commands write, and one clear line for everything that can be wrong.
 
-mod common;
+#[path = "common/desk.rs"]
+mod desk;
 
-use common::desk::{Desk, dimcmc, says, text, with_line};
+use desk::{Desk, dimcmc, says, star, text, with_line};
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// A small star, simulated.
 fn simulated() -> Value {
     json!({
-        "star": {
-            "rotation_period_d": 3.0, "inclination_deg": 50.0, "vsini_kms": 20.0, "contrast": 0.1,
-            "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }
-        },
+        "star": star(),
         "planet": { "k_kms": 0.1, "porb_over_prot": 1.7, "phi": 0.5 },
         "observations": { "simulate": {
             "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],

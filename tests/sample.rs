@@ -1,9 +1,10 @@
 //! `sample` and what belongs to it, as users run them: the same bytes whatever happens on the way, and refusals that write
 //! nothing.
 
-mod common;
+#[path = "common/desk.rs"]
+mod desk;
 
-use common::desk::{Desk, dimcmc, says, text};
+use desk::{Desk, dimcmc, says, star, text};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -24,10 +25,7 @@ const CONFIG: &str = "config.json";
 
 fn tiny() -> Value {
     json!({
-        "star": {
-            "rotation_period_d": 3.0, "inclination_deg": 50.0, "vsini_kms": 20.0, "contrast": 0.1,
-            "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }
-        },
+        "star": star(),
         "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.5 },
         "observations": { "simulate": {
             "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
@@ -291,11 +289,11 @@ fn what_is_no_run_is_neither_resumed_nor_analysed() {
     says(&desk.refusal(&["sample", CONFIG, "--out", "run"]), &["--out run", "not empty", "--force"]);
 
     copy(&desk, "run", "corrupt");
-    desk.edit("corrupt/chain.jsonl", |chain| common::desk::with_line(&chain, 100, "{\"ensemble\":0,\"st"));
+    desk.edit("corrupt/chain.jsonl", |chain| desk::with_line(&chain, 100, "{\"ensemble\":0,\"st"));
     copy(&desk, "run", "swapped");
     desk.edit("swapped/chain.jsonl", |chain| {
         let line = chain.lines().nth(98).unwrap().to_string();
-        common::desk::with_line(&chain, 100, &line)
+        desk::with_line(&chain, 100, &line)
     });
     for (run, problem) in [("corrupt", "EOF"), ("swapped", "expected step 8, ensemble 0, walker 3")] {
         let line = format!("{run}/chain.jsonl, line 100");

@@ -1,6 +1,7 @@
 //! The program as users run it, in a folder of its own.
+#![allow(dead_code)]
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -8,6 +9,14 @@ use std::process::{Command, Output};
 pub struct Desk {
     folder: tempfile::TempDir,
     pub config: Value,
+}
+
+/// A small star, its local line and all.
+pub fn star() -> Value {
+    json!({
+        "rotation_period_d": 3.0, "inclination_deg": 50.0, "vsini_kms": 20.0, "contrast": 0.1,
+        "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }
+    })
 }
 
 pub fn dimcmc(args: &[&str], folder: &Path) -> Output {

@@ -1,8 +1,6 @@
 //! The independent reference numbers under `tests/data/oracle` (see the README there), in this crate's types.
 #![allow(dead_code)]
 
-pub mod desk;
-
 use dimcmc::imaging::Data;
 use dimcmc::objective::{Parameter, ParameterValues};
 use dimcmc::star::{LimbDarkening, LocalLine, Sampling, StarSettings, SurfaceGrid};
