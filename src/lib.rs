@@ -1,4 +1,42 @@
-//! Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler (Petit et al. 2015).
+//! Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
+//!
+//! The idea is that of Petit et al. 2015 (*A maximum entropy approach to detect close-in giant planets around active stars*,
+//! A&A 584, A84): a wrong orbit shifts the line profiles against each other, and the map that fits them needs more spots. Here
+//! the spots are marginalised and the orbit is sampled, instead of being read off a grid.
+//!
+//! # From the paper to the modules
+//!
+//! | in the paper | here |
+//! |---|---|
+//! | the stellar model: geometry, limb darkening, local line, spots (section 2) | [`star`]: pixels to line profiles |
+//! | synthetic data (section 2) | [`simulate`] |
+//! | Doppler imaging by maximum entropy (section 3; Skilling & Bryan 1984) | [`maxent`], which knows no stars; [`imaging`] joins the two |
+//! | the map at an assumed orbit, and radial velocities without the spots | [`fit`] |
+//! | "the orbit that needs the fewest spots" (section 3) | [`objective`]: spottedness, entropy or regularised likelihood as a log-probability |
+//! | orbital parameters and error bars from a grid and a paraboloid | [`search`] and [`optimise`] for the optimum, [`ensemble`] for the posterior |
+//! | convergence and credible intervals | [`chain`] |
+//!
+//! # Around them
+//!
+//! [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
+//! observations, [`run`] a chain on disk that can be stopped and resumed, [`manifest`] what it was begun with.
+//! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
+//! of the star.
+//!
+//! # A map in a few lines
+//!
+//! ```no_run
+//! use dimcmc::{Fit, Reference, Scene};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = Scene::load("configs/demo.json".as_ref())?;
+//! let settings = &scene.settings;
+//! let reference = Reference::build(&scene.imager, settings.values, settings.imaging.chi2_target)?;
+//! let fit = Fit::new(&scene.imager, &scene.observations, &reference);
+//! println!("spots cover {:.1} %", 100.0 * fit.summary.spottedness);
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod chain;
 pub mod config;
@@ -19,3 +57,9 @@ pub mod search;
 pub mod simulate;
 pub mod star;
 pub mod units;
+
+pub use fit::Fit;
+pub use log_density::LogDensity;
+pub use objective::{Posterior, Reference};
+pub use run::Run;
+pub use scene::Scene;
