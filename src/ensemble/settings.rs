@@ -115,7 +115,7 @@ mod tests {
         let text = r#"{ "ensembles": 2, "moves": { "stretch": 0.2 } }"#;
         let settings: SamplerSettings = serde_json::from_str(text).unwrap();
         assert_eq!((settings.ensembles, settings.walkers, settings.ess), (2, 32, 1000.0));
-        assert_eq!(settings.moves, MoveWeights { stretch: 0.2, differential_evolution: 0.5 });
+        assert_eq!(settings.moves, MoveWeights { stretch: 0.2, ..MoveWeights::default() });
         assert!(serde_json::from_str::<SamplerSettings>(r#"{ "walker": 2 }"#).is_err());
         let back: SamplerSettings = serde_json::from_str(&serde_json::to_string(&settings).unwrap()).unwrap();
         assert_eq!(back, settings);
