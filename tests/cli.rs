@@ -231,7 +231,7 @@ fn bad_configs_are_refused_by_key() {
         ("/star/inclination_deg", json!(95.0), &["star.inclination_deg", "95"]),
         ("/sampler/walkers", json!(2), &["sampler.walkers", "at least 4"]),
         ("/sampler/walkers", json!(9), &["sampler.walkers", "even"]),
-        ("/imaging/chi2_target", json!(0.2), &["imaging.chi2_target", "0.2000", "floor", "no map"]),
+        ("/imaging/chi2_target", json!(0.2), &["imaging.chi2_target", "0.2000", "floor", "comes down to"]),
         ("/imaging/chi2_target", json!(1e5), &["imaging.chi2_target", "star without spots"]),
     ] {
         desk.set(pointer, value.clone());
