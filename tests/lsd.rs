@@ -178,7 +178,7 @@ fn the_oracle_s_profiles_are_read() {
 /// The data may not be distributed with the program, so that this runs where they are.
 #[test]
 fn the_profiles_of_lo_peg_are_read() {
-    let list = Path::new("/work/shared/data/lopeg/observations.txt");
+    let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
         let data = lsd::read(list, &options(Some((-90.0, 90.0)))).unwrap().observations;
         assert_eq!((data.profiles.len(), data.profiles[0].intensity.len()), (16, 100));

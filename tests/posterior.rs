@@ -47,7 +47,7 @@ fn posterior(oracle: &Oracle, grid: SurfaceGrid, kind: ObjectiveKind, chi2_per_d
 
 fn sample(posterior: &Posterior) -> Summary {
     let settings = SamplerSettings { walkers: 16, steps: 1500, ess: 1500.0, seed: 7, ..SamplerSettings::default() };
-    let optimum = climb(posterior, &posterior.space().start()).unwrap();
+    let optimum = climb(posterior, &posterior.space().start(), &|| ()).unwrap();
     let draw = StartDraw {
         centre: &optimum.theta,
         covariance: &optimum.covariance,
