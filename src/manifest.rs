@@ -46,6 +46,8 @@ pub struct Manifest {
     pub reference: ReferenceRecord,
     /// The best parameters before sampling.
     pub optimum: OptimumRecord,
+    /// Other maxima that the search found, by regularised likelihood, not much lower than the best.
+    pub rivals: Vec<OptimumRecord>,
     /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
     pub start: Positions,
 }
@@ -145,6 +147,21 @@ impl OptimumRecord {
 }
 
 impl Manifest {
+    /// What a reader of the chain must know of maxima that it did not start from, one line each.
+    pub fn warnings(&self) -> Vec<String> {
+        let place = |rival: &OptimumRecord| {
+            let values: Vec<String> = self.names.iter().map(|n| format!("{n} {:.4}", rival.parameters[n])).collect();
+            values.join(", ")
+        };
+        let line = |rival: &OptimumRecord| {
+            format!(
+                "another maximum, not much lower: {}; the walkers started around the best one, compare with --start prior",
+                place(rival)
+            )
+        };
+        self.rivals.iter().map(line).collect()
+    }
+
     /// Reads the manifest in a run's folder.
     ///
     /// # Errors

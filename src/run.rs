@@ -240,6 +240,7 @@ fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
         truth: scene.truth.map(|values| by_name(&values)),
         reference: ReferenceRecord::of(found.posterior.reference()),
         optimum: OptimumRecord::of(names, &found.optimum),
+        rivals: found.rivals().into_iter().map(|rival| OptimumRecord::of(names, rival)).collect(),
         start,
     }
 }

@@ -98,6 +98,12 @@ pub enum Stage {
 /// The reference is rebuilt until the optimum stays within this many standard deviations of it.
 const REFERENCE_SHIFT: f64 = 0.3;
 
+/// A maximum this much lower in log-probability holds a thousandth of the weight of the best, and is no rival.
+const RIVAL_DROP: f64 = 7.0;
+
+/// Climbs that end within this many standard deviations of each other found the same maximum.
+const RIVAL_DISTANCE: f64 = 4.0;
+
 /// Most rebuilds of the reference.
 const ROUNDS: usize = 4;
 
@@ -153,6 +159,24 @@ pub fn find(
         }
     }
     unreachable!("the loop returns")
+}
+
+impl Found {
+    /// Maxima other than the optimum, best first, that are lower by less than [`RIVAL_DROP`] in log-probability. A chain that
+    /// starts around the optimum may never see them.
+    pub fn rivals(&self) -> Vec<&Optimum> {
+        let mut ends: Vec<&Optimum> = self.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok()).collect();
+        ends.sort_by(|a, b| b.evaluation.log_prob.total_cmp(&a.evaluation.log_prob));
+        let mut distinct: Vec<&Optimum> = Vec::new();
+        for end in ends {
+            let lower = distinct.first().map_or(0.0, |best| best.evaluation.log_prob - end.evaluation.log_prob);
+            let same = |other: &&Optimum| shift(self.posterior.space(), &end.theta, other) < RIVAL_DISTANCE;
+            if lower < RIVAL_DROP && !distinct.iter().any(same) {
+                distinct.push(end);
+            }
+        }
+        distinct.split_off(distinct.len().min(1))
+    }
 }
 
 /// `theta` with an orbit drawn from the prior: it is in the orbit that the landscape has several maxima, one for every alias

@@ -33,6 +33,9 @@ pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), F
     let summary = summarise(chain, &kinds, &goals)
         .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
     write_json(&folder.join(SUMMARY), &summary)?;
-    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.truth.as_ref()));
+    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.truth.as_ref()).trim_end());
+    for warning in manifest.warnings() {
+        let _ = writeln!(std::io::stdout(), "note: {warning}");
+    }
     Ok(())
 }
