@@ -8,9 +8,11 @@ pub mod entropy;
 mod parallelism;
 pub mod preconditioner;
 pub mod problem;
+pub mod solution;
 pub mod solver;
 
 pub use parallelism::parallelism;
 pub use preconditioner::Preconditioner;
 pub use problem::{Curvature, Problem};
-pub use solver::{Goal, Image, Solution, Solver, SolverSettings, Start, Termination};
+pub use solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
+pub use solver::Solver;

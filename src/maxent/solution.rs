@@ -1,0 +1,112 @@
+//! What the solver is asked and what it answers: goal, precision, start, image, and why it stopped.
+//!
+//! Left out: how it gets there (`solver`).
+
+use super::entropy::Entropy;
+
+/// What to solve for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// The image at this Lagrange multiplier.
+    Lambda(f64),
+    /// The image at this chi2; where that takes more than `largest_lambda`, the image at that lambda.
+    Chi2 {
+        /// Target of chi2.
+        target: f64,
+        /// Bound of the Lagrange multiplier.
+        largest_lambda: f64,
+    },
+}
+
+/// Precision and effort.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverSettings {
+    /// Error allowed in `S/lambda - chi2/2`, and in chi2/2 where chi2 is the goal.
+    pub tolerance: f64,
+    /// Residual of the Newton systems over their right-hand side.
+    pub cg_tolerance: f64,
+    /// Most iterations of conjugate gradients for one Newton system.
+    pub cg_iterations: usize,
+    /// Most Newton steps.
+    pub newton_steps: usize,
+}
+
+impl Default for SolverSettings {
+    fn default() -> Self {
+        SolverSettings { tolerance: 1e-3, cg_tolerance: 0.05, cg_iterations: 300, newton_steps: 60 }
+    }
+}
+
+impl SolverSettings {
+    /// To rounding error rather than to what a chain needs: for references and tests.
+    pub fn exact() -> Self {
+        SolverSettings { tolerance: 1e-9, cg_tolerance: 1e-3, ..SolverSettings::default() }
+    }
+}
+
+/// Why the solver stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Termination {
+    /// The goal was met.
+    Converged,
+    /// The target chi2 takes a lambda beyond the bound; the image is the one at the bound.
+    Unreachable,
+    /// The number of Newton steps ran out.
+    StepLimit,
+    /// A number that is not finite appeared.
+    NonFinite,
+}
+
+/// An image where the solver starts or stops: logits of the spot filling factors and the Lagrange multiplier.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// logit of the filling factor of every pixel.
+    pub logit: Vec<f64>,
+    /// Lagrange multiplier of chi2/2.
+    pub lambda: f64,
+}
+
+/// Where the solver starts.
+#[derive(Clone, Debug)]
+pub struct Start {
+    /// Image and lambda.
+    pub image: Image,
+    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none.
+    pub path: Vec<f64>,
+    /// A guess of `d chi2 / d ln(lambda)` to go with it.
+    pub chi2_slope: f64,
+}
+
+impl Start {
+    /// An image without data: every pixel at the default, and a lambda for which data begin to matter.
+    pub fn blank(entropy: &Entropy, pixels: usize, lambda: f64) -> Self {
+        Start {
+            image: Image { logit: vec![entropy.default_logit(); pixels], lambda },
+            path: Vec::new(),
+            chi2_slope: 0.0,
+        }
+    }
+}
+
+/// What the solver found.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Why it stopped.
+    pub termination: Termination,
+    /// The image.
+    pub image: Image,
+    /// chi2 of the image.
+    pub chi2: f64,
+    /// Entropy of the image.
+    pub entropy: f64,
+    /// Spottedness `sum a s`.
+    pub spottedness: f64,
+    /// `d chi2 / d ln(lambda)` along the path of solutions (0 if the goal was a lambda).
+    pub chi2_slope: f64,
+    /// `d spottedness / d ln(lambda)` along the path (0 if the goal was a lambda).
+    pub spottedness_slope: f64,
+    /// `dz / d ln(lambda)` (empty if the goal was a lambda).
+    pub path: Vec<f64>,
+    /// Newton steps taken.
+    pub newton_steps: usize,
+}
