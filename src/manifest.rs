@@ -67,6 +67,10 @@ pub struct ReferenceRecord {
     pub entropy: f64,
     /// Spottedness.
     pub spottedness: f64,
+    /// chi2 at the end of the trade-off curve, where lambda is three times as large.
+    pub chi2_reach: f64,
+    /// Number of data.
+    pub data: usize,
 }
 
 /// The optimum and its error bars.
@@ -121,7 +125,25 @@ impl ReferenceRecord {
             lambda: solution.image.lambda,
             entropy: solution.entropy,
             spottedness: solution.spottedness,
+            chi2_reach: reference.tradeoff.nodes().last().map_or(solution.chi2, |node| node.chi2),
+            data: reference.response.data_len(),
         }
+    }
+
+    /// A target that a noise realisation, which moves the attainable chi2 by sqrt(2/N), may put out of reach: there
+    /// spottedness explodes, and the answer hangs on the target (method section 3).
+    pub fn warning(&self) -> Option<String> {
+        let noise = (2.0 / self.data as f64).sqrt() * self.chi2_target;
+        (self.chi2_target - self.chi2_reach < noise).then(|| {
+            let per_datum = |chi2: f64| chi2 / self.data as f64;
+            format!(
+                "the target chi2 of {:.3} per datum is close to the floor (three times its lambda comes down to {:.3}): see \
+                 whether the answer stays when imaging.chi2_target is raised by {:.3}",
+                per_datum(self.chi2_target),
+                per_datum(self.chi2_reach),
+                per_datum(noise)
+            )
+        })
     }
 
     /// All eight parameters; those missing in the record are taken from `others`.
@@ -147,19 +169,16 @@ impl OptimumRecord {
 }
 
 impl Manifest {
-    /// What a reader of the chain must know of maxima that it did not start from, one line each.
+    /// What a reader of the chain must know beside it, one line each.
     pub fn warnings(&self) -> Vec<String> {
         let place = |rival: &OptimumRecord| {
             let values: Vec<String> = self.names.iter().map(|n| format!("{n} {:.4}", rival.parameters[n])).collect();
             values.join(", ")
         };
         let line = |rival: &OptimumRecord| {
-            format!(
-                "another maximum, not much lower: {}; the walkers started around the best one, compare with --start prior",
-                place(rival)
-            )
+            format!("another maximum, not much lower, where walkers started too: {}", place(rival))
         };
-        self.rivals.iter().map(line).collect()
+        self.rivals.iter().map(line).chain(self.reference.warning()).collect()
     }
 
     /// Reads the manifest in a run's folder.
@@ -227,6 +246,7 @@ pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
 pub fn kinds_and_goals(settings: &Settings) -> (Vec<ParameterKind>, Goals) {
     let kind = |f: &crate::objective::FreeParameter| match (f.parameter, f.prior) {
         (_, Prior::Periodic) => ParameterKind::Periodic,
+        (Parameter::Phi, prior) if prior.bounds().1 - prior.bounds().0 >= 1.0 => ParameterKind::Periodic,
         (Parameter::K, _) => ParameterKind::Amplitude,
         _ => ParameterKind::Linear,
     };

@@ -98,6 +98,9 @@ impl OptimumFile {
             (false, _) => "no well-defined maximum: on the edge of a prior, or the data leave some direction open",
         };
         let _ = writeln!(table, "{verdict}; ln P = {:.3}, spottedness {:.5}", self.optimum.log_prob, self.spottedness);
+        if let Some(warning) = self.reference.warning() {
+            let _ = writeln!(table, "note: {warning}");
+        }
         table
     }
 }

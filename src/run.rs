@@ -12,6 +12,7 @@ use crate::io::journal::{Journal, JournalError};
 use crate::log_density::{LogDensity, Threads};
 use crate::manifest::{Manifest, ManifestError, OptimumRecord, ReferenceRecord, by_name, kinds_and_goals};
 use crate::objective::{Posterior, Reference, ReferenceError};
+use crate::optimise::Optimum;
 use crate::scene::Scene;
 use crate::search::Found;
 use rayon::prelude::*;
@@ -27,7 +28,7 @@ pub const SUMMARY: &str = "summary.json";
 /// Where the walkers start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StartFrom {
-    /// Around the optimum, somewhat wider than its curvature.
+    /// Around the maxima that the search found, somewhat wider than their curvature.
     #[default]
     Optimum,
     /// All over the prior.
@@ -119,21 +120,24 @@ impl Run {
     pub fn begin(scene: &Scene, folder: &Path, found: Found, from: StartFrom, replace: bool) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
         let start = match from {
-            StartFrom::Optimum => around_optimum(&found, scene)?,
+            StartFrom::Optimum => around_maxima(&found, scene)?,
             StartFrom::Prior => over_prior(&found.posterior, scene)?,
         };
+        let first = first_step(scene, &found.posterior, &start)?;
         let manifest = manifest(scene, &found, start);
         std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
         // the chain first: whoever holds it may write the manifest
-        let journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
+        let mut journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
         match std::fs::remove_file(folder.join(SUMMARY)) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(RunError::Folder { path: folder.join(SUMMARY), source });
             }
             _ => manifest.write(folder)?,
         }
-        let chain = Chain::new(manifest.shape());
-        Run::new(scene, folder, manifest, found.posterior, (journal, chain))
+        let mut chain = Chain::new(manifest.shape());
+        journal.append(&first)?;
+        chain.push_step(&first)?;
+        Ok(Run::new(scene, folder, manifest, found.posterior, (journal, chain)))
     }
 
     /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
@@ -145,7 +149,7 @@ impl Run {
         if let Some(what) = manifest.change(&scene.provenance()) {
             return Err(RunError::Changed { folder: folder.into(), what });
         }
-        let journal = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
+        let (mut journal, mut chain) = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
         let values = manifest.reference.values(&scene.settings.values);
         let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target)?;
         let (then, now) = (manifest.reference.lambda, reference.solution.image.lambda);
@@ -154,35 +158,34 @@ impl Run {
         }
         let kind = scene.settings.imaging.objective;
         let posterior = Posterior::new(scene.imager.clone(), scene.space.clone(), kind, reference);
-        let last_step = journal.1.steps().saturating_sub(1);
+        if chain.steps() == 0 {
+            let first = first_step(scene, &posterior, &manifest.start)?;
+            journal.append(&first)?;
+            chain.push_step(&first)?;
+        }
+        let last_step = chain.steps() - 1;
         if manifest.update(&scene.settings, extend.map(|steps| last_step + steps)) {
             manifest.write(folder)?;
         }
-        Run::new(scene, folder, manifest, posterior, journal)
+        Ok(Run::new(scene, folder, manifest, posterior, (journal, chain)))
     }
 
-    /// The run with its chain so far, and step 0 if that is not there.
+    /// The run with its chain so far.
     fn new(
         scene: &Scene,
         folder: &Path,
         manifest: Manifest,
         posterior: Posterior,
-        (mut journal, mut chain): (Journal, Chain),
-    ) -> Result<Self, RunError> {
+        (journal, chain): (Journal, Chain),
+    ) -> Self {
         let settings = scene.settings.sampler.clone();
-        if chain.steps() == 0 {
-            let evaluator = Threads(&posterior);
-            let (_, records) = Sampler::new(&posterior, &evaluator, &settings)?.start(&manifest.start)?;
-            journal.append(&records)?;
-            chain.push_step(&records)?;
-        }
         let (kinds, _) = kinds_and_goals(&scene.settings);
         let policy = StopPolicy::new(&settings);
         let policy = match manifest.extend_to {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        Ok(Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, journal })
+        Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, journal }
     }
 
     /// The step at which the run ends if its goals are not reached before.
@@ -245,17 +248,38 @@ fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
     }
 }
 
-fn around_optimum(found: &Found, scene: &Scene) -> Result<Positions, EnsembleError> {
+/// The walkers at step 0, evaluated; refused here, before anything is written, if they are no start.
+fn first_step(scene: &Scene, posterior: &Posterior, start: &Positions) -> Result<Vec<Record>, RunError> {
+    let evaluator = Threads(posterior);
+    Ok(Sampler::new(posterior, &evaluator, &scene.settings.sampler)?.start(start)?.1)
+}
+
+/// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of them
+/// and half around all in turn, another one for each ensemble: that walkers can hop between them, and that R-hat tells if
+/// they do not.
+fn around_maxima(found: &Found, scene: &Scene) -> Result<Positions, RunError> {
     let sampler = &scene.settings.sampler;
-    let draw = StartDraw {
-        centre: &found.optimum.theta,
-        covariance: &found.optimum.covariance,
-        scale: OVERDISPERSION,
-        ensembles: sampler.ensembles,
-        walkers: sampler.walkers,
-        seed: sampler.seed,
+    let maxima: Vec<&Optimum> = std::iter::once(&found.optimum).chain(found.rivals()).collect();
+    let draw = |(m, maximum): (usize, &&Optimum)| {
+        let draw = StartDraw {
+            centre: &maximum.theta,
+            covariance: &maximum.covariance,
+            scale: OVERDISPERSION,
+            ensembles: sampler.ensembles,
+            walkers: sampler.walkers,
+            seed: sampler.seed.wrapping_add(m as u64),
+        };
+        draw_start(&found.posterior, &draw, &|theta| scene.space.log_prior(theta).is_finite())
     };
-    draw_start(&found.posterior, &draw, &|theta| scene.space.log_prior(theta).is_finite())
+    let around: Result<Vec<Positions>, _> = maxima.iter().enumerate().map(draw).collect();
+    let around = match around {
+        // data so weak that the curvature is wider than the prior
+        Err(EnsembleError::StartOutside { .. }) => return over_prior(&found.posterior, scene),
+        around => around?,
+    };
+    let choose = |e: usize, w: usize| if w.is_multiple_of(2) { e % maxima.len() } else { (w / 2) % maxima.len() };
+    let walker = |e: usize, w: usize| around[choose(e, w)][e][w].clone();
+    Ok((0..sampler.ensembles).map(|e| (0..sampler.walkers).map(|w| walker(e, w)).collect()).collect())
 }
 
 /// Draws from the prior at which the reconstruction succeeds.

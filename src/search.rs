@@ -118,6 +118,8 @@ pub fn find(
     report: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, SearchError> {
     let SearchSettings { chi2_target, objective, prior_starts, seed } = settings;
+    let orbital = space.free().iter().any(|f| f.parameter.is_orbital());
+    let prior_starts = if orbital { prior_starts } else { 0 };
     let (evaluations, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let at = |stage| report(Progress { stage, evaluations: evaluations.load(Relaxed) });
     at(Stage::FirstImage);

@@ -78,6 +78,33 @@ fn a_star_seen_pole_on_shows_its_local_line() {
 }
 
 #[test]
+fn limb_darkening_shapes_the_profile_as_an_integral_over_the_disc_says() {
+    let grid = SurfaceGrid::equal_area(20_000, Quadrature::Gauss2x2);
+    let line = oracle().star.line;
+    for limb in [LINEAR, LimbDarkening::Quadratic(0.3, 0.35), LimbDarkening::Quadratic(0.8, -0.2)] {
+        let depth = unspotted(&grid, &state(), &sampling(&[0.0]), limb);
+        // strips of the disc at x = v / vsini, each the integral of LD(mu) along it; midpoints in angle, so that the limb is
+        // resolved
+        let angle = |i: usize, n: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * std::f64::consts::PI;
+        let strip = |x: f64| {
+            let half = (1.0 - x * x).sqrt();
+            let at = |i| half * angle(i, 200).cos() * limb.at(half * angle(i, 200).cos());
+            (0..200).map(at).sum::<f64>()
+        };
+        let strips: Vec<(f64, f64)> =
+            (0..400).map(|i| (angle(i, 400).sin(), angle(i, 400).cos() * strip(angle(i, 400).sin()))).collect();
+        let continuum: f64 = strips.iter().map(|(_, weight)| weight).sum();
+        for (j, depth) in depth.iter().enumerate() {
+            let v = -59.4 + 1.8 * j as f64;
+            let gaussian = |x: f64| (-0.5 * ((v - 40.0 * x) / line.sigma_kms).powi(2)).exp();
+            let area = line.equivalent_width_kms / (line.sigma_kms * std::f64::consts::TAU.sqrt());
+            let wanted = area * strips.iter().map(|(x, weight)| weight * gaussian(*x)).sum::<f64>() / continuum;
+            assert!((depth - wanted).abs() < 3e-6, "{limb:?} {v} km/s: {depth} instead of {wanted}");
+        }
+    }
+}
+
+#[test]
 fn orbit_and_systemic_velocity_shift_the_profile_as_a_whole() {
     let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
     let sampling = sampling(&[0.7]);

@@ -4,10 +4,11 @@
 mod common;
 
 use common::{Oracle, oracle, values};
-use dimcmc::imaging::{Imager, ImagingProblem};
+use dimcmc::imaging::{Data, Imager, ImagingProblem};
 use dimcmc::maxent::entropy::Entropy;
 use dimcmc::maxent::{Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
 use dimcmc::objective::{Parameter, Reference};
+use dimcmc::observation::{Observations, Profile};
 use dimcmc::star::{Quadrature, SurfaceGrid};
 
 fn imager(oracle: &Oracle) -> Imager {
@@ -31,6 +32,27 @@ fn wave(n: usize, a: f64) -> Vec<f64> {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[test]
+fn chi2_is_the_sum_of_squared_residuals_over_their_errors() {
+    let profile = |time_d, intensity: [f64; 2], sigma: [f64; 2]| Profile {
+        time_d,
+        first_velocity_kms: -1.0,
+        intensity: intensity.to_vec(),
+        sigma: sigma.to_vec(),
+    };
+    let profiles = vec![profile(0.0, [0.9, 1.0], [0.1, 0.2]), profile(1.0, [0.8, 0.7], [0.5, 0.05])];
+    let data = Data::of(&Observations { step_kms: 2.0, profiles });
+    let close = |a: &[f64], b: [f64; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0));
+    assert!(close(&data.depth, [0.1, 0.0, 0.2, 0.3]), "{:?}", data.depth);
+    assert!(close(&data.inverse_variance, [100.0, 25.0, 4.0, 400.0]), "{:?}", data.inverse_variance);
+    let oracle = oracle();
+    let imager = imager(&oracle);
+    let mut problem = problem(&oracle, &imager);
+    let chi2 = problem.linearise(&vec![0.1; imager.grid.len()]);
+    let residuals = problem.model().iter().zip(&oracle.data.depth).map(|(model, depth)| (model - depth) / 1e-3);
+    assert!((chi2 / residuals.map(|r| r * r).sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
 #[test]

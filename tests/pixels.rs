@@ -35,4 +35,15 @@ fn vsini_on_2000_pixels_is_that_of_20000() {
     let ((coarse, _), (fine, sigma)) = (vsini(2000), vsini(20_000));
     println!("vsini {coarse:.4} on 2,000 pixels, {fine:.4} +- {sigma:.4} on 20,000");
     assert!((coarse - fine).abs() < 0.2 * sigma);
+    peak_memory_is_below_one_gibibyte();
+}
+
+/// Of this process, which has just worked on 20,000 pixels; where the system says (Linux).
+fn peak_memory_is_below_one_gibibyte() {
+    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return };
+    let peak =
+        status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB")?.trim().parse().ok());
+    let peak: f64 = peak.expect("a number of kB");
+    println!("peak memory {:.0} MiB", peak / 1024.0);
+    assert!(peak < 1024.0 * 1024.0, "{peak} kB");
 }

@@ -14,7 +14,7 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
     let mut advice = Vec::new();
     if chain.shape().ensembles < 2 {
         advice
-            .push("one ensemble only: R-hat compares its two halves; use `sampler.ensembles` of 2 or more".to_owned());
+            .push("one ensemble alone cannot be judged, R-hat only compares its two halves: set `sampler.ensembles` to 2 or more".to_owned());
     }
     let diagnostics = chain.names().iter().zip(&convergence.diagnostics);
     advice.extend(diagnostics.filter_map(|(name, one)| parameter_advice(name, one, convergence.kept, goals)));

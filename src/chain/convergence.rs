@@ -67,6 +67,8 @@ pub struct Convergence {
     pub diagnostics: Vec<Diagnostic>,
     /// Walkers (ensemble, walker) that do not move any more.
     pub stuck: Vec<(usize, usize)>,
+    /// Number of independent ensembles.
+    pub ensembles: usize,
 }
 
 impl Convergence {
@@ -99,12 +101,14 @@ impl Convergence {
             .map(|(parameter, kind)| diagnose(&facets(chain.series(parameter, discarded), *kind)))
             .collect();
         let kept = chain.steps() - discarded;
-        Ok(Convergence { discarded, kept, diagnostics, stuck: stuck(chain, discarded) })
+        let ensembles = chain.shape().ensembles;
+        Ok(Convergence { discarded, kept, diagnostics, stuck: stuck(chain, discarded), ensembles })
     }
 
-    /// Whether every parameter has reached the goals and no walker is stuck.
+    /// Whether every parameter has reached the goals and no walker is stuck. One ensemble alone never has: there is nothing
+    /// independent to compare it with.
     pub fn reached(&self, goals: &Goals) -> bool {
-        self.stuck.is_empty() && self.diagnostics.iter().all(|one| one.reached(goals))
+        self.ensembles > 1 && self.stuck.is_empty() && self.diagnostics.iter().all(|one| one.reached(goals))
     }
 }
 

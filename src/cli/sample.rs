@@ -39,7 +39,7 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Start {
-    /// Around the optimum
+    /// Around the maxima that the search finds
     Optimum,
     /// All over the prior
     Prior,
@@ -57,6 +57,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let failed = |e| Failure::run(&args.config, e);
     let signals = Signals::catch()?;
     let mut run = if resume {
+        signals.defer();
         let spinner = progress::bar(global, None, "reading the chain, reference image");
         let run = Run::resume(&scene, folder, args.extend);
         spinner.finish_and_clear();

@@ -1,8 +1,8 @@
 //! The sum over visible pixels: brightness deposited on a velocity grid, and its transpose. This is the hot path.
 //!
 //! Every visible (pixel, observation) pair holds six weights on consecutive nodes of a uniform velocity grid (see
-//! `line_profile`): 40 bytes and eight multiply-adds (two of them by zero, to fill a vector register) a pair, whatever the shape and width of the line. The weights depend on
-//! the star's rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
+//! `line_profile`): 32 bytes and six multiply-adds, whatever the shape and width of the line. The weights depend on the
+//! star's rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
 //! Left out: the line itself (`convolution`).
 
 use super::StarState;
@@ -26,16 +26,13 @@ pub struct Deposit {
     pairs: Vec<Pair>,
 }
 
-/// Nodes that are read or written for a pair: those with a weight, and zeros up to a whole number of vector registers.
-const WINDOW: usize = 6;
-
 /// Grids that are summed side by side.
 pub const LANES: usize = 4;
 
 /// One visible pixel of one observation.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
-    weights: [f32; WINDOW],
+    weights: [f32; DEPOSIT_NODES],
     pixel: u32,
     node: u16,
 }
@@ -86,7 +83,7 @@ impl Deposit {
         let position = (velocity - self.origin_kms) / self.step_kms;
         let cell = position.floor();
         let spread = variance / (2.0 * self.step_kms * self.step_kms);
-        let mut weights = [0.0; WINDOW];
+        let mut weights = [0.0; DEPOSIT_NODES];
         for (w, share) in weights.iter_mut().zip(deposit_weights(position - cell, spread)) {
             *w = (weight * share) as f32;
         }
@@ -104,16 +101,17 @@ impl Deposit {
     }
 
     /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid: the sum over `lanes` of
-    /// [`LANES`] grids of [`Deposit::stride`] nodes each.
+    /// [`LANES`] grids.
     #[inline(always)]
     pub fn gather<const FMA: bool>(&self, k: usize, x: &[f64], lanes: &mut [f64]) {
         lanes.fill(0.0);
-        let stride = self.stride();
+        let stride = self.nodes;
         // neighbours in a ring hit overlapping nodes: with a grid each, none waits for the other's sums to reach memory
         for (i, pair) in self.pairs_of(k).enumerate() {
             let first = (i % LANES) * stride + usize::from(pair.node);
             let brightness = x[pair.pixel as usize];
-            let target: &mut [f64; WINDOW] = (&mut lanes[first..first + WINDOW]).try_into().expect("a whole window");
+            let target: &mut [f64; DEPOSIT_NODES] =
+                (&mut lanes[first..first + DEPOSIT_NODES]).try_into().expect("a whole window");
             for (t, w) in target.iter_mut().zip(pair.weights) {
                 *t = multiply_add::<FMA>(brightness, f64::from(w), *t);
             }
@@ -125,7 +123,8 @@ impl Deposit {
     pub fn scatter<const FMA: bool>(&self, k: usize, nodes: &[f64], out: &mut [f64]) {
         for pair in self.pairs_of(k) {
             let first = usize::from(pair.node);
-            let source: &[f64; WINDOW] = (&nodes[first..first + WINDOW]).try_into().expect("a whole window");
+            let source: &[f64; DEPOSIT_NODES] =
+                (&nodes[first..first + DEPOSIT_NODES]).try_into().expect("a whole window");
             let w = pair.weights.map(f64::from);
             let mut sums = [source[0] * w[0], source[1] * w[1], source[2] * w[2], source[3] * w[3]];
             sums[0] = multiply_add::<FMA>(source[4], w[4], sums[0]);
@@ -137,11 +136,6 @@ impl Deposit {
     #[inline(always)]
     fn pairs_of(&self, k: usize) -> impl Iterator<Item = &Pair> {
         self.pairs[self.starts[k]..self.starts[k + 1]].iter()
-    }
-
-    /// Nodes of the grid and a margin, so that every window lies inside.
-    pub fn stride(&self) -> usize {
-        self.nodes + WINDOW - DEPOSIT_NODES
     }
 }
 

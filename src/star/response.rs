@@ -149,7 +149,7 @@ impl Response {
 
     #[inline(always)]
     fn apply_with<const FMA: bool>(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
-        let stride = self.deposit.stride();
+        let stride = self.deposit.nodes;
         let mut lanes = vec![0.0; LANES * stride];
         let mut rows = Rows::new(stride, self.steps_per_bin);
         for (k, convolution) in self.convolutions.iter().enumerate() {
@@ -167,7 +167,7 @@ impl Response {
     #[inline(always)]
     fn apply_transpose_with<const FMA: bool>(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
         out.fill(0.0);
-        let mut nodes = vec![0.0; self.deposit.stride()];
+        let mut nodes = vec![0.0; self.deposit.nodes];
         let mut rows = Rows::new(nodes.len(), self.steps_per_bin);
         for (k, convolution) in self.convolutions.iter().enumerate() {
             convolution.spread_bins::<FMA>(&line[self.bins(k)], &mut rows);

@@ -47,6 +47,10 @@ pub(super) struct Fault {
     pub problem: String,
 }
 
+/// Smallest standard error and largest numbers that a profile in units of the continuum can have.
+const SMALLEST_SIGMA: f64 = 1e-9;
+const LARGEST: f64 = 1e6;
+
 /// How far a point may be off the uniform axis, in steps.
 const UNIFORMITY: f64 = 0.01;
 
@@ -137,6 +141,9 @@ fn parse_row(line: usize, fields: &[&str], columns: usize) -> Result<Row, Fault>
     }
     if sigma <= 0.0 {
         return fault(line, format!("sigma is {sigma}, it must be above 0"));
+    }
+    if !(SMALLEST_SIGMA..=LARGEST).contains(&sigma) || intensity.abs() > LARGEST {
+        return fault(line, format!("intensity {intensity} with sigma {sigma} is not in units of the continuum"));
     }
     Ok(Row { line, velocity, intensity, sigma })
 }
