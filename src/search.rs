@@ -164,7 +164,7 @@ pub fn find(
 }
 
 impl Found {
-    /// Maxima other than the optimum, best first, that are lower by less than [`RIVAL_DROP`] in log-probability. A chain that
+    /// Maxima other than the optimum, best first, that are lower by less than 7 in log-probability. A chain that
     /// starts around the optimum may never see them.
     pub fn rivals(&self) -> Vec<&Optimum> {
         let mut ends: Vec<&Optimum> = self.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok()).collect();
