@@ -143,7 +143,7 @@ fn parse_row(line: usize, fields: &[&str], columns: usize) -> Result<Row, Fault>
         return fault(line, format!("sigma is {sigma}, it must be above 0"));
     }
     if !(SMALLEST_SIGMA..=LARGEST).contains(&sigma) || intensity.abs() > LARGEST {
-        return fault(line, format!("intensity {intensity} with sigma {sigma} is not in units of the continuum"));
+        return fault(line, format!("intensity {intensity:e} with sigma {sigma:e} is not in units of the continuum"));
     }
     Ok(Row { line, velocity, intensity, sigma })
 }
