@@ -57,6 +57,7 @@ pub mod search;
 pub mod simulate;
 pub mod star;
 pub mod units;
+pub mod vector;
 
 pub use fit::Fit;
 pub use log_density::LogDensity;

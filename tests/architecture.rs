@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
 const LAYERS: &[&[&str]] = &[
-    &["units", "log_density"],
+    &["units", "vector", "log_density"],
     &["observation"],
     &["star", "maxent", "chain"],
     &["imaging", "ensemble", "optimise"],
@@ -24,11 +24,12 @@ const LAYERS: &[&[&str]] = &[
 /// Modules, and all that they may import. What is not listed here may import whatever lies lower.
 const MAY_SEE: &[(&str, &[&str])] = &[
     ("units", &[]),
+    ("vector", &[]),
     ("log_density", &[]),
     ("observation", &["units"]),
-    ("star", &["observation", "units"]),
-    ("maxent", &["units"]),
-    ("imaging", &["maxent", "observation", "star", "units"]),
+    ("star", &["observation", "units", "vector"]),
+    ("maxent", &["units", "vector"]),
+    ("imaging", &["maxent", "observation", "star", "units", "vector"]),
     ("chain", &["log_density"]),
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),

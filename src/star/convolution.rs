@@ -1,112 +1,148 @@
 //! From the velocity grid to the bins of one observed profile: convolution with the local line, and its transpose.
 //!
-//! A bin is a whole number m of grid steps wide, so that one short table of the line serves all bins of a profile; the orbit
-//! and the systemic velocity only shift that table. The grid is kept as m interleaved rows, which makes both directions
-//! plain vector updates. Left out: pixels.
+//! A bin is a whole number m of grid steps wide: kept as m interleaved rows (node i is entry i / m of row i mod m), the grid
+//! is turned into bins by one short filter a row. The orbit and the systemic velocity only shift the filters. Left out: pixels.
 
-use super::deposit::multiply_add;
 use super::line_profile::LineKernel;
+use crate::vector::Instructions;
 
-/// The local line, sampled for one profile.
+/// The local line, sampled for one profile: a filter for every row of the grid.
 #[derive(Clone, Debug)]
 pub struct ProfileConvolution {
-    /// Grid steps a bin.
-    steps_per_bin: usize,
-    /// Grid index, relative to the first bin's, of the table's first entry.
-    first: isize,
-    table: Vec<f64>,
+    filters: Vec<Filter>,
 }
+
+/// `bin[b] = sum_q taps[q] row[first + q + b]`.
+#[derive(Clone, Debug)]
+struct Filter {
+    first: isize,
+    taps: Vec<f64>,
+    /// The taps in reverse order, for the transpose.
+    reversed: Vec<f64>,
+}
+
+/// Sums that are kept in registers together.
+const CHUNK: usize = 16;
 
 impl ProfileConvolution {
     /// For a profile whose first bin lies `first_bin_kms` above the grid's first node, in the star's frame.
     pub fn new(kernel: &LineKernel, grid_step: f64, steps_per_bin: usize, first_bin_kms: f64) -> Self {
         let position = first_bin_kms / grid_step;
         let reach = kernel.reach_kms() / grid_step;
-        let first = (position - reach).ceil();
-        let count = ((position + reach).floor() - first) as usize + 1;
-        let table = (0..count).map(|i| kernel.at((position - first - i as f64) * grid_step)).collect();
-        ProfileConvolution { steps_per_bin, first: first as isize, table }
+        let (m, first, last) =
+            (steps_per_bin as isize, (position - reach).ceil() as isize, (position + reach).floor() as isize);
+        let filter = |row: isize| {
+            let nodes = (first..=last).filter(|node| node.rem_euclid(m) == row);
+            let taps: Vec<f64> = nodes.map(|node| kernel.at((position - node as f64) * grid_step)).collect();
+            let reversed = taps.iter().rev().copied().collect();
+            Filter { first: (first - row + m - 1).div_euclid(m), taps, reversed }
+        };
+        ProfileConvolution { filters: (0..m).map(filter).collect() }
     }
 
-    /// Calls `f(line, row, column, bins)` for every entry of the table: bins `bins` see it at `row[column..]`.
-    #[inline(always)]
-    fn each_entry(&self, columns: usize, bins: usize, mut f: impl FnMut(f64, usize, usize, std::ops::Range<usize>)) {
-        let m = self.steps_per_bin as isize;
-        for (i, &line) in self.table.iter().enumerate() {
-            let index = self.first + i as isize;
-            let (row, column) = (index.rem_euclid(m) as usize, index.div_euclid(m));
-            let from = (-column).max(0);
-            let to = (columns as isize - column).min(bins as isize);
-            if from < to {
-                f(line, row, (from + column) as usize, from as usize..to as usize);
-            }
-        }
+    /// Columns before the rows' first, and bins' worth of them from the first on, that the filters reach.
+    fn reach(&self) -> (usize, usize) {
+        let before = self.filters.iter().map(|f| f.first.min(0).unsigned_abs()).max();
+        let after = self.filters.iter().map(|f| (f.first + f.taps.len() as isize).max(0) as usize).max();
+        (before.unwrap_or(0), after.unwrap_or(0))
     }
 
     /// Line depth in every bin (overwritten) from the rows of the grid.
     #[inline(always)]
-    pub fn sum_to_bins<const FMA: bool>(&self, rows: &Rows, bins: &mut [f64]) {
-        bins.fill(0.0);
-        self.each_entry(rows.columns, bins.len(), |line, row, column, range| {
-            let source = &rows.row(row)[column..column + range.len()];
-            for (bin, x) in bins[range].iter_mut().zip(source) {
-                *bin = multiply_add::<FMA>(line, *x, *bin);
+    pub fn sum_to_bins(&self, i: impl Instructions, rows: &Rows, bins: &mut [f64]) {
+        for (chunk, b) in bins.chunks_mut(CHUNK).zip((0..).step_by(CHUNK)) {
+            let mut sums = [0.0; CHUNK];
+            for (row, filter) in self.filters.iter().enumerate() {
+                let first = (filter.first + rows.margin as isize) as usize + b;
+                correlate(i, &filter.taps, &rows.row(row)[first..], &mut sums);
             }
-        });
+            chunk.copy_from_slice(&sums[..chunk.len()]);
+        }
     }
 
     /// Transpose of [`ProfileConvolution::sum_to_bins`]: sets the rows of the grid from the bins.
     #[inline(always)]
-    pub fn spread_bins<const FMA: bool>(&self, bins: &[f64], rows: &mut Rows) {
+    pub fn spread_bins(&self, i: impl Instructions, bins: &[f64], rows: &mut Rows) {
         rows.values.fill(0.0);
-        let columns = rows.columns;
-        self.each_entry(columns, bins.len(), |line, row, column, range| {
-            let target = &mut rows.row_mut(row)[column..column + range.len()];
-            for (t, bin) in target.iter_mut().zip(&bins[range]) {
-                *t = multiply_add::<FMA>(line, *bin, *t);
+        for (row, filter) in self.filters.iter().enumerate() {
+            let Some(margin) = filter.taps.len().checked_sub(1) else { continue };
+            // bins with as many zeros on either side as the filter reaches
+            rows.padded.clear();
+            rows.padded.resize(margin, 0.0);
+            rows.padded.extend_from_slice(bins);
+            rows.padded.resize(bins.len() + 2 * margin + CHUNK, 0.0);
+            let first = (filter.first + rows.margin as isize) as usize;
+            let targets = &mut rows.values[row * rows.stride + first..][..bins.len() + margin];
+            for (chunk, c) in targets.chunks_mut(CHUNK).zip((0..).step_by(CHUNK)) {
+                let mut sums = [0.0; CHUNK];
+                correlate(i, &filter.reversed, &rows.padded[c..], &mut sums);
+                chunk.copy_from_slice(&sums[..chunk.len()]);
             }
-        });
+        }
     }
 }
 
-/// The velocity grid as interleaved rows: node i is entry i / m of row i mod m.
+/// `sums[i] += sum_q taps[q] source[q + i]`.
+#[inline(always)]
+fn correlate(i: impl Instructions, taps: &[f64], source: &[f64], sums: &mut [f64; CHUNK]) {
+    for (tap, window) in taps.iter().zip(source.windows(CHUNK)) {
+        for (sum, x) in sums.iter_mut().zip(window) {
+            *sum = i.multiply_add(*tap, *x, *sum);
+        }
+    }
+}
+
+/// The velocity grid as interleaved rows, with room on either side for filters that reach beyond it.
 #[derive(Clone, Debug)]
 pub struct Rows {
-    columns: usize,
+    /// Columns before the grid's first node.
+    margin: usize,
+    /// Columns of a row.
+    stride: usize,
     steps_per_bin: usize,
     values: Vec<f64>,
+    padded: Vec<f64>,
 }
 
 impl Rows {
-    /// Rows for a grid of `nodes` nodes.
-    pub fn new(nodes: usize, steps_per_bin: usize) -> Self {
-        let columns = nodes.div_ceil(steps_per_bin);
-        Rows { columns, steps_per_bin, values: vec![0.0; columns * steps_per_bin] }
+    /// Rows for a grid of `nodes` nodes and profiles of the given numbers of bins.
+    pub fn new<'a>(
+        nodes: usize,
+        steps_per_bin: usize,
+        profiles: impl Iterator<Item = (&'a ProfileConvolution, usize)>,
+    ) -> Self {
+        let (mut margin, mut end) = (0, nodes.div_ceil(steps_per_bin));
+        for (convolution, bins) in profiles {
+            let (before, after) = convolution.reach();
+            margin = margin.max(before);
+            end = end.max(after + bins + CHUNK);
+        }
+        let stride = margin + end;
+        Rows { margin, stride, steps_per_bin, values: vec![0.0; stride * steps_per_bin], padded: Vec::new() }
     }
 
     fn row(&self, row: usize) -> &[f64] {
-        &self.values[row * self.columns..(row + 1) * self.columns]
-    }
-
-    fn row_mut(&mut self, row: usize) -> &mut [f64] {
-        &mut self.values[row * self.columns..(row + 1) * self.columns]
+        &self.values[row * self.stride..(row + 1) * self.stride]
     }
 
     /// Takes over the grid's nodes.
+    #[inline(always)]
     pub fn interleave(&mut self, nodes: &[f64]) {
-        for row in 0..self.steps_per_bin {
-            let m = self.steps_per_bin;
-            for (value, node) in self.row_mut(row).iter_mut().zip(nodes.iter().skip(row).step_by(m)) {
+        for (row, values) in self.values.chunks_exact_mut(self.stride).enumerate() {
+            for (value, node) in
+                values[self.margin..].iter_mut().zip(nodes[row.min(nodes.len())..].iter().step_by(self.steps_per_bin))
+            {
                 *value = *node;
             }
         }
     }
 
     /// Writes the grid's nodes.
+    #[inline(always)]
     pub fn deinterleave(&self, nodes: &mut [f64]) {
-        for row in 0..self.steps_per_bin {
-            let targets = nodes.iter_mut().skip(row).step_by(self.steps_per_bin);
-            for (value, node) in self.row(row).iter().zip(targets) {
+        for row in 0..self.steps_per_bin.min(nodes.len()) {
+            let targets = nodes[row..].iter_mut().step_by(self.steps_per_bin);
+            for (value, node) in self.row(row)[self.margin..].iter().zip(targets) {
                 *node = *value;
             }
         }

@@ -1,15 +1,17 @@
-//! The sum over visible pixels: brightness deposited on a velocity grid, and its transpose. This is the hot path.
+//! Brightness deposited on a velocity grid, for every observation, and its transpose. This is the hot path.
 //!
-//! Every visible (pixel, observation) pair holds six weights on consecutive nodes of a uniform velocity grid (see
-//! `line_profile`): 32 bytes and six multiply-adds, whatever the shape and width of the line. The weights depend on the
-//! star's rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
-//! Left out: the line itself (`convolution`).
+//! Every visible (pixel, observation) pair lies in one cell of a uniform velocity grid. The pairs of a cell lie together, so
+//! that the sum over them is one of powers of the position within the cell (`kernel`); the cell's polynomials (`line_profile`)
+//! make node values of them, whatever the shape and width of the line. The pairs depend on the star's rotation, inclination
+//! and vsini alone; an orbit or a systemic velocity leaves them as they are. Left out: the line itself (`convolution`).
 
 use super::StarState;
 use super::grid::SurfaceGrid;
+use super::kernel::{self, Block, LANES};
 use super::limb_darkening::LimbDarkening;
-use super::line_profile::{DEPOSIT_NODES, deposit_weights};
-use super::view::Viewer;
+use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
+use super::view::{Viewer, Views};
+use crate::vector::{self, Instructions, Task};
 
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.
 #[derive(Clone, Debug)]
@@ -21,20 +23,10 @@ pub struct Deposit {
     /// Number of nodes.
     pub nodes: usize,
     pixels: usize,
-    /// First pair of each observation, and the end.
-    starts: Vec<usize>,
-    pairs: Vec<Pair>,
-}
-
-/// Grids that are summed side by side.
-pub const LANES: usize = 4;
-
-/// One visible pixel of one observation.
-#[derive(Clone, Copy, Debug)]
-struct Pair {
-    weights: [f32; DEPOSIT_NODES],
-    pixel: u32,
-    node: u16,
+    pairs: usize,
+    /// First block of every cell of every observation, and the end.
+    starts: Vec<u32>,
+    blocks: Vec<Block>,
 }
 
 impl Deposit {
@@ -48,29 +40,16 @@ impl Deposit {
     ) -> Self {
         let viewer = Viewer::new(state, limb);
         let reach = reach(&viewer, step_kms);
-        let capacity = since_epoch_d.len() * grid.len() * 5 / 8;
         let mut deposit = Deposit {
             origin_kms: -reach * step_kms,
             step_kms,
             nodes: 2 * reach as usize + 1,
             pixels: grid.len(),
+            pairs: 0,
             starts: vec![0],
-            pairs: Vec::with_capacity(capacity),
+            blocks: Vec::with_capacity(since_epoch_d.len() * grid.len() * 5 / 8 / LANES),
         };
-        assert!(deposit.nodes <= usize::from(u16::MAX), "velocity grid of {} nodes", deposit.nodes);
-        let mut views = Vec::new();
-        for &time in since_epoch_d {
-            for ring in &grid.rings {
-                viewer.look(grid, ring, time, &mut views);
-                for (p, view) in ring.pixels.clone().zip(&views) {
-                    if view.weight > 0.0 {
-                        let (mean, variance) = view.velocity();
-                        deposit.push(p, view.weight, mean, variance);
-                    }
-                }
-            }
-            deposit.starts.push(deposit.pairs.len());
-        }
+        vector::run(Build { deposit: &mut deposit, viewer, grid, since_epoch_d });
         deposit
     }
 
@@ -79,20 +58,14 @@ impl Deposit {
         2.0 * reach(&Viewer::new(state, limb), step_kms) + 1.0
     }
 
-    fn push(&mut self, pixel: usize, weight: f64, velocity: f64, variance: f64) {
-        let position = (velocity - self.origin_kms) / self.step_kms;
-        let cell = position.floor();
-        let spread = variance / (2.0 * self.step_kms * self.step_kms);
-        let mut weights = [0.0; DEPOSIT_NODES];
-        for (w, share) in weights.iter_mut().zip(deposit_weights(position - cell, spread)) {
-            *w = (weight * share) as f32;
-        }
-        self.pairs.push(Pair { weights, pixel: pixel as u32, node: cell as u16 - 2 });
-    }
-
     /// Number of visible (pixel, observation) pairs.
     pub fn pairs(&self) -> usize {
-        self.pairs.len()
+        self.pairs
+    }
+
+    /// Memory (bytes) that a pass over all pairs reads.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.blocks.as_slice()) + size_of_val(self.starts.as_slice())
     }
 
     /// Number of pixels of the map.
@@ -100,49 +73,135 @@ impl Deposit {
         self.pixels
     }
 
-    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid: the sum over `lanes` of
-    /// [`LANES`] grids.
+    /// Cells of the grid on which something can be deposited: that many of its nodes have all nodes of their cell above them.
+    fn cells(&self) -> usize {
+        self.nodes - BEYOND
+    }
+
+    fn blocks_of(&self, observation: usize) -> impl Iterator<Item = &[Block]> {
+        let first = observation * self.cells();
+        let bounds = self.starts[first..first + self.cells() + 1].windows(2);
+        bounds.map(|b| &self.blocks[b[0] as usize..b[1] as usize])
+    }
+
+    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid (overwritten).
     #[inline(always)]
-    pub fn gather<const FMA: bool>(&self, k: usize, x: &[f64], lanes: &mut [f64]) {
-        lanes.fill(0.0);
-        let stride = self.nodes;
-        // neighbours in a ring hit overlapping nodes: with a grid each, none waits for the other's sums to reach memory
-        for (i, pair) in self.pairs_of(k).enumerate() {
-            let first = (i % LANES) * stride + usize::from(pair.node);
-            let brightness = x[pair.pixel as usize];
-            let target: &mut [f64; DEPOSIT_NODES] =
-                (&mut lanes[first..first + DEPOSIT_NODES]).try_into().expect("a whole window");
-            for (t, w) in target.iter_mut().zip(pair.weights) {
-                *t = multiply_add::<FMA>(brightness, f64::from(w), *t);
-            }
+    #[allow(unsafe_code)]
+    pub fn gather<I: Instructions>(&self, i: I, k: usize, x: &[f64], moments: &mut Moments, nodes: &mut [f64]) {
+        assert_eq!(x.len(), self.pixels);
+        for (cell, blocks) in self.blocks_of(k).enumerate() {
+            // safe: blocks hold pixels of the grid alone
+            let sums = unsafe { kernel::sum(i, blocks, x) };
+            moments.powers.iter_mut().zip(sums).for_each(|(moments, sum)| moments[BEYOND + cell] = sum);
+        }
+        nodes.fill(0.0);
+        for (power, moments) in moments.powers.iter().enumerate() {
+            correlate(i, &std::array::from_fn(|n| DEPOSIT_WEIGHTS[BEYOND - n][power]), moments, nodes);
         }
     }
 
     /// Transpose of [`Deposit::gather`]: adds to map `out` what observation `k` gives back from the grid `nodes`.
     #[inline(always)]
-    pub fn scatter<const FMA: bool>(&self, k: usize, nodes: &[f64], out: &mut [f64]) {
-        for pair in self.pairs_of(k) {
-            let first = usize::from(pair.node);
-            let source: &[f64; DEPOSIT_NODES] =
-                (&nodes[first..first + DEPOSIT_NODES]).try_into().expect("a whole window");
-            let w = pair.weights.map(f64::from);
-            let mut sums = [source[0] * w[0], source[1] * w[1], source[2] * w[2], source[3] * w[3]];
-            sums[0] = multiply_add::<FMA>(source[4], w[4], sums[0]);
-            sums[1] = multiply_add::<FMA>(source[5], w[5], sums[1]);
-            out[pair.pixel as usize] += (sums[0] + sums[2]) + (sums[1] + sums[3]);
+    #[allow(unsafe_code)]
+    pub fn scatter<I: Instructions>(&self, i: I, k: usize, nodes: &[f64], moments: &mut Moments, out: &mut [f64]) {
+        assert_eq!(out.len(), self.pixels);
+        for (power, moments) in moments.powers.iter_mut().enumerate() {
+            let cells = &mut moments[BEYOND..self.nodes];
+            cells.fill(0.0);
+            correlate(i, &std::array::from_fn(|n| DEPOSIT_WEIGHTS[n][power]), nodes, cells);
         }
-    }
-
-    #[inline(always)]
-    fn pairs_of(&self, k: usize) -> impl Iterator<Item = &Pair> {
-        self.pairs[self.starts[k]..self.starts[k + 1]].iter()
+        for (cell, blocks) in self.blocks_of(k).enumerate() {
+            let coefficients = std::array::from_fn(|power| moments.powers[power][BEYOND + cell]);
+            // safe: blocks hold pixels of the grid alone
+            unsafe { kernel::spread(i, blocks, &coefficients, out) };
+        }
     }
 }
 
-/// `a b + c`, fused where the processor can.
+/// Nodes of a cell beyond the one that it is counted by.
+const BEYOND: usize = DEPOSIT_NODES - 1;
+
+/// Scratch of a deposit: the sums of every power of the position in every cell, and room for the cells before the first.
+#[derive(Clone, Debug)]
+pub struct Moments {
+    powers: [Vec<f64>; DEPOSIT_NODES],
+}
+
+impl Moments {
+    /// For the cells of `deposit`.
+    pub fn new(deposit: &Deposit) -> Self {
+        Moments { powers: std::array::from_fn(|_| vec![0.0; BEYOND + deposit.nodes]) }
+    }
+}
+
+/// `out[j] += sum_n weights[n] source[j + n]`.
 #[inline(always)]
-pub fn multiply_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FMA { a.mul_add(b, c) } else { a * b + c }
+fn correlate(i: impl Instructions, weights: &[f64; DEPOSIT_NODES], source: &[f64], out: &mut [f64]) {
+    let sources: [&[f64]; DEPOSIT_NODES] = std::array::from_fn(|n| &source[n..n + out.len()]);
+    for (j, out) in out.iter_mut().enumerate() {
+        let low = i.multiply_add(
+            weights[2],
+            sources[2][j],
+            i.multiply_add(weights[1], sources[1][j], weights[0] * sources[0][j]),
+        );
+        let high = i.multiply_add(
+            weights[5],
+            sources[5][j],
+            i.multiply_add(weights[4], sources[4][j], weights[3] * sources[3][j]),
+        );
+        *out += low + high;
+    }
+}
+
+/// The work of [`Deposit::new`]: looks at the pixels of every observation and sorts the visible ones into cells.
+struct Build<'a> {
+    deposit: &'a mut Deposit,
+    viewer: Viewer,
+    grid: &'a SurfaceGrid,
+    since_epoch_d: &'a [f64],
+}
+
+impl Task for Build<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, instructions: I) {
+        let Build { deposit, viewer, grid, since_epoch_d } = self;
+        let mut views = Views::new(grid.len());
+        let mut cells = vec![0; grid.len()];
+        let half_inverse_square = 0.5 / (deposit.step_kms * deposit.step_kms);
+        for &time in since_epoch_d {
+            viewer.look(instructions, grid, time, &mut views);
+            // from velocities to positions on the grid, with the cell that the first of its nodes counts
+            let mut next = vec![0; deposit.cells()];
+            for ((weight, velocity), cell) in views.weight.iter().zip(&mut views.velocity).zip(&mut cells) {
+                if *weight > 0.0 {
+                    *velocity = (*velocity - deposit.origin_kms) / deposit.step_kms;
+                    *cell = *velocity as u32 - 2;
+                    next[*cell as usize] += 1;
+                    deposit.pairs += 1;
+                }
+            }
+            let mut end = deposit.blocks.len();
+            for next in &mut next {
+                let count = std::mem::replace(next, LANES * end);
+                end += usize::div_ceil(count, LANES);
+                deposit.starts.push(end as u32);
+            }
+            deposit.blocks.resize(end, Block::empty(0));
+            for (p, (weight, cell)) in views.weight.iter().zip(&cells).enumerate() {
+                if *weight > 0.0 {
+                    let next = &mut next[*cell as usize];
+                    let (block, lane) = (&mut deposit.blocks[*next / LANES], *next % LANES);
+                    *next += 1;
+                    block.weight[lane] = *weight as f32;
+                    block.position[lane] = (views.velocity[p] - f64::from(*cell + 2)) as f32;
+                    block.spread[lane] = (views.variance[p] * half_inverse_square) as f32;
+                    block.pixel[lane] = p as u32;
+                }
+            }
+        }
+    }
 }
 
 /// Nodes on either side of the line's centre.

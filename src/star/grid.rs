@@ -47,8 +47,10 @@ pub struct SurfaceGrid {
     pub latitude: Vec<f64>,
     /// Area of each pixel as a fraction of the star; they sum to 1.
     pub area: Vec<f64>,
-    /// Cosine and sine of each pixel's longitude.
-    pub(crate) longitude_cos_sin: Vec<(f64, f64)>,
+    /// Cosine of each pixel's longitude.
+    pub(crate) longitude_cos: Vec<f64>,
+    /// Sine of each pixel's longitude.
+    pub(crate) longitude_sin: Vec<f64>,
     /// The pixels in rings of constant latitude, south to north.
     pub(crate) rings: Vec<Ring>,
 }
@@ -69,13 +71,14 @@ impl SurfaceGrid {
             longitude: Vec::with_capacity(total),
             latitude: Vec::with_capacity(total),
             area: vec![area; total],
-            longitude_cos_sin: Vec::new(),
+            longitude_cos: Vec::new(),
+            longitude_sin: Vec::new(),
             rings: Vec::with_capacity(n_rings),
         };
         for &count in &counts {
             grid.push_ring(count, area, quadrature);
         }
-        grid.longitude_cos_sin = grid.longitude.iter().map(|l| (l.cos(), l.sin())).collect();
+        (grid.longitude_cos, grid.longitude_sin) = cos_sin(&grid.longitude);
         grid
     }
 
@@ -107,8 +110,8 @@ impl SurfaceGrid {
         let rings = (0..longitude.len())
             .map(|p| Ring { pixels: p..p + 1, points: vec![RingPoint::new(latitude[p].sin(), 0.0, area[p])] })
             .collect();
-        let longitude_cos_sin = longitude.iter().map(|l| (l.cos(), l.sin())).collect();
-        SurfaceGrid { longitude, latitude, area, longitude_cos_sin, rings }
+        let (longitude_cos, longitude_sin) = cos_sin(&longitude);
+        SurfaceGrid { longitude, latitude, area, longitude_cos, longitude_sin, rings }
     }
 
     /// Number of pixels.
@@ -143,6 +146,10 @@ impl SurfaceGrid {
         }
         means
     }
+}
+
+fn cos_sin(longitude: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    longitude.iter().map(|l| (l.cos(), l.sin())).unzip()
 }
 
 impl RingPoint {

@@ -56,25 +56,22 @@ impl LineKernel {
     }
 }
 
-/// Nodes that a pixel is deposited on.
+/// Nodes that a pixel is deposited on, and terms of the polynomials that say with which weights.
 pub const DEPOSIT_NODES: usize = 6;
 
-/// Quintic B-spline weights of a pixel at fraction `t` in [0, 1) of a grid cell, on the nodes -2 to 3 of the cell, with
-/// `spread` = (variance of the pixel's velocity) / (2 h^2) added through the spline's second derivative. They sum to 1.
-pub fn deposit_weights(t: f64, spread: f64) -> [f64; DEPOSIT_NODES] {
-    let near = |x: f64| {
-        let x2 = x * x;
-        11.0 / 20.0 + x2 * (-0.5 + x2 * (0.25 - x / 12.0)) + spread * (-1.0 + x2 * (3.0 - 5.0 / 3.0 * x))
-    };
-    let middle = |x: f64| {
-        17.0 / 40.0
-            + x * (0.625 + x * (-1.75 + x * (1.25 + x * (-0.375 + x / 24.0))))
-            + spread * (-3.5 + x * (7.5 + x * (-4.5 + x * (5.0 / 6.0))))
-    };
-    let outer = |y: f64| y * y * y * (y * y / 120.0 + spread / 6.0);
-    let s = 1.0 - t;
-    [outer(s), middle(1.0 + t), near(t), near(s), middle(1.0 + s), outer(t)]
-}
+/// The quintic B-spline on one grid cell: weights of the nodes -2 to 3 of the cell (rows) as polynomials in the position
+/// `t` in [0, 1) within it (coefficients of 1, t, ... t^5). The rows sum to the polynomial 1.
+///
+/// A pixel with a spread of velocities is deposited with the means of the powers over it, `t^k + k (k - 1) t^(k-2) spread`
+/// to second order, where `spread` = (variance of its velocity) / (2 h^2).
+pub const DEPOSIT_WEIGHTS: [[f64; DEPOSIT_NODES]; DEPOSIT_NODES] = [
+    [1.0 / 120.0, -1.0 / 24.0, 1.0 / 12.0, -1.0 / 12.0, 1.0 / 24.0, -1.0 / 120.0],
+    [13.0 / 60.0, -5.0 / 12.0, 1.0 / 6.0, 1.0 / 6.0, -1.0 / 6.0, 1.0 / 24.0],
+    [11.0 / 20.0, 0.0, -0.5, 0.0, 0.25, -1.0 / 12.0],
+    [13.0 / 60.0, 5.0 / 12.0, 1.0 / 6.0, -1.0 / 6.0, -1.0 / 6.0, 1.0 / 12.0],
+    [1.0 / 120.0, 1.0 / 24.0, 1.0 / 12.0, 1.0 / 12.0, 1.0 / 24.0, -1.0 / 24.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 120.0],
+];
 
 #[cfg(test)]
 mod tests {
@@ -88,11 +85,12 @@ mod tests {
     fn through_grid(line: LocalLine, step: f64, v: f64, v_p: f64, variance: f64) -> f64 {
         let kernel = LineKernel::new(line, step);
         let cell = (v_p / step).floor();
-        deposit_weights(v_p / step - cell, variance / (2.0 * step * step))
-            .iter()
-            .enumerate()
-            .map(|(i, w)| w * kernel.at(v - (cell + i as f64 - 2.0) * step))
-            .sum()
+        let (t, spread) = (v_p / step - cell, variance / (2.0 * step * step));
+        let plus = |factor: f64| t * t + factor * spread;
+        let powers = [1.0, t, plus(2.0), t * plus(6.0), t * t * plus(12.0), t * t * t * plus(20.0)];
+        let weight = |row: &[f64; 6]| row.iter().zip(powers).map(|(c, power)| c * power).sum::<f64>();
+        let nodes = DEPOSIT_WEIGHTS.iter().enumerate();
+        nodes.map(|(i, row)| weight(row) * kernel.at(v - (cell + i as f64 - 2.0) * step)).sum()
     }
 
     #[test]

@@ -6,6 +6,7 @@
 mod convolution;
 mod deposit;
 pub mod grid;
+mod kernel;
 pub mod limb_darkening;
 mod line_profile;
 pub mod orbit;

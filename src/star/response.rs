@@ -5,11 +5,12 @@
 //! (what x is), the division by the continuum, data.
 
 use super::convolution::{ProfileConvolution, Rows};
-use super::deposit::{Deposit, LANES};
+use super::deposit::{Deposit, Moments};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
 use crate::observation::Observations;
+use crate::vector::{self, Instructions, Task};
 use std::sync::Arc;
 
 /// When and at which velocities the star is observed.
@@ -86,6 +87,11 @@ impl Response {
         Response { deposit, convolutions, steps_per_bin, starts }
     }
 
+    fn rows(&self) -> Rows {
+        let bins = self.starts.windows(2).map(|s| s[1] - s[0]);
+        Rows::new(self.deposit.nodes, self.steps_per_bin, self.convolutions.iter().zip(bins))
+    }
+
     /// Number of pixels.
     pub fn pixels(&self) -> usize {
         self.deposit.pixels()
@@ -101,6 +107,11 @@ impl Response {
         self.deposit.pairs()
     }
 
+    /// Memory (bytes) that a pass over all pairs reads.
+    pub fn bytes(&self) -> usize {
+        self.deposit.bytes()
+    }
+
     /// Bins of profile `k` within the data.
     pub fn bins(&self, k: usize) -> std::ops::Range<usize> {
         self.starts[k]..self.starts[k + 1]
@@ -113,68 +124,12 @@ impl Response {
 
     /// Line depth of every bin and continuum of every profile for the map `x`.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
-        if has_avx2() {
-            // safe: the processor has what the function needs
-            #[allow(unsafe_code)]
-            unsafe {
-                self.apply_avx2(x, line, continuum);
-            }
-        } else {
-            self.apply_with::<false>(x, line, continuum);
-        }
+        vector::run(Apply { response: self, x, line, continuum });
     }
 
     /// Transpose of [`Response::apply`]; `out` is overwritten.
     pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
-        if has_avx2() {
-            // safe: the processor has what the function needs
-            #[allow(unsafe_code)]
-            unsafe {
-                self.apply_transpose_avx2(line, continuum, out);
-            }
-        } else {
-            self.apply_transpose_with::<false>(line, continuum, out);
-        }
-    }
-
-    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
-    fn apply_avx2(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
-        self.apply_with::<true>(x, line, continuum);
-    }
-
-    #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
-    fn apply_transpose_avx2(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
-        self.apply_transpose_with::<true>(line, continuum, out);
-    }
-
-    #[inline(always)]
-    fn apply_with<const FMA: bool>(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
-        let stride = self.deposit.nodes;
-        let mut lanes = vec![0.0; LANES * stride];
-        let mut rows = Rows::new(stride, self.steps_per_bin);
-        for (k, convolution) in self.convolutions.iter().enumerate() {
-            self.deposit.gather::<FMA>(k, x, &mut lanes);
-            let (nodes, others) = lanes.split_at_mut(stride);
-            for other in others.chunks_exact(stride) {
-                nodes.iter_mut().zip(other).for_each(|(node, x)| *node += x);
-            }
-            continuum[k] = nodes.iter().sum();
-            rows.interleave(nodes);
-            convolution.sum_to_bins::<FMA>(&rows, &mut line[self.bins(k)]);
-        }
-    }
-
-    #[inline(always)]
-    fn apply_transpose_with<const FMA: bool>(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
-        out.fill(0.0);
-        let mut nodes = vec![0.0; self.deposit.nodes];
-        let mut rows = Rows::new(nodes.len(), self.steps_per_bin);
-        for (k, convolution) in self.convolutions.iter().enumerate() {
-            convolution.spread_bins::<FMA>(&line[self.bins(k)], &mut rows);
-            rows.deinterleave(&mut nodes);
-            nodes.iter_mut().for_each(|node| *node += continuum[k]);
-            self.deposit.scatter::<FMA>(k, &nodes, out);
-        }
+        vector::run(ApplyTranspose { response: self, line, continuum, out });
     }
 
     /// Normalised depth `1 - I` of every bin for a brightness map: the observable of method section 1.
@@ -189,10 +144,51 @@ impl Response {
     }
 }
 
-/// Whether the vector instructions that the hot loops are compiled for as well are there (looked up once, then remembered).
-fn has_avx2() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    return std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
-    #[cfg(not(target_arch = "x86_64"))]
-    return false;
+struct Apply<'a> {
+    response: &'a Response,
+    x: &'a [f64],
+    line: &'a mut [f64],
+    continuum: &'a mut [f64],
+}
+
+impl Task for Apply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, instructions: I) {
+        let Apply { response, x, line, continuum } = self;
+        let mut nodes = vec![0.0; response.deposit.nodes];
+        let (mut moments, mut rows) = (Moments::new(&response.deposit), response.rows());
+        for (k, convolution) in response.convolutions.iter().enumerate() {
+            response.deposit.gather(instructions, k, x, &mut moments, &mut nodes);
+            continuum[k] = nodes.iter().sum();
+            rows.interleave(&nodes);
+            convolution.sum_to_bins(instructions, &rows, &mut line[response.bins(k)]);
+        }
+    }
+}
+
+struct ApplyTranspose<'a> {
+    response: &'a Response,
+    line: &'a [f64],
+    continuum: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Task for ApplyTranspose<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, instructions: I) {
+        let ApplyTranspose { response, line, continuum, out } = self;
+        let mut nodes = vec![0.0; response.deposit.nodes];
+        let (mut moments, mut rows) = (Moments::new(&response.deposit), response.rows());
+        out.fill(0.0);
+        for (k, convolution) in response.convolutions.iter().enumerate() {
+            convolution.spread_bins(instructions, &line[response.bins(k)], &mut rows);
+            rows.deinterleave(&mut nodes);
+            nodes.iter_mut().for_each(|node| *node += continuum[k]);
+            response.deposit.scatter(instructions, k, &nodes, &mut moments, out);
+        }
+    }
 }
