@@ -43,18 +43,17 @@ impl Entropy {
         capped
     }
 
-    /// Entropy of the image with logits `u` (at most 0, and 0 at the default).
-    pub fn value(&self, u: &[f64], area: &[f64]) -> f64 {
-        // s u - ln(1 + e^u) is s ln s + (1-s) ln(1-s)
-        let softplus = |u: f64| u.max(0.0) + (-u.abs()).exp().ln_1p();
-        let at_default = softplus(self.default_logit);
-        -u.iter()
-            .zip(area)
-            .map(|(&u, a)| {
-                let s = 1.0 / (1.0 + (-u).exp());
-                a * (s * (u - self.default_logit) - softplus(u) + at_default)
-            })
-            .sum::<f64>()
+    /// Entropy of the image with logits `u` (at most 0, and 0 at the default), and the image s itself.
+    pub fn value(&self, u: &[f64], area: &[f64], s: &mut [f64]) -> f64 {
+        // s u - ln(1 + e^u) is s ln s + (1-s) ln(1-s); both parts from one exponential
+        let at_default = softplus(self.default_logit, (-self.default_logit.abs()).exp());
+        let mut sum = 0.0;
+        for ((s, &u), a) in s.iter_mut().zip(u).zip(area) {
+            let small = (-u.abs()).exp();
+            *s = if u > 0.0 { 1.0 } else { small } / (1.0 + small);
+            sum += a * (*s * (u - self.default_logit) - softplus(u, small) + at_default);
+        }
+        -sum
     }
 
     /// Gradient of -S with respect to s.
@@ -80,7 +79,13 @@ fn logit_step(s: f64, ds: f64) -> f64 {
     let room = if ds < 0.0 { s } else { 1.0 - s };
     let straight = ds.abs().min(0.5 * room) * ds.signum();
     let (there, rest) = (s + straight, ds - straight);
-    (straight / s).ln_1p() - (-straight / (1.0 - s)).ln_1p() + rest / (there * (1.0 - there))
+    let left = 1.0 - there;
+    (straight / (s * left)).ln_1p() + rest / (there * left)
+}
+
+/// `ln(1 + e^u)`, given `e^-|u|`.
+fn softplus(u: f64, small: f64) -> f64 {
+    u.max(0.0) + small.ln_1p()
 }
 
 #[cfg(test)]
@@ -98,8 +103,11 @@ mod tests {
             };
             -u.iter().zip(&area).map(term).sum::<f64>()
         };
-        assert!((entropy.value(&u, &area) - formula(&u)).abs() < 1e-13);
-        assert!(entropy.value(&[entropy.default_logit(); 4], &area).abs() < 1e-15);
+        let (mut image, mut same) = ([0.0; 4], [0.0; 4]);
+        assert!((entropy.value(&u, &area, &mut image) - formula(&u)).abs() < 1e-13);
+        entropy.image(&u, &mut same);
+        assert!(image.iter().zip(same).all(|(a, b)| (a / b - 1.0).abs() < 1e-14));
+        assert!(entropy.value(&[entropy.default_logit(); 4], &area, &mut image).abs() < 1e-15);
         let mut gradient = [0.0; 4];
         entropy.gradient(&u, &area, &mut gradient);
         for p in 0..4 {

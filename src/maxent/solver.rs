@@ -116,9 +116,8 @@ impl Solver<'_> {
 
     fn arrive(&self, problem: &mut impl Problem, u: Vec<f64>, lambda: f64) -> Point {
         let mut s = vec![0.0; u.len()];
-        self.entropy.image(&u, &mut s);
+        let entropy = self.entropy.value(&u, problem.area(), &mut s);
         let chi2 = problem.linearise(&s);
-        let entropy = self.entropy.value(&u, problem.area());
         Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy }
     }
 
