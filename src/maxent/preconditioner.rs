@@ -5,6 +5,7 @@
 //! of pixels; the basis is found by subspace iteration from a fixed random start (Halko et al. 2011), and lives on the
 //! pixels that carry it: the spotted part of the star. Left out: when to rebuild it.
 
+use super::cg::dot;
 use crate::vector::{self, Instructions, Task};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
@@ -93,20 +94,24 @@ impl Preconditioner {
     /// Approximates `out = (1 + lambda M)^-1 r`.
     pub fn apply(&self, lambda: f64, r: &[f64], out: &mut [f64]) {
         out.copy_from_slice(r);
-        let rank = self.rank();
-        if rank == 0 {
-            return;
-        }
-        // single precision suffices for an approximate inverse, and is twice as fast
         let mut components = vector::run(Components { basis: self, r });
         for (c, e) in components.iter_mut().zip(&self.eigenvalues) {
             *c *= (lambda * e / (1.0 + lambda * e)) as f32;
         }
         vector::run(Subtract { basis: self, components: &components, out });
     }
+
+    /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
+    pub fn norms(&self, lambda: f64, r: &[f64]) -> (f64, f64) {
+        let components = vector::run(Components { basis: self, r });
+        let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(c * c) / (1.0 + lambda * e));
+        let mut rest = r.to_vec();
+        vector::run(Subtract { basis: self, components: &components, out: &mut rest });
+        (spanned.sum(), dot(&rest, &rest))
+    }
 }
 
-/// Scalar products of `r` with the eigenvectors.
+/// Scalar products of `r` with the eigenvectors; single precision suffices for an approximate inverse, and is twice as fast.
 struct Components<'a> {
     basis: &'a Preconditioner,
     r: &'a [f64],
@@ -118,7 +123,7 @@ impl Task for Components<'_> {
     #[inline(always)]
     fn run<I: Instructions>(self, _: I) -> Vec<f32> {
         let mut components = vec![0.0; self.basis.rank()];
-        for (row, &p) in self.basis.rows.chunks_exact(components.len()).zip(&self.basis.active) {
+        for (row, &p) in self.basis.rows.chunks_exact(components.len().max(1)).zip(&self.basis.active) {
             let r = self.r[p as usize] as f32;
             components.iter_mut().zip(row).for_each(|(c, v)| *c += r * v);
         }
@@ -140,7 +145,7 @@ impl Task for Subtract<'_> {
     fn run<I: Instructions>(self, _: I) {
         const LANES: usize = 16;
         let rank = self.components.len();
-        for (row, &p) in self.basis.rows.chunks_exact(rank).zip(&self.basis.active) {
+        for (row, &p) in self.basis.rows.chunks_exact(rank.max(1)).zip(&self.basis.active) {
             let mut sums = [0.0; LANES];
             for (v, c) in row.chunks(LANES).zip(self.components.chunks(LANES)) {
                 sums.iter_mut().zip(v).zip(c).for_each(|((sum, v), c)| *sum += v * c);

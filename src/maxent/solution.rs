@@ -33,7 +33,7 @@ pub struct SolverSettings {
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        SolverSettings { tolerance: 1e-3, cg_tolerance: 0.05, cg_iterations: 300, newton_steps: 60 }
+        SolverSettings { tolerance: 2e-4, cg_tolerance: 0.05, cg_iterations: 300, newton_steps: 60 }
     }
 }
 
@@ -75,6 +75,9 @@ pub struct Start {
     pub path: Vec<f64>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,
+    /// The adjoint of spottedness at fixed chi2, in the entropy's metric: how much of it a residual of the Newton system is
+    /// worth. Empty for none: then what is left of spottedness when the solver stops is not forecast.
+    pub adjoint: Vec<f64>,
 }
 
 impl Start {
@@ -84,6 +87,7 @@ impl Start {
             image: Image { logit: vec![entropy.default_logit(); pixels], lambda },
             path: Vec::new(),
             chi2_slope: 0.0,
+            adjoint: Vec::new(),
         }
     }
 }
@@ -101,6 +105,8 @@ pub struct Solution {
     pub entropy: f64,
     /// Spottedness `sum a s`.
     pub spottedness: f64,
+    /// First-order forecast of what spottedness has still to change at this chi2, from the start's adjoint.
+    pub spottedness_left: f64,
     /// `d chi2 / d ln(lambda)` along the path of solutions (0 if the goal was a lambda).
     pub chi2_slope: f64,
     /// `d spottedness / d ln(lambda)` along the path (0 if the goal was a lambda).

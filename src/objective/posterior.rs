@@ -150,7 +150,10 @@ impl Posterior {
         };
         let value = match measure {
             Measure::Spottedness if to_target == 0.0 => solution.spottedness,
-            Measure::Spottedness => solution.spottedness + to_target * solution.spottedness_slope / solution.chi2_slope,
+            Measure::Spottedness => {
+                let moved = to_target * solution.spottedness_slope / solution.chi2_slope;
+                solution.spottedness + moved + solution.spottedness_left
+            }
             Measure::NegativeEntropy => -solution.entropy - 0.5 * solution.image.lambda * to_target,
         };
         let (on_curve, slope) = self.reference.tradeoff.chi2_at(measure, value);

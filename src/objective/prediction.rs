@@ -21,6 +21,8 @@ pub struct Prediction {
     image: Vec<Vec<f64>>,
     /// Change of ln(lambda) per unit of each coordinate.
     ln_lambda: Vec<f64>,
+    /// Adjoint of spottedness at fixed chi2, in the entropy's metric; empty at a fixed lambda.
+    adjoint: Vec<f64>,
 }
 
 /// Numerical derivatives step by this share of a coordinate's natural scale.
@@ -58,6 +60,15 @@ impl Prediction {
         problem.linearise(&map);
         let mut gradient = vec![0.0; n];
         problem.gradient(&mut gradient);
+        let adjoint = match goal {
+            Goal::Lambda(_) => Vec::new(),
+            Goal::Chi2 { .. } => {
+                let inverse = solver.apply_inverse(&mut problem, &solution.image, &imager.grid.area);
+                let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
+                let adjoint = inverse.iter().zip(&scale).zip(&solution.path);
+                adjoint.map(|((y, scale), path)| y / scale + along_path * path).collect()
+            }
+        };
         let (mut image, mut ln_lambda) = (Vec::new(), Vec::new());
         for (i, scale_i) in scales.iter().enumerate() {
             let h = STEP * scale_i;
@@ -85,12 +96,12 @@ impl Prediction {
             image.push(step);
             ln_lambda.push(along);
         }
-        Prediction { origin, scales, image, ln_lambda }
+        Prediction { origin, scales, image, ln_lambda, adjoint }
     }
 
     /// Where an evaluation at the internal coordinates `x` starts.
     pub fn start(&self, imager: &Imager, reference: &Reference, x: &[f64]) -> Start {
-        let mut start = reference.start();
+        let mut start = Start { adjoint: self.adjoint.clone(), ..reference.start() };
         let shifts: Vec<f64> = x.iter().zip(&self.origin).map(|(x, x0)| x - x0).collect();
         let farthest = shifts.iter().zip(&self.scales).map(|(d, s)| (d / s).abs()).fold(0.0, f64::max);
         let shrink = (REACH / farthest).min(1.0);

@@ -182,7 +182,8 @@ impl Reference {
 
 /// Where the next solution starts from this one.
 fn start(solution: &Solution) -> Start {
-    Start { image: solution.image.clone(), path: solution.path.clone(), chi2_slope: solution.chi2_slope }
+    let Solution { image, path, chi2_slope, .. } = solution;
+    Start { image: image.clone(), path: path.clone(), chi2_slope: *chi2_slope, adjoint: Vec::new() }
 }
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.
