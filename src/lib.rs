@@ -44,6 +44,7 @@ pub mod ensemble;
 pub mod fit;
 pub mod imaging;
 pub mod io;
+pub mod landscape;
 pub mod log_density;
 pub mod manifest;
 pub mod maxent;
@@ -56,6 +57,7 @@ pub mod scene;
 pub mod search;
 pub mod simulate;
 pub mod star;
+pub mod text;
 pub mod units;
 
 pub use fit::Fit;
