@@ -52,6 +52,7 @@ pub mod objective;
 pub mod observation;
 pub mod optimise;
 pub mod optimum;
+pub mod origin;
 pub mod run;
 pub mod scene;
 pub mod search;
