@@ -9,6 +9,7 @@ use dimcmc::origin::OriginError;
 use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
 use dimcmc::search::SearchError;
+use dimcmc::survey::SurveyError;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -57,6 +58,15 @@ impl Failure {
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
             RunError::PriorStart => Failure::input(format!("{}: {error}", path.display())),
             RunError::Journal(error) => error.into(),
+        }
+    }
+
+    /// A landscape of the config at `path` that cannot begin or go on.
+    pub fn survey(path: &Path, error: SurveyError) -> Self {
+        match error {
+            SurveyError::Origin(error) => Failure::origin(path, error),
+            SurveyError::Journal(error) => error.into(),
+            SurveyError::Write(_) | SurveyError::Landscape(_) => Failure::failed(error),
         }
     }
 
