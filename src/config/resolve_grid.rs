@@ -56,7 +56,7 @@ fn check_axis(parameter: Parameter, axis: &Axis) -> Result<(), Fault> {
         _ if min >= max => format!("min {min} must be below max {max}"),
         _ if !(max - min).is_finite() => format!("max {max} is too far from min {min}"),
         _ if axis.overlaps() => format!("from {min} to {max} is more than the period, which is 1"),
-        _ if axis.spacing() < SMALLEST_SPACING * min.abs().max(max.abs()) => {
+        _ if axis.spacing() < (SMALLEST_SPACING * min.abs().max(max.abs())).max(f64::MIN_POSITIVE) => {
             format!("{nodes} nodes from {min} to {max} are too close for double precision")
         }
         _ => return Ok(()),
