@@ -66,7 +66,8 @@ pub enum SurveyError {
 }
 
 impl Survey {
-    /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes `found`. A landscape that is there already is replaced if `replace`, and refused otherwise.
+    /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes `found`.
+    /// A landscape that is there already is replaced if `replace`, and refused otherwise.
     ///
     /// # Errors
     /// [`SurveyError`]: files that are there already, or cannot be written.
@@ -100,8 +101,8 @@ impl Survey {
         Ok(Survey { header, posterior, landscape, file })
     }
 
-    /// Reconstructs until the landscape is whole or `stop` is set; every batch is on disk before the next begins. Returns
-    /// whether it is whole.
+    /// Reconstructs until the landscape is whole or `stop` is set, after which no node is begun; every batch is on disk before
+    /// the next one. Returns whether the landscape is whole.
     ///
     /// # Errors
     /// Nodes that cannot be written.
@@ -115,9 +116,11 @@ impl Survey {
             let after = (first + BATCH_PER_THREAD * rayon::current_num_threads()).min(grid.len());
             let node = |index: usize| {
                 let theta = grid.theta(index);
-                Node { index, reconstruction: posterior.likelihood(&theta), theta }
+                let going = !stop.load(Ordering::Relaxed);
+                going.then(|| Node { index, reconstruction: posterior.likelihood(&theta), theta })
             };
-            let batch: Vec<Node> = (first..after).into_par_iter().with_max_len(1).map(node).collect();
+            let batch: Vec<Option<Node>> = (first..after).into_par_iter().with_max_len(1).map(node).collect();
+            let batch: Vec<Node> = batch.into_iter().map_while(|node| node).collect();
             landscape::append(file, grid, &batch)?;
             batch.into_iter().try_for_each(|node| landscape.push(node))?;
             on_batch(landscape);
@@ -128,10 +131,7 @@ impl Survey {
 
 /// The first axis that is not the same.
 fn change(then: &Grid, now: &Grid) -> Option<String> {
-    let differs = |grid: &Grid, name: &str| {
-        let axis = |grid: &Grid| grid.axes.iter().find(|axis| axis.name == name).cloned();
-        axis(then) != axis(now) && axis(grid).is_some()
-    };
-    let find = |grid: &Grid| grid.names().find(|name| differs(grid, name)).map(str::to_owned);
-    find(now).or_else(|| find(then)).map(|name| format!("grid.axes.{name} of the config changed"))
+    let axis = |grid: &Grid, name: &str| grid.axes.iter().find(|axis| axis.name == name).cloned();
+    let name = now.names().chain(then.names()).find(|name| axis(then, name) != axis(now, name))?;
+    Some(format!("grid.axes.{name} of the config changed"))
 }

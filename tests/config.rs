@@ -76,6 +76,18 @@ fn the_seven_dimensional_config_starts_off_the_truth() {
 }
 
 #[test]
+fn the_landscape_of_the_paper_is_of_the_same_data() {
+    let settings = config::load(&shipped("paper_grid.json")).unwrap();
+    let seven = config::load(&shipped("paper_7d.json")).unwrap();
+    assert_eq!((&settings.source, &settings.star), (&seven.source, &seven.star));
+    let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
+    assert_eq!(settings.values, simulation.truth);
+    let plan = settings.require_grid().unwrap();
+    assert_eq!((plan.grid.len(), settings.imaging.pixels), (3375, 5000));
+    assert_eq!(plan.free, settings.free, "chain and landscape have the same reference");
+}
+
+#[test]
 fn lo_peg_resolves() {
     let settings = config::load(&shipped("lopeg.json")).unwrap();
     assert_eq!(settings.equivalent_width, EquivalentWidth::Auto);
