@@ -114,9 +114,10 @@ impl Landscape {
         self.nodes.iter().filter(|node| is(node.reconstruction.status)).count()
     }
 
-    /// Median number of passes of a reconstruction (the upper one of two); 0 without nodes.
+    /// Median number of passes of those reconstructions that were begun (the upper one of two); 0 without any.
     pub fn passes_median(&self) -> u32 {
-        let mut passes: Vec<u32> = self.nodes.iter().map(|node| node.reconstruction.passes).collect();
+        let all = self.nodes.iter().map(|node| node.reconstruction.passes);
+        let mut passes: Vec<u32> = all.filter(|passes| *passes > 0).collect();
         passes.sort_unstable();
         passes.get(passes.len() / 2).copied().unwrap_or(0)
     }
