@@ -13,13 +13,15 @@
 //! | Doppler imaging by maximum entropy (section 3; Skilling & Bryan 1984) | [`maxent`], which knows no stars; [`imaging`] joins the two |
 //! | the map at an assumed orbit, and radial velocities without the spots | [`fit`] |
 //! | "the orbit that needs the fewest spots" (section 3) | [`objective`]: spottedness, entropy or regularised likelihood as a log-probability |
+//! | the landscape of spottedness on a grid of orbits | [`landscape`], computed by [`survey`] |
 //! | orbital parameters and error bars from a grid and a paraboloid | [`search`] and [`optimise`] for the optimum, [`ensemble`] for the posterior |
 //! | convergence and credible intervals | [`chain`] |
 //!
 //! # Around them
 //!
 //! [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
-//! observations, [`run`] a chain on disk that can be stopped and resumed, [`manifest`] what it was begun with.
+//! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
+//! what they were begun with.
 //! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
 //! of the star.
 //!
@@ -44,6 +46,7 @@ pub mod ensemble;
 pub mod fit;
 pub mod imaging;
 pub mod io;
+pub mod landscape;
 pub mod log_density;
 pub mod manifest;
 pub mod maxent;
@@ -51,11 +54,14 @@ pub mod objective;
 pub mod observation;
 pub mod optimise;
 pub mod optimum;
+pub mod origin;
 pub mod run;
 pub mod scene;
 pub mod search;
 pub mod simulate;
 pub mod star;
+pub mod survey;
+pub mod text;
 pub mod units;
 pub mod vector;
 

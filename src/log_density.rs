@@ -52,6 +52,40 @@ impl Evaluation {
     }
 }
 
+/// What a reconstruction is worth without the prior, and the numbers of its image: the values of a landscape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Likelihood {
+    /// ln(likelihood); only differences mean something.
+    pub log_likelihood: f64,
+    /// Fractional spot coverage of the image.
+    pub spottedness: f64,
+    /// Entropy of the image.
+    pub entropy: f64,
+    /// chi2 of the image.
+    pub chi2: f64,
+    /// Lagrange multiplier of chi2/2 in `S - lambda chi2/2`, which the image maximises.
+    pub lambda: f64,
+}
+
+impl Likelihood {
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        let Likelihood { log_likelihood, spottedness, entropy, chi2, lambda } = *self;
+        [log_likelihood, spottedness, entropy, chi2, lambda].iter().all(|x| x.is_finite())
+    }
+}
+
+/// What became of a reconstruction, whatever the prior says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reconstruction {
+    /// Its values; `None` if it failed.
+    pub likelihood: Option<Likelihood>,
+    /// Applications of the response or its transpose that it took.
+    pub passes: u32,
+    /// How it ended; never [`Status::OutsidePrior`].
+    pub status: Status,
+}
+
 /// A posterior density over named parameters.
 ///
 /// `theta` is always in the coordinates of [`LogDensity::names`] (the *written* coordinates). Samplers may move in

@@ -1,7 +1,7 @@
 //! What `optimise` found: `optimum.json`, and the same as a table.
 
 use crate::io::provenance::Provenance;
-use crate::manifest::{OptimumRecord, ReferenceRecord, by_name};
+use crate::origin::{OptimumRecord, ReferenceRecord, by_name};
 use crate::scene::Scene;
 use crate::search::{Attempt, Found};
 use serde::Serialize;

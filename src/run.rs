@@ -10,9 +10,10 @@ use crate::ensemble::{
 use crate::io::atomic::WriteError;
 use crate::io::journal::{Journal, JournalError};
 use crate::log_density::{LogDensity, Threads};
-use crate::manifest::{Manifest, ManifestError, OptimumRecord, ReferenceRecord, by_name, kinds_and_goals};
-use crate::objective::{Posterior, Reference, ReferenceError};
+use crate::manifest::{Manifest, kinds_and_goals};
+use crate::objective::Posterior;
 use crate::optimise::Optimum;
+use crate::origin::{Origin, OriginError};
 use crate::scene::Scene;
 use crate::search::Found;
 use rayon::prelude::*;
@@ -68,30 +69,9 @@ pub enum RunError {
         "start from the prior: no reconstruction succeeds at {PRIOR_TRIES} draws; narrow the priors under `parameters`"
     )]
     PriorStart,
-    /// The manifest is missing or wrong.
+    /// What the run was begun with is missing, wrong, or not what is there now.
     #[error(transparent)]
-    Manifest(#[from] ManifestError),
-    /// Config or data are not those that the run was begun with.
-    #[error("{}: {what} since this run began; begin another run for it", .folder.display())]
-    Changed {
-        /// The folder.
-        folder: PathBuf,
-        /// What changed.
-        what: String,
-    },
-    /// The reference comes out differently: another version of the program, or another kind of processor.
-    #[error("{}: the reference image comes out differently here (lambda {now:e} instead of {then:e}): resume with the version and on the kind of machine it was begun with", folder.display())]
-    Irreproducible {
-        /// The folder.
-        folder: PathBuf,
-        /// lambda in the manifest.
-        then: f64,
-        /// lambda now.
-        now: f64,
-    },
-    /// No reference at the manifest's parameters.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
+    Origin(#[from] OriginError),
     /// The chain on disk is wrong or locked.
     #[error(transparent)]
     Journal(#[from] JournalError),
@@ -146,18 +126,9 @@ impl Run {
     /// [`RunError`]: no run there, changed config or data, a broken chain.
     pub fn resume(scene: &Scene, folder: &Path, extend: Option<usize>) -> Result<Self, RunError> {
         let mut manifest = Manifest::read(folder)?;
-        if let Some(what) = manifest.change(&scene.provenance()) {
-            return Err(RunError::Changed { folder: folder.into(), what });
-        }
+        manifest.origin.check(scene, folder)?;
         let (mut journal, mut chain) = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
-        let values = manifest.reference.values(&scene.settings.values);
-        let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target)?;
-        let (then, now) = (manifest.reference.lambda, reference.solution.image.lambda);
-        if then.to_bits() != now.to_bits() {
-            return Err(RunError::Irreproducible { folder: folder.into(), then, now });
-        }
-        let kind = scene.settings.imaging.objective;
-        let posterior = Posterior::new(scene.imager.clone(), scene.space.clone(), kind, reference);
+        let posterior = manifest.origin.posterior(scene, scene.space.clone(), folder)?;
         if chain.steps() == 0 {
             let first = first_step(scene, &posterior, &manifest.start)?;
             journal.append(&first)?;
@@ -224,26 +195,17 @@ impl Run {
 }
 
 fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
-    let provenance = scene.provenance();
     let prior = |f: &crate::objective::FreeParameter| {
         (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
     };
-    let names = scene.space.names();
     Manifest {
-        version: provenance.version.to_string(),
-        config_sha256: provenance.config_sha256,
-        data_sha256: provenance.data_sha256,
-        config: provenance.config,
-        names: names.to_vec(),
+        origin: Origin::of(scene, found),
+        names: scene.space.names().to_vec(),
         priors: scene.space.free().iter().map(prior).collect(),
         ensembles: scene.settings.sampler.ensembles,
         walkers: scene.settings.sampler.walkers,
         seed: scene.settings.sampler.seed,
         extend_to: None,
-        truth: scene.truth.map(|values| by_name(&values)),
-        reference: ReferenceRecord::of(found.posterior.reference()),
-        optimum: OptimumRecord::of(names, &found.optimum),
-        rivals: found.rivals().into_iter().map(|rival| OptimumRecord::of(names, rival)).collect(),
         start,
     }
 }

@@ -7,7 +7,7 @@ use crate::imaging::Imager;
 use crate::io::lsd::{self, LsdError};
 use crate::io::provenance::Provenance;
 use crate::io::truth::Truth;
-use crate::objective::{ParameterSpace, ParameterValues};
+use crate::objective::{FreeParameter, ParameterSpace, ParameterValues};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::{Quadrature, SurfaceGrid};
@@ -70,11 +70,14 @@ impl Scene {
         };
         settings.check_velocity_grid(&settings.values, observations.step_kms)?;
         let star = settings.star_for(&observations)?;
-        let rotation_period_d = star.rotation_period_d;
         let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
-        let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
-        let space = ParameterSpace::new(settings.free.clone(), settings.values, mid, base, rotation_period_d);
+        let space = space(&settings.free, &settings, &imager);
         Ok(Scene { settings, observations, data_sha256, truth, imager, space })
+    }
+
+    /// The space of the parameters in `free`, starting at the config's values, all others fixed there.
+    pub fn space_of(&self, free: &[FreeParameter]) -> ParameterSpace {
+        space(free, &self.settings, &self.imager)
     }
 
     /// The true spot map on the pixels of the image, if the observations are simulated.
@@ -115,6 +118,11 @@ impl Scene {
             config: self.settings.resolved.clone(),
         }
     }
+}
+
+fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {
+    let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
+    ParameterSpace::new(free.to_vec(), settings.values, mid, base, imager.star.rotation_period_d)
 }
 
 /// SHA-256 (hex) of the numbers of `observations`, little-endian: the step, then for each profile time, number of bins, and

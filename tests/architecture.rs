@@ -8,29 +8,32 @@ use std::path::{Path, PathBuf};
 
 /// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
 const LAYERS: &[&[&str]] = &[
-    &["units", "vector", "log_density"],
+    &["units", "text", "vector", "log_density"],
     &["observation"],
-    &["star", "maxent", "chain"],
+    &["star", "maxent", "chain", "landscape"],
     &["imaging", "ensemble", "optimise"],
     &["objective"],
     &["simulate", "fit"],
     &["io"],
     &["config"],
     &["scene", "search"],
-    &["manifest"],
-    &["run", "optimum"],
+    &["origin"],
+    &["manifest", "survey", "optimum"],
+    &["run"],
 ];
 
 /// Modules, and all that they may import. What is not listed here may import whatever lies lower.
 const MAY_SEE: &[(&str, &[&str])] = &[
     ("units", &[]),
+    ("text", &[]),
     ("vector", &[]),
     ("log_density", &[]),
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
     ("maxent", &["units", "vector"]),
     ("imaging", &["maxent", "observation", "star", "units", "vector"]),
-    ("chain", &["log_density"]),
+    ("chain", &["log_density", "text"]),
+    ("landscape", &["log_density", "text"]),
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),
 ];

@@ -54,8 +54,10 @@ fn the_demo_resolves() {
     assert_eq!((simulation.spots.len(), simulation.times_d.len(), simulation.bins), (12, 50, 57));
     assert!((simulation.times_d[49] - 2.94 * 3.0).abs() < 1e-12);
     assert_eq!(simulation.truth, settings.values);
-    let grid = settings.require_grid().unwrap();
-    assert_eq!((grid.len(), grid[1].at(0), grid[1].at(14)), (3, 1.2, 2.2));
+    let plan = settings.require_grid().unwrap();
+    let period = &plan.grid.axes[1];
+    assert_eq!((plan.grid.len(), period.value(0), period.value(14)), (3375, 1.2, 2.2));
+    assert_eq!(plan.free, settings.free, "the landscape and the chain have the same reference");
 }
 
 #[test]
@@ -71,6 +73,18 @@ fn the_seven_dimensional_config_starts_off_the_truth() {
         let off = (settings.values.0[k] - simulation.truth.0[k]) / sigma;
         assert!((off - 3.0).abs() < 0.01, "{}: {off}", Parameter::ALL[k].name());
     }
+}
+
+#[test]
+fn the_landscape_of_the_paper_is_of_the_same_data() {
+    let settings = config::load(&shipped("paper_grid.json")).unwrap();
+    let seven = config::load(&shipped("paper_7d.json")).unwrap();
+    assert_eq!((&settings.source, &settings.star), (&seven.source, &seven.star));
+    let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
+    assert_eq!(settings.values, simulation.truth);
+    let plan = settings.require_grid().unwrap();
+    assert_eq!((plan.grid.len(), settings.imaging.pixels), (3375, 5000));
+    assert_eq!(plan.free, settings.free, "chain and landscape have the same reference");
 }
 
 #[test]
@@ -173,7 +187,8 @@ fn accepted_spellings() {
         ("/$schema", json!("dimcmc.schema.json")),
         ("/instrument", Value::Null),
         ("/star/limb_darkening", json!({ "law": "quadratic", "coefficients": [0.4, 0.3] })),
-        ("/grid/axes/phi", json!([0.5, 0.5, 1])),
+        ("/grid/axes/phi", json!([0.8, 1.2, 9])),
+        ("/grid/axes/phi", json!([-3, -2, 2])),
         ("/parameters/phi", json!({ "prior": "uniform", "min": 0.2, "max": 0.8 })),
     ] {
         resolve(&with(demo(), pointer, value)).unwrap_or_else(|e| panic!("{e}"));
@@ -211,6 +226,22 @@ fn the_text_of_errors() {
             ": observations.simulate.spots[2]: expected an array of length 4, found length 3",
         ),
         ("/grid/axes/phi", json!([0.1, 0.2]), ": grid.axes.phi: expected an array of length 3, found length 2"),
+        ("/grid/axes/k_km", json!([0, 1, 5]), ": unknown key grid.axes.k_km: did you mean k_kms?"),
+        ("/grid/axis", json!({}), ": unknown key grid.axis: did you mean axes?"),
+        (
+            "/grid/axes/k_kms",
+            json!([0, 1, 2.5]),
+            ": grid.axes.k_kms[2]: expected a whole number, 0 or more, found floating point `2.5`",
+        ),
+        ("/grid/axes/k_kms", json!([-0.1, 0.1, 5]), ": grid.axes.k_kms: -0.1 must be 0 or more"),
+        ("/grid/axes/k_kms", json!([0.2, 0.1, 5]), ": grid.axes.k_kms: min 0.2 must be below max 0.1"),
+        ("/grid/axes/phi", json!([0, 1.2, 5]), ": grid.axes.phi: from 0 to 1.2 is more than the period, which is 1"),
+        (
+            "/grid/axes/k_kms",
+            json!([0.1, 0.2, 1]),
+            ": grid.axes.k_kms: 1 nodes must be 2 or more; a parameter without an axis is fixed",
+        ),
+        ("/grid/axes/k_kms", json!([0, 1, 1000000]), ": grid.axes: 225000000 nodes exceed 1000000"),
         ("/planet/k_kms", json!(0.5), ": planet.k_kms: 0.5 is outside its prior, [0, 0.3] by parameters.k_kms"),
         (
             "/parameters/k_kms/min",
@@ -271,6 +302,13 @@ fn senseless_values_name_their_key() {
         ("/sampler/steps", json!(0), "sampler.steps"),
         ("/grid/axes/k_kms", json!([0.2, 0.1, 5]), "grid.axes.k_kms"),
         ("/grid/axes/k_kms", json!([0.1, 0.2, 0]), "grid.axes.k_kms"),
+        ("/grid/axes/k_kms", json!([0.2, 0.2, 5]), "grid.axes.k_kms"),
+        ("/grid/axes/k_kms", json!([0, 1e-320, 15]), "grid.axes.k_kms"),
+        ("/grid/axes/phi", json!([1e15, 1e15 + 0.5, 3]), "grid.axes.phi"),
+        ("/grid/axes/porb_over_prot", json!([0, 2, 5]), "grid.axes.porb_over_prot"),
+        ("/grid/axes", json!({ "inclination_deg": [30, 100, 5] }), "grid.axes.inclination_deg"),
+        ("/grid/axes", json!({ "vsys_kms": [-1e308, 1e308, 5] }), "grid.axes.vsys_kms"),
+        ("/grid/axes/phi", json!([0, 1, 18446744073709551615u64]), "grid.axes"),
         ("/grid/axes/vsini_kms", json!([39, 41, 5]), "grid.axes"),
         ("/grid/axes", json!({}), "grid.axes"),
         ("/observations/path", json!("observations.txt"), "observations"),
@@ -304,6 +342,7 @@ fn phase_and_period_mean_nothing_without_a_planet() {
     let fixed = with(with(demo(), "/planet/k_kms", json!(0)), "/parameters/k_kms", Value::Null);
     assert!(message(&with(fixed.clone(), "/parameters/porb_over_prot", Value::Null)).starts_with(": parameters.phi: "));
     let none = with(fixed, "/parameters", Value::Null);
+    assert!(message(&with(none.clone(), "/grid/axes/k_kms", Value::Null)).starts_with(": grid.axes.porb_over_prot: "));
     let error = resolve(&none).unwrap().require_free().unwrap_err().to_string();
     assert!(error.starts_with("dir/x.json: parameters: no parameter is free"), "{error}");
     let error = resolve(&with(none, "/grid", Value::Null)).unwrap().require_grid().unwrap_err().to_string();

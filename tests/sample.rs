@@ -4,13 +4,15 @@
 #[path = "common/desk.rs"]
 mod desk;
 
-use desk::{Desk, dimcmc, says, star, text};
+#[cfg(unix)]
+use desk::interrupt;
+use desk::{Desk, dimcmc, kill, says, star, text};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Child;
+use std::time::Duration;
 
 /// Step limit of the tiny run; its goals are out of reach, so that it gets there.
 const STEPS: usize = 60;
@@ -53,28 +55,14 @@ fn finished() -> Desk {
     desk
 }
 
-fn start(desk: &Desk, args: &[&str]) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_dimcmc"));
-    command.args(args).current_dir(desk.path("")).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-}
-
 /// Lines in the chain of a run so far.
 fn lines(desk: &Desk, run: &str) -> usize {
-    std::fs::read(desk.path(run).join("chain.jsonl")).map_or(0, |text| text.iter().filter(|b| **b == b'\n').count())
+    desk.lines(&format!("{run}/chain.jsonl"))
 }
 
-/// Waits until the chain of a run has so many lines (or bytes of nothing, for 0) or the run has ended.
+/// Waits until the chain of a run has so many lines or the run has ended.
 fn wait_for_lines(desk: &Desk, run: &str, child: &mut Child, least: usize) {
-    let began = Instant::now();
-    while lines(desk, run) < least && child.try_wait().unwrap().is_none() {
-        assert!(began.elapsed() < Duration::from_secs(300), "{run} does not come to {least} lines");
-        std::thread::sleep(Duration::from_micros(200));
-    }
-}
-
-fn kill(mut child: Child) {
-    child.kill().unwrap();
-    child.wait().unwrap();
+    desk.wait_for_lines(&format!("{run}/chain.jsonl"), child, least);
 }
 
 fn same_run(desk: &Desk, a: &str, b: &str) {
@@ -121,7 +109,7 @@ fn killed_at_ten_random_moments_and_resumed_is_uninterrupted() {
     for k in 0..10 {
         let run = format!("run{k}");
         let sample = ["sample", CONFIG, "--out", &run];
-        let mut child = start(&desk, &sample);
+        let mut child = desk.start(&sample);
         if k == 0 {
             // during the search
             std::thread::sleep(Duration::from_millis(10));
@@ -136,7 +124,7 @@ fn killed_at_ten_random_moments_and_resumed_is_uninterrupted() {
         println!("{run}: killed at line {}", lines(&desk, &run));
         if desk.path(&run).join("manifest.json").exists() {
             // and again, before it has gone far
-            let mut child = start(&desk, &[&sample[..], &["--resume"]].concat());
+            let mut child = desk.start(&[&sample[..], &["--resume"]].concat());
             wait_for_lines(&desk, &run, &mut child, lines(&desk, &run) + rng.random_range(0..4 * LINES));
             kill(child);
             desk.succeed(&[&sample[..], &["--resume"]].concat());
@@ -181,13 +169,9 @@ fn a_torn_chain_is_recovered() {
 fn ctrl_c_stops_cleanly_and_says_how_to_go_on() {
     let desk = finished();
     let sample = ["sample", CONFIG, "--out", "stopped"];
-    let mut child = start(&desk, &sample);
+    let mut child = desk.start(&sample);
     wait_for_lines(&desk, "stopped", &mut child, 10 * LINES);
-    let pid = child.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    let message = text(&output.stderr);
+    let message = interrupt(child);
     says(&message, &["error: interrupted after step", "dimcmc sample config.json --out stopped --resume"]);
     assert_eq!(message.matches('\n').count(), 1);
     let lines = lines(&desk, "stopped");
@@ -203,12 +187,9 @@ fn ctrl_c_during_the_search_writes_nothing() {
     // an image large enough to be at work for a while
     desk.set("/imaging", json!({ "pixels": 20000, "chi2_target": 1.05 }));
     let before = desk.inventory();
-    let child = start(&desk, &["sample", CONFIG, "--out", "run"]);
+    let child = desk.start(&["sample", CONFIG, "--out", "run"]);
     std::thread::sleep(Duration::from_millis(150));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert_eq!(text(&output.stderr), "error: interrupted before the first step; nothing was written\n");
+    assert_eq!(interrupt(child), "error: interrupted before the first step; nothing was written\n");
     assert!(desk.inventory() == before);
 }
 
@@ -228,7 +209,7 @@ fn an_extension_adds_its_steps_and_survives_a_kill() {
     assert_eq!(desk.read("run/chain.jsonl"), long);
 
     let extend = ["sample", CONFIG, "--out", "killed", "--extend", "30"];
-    let mut child = start(&desk, &extend);
+    let mut child = desk.start(&extend);
     wait_for_lines(&desk, "killed", &mut child, LINES * (STEPS + 8));
     kill(child);
     desk.succeed(&["sample", CONFIG, "--out", "killed", "--resume"]);
@@ -309,7 +290,7 @@ fn what_is_no_run_is_neither_resumed_nor_analysed() {
 #[test]
 fn a_run_has_one_process() {
     let desk = finished();
-    let mut child = start(&desk, &["sample", CONFIG, "--out", "run", "--extend", "100000"]);
+    let mut child = desk.start(&["sample", CONFIG, "--out", "run", "--extend", "100000"]);
     wait_for_lines(&desk, "run", &mut child, LINES * (STEPS + 3));
     for args in [&["--resume"][..], &["--extend", "5"], &["--force"]] {
         let output = dimcmc(&[&["sample", CONFIG, "--out", "run"], args].concat(), &desk.path(""));

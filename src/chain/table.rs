@@ -1,6 +1,7 @@
 //! The summary as text, aligned, one line a parameter, and a last line that says plainly whether it can be trusted.
 
 use crate::chain::{ParameterSummary, Summary};
+use crate::text::aligned;
 use std::collections::BTreeMap;
 
 /// The table. With `truth` (injected values by name) there is a column for it.
@@ -73,19 +74,4 @@ fn decimals(one: &ParameterSummary) -> usize {
 
 fn number(value: f64, digits: usize) -> String {
     format!("{value:.digits$}")
-}
-
-/// Columns under each other: the first to the left, the others to the right.
-fn aligned(rows: &[Vec<String>]) -> String {
-    let columns = rows.first().map_or(0, Vec::len);
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, width))| match column {
-            0 => format!("{cell:<width$}"),
-            _ => format!("{cell:>width$}"),
-        });
-        cells.collect::<Vec<_>>().join("  ") + "\n"
-    };
-    rows.iter().map(line).collect()
 }

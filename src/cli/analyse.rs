@@ -22,18 +22,18 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
-    let manifest = Manifest::read(&args.run)?;
+    let manifest = Manifest::read(&args.run).map_err(Failure::input)?;
     let chain = journal::read(&args.run.join(CHAIN), &manifest.shape())?;
     report(&args.run, &manifest, &chain)
 }
 
 /// Writes the summary of `chain` into `folder` and prints its table.
 pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), Failure> {
-    let (kinds, goals) = kinds_and_goals(&manifest.settings(folder)?);
+    let (kinds, goals) = kinds_and_goals(&manifest.settings(folder).map_err(Failure::input)?);
     let summary = summarise(chain, &kinds, &goals)
         .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
     write_json(&folder.join(SUMMARY), &summary)?;
-    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.truth.as_ref()).trim_end());
+    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.origin.truth.as_ref()).trim_end());
     for warning in manifest.warnings() {
         let _ = writeln!(std::io::stdout(), "note: {warning}");
     }

@@ -4,11 +4,12 @@ use dimcmc::config::ConfigError;
 use dimcmc::io::atomic::WriteError;
 use dimcmc::io::journal::JournalError;
 use dimcmc::io::lsd::LsdError;
-use dimcmc::manifest::ManifestError;
 use dimcmc::objective::ReferenceError;
+use dimcmc::origin::OriginError;
 use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
 use dimcmc::search::SearchError;
+use dimcmc::survey::SurveyError;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -52,15 +53,29 @@ impl Failure {
     /// A run of the config at `path` that cannot begin or go on.
     pub fn run(path: &Path, error: RunError) -> Self {
         match error {
-            RunError::Reference(error) => Failure::reference(path, error),
-            RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) | RunError::Irreproducible { .. } => {
-                Failure::failed(error)
-            }
+            RunError::Origin(error) => Failure::origin(path, error),
+            RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
             RunError::PriorStart => Failure::input(format!("{}: {error}", path.display())),
-            RunError::Manifest(error) => error.into(),
             RunError::Journal(error) => error.into(),
-            RunError::Changed { .. } => Failure::input(error),
+        }
+    }
+
+    /// A landscape of the config at `path` that cannot begin or go on.
+    pub fn survey(path: &Path, error: SurveyError) -> Self {
+        match error {
+            SurveyError::Origin(error) => Failure::origin(path, error),
+            SurveyError::Journal(error) => error.into(),
+            SurveyError::Write(_) | SurveyError::Landscape(_) => Failure::failed(error),
+        }
+    }
+
+    /// What began in a folder cannot go on with the config at `path`.
+    pub fn origin(path: &Path, error: OriginError) -> Self {
+        match error {
+            OriginError::Reference(error) => Failure::reference(path, error),
+            OriginError::Irreproducible { .. } => Failure::failed(error),
+            error => Failure::input(error),
         }
     }
 
@@ -97,12 +112,6 @@ impl From<SceneError> for Failure {
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
         Failure::failed(error)
-    }
-}
-
-impl From<ManifestError> for Failure {
-    fn from(error: ManifestError) -> Self {
-        Failure::input(error)
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod analyse;
 mod failure;
+mod grid;
 mod map;
 mod optimise;
 mod output;
@@ -47,6 +48,7 @@ enum Command {
     Map(map::Args),
     #[command(alias = "optimize")]
     Optimise(optimise::Args),
+    Grid(grid::Args),
     Sample(sample::Args),
     #[command(alias = "analyze")]
     Analyse(analyse::Args),
@@ -64,6 +66,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(args),
         Command::Map(args) => map::run(args, &cli.global),
         Command::Optimise(args) => optimise::run(args, &cli.global),
+        Command::Grid(args) => grid::run(args, &cli.global),
         Command::Sample(args) => sample::run(args, &cli.global),
         Command::Analyse(args) => analyse::run(args, &cli.global),
     }

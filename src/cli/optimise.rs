@@ -27,7 +27,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     scene.settings.require_free()?;
-    let found = search(global, &args.config, &scene)?;
+    let found = search(global, &args.config, &scene, &scene.space)?;
     let file = OptimumFile::new(&scene, &found);
     let folder = args.output.create()?;
     write_json(&folder.join("optimum.json"), &file)?;

@@ -55,7 +55,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     scene.settings.require_free()?;
     let folder = args.output.folder();
     let failed = |e| Failure::run(&args.config, e);
-    let signals = Signals::catch()?;
+    let signals = Signals::catch("step")?;
     let mut run = if resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the chain, reference image");
@@ -67,7 +67,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             Start::Optimum => StartFrom::Optimum,
             Start::Prior => StartFrom::Prior,
         };
-        let found = search(global, &args.config, &scene)?;
+        let found = search(global, &args.config, &scene, &scene.space)?;
         let spinner = progress::bar(global, None, "start of the walkers");
         args.output.check()?;
         signals.defer();

@@ -1,17 +1,18 @@
 //! The search for the best parameters with its display, for the commands that begin with one.
 
 use super::{Failure, Global, progress};
+use dimcmc::objective::ParameterSpace;
 use dimcmc::scene::Scene;
 use dimcmc::search::{Found, Progress, SearchSettings, Stage, find};
 use std::path::Path;
 use std::time::Instant;
 
-/// Searches in the `scene` of the config at `path`.
-pub fn search(global: &Global, path: &Path, scene: &Scene) -> Result<Found, Failure> {
+/// Searches `space` in the `scene` of the config at `path`.
+pub fn search(global: &Global, path: &Path, scene: &Scene, space: &ParameterSpace) -> Result<Found, Failure> {
     let spinner = progress::bar(global, None, "searching");
     let began = Instant::now();
     let report = |progress| spinner.set_message(message(progress, began.elapsed().as_secs_f64()));
-    let found = find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &report);
+    let found = find(&scene.imager, space, SearchSettings::new(&scene.settings), &report);
     spinner.finish_and_clear();
     found.map_err(|e| Failure::search(path, e))
 }

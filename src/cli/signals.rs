@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: at once where there is nothing to lose, at the end of a half-step where there is.
+//! Ctrl-C and SIGTERM: at once where there is nothing to lose, at the end of a half-step or a batch where there is.
 
 use super::Failure;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -15,8 +15,8 @@ pub struct Signals {
 
 impl Signals {
     /// Catches the signals: until [`Signals::defer`], the first one ends the program with a message; after it, the first one
-    /// sets the flag, and the second one ends the program.
-    pub fn catch() -> Result<Self, Failure> {
+    /// sets the flag, and the second one ends the program. The message names what has not begun: the first `unit`.
+    pub fn catch(unit: &'static str) -> Result<Self, Failure> {
         let signals = Signals { stop: Arc::default(), deferred: Arc::default() };
         let (stop, deferred) = (Arc::clone(&signals.stop), Arc::clone(&signals.deferred));
         let mut incoming =
@@ -26,7 +26,7 @@ impl Signals {
                 if !deferred.load(Ordering::SeqCst) {
                     // a terminal is in the middle of the progress line
                     let line_break = if std::io::stderr().is_terminal() { "\n" } else { "" };
-                    eprintln!("{line_break}error: interrupted before the first step; nothing was written");
+                    eprintln!("{line_break}error: interrupted before the first {unit}; nothing was written");
                     std::process::exit(1);
                 }
                 if stop.swap(true, Ordering::SeqCst) {

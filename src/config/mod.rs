@@ -9,6 +9,7 @@ mod identity;
 mod raw;
 mod raw_parts;
 mod resolve;
+mod resolve_grid;
 mod resolve_observations;
 mod resolve_star;
 mod settings;
@@ -18,7 +19,7 @@ pub use crate::ensemble::SamplerSettings;
 pub use error::ConfigError;
 pub use identity::first_difference;
 pub use raw_parts::EquivalentWidth;
-pub use settings::{GridAxis, ImagingSettings, ObservationSource, Settings};
+pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;
 

@@ -181,11 +181,14 @@ pub(super) struct VelocitySection {
     pub step: f64,
 }
 
-/// The landscape that `dimcmc grid` computes.
+/// The landscape that `dimcmc grid` computes: ln L of the reconstructions, without priors. All parameters without an axis are
+/// fixed at their values under `star` and `planet`, those with a prior too.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Grid {
-    /// One to three axes `[min, max, n]`: n nodes from min to max, both included.
+    /// One to three axes `[min, max, n]`: n nodes (2 or more) from min to max, both included, 1,000,000 nodes in all at most.
+    /// An axis of `phi` may wrap around 0 or 1 (nodes are written in [0, 1)); where it spans a whole period, as [0, 1, n],
+    /// max is the same place as min and is left out.
     pub axes: PerParameter<(f64, f64, usize)>,
 }
 

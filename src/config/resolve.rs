@@ -1,15 +1,16 @@
 //! From the config as written to [`Settings`]: checks, defaults that depend on other keys, units.
 //!
-//! Left out: the star (`resolve_star`), observations (`resolve_observations`), and what each prior may be (`domain`).
+//! Left out: the star (`resolve_star`), observations (`resolve_observations`), the landscape (`resolve_grid`), and what each
+//! prior may be (`domain`).
 
 use super::domain::{check_value, key, resolve_prior};
 use super::error::Fault;
 use super::identity::fingerprint;
 use super::raw::Config;
-use super::raw_parts::Grid;
+use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
-use super::{GridAxis, ImagingSettings, SamplerSettings, Settings};
+use super::{ImagingSettings, SamplerSettings, Settings};
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
 use std::path::Path;
 
@@ -23,7 +24,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     check_imaging(&raw.imaging)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
-    let grid = raw.grid.as_ref().map(resolve_grid).transpose()?;
+    let grid = raw.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
     let resolved = serde_json::to_value(&raw).map_err(|e| Fault::new("config", e.to_string()))?;
     Ok(Settings {
         path: path.into(),
@@ -82,16 +83,22 @@ fn resolve_free(raw: &mut Config, values: &mut ParameterValues) -> Result<Vec<Fr
         *raw.parameters.slot(parameter) = Some(section);
         free.push(FreeParameter { parameter, prior });
     }
-    let no_planet = values[Parameter::K] == 0.0 && raw.parameters.k_kms.is_none();
-    match free.iter().find(|f| no_planet && matches!(f.parameter, Parameter::Phi | Parameter::PorbOverProt)) {
-        Some(f) => {
-            let name = f.parameter.name();
+    match without_planet(&free, values) {
+        Some(parameter) => {
+            let name = parameter.name();
             let problem =
                 format!("{name} has no effect while planet.k_kms is fixed at 0: free k_kms too, or fix {name}");
             Err(Fault::new(format!("parameters.{name}"), problem))
         }
         None => Ok(free),
     }
+}
+
+/// A free parameter of an orbit of which K is fixed at 0.
+pub(super) fn without_planet(free: &[FreeParameter], values: &ParameterValues) -> Option<Parameter> {
+    let mut parameters = free.iter().map(|f| f.parameter);
+    let no_planet = values[Parameter::K] == 0.0 && free.iter().all(|f| f.parameter != Parameter::K);
+    parameters.find(|parameter| no_planet && parameter.is_orbital())
 }
 
 fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
@@ -120,31 +127,4 @@ fn check_sampler(sampler: &SamplerSettings, free: usize) -> Result<(), Fault> {
         e.split_once(": ").map(|(key, problem)| Fault::new(key, problem)).unwrap_or(Fault::new("sampler", e))
     };
     sampler.validate(free.max(1)).map_err(|e| message(e.to_string()))
-}
-
-fn resolve_grid(grid: &Grid) -> Result<Vec<GridAxis>, Fault> {
-    const MOST_NODES: usize = 10_000_000;
-    let axes = grid.axes.entries();
-    if !(1..=3).contains(&axes.len()) {
-        return Err(Fault::new("grid.axes", format!("{} axes must be 1 to 3", axes.len())));
-    }
-    let total = axes.iter().fold(1usize, |product, (_, (_, _, n))| product.saturating_mul(*n));
-    if total > MOST_NODES {
-        return Err(Fault::new("grid.axes", format!("{total} nodes exceed {MOST_NODES}")));
-    }
-    axes.into_iter().map(|(parameter, axis)| resolve_axis(parameter, axis)).collect()
-}
-
-fn resolve_axis(parameter: Parameter, (min, max, nodes): (f64, f64, usize)) -> Result<GridAxis, Fault> {
-    let key = format!("grid.axes.{}", parameter.name());
-    check_value(parameter, min, &key)?;
-    check_value(parameter, max, &key)?;
-    let problem = match nodes {
-        0 => "0 nodes must be at least 1".to_string(),
-        _ if min > max => format!("min {min} must not be above max {max}"),
-        n if n > 1 && min == max => format!("min = max = {min} makes {n} nodes one: give n = 1"),
-        _ if !(max - min).is_finite() => format!("max {max} is too far from min {min}"),
-        _ => return Ok(GridAxis { parameter, min, max, nodes }),
-    };
-    Err(Fault::new(key, problem))
 }

@@ -3,6 +3,7 @@
 use super::raw_parts::EquivalentWidth;
 use super::{ConfigError, SamplerSettings};
 use crate::io::lsd::ReadOptions;
+use crate::landscape::Grid;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
@@ -31,8 +32,8 @@ pub struct Settings {
     pub free: Vec<FreeParameter>,
     /// The chain.
     pub sampler: SamplerSettings,
-    /// Axes of the landscape in the order of [`Parameter::ALL`].
-    pub grid: Option<Vec<GridAxis>>,
+    /// The landscape.
+    pub grid: Option<GridSettings>,
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`, and
@@ -74,27 +75,15 @@ impl Default for ImagingSettings {
     }
 }
 
-/// One axis of the landscape.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GridAxis {
-    /// Which parameter.
-    pub parameter: Parameter,
-    /// First node.
-    pub min: f64,
-    /// Last node.
-    pub max: f64,
-    /// Number of nodes, at least 1.
-    pub nodes: usize,
-}
-
-impl GridAxis {
-    /// Value at node `k`; a single node lies in the middle.
-    pub fn at(&self, k: usize) -> f64 {
-        match self.nodes {
-            1 => self.min + 0.5 * (self.max - self.min),
-            n => self.min + (self.max - self.min) * (k as f64 / (n - 1) as f64),
-        }
-    }
+/// The landscape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridSettings {
+    /// Its nodes, the axes in the order of [`Parameter::ALL`].
+    pub grid: Grid,
+    /// The parameters on its axes, in the same order, with the priors of the search for the reference: those under
+    /// `parameters`, or uniform along the axis. All other parameters are fixed at their values in the config. The priors do
+    /// not enter the landscape.
+    pub free: Vec<FreeParameter>,
 }
 
 impl Settings {
@@ -109,12 +98,12 @@ impl Settings {
         }
     }
 
-    /// The axes of the landscape, for the command that cannot do without.
+    /// The landscape, for the command that cannot do without.
     ///
     /// # Errors
     /// If the config has no `grid`.
-    pub fn require_grid(&self) -> Result<&[GridAxis], ConfigError> {
-        self.grid.as_deref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
+    pub fn require_grid(&self) -> Result<&GridSettings, ConfigError> {
+        self.grid.as_ref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
     }
 
     /// The star, its equivalent width measured on `observations` if that is [`EquivalentWidth::Auto`].

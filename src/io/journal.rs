@@ -1,70 +1,25 @@
 //! The journal: `chain.jsonl`, one line per step, ensemble and walker, appended by whole steps.
 //!
-//! What a crash can leave is recovered: a torn last line and an incomplete last step are dropped. Anything else that is
-//! wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn tail.
-//! While a process writes a journal it holds a lock on the file. Left out: what the numbers mean.
+//! Left out: what a crash leaves of a file (`lines`), and what the numbers mean.
 
+use super::lines::{self, LineFile, Refusal};
 use crate::chain::{Chain, ChainError, Record, Shape};
 use crate::log_density::Status;
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+pub use super::lines::JournalError;
 
 /// Keys of a line that are not parameters.
 const KEYS: [&str; 10] =
     ["ensemble", "step", "walker", "accepted", "log_prob", "spottedness", "chi2", "status", "proposed", "passes"];
 
-/// What can be wrong with a journal.
-#[derive(Debug, thiserror::Error)]
-pub enum JournalError {
-    /// The file cannot be opened, read or written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Another process is writing the file.
-    #[error("{}: another process is writing this run", path.display())]
-    Locked {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A line is wrong, and not because writing it was interrupted.
-    #[error("{}, line {line}: {problem}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: String,
-    },
-    /// A step that is no next step was to be written.
-    #[error("{}: {source}", path.display())]
-    Step {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: ChainError,
-    },
-    /// A parameter has the name of another key of a line, or of another parameter.
-    #[error("`{name}` cannot be the name of a parameter in a chain: it is taken")]
-    Name {
-        /// The name.
-        name: String,
-    },
-}
-
 /// A journal open for appending, locked against other processes until it is dropped.
 #[derive(Debug)]
 pub struct Journal {
-    writer: BufWriter<File>,
-    path: PathBuf,
+    file: LineFile,
     shape: Shape,
     lines: usize,
 }
@@ -76,17 +31,7 @@ impl Journal {
     /// [`JournalError::Io`] (the file is there already, for one), [`JournalError::Locked`], [`JournalError::Name`].
     pub fn create(path: &Path, shape: Shape, replace: bool) -> Result<Self, JournalError> {
         check_names(&shape)?;
-        let mut options = OpenOptions::new();
-        options.read(true).write(true);
-        if replace {
-            options.create(true)
-        } else {
-            options.create_new(true)
-        };
-        let file = options.open(path).map_err(at(path))?;
-        lock(&file, path)?;
-        file.set_len(0).map_err(at(path))?;
-        Ok(Journal { writer: BufWriter::new(file), path: path.to_owned(), shape, lines: 0 })
+        Ok(Journal { file: LineFile::create(path, replace)?, shape, lines: 0 })
     }
 
     /// Opens a journal to go on with it: reads the complete steps, and cuts the file after them.
@@ -95,35 +40,30 @@ impl Journal {
     /// Those of [`read`], and [`JournalError::Locked`]. The file is only cut when it can be read without error.
     pub fn recover(path: &Path, shape: Shape) -> Result<(Self, Chain), JournalError> {
         check_names(&shape)?;
-        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(at(path))?;
-        lock(&file, path)?;
-        let (chain, end) = parse(&mut BufReader::new(&file), path, &shape)?;
-        file.set_len(end).map_err(at(path))?;
-        file.seek(SeekFrom::Start(end)).map_err(at(path))?;
+        let mut reader = StepReader::new(&shape);
+        let file = LineFile::recover(path, &mut |line| reader.take(line))?;
+        let chain = reader.chain;
         let lines = chain.records().len();
-        Ok((Journal { writer: BufWriter::new(file), path: path.to_owned(), shape, lines }, chain))
+        Ok((Journal { file, shape, lines }, chain))
     }
 
     /// Appends one whole step and hands it to the operating system.
     ///
     /// # Errors
-    /// [`JournalError::Step`] when it is not the next step, whole and finite (nothing is written then);
+    /// [`JournalError::Next`] when it is not the next step, whole and finite (nothing is written then);
     /// [`JournalError::Io`].
     pub fn append(&mut self, step: &[Record]) -> Result<(), JournalError> {
-        let refuse = |source| JournalError::Step { path: self.path.clone(), source };
+        let refuse =
+            |error: ChainError| JournalError::Next { path: self.file.path().into(), problem: error.to_string() };
         if step.len() != self.shape.size() {
             return Err(refuse(ChainError::StepSize { expected: self.shape.size(), found: step.len() }));
         }
         for (index, record) in step.iter().enumerate() {
             self.shape.check(self.lines + index, record).map_err(refuse)?;
         }
-        for record in step {
-            let line = Line { names: &self.shape.names, record };
-            serde_json::to_writer(&mut self.writer, &line).map_err(|e| at(&self.path)(e.into()))?;
-            self.writer.write_all(b"\n").map_err(at(&self.path))?;
-        }
+        self.file.append(step.iter().map(|record| Line { names: &self.shape.names, record }))?;
         self.lines += step.len();
-        self.writer.flush().map_err(at(&self.path))
+        Ok(())
     }
 }
 
@@ -133,40 +73,35 @@ impl Journal {
 /// [`JournalError::Io`]; [`JournalError::Line`] for anything wrong but a torn tail.
 pub fn read(path: &Path, shape: &Shape) -> Result<Chain, JournalError> {
     check_names(shape)?;
-    let file = File::open(path).map_err(at(path))?;
-    Ok(parse(&mut BufReader::new(file), path, shape)?.0)
+    let mut reader = StepReader::new(shape);
+    lines::read(path, &mut |line| reader.take(line))?;
+    Ok(reader.chain)
 }
 
-/// The complete steps, and the byte after the last of them.
-fn parse(reader: &mut dyn BufRead, path: &Path, shape: &Shape) -> Result<(Chain, u64), JournalError> {
-    let mut chain = Chain::new(shape.clone());
-    let mut step: Vec<Record> = Vec::with_capacity(shape.size());
-    let (mut end, mut complete, mut line) = (0u64, 0u64, 0usize);
-    let mut bytes = Vec::new();
-    loop {
-        bytes.clear();
-        end += reader.read_until(b'\n', &mut bytes).map_err(at(path))? as u64;
-        line += 1;
-        let refuse = |problem: String| JournalError::Line { path: path.to_owned(), line, problem };
-        // No newline: the end of the file, or of what was written of its last line.
-        let Some(text) = bytes.strip_suffix(b"\n") else { return Ok((chain, complete)) };
-        let record = match parse_line(text, &shape.names) {
-            Ok(record) => record,
-            Err(error) if error.is_data() => return Err(refuse(without_place(&error))),
-            Err(error) => {
-                let mut rest = Vec::new();
-                reader.read_until(b'\n', &mut rest).map_err(at(path))?;
-                let followed = rest.ends_with(b"\n");
-                return if followed { Err(refuse(without_place(&error))) } else { Ok((chain, complete)) };
-            }
-        };
-        shape.check(line - 1, &record).map_err(|error| refuse(error.to_string()))?;
-        step.push(record);
-        if step.len() == shape.size() {
-            chain.push_step(&step).map_err(|error| refuse(error.to_string()))?;
-            step.clear();
-            complete = end;
+/// Gathers lines into whole steps.
+struct StepReader {
+    chain: Chain,
+    step: Vec<Record>,
+}
+
+impl StepReader {
+    fn new(shape: &Shape) -> Self {
+        StepReader { chain: Chain::new(shape.clone()), step: Vec::with_capacity(shape.size()) }
+    }
+
+    /// Takes the next line; whether a step is whole with it.
+    fn take(&mut self, line: &[u8]) -> Result<bool, Refusal> {
+        let shape = self.chain.shape();
+        let record = parse_line(line, &shape.names)?;
+        let index = self.chain.records().len() + self.step.len();
+        shape.check(index, &record).map_err(|error| error.to_string())?;
+        self.step.push(record);
+        if self.step.len() < shape.size() {
+            return Ok(false);
         }
+        self.chain.push_step(&self.step).map_err(|error| error.to_string())?;
+        self.step.clear();
+        Ok(true)
     }
 }
 
@@ -175,27 +110,6 @@ fn parse_line(text: &[u8], names: &[String]) -> Result<Record, serde_json::Error
     let record = LineSeed { names }.deserialize(&mut deserializer)?;
     deserializer.end()?;
     Ok(record)
-}
-
-/// The message of a JSON error; its "line 1" would be misleading.
-fn without_place(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    let message = text.rfind(" at line ").map_or(text.as_str(), |end| &text[..end]);
-    format!("{message} (column {})", error.column())
-}
-
-fn at(path: &Path) -> impl Fn(std::io::Error) -> JournalError {
-    move |source| JournalError::Io { path: path.to_owned(), source }
-}
-
-fn lock(file: &File, path: &Path) -> Result<(), JournalError> {
-    match file.try_lock() {
-        Ok(()) => Ok(()),
-        Err(TryLockError::WouldBlock) => Err(JournalError::Locked { path: path.to_owned() }),
-        // A file system without locks: then nobody else can hold one either.
-        Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => Ok(()),
-        Err(TryLockError::Error(error)) => Err(at(path)(error)),
-    }
 }
 
 fn check_names(shape: &Shape) -> Result<(), JournalError> {

@@ -1,8 +1,10 @@
-//! Files in and out: LSD profiles, the chain's journal, maps, exports. No decisions are taken here.
+//! Files in and out: LSD profiles, the journals of chains and landscapes, maps, exports. No decisions are taken here.
 
 pub mod atomic;
 pub mod csv;
 pub mod journal;
+pub mod landscape;
+pub mod lines;
 pub mod lsd;
 pub mod map;
 pub mod provenance;

@@ -2,6 +2,7 @@
 
 pub mod coordinates;
 pub mod kind;
+mod likelihood;
 pub mod parameters;
 pub mod posterior;
 mod prediction;

@@ -1,14 +1,13 @@
 //! The log-probability of a parameter vector: one maximum-entropy reconstruction, judged by one of three objectives (method
 //! section 3), times the prior; and its gradient.
 //!
-//! Left out: how the reference was found, and who explores the posterior.
+//! Left out: what a reconstruction is worth (`likelihood`), how the reference was found, and who explores the posterior.
 
 use super::coordinates::ParameterSpace;
 use super::kind::ObjectiveKind;
 use super::parameters::Parameter;
 use super::prediction::Prediction;
 use super::reference::Reference;
-use super::tradeoff::Measure;
 use crate::imaging::{Imager, ImagingProblem};
 use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
 use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Termination};
@@ -33,9 +32,6 @@ const LARGEST_VSINI_KMS: f64 = 2000.0;
 
 /// Newton steps from the reference before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
 const NEWTON_STEPS: usize = 15;
-
-/// A chi2 this many times the target is far from any fit.
-const FAR: f64 = 1.05;
 
 /// Numerical derivatives of forward models step by this share of a coordinate's natural scale.
 const DERIVATIVE_STEP: f64 = 0.05;
@@ -65,6 +61,11 @@ impl Posterior {
         &self.reference
     }
 
+    /// What a reconstruction is judged by.
+    pub fn kind(&self) -> ObjectiveKind {
+        self.kind
+    }
+
     /// The parameter space.
     pub fn space(&self) -> &ParameterSpace {
         &self.space
@@ -85,7 +86,7 @@ impl Posterior {
     }
 
     /// Whether profiles can be computed at all at `theta`.
-    fn is_physical(&self, theta: &[f64]) -> bool {
+    pub(super) fn is_physical(&self, theta: &[f64]) -> bool {
         let values = self.space.values_at(theta);
         let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
         let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
@@ -132,50 +133,15 @@ impl Posterior {
         (solution, problem)
     }
 
-    /// ln L of a reconstruction, and the derivative of chi2 on the trade-off curve with respect to its measure.
-    fn log_likelihood(&self, solution: &Solution) -> (f64, f64) {
-        let measure = match self.kind {
-            ObjectiveKind::RegularisedLikelihood => {
-                let lambda = solution.image.lambda;
-                return (solution.entropy / lambda - 0.5 * solution.chi2, 0.0);
+    /// The evaluation that a reconstruction of so many passes makes with its prior.
+    fn evaluation(&self, solution: &Solution, passes: u32, log_prior: f64) -> Evaluation {
+        let &Solution { spottedness, chi2, .. } = solution;
+        match self.judge(solution) {
+            Ok((log_likelihood, status)) => {
+                Evaluation { log_prob: log_likelihood + log_prior, spottedness, chi2, passes, status }
             }
-            ObjectiveKind::Spottedness => Measure::Spottedness,
-            ObjectiveKind::Entropy => Measure::NegativeEntropy,
-        };
-        let target = self.reference.chi2_target;
-        // to first order along the path to the target; where that is out of reach, its misfit counts as it is
-        let (to_target, misfit) = match solution.termination {
-            Termination::Converged => (target - solution.chi2, 0.0),
-            _ => (0.0, solution.chi2 - target),
-        };
-        let value = match measure {
-            Measure::Spottedness if to_target == 0.0 => solution.spottedness,
-            Measure::Spottedness => {
-                let moved = to_target * solution.spottedness_slope / solution.chi2_slope;
-                solution.spottedness + moved + solution.spottedness_left
-            }
-            Measure::NegativeEntropy => -solution.entropy - 0.5 * solution.image.lambda * to_target,
-        };
-        let (on_curve, slope) = self.reference.tradeoff.chi2_at(measure, value);
-        (-0.5 * (target - on_curve + misfit), slope)
-    }
-
-    fn judge(&self, solution: &Solution, passes: u32, log_prior: f64) -> Evaluation {
-        let status = match solution.termination {
-            Termination::Converged => Status::Converged,
-            Termination::Unreachable => Status::Unreachable,
-            Termination::StepLimit if solution.chi2 < FAR * self.reference.chi2_target => {
-                return Evaluation { passes, ..Evaluation::rejected(Status::StoppedShort) };
-            }
-            // a lower bound of the log-probability, good enough where it is hundreds below the best
-            Termination::StepLimit => Status::Unreachable,
-            Termination::NonFinite => return Evaluation { passes, ..Evaluation::rejected(Status::NonFinite) },
-        };
-        let log_prob = self.log_likelihood(solution).0 + log_prior;
-        if !log_prob.is_finite() {
-            return Evaluation { passes, ..Evaluation::rejected(Status::NonFinite) };
+            Err(status) => Evaluation { passes, ..Evaluation::rejected(status) },
         }
-        Evaluation { log_prob, spottedness: solution.spottedness, chi2: solution.chi2, passes, status }
     }
 
     /// Prior and physics, before anything is reconstructed: the prior's log-density, or why `theta` is refused.
@@ -232,7 +198,7 @@ impl LogDensity for Posterior {
             Err(refused) => refused,
             Ok(log_prior) => {
                 let (solution, problem) = self.reconstruct(theta);
-                self.judge(&solution, problem.passes(), log_prior)
+                self.evaluation(&solution, problem.passes(), log_prior)
             }
         }
     }
@@ -257,7 +223,7 @@ impl Gradient for Posterior {
             Err(refused) => return (refused, Vec::new()),
         };
         let (solution, mut problem) = self.reconstruct(theta);
-        let evaluation = self.judge(&solution, problem.passes(), log_prior);
+        let evaluation = self.evaluation(&solution, problem.passes(), log_prior);
         if evaluation.log_prob == f64::NEG_INFINITY {
             return (evaluation, Vec::new());
         }

@@ -3,7 +3,8 @@
 
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 /// A folder of its own with a config.
 pub struct Desk {
@@ -73,6 +74,26 @@ impl Desk {
         stdout
     }
 
+    /// Starts the program and does not wait for it.
+    pub fn start(&self, args: &[&str]) -> Child {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dimcmc"));
+        command.args(args).current_dir(self.path("")).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    }
+
+    /// Lines in a file so far; 0 if it is not there.
+    pub fn lines(&self, name: &str) -> usize {
+        std::fs::read(self.path(name)).map_or(0, |text| text.iter().filter(|b| **b == b'\n').count())
+    }
+
+    /// Waits until a file has so many lines or the program has ended.
+    pub fn wait_for_lines(&self, name: &str, child: &mut Child, least: usize) {
+        let began = Instant::now();
+        while self.lines(name) < least && child.try_wait().unwrap().is_none() {
+            assert!(began.elapsed() < Duration::from_secs(300), "{name} does not come to {least} lines");
+            std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+
     /// Everything in the folder, with its content.
     pub fn inventory(&self) -> Vec<(PathBuf, Vec<u8>)> {
         let mut found = Vec::new();
@@ -105,6 +126,21 @@ impl Desk {
         assert_eq!(message.matches('\n').count(), 1, "more than one line: {message}");
         message.trim_end().to_string()
     }
+}
+
+/// Ends a program as a power cut does.
+pub fn kill(mut child: Child) {
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// Ends a program as Ctrl-C does; what it says.
+#[cfg(unix)]
+pub fn interrupt(child: Child) -> String {
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    text(&output.stderr)
 }
 
 /// Whether every part stands in the message.

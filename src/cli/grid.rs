@@ -1,0 +1,106 @@
+//! `dimcmc grid`: the landscape.
+
+use super::output::Output;
+use super::search::search;
+use super::signals::Signals;
+use super::{Failure, Global, progress};
+use dimcmc::landscape::{Landscape, table};
+use dimcmc::scene::Scene;
+use dimcmc::survey::{HEADER, NODES, Survey};
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Compute the landscape: a reconstruction at every node of a grid
+///
+/// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values. ln L is
+/// the log-probability of `sample` without the prior, relative to the same reference: the best parameters along the axes,
+/// which are searched for first. Writes landscape.json (what it was begun with) and landscape.jsonl (a line per node). A
+/// landscape that was stopped, by whatever, goes on with --resume and comes to the same bytes as one that was not.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc grid configs/demo.json --out runs/demo_grid\n  \
+                        dimcmc grid configs/demo.json --out runs/demo_grid --resume")]
+pub struct Args {
+    /// Config file (JSON)
+    config: PathBuf,
+    #[command(flatten)]
+    output: Output,
+    /// Go on with the landscape in the folder
+    #[arg(long)]
+    resume: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    if !args.resume {
+        args.output.check()?;
+    }
+    let scene = Scene::load(&args.config)?;
+    let plan = scene.settings.require_grid()?;
+    let folder = args.output.folder();
+    let failed = |e| Failure::survey(&args.config, e);
+    let signals = Signals::catch("node")?;
+    let mut survey = if args.resume {
+        signals.defer();
+        let spinner = progress::bar(global, None, "reading the landscape, reference image");
+        let survey = Survey::resume(&scene, plan, folder);
+        spinner.finish_and_clear();
+        survey.map_err(failed)?
+    } else {
+        let found = search(global, &args.config, &scene, &scene.space_of(&plan.free))?;
+        signals.defer();
+        let folder = args.output.create()?;
+        Survey::begin(&scene, plan, found, folder, args.output.replaces()).map_err(failed)?
+    };
+    let mut meter = Meter::new(global, &survey.landscape);
+    let whole = survey.go(signals.flag(), |landscape| meter.show(landscape));
+    meter.bar.finish_and_clear();
+    if !whole.map_err(failed)? {
+        let (config, folder, nodes) = (args.config.display(), folder.display(), survey.landscape.nodes().len());
+        return Err(Failure::failed(format!(
+            "interrupted after {nodes} nodes; go on with: dimcmc grid {config} --out {folder} --resume"
+        )));
+    }
+    let Survey { header, landscape, .. } = &survey;
+    let mut stdout = std::io::stdout().lock();
+    // whoever reads may stop reading
+    let _ = write!(stdout, "{}", table(landscape, header.origin.truth.as_ref()));
+    let _ = writeln!(stdout, "{}", meter.cost(landscape));
+    if let Some(warning) = header.origin.reference.warning() {
+        let _ = writeln!(stdout, "note: {warning}");
+    }
+    let _ = writeln!(stdout, "written: {}: {HEADER}, {NODES}", folder.display());
+    Ok(())
+}
+
+/// What is shown while a landscape grows, and how long it took.
+struct Meter {
+    bar: indicatif::ProgressBar,
+    began: Instant,
+    /// Nodes that were there before.
+    before: usize,
+}
+
+impl Meter {
+    fn new(global: &Global, landscape: &Landscape) -> Self {
+        let bar = progress::bar(global, Some(landscape.grid().len() as u64), "first nodes");
+        let before = landscape.nodes().len();
+        bar.set_position(before as u64);
+        Meter { bar, began: Instant::now(), before }
+    }
+
+    fn show(&mut self, landscape: &Landscape) {
+        let (done, total) = (landscape.nodes().len(), landscape.grid().len());
+        let rate = (done - self.before) as f64 / self.began.elapsed().as_secs_f64().max(1e-9);
+        let left = Duration::from_secs_f64((total - done) as f64 / rate);
+        self.bar.set_position(done as u64);
+        self.bar.set_message(format!("{done}/{total}, {:#} left, {rate:.0} rec/s", indicatif::HumanDuration(left)));
+    }
+
+    /// Seconds of this part of the computation, the search before it left out.
+    fn cost(&self, landscape: &Landscape) -> String {
+        let nodes = landscape.nodes().len() - self.before;
+        let now = if self.before == 0 { "" } else { " now" };
+        format!("{nodes} nodes{now} in {:.1} s", self.began.elapsed().as_secs_f64())
+    }
+}
