@@ -14,5 +14,5 @@ pub mod solver;
 pub use parallelism::parallelism;
 pub use preconditioner::Preconditioner;
 pub use problem::{Curvature, Problem};
-pub use solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
+pub use solution::{Best, Goal, Image, Solution, SolverSettings, Start, Termination};
 pub use solver::Solver;

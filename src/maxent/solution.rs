@@ -21,7 +21,7 @@ pub enum Goal {
 /// Precision and effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings {
-    /// Error allowed in `S/lambda - chi2/2`, and in chi2/2 where chi2 is the goal.
+    /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth where chi2 is the goal.
     pub tolerance: f64,
     /// Residual of the Newton systems over their right-hand side.
     pub cg_tolerance: f64,
@@ -37,7 +37,16 @@ impl Default for SolverSettings {
     }
 }
 
+/// Solutions this far below the best, in units of log-likelihood, are found to twice the tolerance.
+const LENIENT_FROM: f64 = 10.0;
+
 impl SolverSettings {
+    /// The error allowed to a solution that is `drop` below the best in log-likelihood: a chain never sees it, and a landscape
+    /// shows it to a small fraction of itself.
+    pub fn tolerance_at(&self, drop: f64) -> f64 {
+        self.tolerance * (1.0 + (drop / LENIENT_FROM).max(0.0).powi(3))
+    }
+
     /// To rounding error rather than to what a chain needs: for references and tests.
     pub fn exact() -> Self {
         SolverSettings { tolerance: 1e-9, cg_tolerance: 1e-3, ..SolverSettings::default() }
@@ -78,6 +87,17 @@ pub struct Start {
     /// The adjoint of spottedness at fixed chi2, in the entropy's metric: how much of it a residual of the Newton system is
     /// worth. Empty for none: then what is left of spottedness when the solver stops is not forecast.
     pub adjoint: Vec<f64>,
+    /// The best solution there is, so that effort is spared far below it; none to be precise everywhere.
+    pub best: Option<Best>,
+}
+
+/// The best solution of a family of problems: what others are compared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Best {
+    /// Its spottedness.
+    pub spottedness: f64,
+    /// Its `S/lambda - chi2/2`.
+    pub merit: f64,
 }
 
 impl Start {
@@ -88,6 +108,7 @@ impl Start {
             path: Vec::new(),
             chi2_slope: 0.0,
             adjoint: Vec::new(),
+            best: None,
         }
     }
 }

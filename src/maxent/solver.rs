@@ -10,7 +10,7 @@ use super::cg::{self, CgLimits, axpy, dot};
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
-use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
+use super::solution::{Best, Goal, Image, Solution, SolverSettings, Start, Termination};
 
 /// Largest change of a logit in one step, and of ln(lambda).
 const LOGIT_CAP: f64 = 2.0;
@@ -79,6 +79,21 @@ struct Standing {
     at_bound: bool,
 }
 
+impl Standing {
+    /// About how far the solution at hand is below `best` in log-likelihood.
+    fn below(&self, best: &Best, at: &Point, goal: Goal, area: &[f64]) -> f64 {
+        match goal {
+            Goal::Lambda(lambda) => best.merit - (at.entropy / lambda - 0.5 * at.chi2),
+            Goal::Chi2 { target, .. } => {
+                let moved = (target - at.chi2) * self.spottedness_path / self.chi2_path;
+                let (more, misfit) = if self.at_bound { (0.0, at.chi2 - target) } else { (moved, 0.0) };
+                let spottedness = dot(&at.s, area) + more - best.spottedness;
+                0.5 * (misfit - spottedness * self.chi2_path / self.spottedness_path)
+            }
+        }
+    }
+}
+
 /// Step at fixed lambda and path along lambda, in the metric.
 struct Newton {
     step: Vec<f64>,
@@ -105,7 +120,8 @@ impl Solver<'_> {
                 return self.finish(problem, at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
             let standing = self.stand(problem, &at, goal, &path, &start.adjoint);
-            if standing.error < self.settings.tolerance {
+            let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal, problem.area()));
+            if standing.error < self.settings.tolerance_at(drop) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
                 return self.finish(problem, at, Some(standing), path, why, newton_steps);
             }

@@ -31,7 +31,7 @@ pub struct Posterior {
 const LARGEST_VSINI_KMS: f64 = 2000.0;
 
 /// Newton steps from the reference before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
-const NEWTON_STEPS: usize = 15;
+const NEWTON_STEPS: usize = 25;
 
 /// Numerical derivatives of forward models step by this share of a coordinate's natural scale.
 const DERIVATIVE_STEP: f64 = 0.05;

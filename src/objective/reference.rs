@@ -6,7 +6,7 @@
 use super::parameters::ParameterValues;
 use super::tradeoff::{Node, TradeOff};
 use crate::imaging::Imager;
-use crate::maxent::{Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
+use crate::maxent::{Best, Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
 use crate::star::Response;
 
 /// Rank of the preconditioner; directions beyond it have lambda x curvature below 1 on the paper's setup.
@@ -171,19 +171,25 @@ impl Reference {
 
     /// A blank star, where an evaluation far from the reference starts.
     pub fn blank(&self, imager: &Imager) -> Start {
-        Start::blank(&imager.entropy, imager.grid.len(), BLANK_LAMBDA / imager.data.depth.len() as f64)
+        let lambda = BLANK_LAMBDA / imager.data.depth.len() as f64;
+        Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.grid.len(), lambda) }
     }
 
     /// Where every evaluation starts.
     pub fn start(&self) -> Start {
-        start(&self.solution)
+        Start { best: Some(self.best()), ..start(&self.solution) }
+    }
+
+    fn best(&self) -> Best {
+        let Solution { spottedness, entropy, chi2, image, .. } = &self.solution;
+        Best { spottedness: *spottedness, merit: entropy / image.lambda - 0.5 * chi2 }
     }
 }
 
 /// Where the next solution starts from this one.
 fn start(solution: &Solution) -> Start {
     let Solution { image, path, chi2_slope, .. } = solution;
-    Start { image: image.clone(), path: path.clone(), chi2_slope: *chi2_slope, adjoint: Vec::new() }
+    Start { image: image.clone(), path: path.clone(), chi2_slope: *chi2_slope, adjoint: Vec::new(), best: None }
 }
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.
