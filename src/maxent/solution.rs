@@ -37,6 +37,9 @@ impl Default for SolverSettings {
     }
 }
 
+/// Largest error allowed to a solution, over its distance from the best.
+const LENIENCY: f64 = 0.005;
+
 /// Solutions this far below the best, in units of log-likelihood, are found to twice the tolerance.
 const LENIENT_FROM: f64 = 10.0;
 
@@ -44,7 +47,8 @@ impl SolverSettings {
     /// The error allowed to a solution that is `drop` below the best in log-likelihood: a chain never sees it, and a landscape
     /// shows it to a small fraction of itself.
     pub fn tolerance_at(&self, drop: f64) -> f64 {
-        self.tolerance * (1.0 + (drop / LENIENT_FROM).max(0.0).powi(3))
+        let lenient = self.tolerance * (1.0 + (drop / LENIENT_FROM).max(0.0).powi(3));
+        lenient.min(LENIENCY * drop).max(self.tolerance)
     }
 
     /// To rounding error rather than to what a chain needs: for references and tests.
