@@ -1,0 +1,88 @@
+//! Times of things that are compared with each other: in turn within one run, so that whatever else the machine is doing
+//! slows all of them alike.
+//!
+//! Left out: statistics beyond quantiles; criterion has them.
+
+use criterion::Criterion;
+use std::time::{Duration, Instant};
+
+/// Something to be timed.
+pub struct Candidate<'a> {
+    pub name: &'static str,
+    pub run: Box<dyn FnMut() + 'a>,
+}
+
+impl<'a> Candidate<'a> {
+    pub fn new(name: &'static str, run: impl FnMut() + 'a) -> Self {
+        Candidate { name, run: Box::new(run) }
+    }
+}
+
+/// Seconds that `f` takes.
+pub fn seconds(f: impl FnOnce()) -> f64 {
+    let began = Instant::now();
+    f();
+    began.elapsed().as_secs_f64()
+}
+
+/// Seconds of every candidate, `[candidate][round]`. In a round each runs twice and the second time counts: the caches then
+/// hold what they hold in a sequence of passes.
+pub fn in_turn(candidates: &mut [Candidate], rounds: usize) -> Vec<Vec<f64>> {
+    let mut times = vec![Vec::with_capacity(rounds); candidates.len()];
+    for _ in 0..rounds {
+        for (candidate, times) in candidates.iter_mut().zip(&mut times) {
+            (candidate.run)();
+            times.push(seconds(&mut candidate.run));
+        }
+    }
+    times
+}
+
+/// The same candidates by criterion, which compares them with its last run.
+pub fn by_criterion(criterion: &mut Criterion, group: &str, candidates: &mut [Candidate]) {
+    let mut group = criterion.benchmark_group(group);
+    for candidate in candidates {
+        group.bench_function(candidate.name, |bencher| bencher.iter(&mut candidate.run));
+    }
+}
+
+/// Criterion in a hurry.
+pub fn criterion() -> Criterion {
+    Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_millis(800))
+        .nresamples(2000)
+        .configure_from_args()
+}
+
+/// The value below which a share `p` of the values lies.
+pub fn quantile(values: &[f64], p: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let position = p * (sorted.len() - 1) as f64;
+    let (below, share) = (position.floor() as usize, position.fract());
+    sorted[below] + share * (sorted[position.ceil() as usize] - sorted[below])
+}
+
+pub fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// Median over rounds of the ratio of two times of the same round.
+pub fn median_ratio(numerator: &[f64], denominator: &[f64]) -> f64 {
+    median(&numerator.iter().zip(denominator).map(|(n, d)| n / d).collect::<Vec<_>>())
+}
+
+/// Slope of ln(cost) against ln(size), by least squares.
+pub fn exponent(sizes: &[f64], costs: &[f64]) -> f64 {
+    let mean = |x: &[f64]| x.iter().map(|x| x.ln()).sum::<f64>() / x.len() as f64;
+    let (mean_size, mean_cost) = (mean(sizes), mean(costs));
+    let (mut product, mut square) = (0.0, 0.0);
+    for (size, cost) in sizes.iter().zip(costs) {
+        let x = size.ln() - mean_size;
+        product += x * (cost.ln() - mean_cost);
+        square += x * x;
+    }
+    product / square
+}
