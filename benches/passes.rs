@@ -59,9 +59,7 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
     let response = imager.response(&truth(scene));
     let plain = PlainLoop::<WINDOW>::new(&imager.grid, &imager.star, &truth(scene), &imager.sampling);
     let stored = vec![1_u64; response.pairs() * PAIR_BYTES / size_of::<u64>()];
-    let read = || {
-        black_box(black_box(&stored).iter().fold(0_u64, |sum, x| sum.wrapping_add(*x)));
-    };
+    let read = || black_box(&stored).iter().fold(0_u64, |sum, x| sum.wrapping_add(*x));
     let x = uneven_map(response.pixels());
     let (y, z) = (uneven_map(response.data_len()), uneven_map(response.profiles()));
 
@@ -98,8 +96,8 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
 fn builds(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut Table) {
     let (imager, state) = (&scene.imager, truth(scene));
     let response = imager.response(&state);
-    let build = || drop(black_box(imager.response(black_box(&state))));
-    let shift = || drop(black_box(response.with_velocities(&imager.star, black_box(&state), &imager.sampling)));
+    let build = || imager.response(black_box(&state));
+    let shift = || response.with_velocities(&imager.star, black_box(&state), &imager.sampling);
     let mut candidates = [Candidate::new("build", build), Candidate::new("shift", shift)];
     by_criterion(criterion, &format!("response, {pixels} pixels"), &mut candidates);
     let times = in_turn(&mut candidates, ROUNDS / 3);

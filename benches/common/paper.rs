@@ -8,7 +8,7 @@ use dimcmc::ensemble::{StartDraw, draw_start};
 use dimcmc::objective::Posterior;
 use dimcmc::scene::Scene;
 use dimcmc::search::{self, SearchSettings};
-use dimcmc::star::StarState;
+use dimcmc::star::{Response, StarState};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -81,6 +81,19 @@ pub fn truth(scene: &Scene) -> StarState {
 /// A map with structure on all scales: no two neighbours alike.
 pub fn uneven_map(pixels: usize) -> Vec<f64> {
     (0..pixels).map(|p| 0.8 + 0.2 * (0.7 * p as f64).sin()).collect()
+}
+
+/// That many passes, forward and transpose in turn.
+pub fn passes_of(response: &Response, passes: u32) {
+    let (x, y, z) = (uneven_map(response.pixels()), uneven_map(response.data_len()), uneven_map(response.profiles()));
+    let (mut map, mut line, mut continuum) = (x.clone(), y.clone(), z.clone());
+    for pass in 0..passes {
+        match pass % 2 {
+            0 => response.apply(&x, &mut line, &mut continuum),
+            _ => response.apply_transpose(&y, &z, &mut map),
+        }
+    }
+    std::hint::black_box((map, line, continuum));
 }
 
 /// A posterior and points drawn from its bulk: a Gaussian around the maximum, as wide as the curvature there says.

@@ -4,6 +4,7 @@
 //! Left out: statistics beyond quantiles; criterion has them.
 
 use criterion::Criterion;
+use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// Something to be timed.
@@ -13,8 +14,8 @@ pub struct Candidate<'a> {
 }
 
 impl<'a> Candidate<'a> {
-    pub fn new(name: &'static str, run: impl FnMut() + 'a) -> Self {
-        Candidate { name, run: Box::new(run) }
+    pub fn new<R>(name: &'static str, mut run: impl FnMut() -> R + 'a) -> Self {
+        Candidate { name, run: Box::new(move || drop(black_box(run()))) }
     }
 }
 
