@@ -26,8 +26,12 @@ fn main() {
     }
     let columns = ["command", "seconds", "processor seconds", "peak memory, MiB", "reconstructions"];
     let mut table = Table::new("Whole commands", &columns);
+    let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
     for (command, config, counted) in COMMANDS {
         let name = format!("`dimcmc {command} {config}`");
+        if !name.contains(&filter) {
+            continue;
+        }
         println!("{name} ...");
         let unknown = || "-".to_owned();
         let cells = match run(command, config) {

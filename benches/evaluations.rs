@@ -44,8 +44,9 @@ fn main() {
     let [three, seven] = [Free::Three, Free::Seven].map(|free| most_passes(free).map(|target| target.to_string()));
     table.print(&format!(
         "Objective spottedness; points drawn from a Gaussian around the maximum with the covariance found there: 200 of them, 80 on \
-         20,000 pixels. Targets of passes: {} and {} in 3-D, {} and {} in 7-D. The last column is the median over points of the \
-         time of an evaluation over that of as many passes, forward and transpose in turn, at the same point right after it.",
+         20,000 pixels; the faster of two evaluations each. Targets of passes: {} and {} in 3-D, {} and {} in 7-D. The last column \
+         is the median over points of the time of an evaluation over that of as many passes, forward and transpose in turn, at \
+         the same point.",
         three[0], three[1], seven[0], seven[1]
     ));
 }
@@ -54,11 +55,15 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
     let (mut times, mut pass_times, mut passes) = (Vec::new(), Vec::new(), Vec::new());
     for theta in &bulk.points {
         let response = response(&bulk.posterior, theta);
-        let mut evaluation = None;
-        times.push(seconds(|| evaluation = Some(bulk.posterior.evaluate(theta))));
-        let evaluation = evaluation.expect("just made");
+        let evaluation = bulk.posterior.evaluate(theta);
         assert_eq!(evaluation.status, Status::Converged, "{theta:?}");
-        pass_times.push(seconds(|| passes_of(&response, evaluation.passes)));
+        let (mut time, mut pass_time) = (f64::INFINITY, f64::INFINITY);
+        for _ in 0..2 {
+            time = time.min(seconds(|| bulk.posterior.evaluate(theta)));
+            pass_time = pass_time.min(seconds(|| passes_of(&response, evaluation.passes)));
+        }
+        times.push(time);
+        pass_times.push(pass_time);
         passes.push(f64::from(evaluation.passes));
     }
     let [at_median, at_95] = most_passes(free);

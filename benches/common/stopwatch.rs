@@ -20,9 +20,9 @@ impl<'a> Candidate<'a> {
 }
 
 /// Seconds that `f` takes.
-pub fn seconds(f: impl FnOnce()) -> f64 {
+pub fn seconds<R>(f: impl FnOnce() -> R) -> f64 {
     let began = Instant::now();
-    f();
+    black_box(f());
     began.elapsed().as_secs_f64()
 }
 
@@ -68,6 +68,11 @@ pub fn quantile(values: &[f64], p: f64) -> f64 {
 
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
+}
+
+/// What a machine shared with others comes to when they leave it alone for a round.
+pub fn fastest(times: &[f64]) -> f64 {
+    times.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 /// Median over rounds of the ratio of two times of the same round.
