@@ -15,7 +15,7 @@ const TWICE: Target = Target::AtLeast(1.8);
 /// Parameter vectors of a batch: what the halves of four ensembles of 32 walkers ask for at once.
 const BATCH: usize = 64;
 
-const ROUNDS: usize = 7;
+const ROUNDS: usize = 15;
 
 fn main() {
     if !common::wanted() {

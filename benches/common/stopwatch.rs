@@ -66,18 +66,9 @@ pub fn quantile(values: &[f64], p: f64) -> f64 {
     sorted[below] + share * (sorted[position.ceil() as usize] - sorted[below])
 }
 
-pub fn median(values: &[f64]) -> f64 {
-    quantile(values, 0.5)
-}
-
 /// What a machine shared with others comes to when they leave it alone for a round.
 pub fn fastest(times: &[f64]) -> f64 {
     times.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
-/// Median over rounds of the ratio of two times of the same round.
-pub fn median_ratio(numerator: &[f64], denominator: &[f64]) -> f64 {
-    median(&numerator.iter().zip(denominator).map(|(n, d)| n / d).collect::<Vec<_>>())
 }
 
 /// Slope of ln(cost) against ln(size), by least squares.
