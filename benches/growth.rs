@@ -121,5 +121,5 @@ fn family(name: &str, sizes: &[usize], size: impl Fn(usize) -> Size, table: &mut
 
 /// Time of one of `parts` equal parts of every candidate, in its fastest round.
 fn times_of(candidates: &mut [Candidate], rounds: usize, parts: f64) -> Vec<f64> {
-    in_turn(candidates, rounds).iter().map(|times| fastest(times) / parts).collect()
+    in_turn(candidates, rounds, 1).iter().map(|times| fastest(times) / parts).collect()
 }

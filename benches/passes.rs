@@ -23,7 +23,10 @@ const OVER_PLAIN: Target = Target::AtLeast(4.0);
 /// Times a straight read.
 const OVER_READ: Target = Target::AtMost(3.0);
 
-const ROUNDS: usize = 100;
+const ROUNDS: usize = 50;
+
+/// Runs in a row; an evaluation makes 20 passes and more.
+const RUNS: usize = 8;
 
 /// What the response stores of a visible pair, in bytes: six weights, pixel and node.
 const PAIR_BYTES: usize = 32;
@@ -46,7 +49,7 @@ fn main() {
     }
     criterion.final_summary();
     table.print(&format!(
-        "One thread; the fastest of {ROUNDS} rounds in which all take turns. A pair takes {PAIR_BYTES} bytes in the response and {} in the \
+        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. A pair takes {PAIR_BYTES} bytes in the response and {} in the \
          plain loop, whose windows have {WINDOW} bins; `read` sums as many bytes as the response has. `build` is a response for \
          new stellar parameters, `shift` one for a new orbit.",
         PlainLoop::<WINDOW>::PAIR_BYTES,
@@ -78,7 +81,7 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
     ];
     for (name, candidates) in [("forward", &mut forward), ("transpose", &mut transpose)] {
         by_criterion(criterion, &format!("{name}, {pixels} pixels"), candidates);
-        let times = in_turn(candidates, ROUNDS);
+        let times = in_turn(candidates, ROUNDS, RUNS);
         let per_pair = |times: &[f64], pairs: usize| format!("{:.2}", 1e9 * fastest(times) / pairs as f64);
         table.row([
             thousands(pixels),
@@ -100,7 +103,7 @@ fn builds(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
     let shift = || response.with_velocities(&imager.star, black_box(&state), &imager.sampling);
     let mut candidates = [Candidate::new("build", build), Candidate::new("shift", shift)];
     by_criterion(criterion, &format!("response, {pixels} pixels"), &mut candidates);
-    let times = in_turn(&mut candidates, ROUNDS / 3);
+    let times = in_turn(&mut candidates, ROUNDS / 2, 1);
     for (candidate, times) in candidates.iter().zip(times) {
         let per_pair = format!("{:.2}", 1e9 * fastest(&times) / response.pairs() as f64);
         let none = || "-".to_owned();

@@ -29,7 +29,7 @@ fn main() {
         let (one, two) = (pool(1), pool(2));
         let batch = |pool: &rayon::ThreadPool| pool.install(|| Threads(&bulk.posterior).evaluate(&bulk.points));
         let mut candidates = [Candidate::new("1 thread", || batch(&one)), Candidate::new("2 threads", || batch(&two))];
-        let times = in_turn(&mut candidates, ROUNDS);
+        let times = in_turn(&mut candidates, ROUNDS, 1);
         let rate = |times: &[f64]| format!("{:.0}", BATCH as f64 / fastest(times));
         table.row([
             free.name().to_owned(),

@@ -26,14 +26,14 @@ pub fn seconds<R>(f: impl FnOnce() -> R) -> f64 {
     began.elapsed().as_secs_f64()
 }
 
-/// Seconds of every candidate, `[candidate][round]`. In a round each runs twice and the second time counts: the caches then
-/// hold what they hold in a sequence of passes.
-pub fn in_turn(candidates: &mut [Candidate], rounds: usize) -> Vec<Vec<f64>> {
+/// Seconds of a run of every candidate, `[candidate][round]`. In a round each runs once untimed and then `runs` times: the
+/// caches then hold what they hold in a sequence of passes.
+pub fn in_turn(candidates: &mut [Candidate], rounds: usize, runs: usize) -> Vec<Vec<f64>> {
     let mut times = vec![Vec::with_capacity(rounds); candidates.len()];
     for _ in 0..rounds {
         for (candidate, times) in candidates.iter_mut().zip(&mut times) {
             (candidate.run)();
-            times.push(seconds(&mut candidate.run));
+            times.push(seconds(|| (0..runs).for_each(|_| (candidate.run)())) / runs as f64);
         }
     }
     times
