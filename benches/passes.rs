@@ -49,9 +49,9 @@ fn main() {
     }
     criterion.final_summary();
     table.print(&format!(
-        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. A pair takes {PAIR_BYTES} bytes in the response and {} in the \
-         plain loop, whose windows have {WINDOW} bins; `read` sums as many bytes as the response has. `build` is a response for \
-         new stellar parameters, `shift` one for a new orbit.",
+        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. A pair takes {PAIR_BYTES} bytes \
+         in the response and {} in the plain loop, whose windows have {WINDOW} bins; `read` sums as many bytes as the response \
+         has. `build` is a response for new stellar parameters, `shift` one for a new orbit.",
         PlainLoop::<WINDOW>::PAIR_BYTES,
     ));
 }
