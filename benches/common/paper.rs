@@ -1,0 +1,122 @@
+//! The paper's setup (Petit et al. 2015, section 2) at any size: a spotted star with a planet, 50 profiles over three
+//! rotations in 57 bins; three or seven free parameters.
+//!
+//! Left out: anything that takes a reconstruction but for [`Bulk`].
+
+use dimcmc::config::{self, ObservationSource};
+use dimcmc::ensemble::{StartDraw, draw_start};
+use dimcmc::objective::Posterior;
+use dimcmc::scene::Scene;
+use dimcmc::search::{self, SearchSettings};
+use dimcmc::star::{Response, StarState};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// What is free.
+#[derive(Clone, Copy)]
+pub enum Free {
+    /// The orbit: K, period, phase.
+    Three,
+    /// Also both rotations, inclination and vsini.
+    Seven,
+}
+
+impl Free {
+    pub fn name(self) -> &'static str {
+        match self {
+            Free::Three => "3-D",
+            Free::Seven => "7-D",
+        }
+    }
+
+    fn config(self) -> &'static str {
+        match self {
+            Free::Three => "configs/demo.json",
+            Free::Seven => "configs/paper_7d.json",
+        }
+    }
+}
+
+/// Pixels, profiles and velocity bins.
+#[derive(Clone, Copy)]
+pub struct Size {
+    pub pixels: usize,
+    pub profiles: usize,
+    pub step_kms: f64,
+}
+
+impl Size {
+    /// The paper's profiles and bins on a map of that many pixels.
+    pub fn pixels(pixels: usize) -> Self {
+        Size { pixels, profiles: 50, step_kms: 1.8 }
+    }
+}
+
+/// A file of this repository.
+pub fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+/// The scene, its start at the injected values.
+pub fn scene(free: Free, size: Size) -> Scene {
+    let path = file(free.config());
+    let mut config: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    config["imaging"]["pixels"] = json!(size.pixels);
+    let simulate = &mut config["observations"]["simulate"];
+    simulate["velocity_kms"]["step"] = json!(size.step_kms);
+    let spacing = 3.0 / size.profiles as f64;
+    simulate["cycles"] = (0..size.profiles).map(|k| json!(k as f64 * spacing)).collect();
+    let mut settings = config::from_json(config.to_string().as_bytes(), &path).unwrap();
+    if let ObservationSource::Simulate(simulation) = &settings.source {
+        settings.values = simulation.truth;
+    }
+    Scene::new(settings).unwrap()
+}
+
+/// The star as injected.
+pub fn truth(scene: &Scene) -> StarState {
+    scene.truth.expect("a simulation").state()
+}
+
+/// A map with structure on all scales: no two neighbours alike.
+pub fn uneven_map(pixels: usize) -> Vec<f64> {
+    (0..pixels).map(|p| 0.8 + 0.2 * (0.7 * p as f64).sin()).collect()
+}
+
+/// That many passes, forward and transpose in turn.
+pub fn passes_of(response: &Response, passes: u32) {
+    let (x, y, z) = (uneven_map(response.pixels()), uneven_map(response.data_len()), uneven_map(response.profiles()));
+    let (mut map, mut line, mut continuum) = (x.clone(), y.clone(), z.clone());
+    for pass in 0..passes {
+        match pass % 2 {
+            0 => response.apply(&x, &mut line, &mut continuum),
+            _ => response.apply_transpose(&y, &z, &mut map),
+        }
+    }
+    std::hint::black_box((map, line, continuum));
+}
+
+/// A posterior and points drawn from its bulk: a Gaussian around the maximum, as wide as the curvature there says.
+pub struct Bulk {
+    pub posterior: Posterior,
+    pub points: Vec<Vec<f64>>,
+}
+
+impl Bulk {
+    /// The posterior around its maximum, where a search from the injected values has put the reference.
+    pub fn new(scene: &Scene, points: usize) -> Self {
+        let settings = SearchSettings { prior_starts: 0, ..SearchSettings::new(&scene.settings) };
+        let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
+        let draw = StartDraw {
+            centre: &found.optimum.theta,
+            covariance: &found.optimum.covariance,
+            scale: 1.0,
+            ensembles: 1,
+            walkers: points,
+            seed: 1,
+        };
+        let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
+        let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
+        Bulk { posterior: found.posterior, points }
+    }
+}

@@ -1,0 +1,83 @@
+//! Evaluations of the log-probability over the bulk of the paper's posterior: how many a second, passes each, and what they
+//! cost beyond their passes.
+//!
+//! Left out: how evaluations grow with the size of the problem (`growth`), several threads (`threads`).
+
+mod common;
+
+use common::paper::{Bulk, Free, Size, passes_of, scene};
+use common::stopwatch::{Candidate, by_criterion, criterion, quantile, seconds};
+use common::table::{Table, Target, thousands};
+use dimcmc::log_density::{LogDensity, Status};
+use dimcmc::objective::Posterior;
+use dimcmc::star::Response;
+use std::hint::black_box;
+
+/// An evaluation over its passes.
+const OVER_PASSES: Target = Target::AtMost(1.5);
+
+/// Passes of an evaluation: median and 95 %.
+fn most_passes(free: Free) -> [Target; 2] {
+    match free {
+        Free::Three => [Target::AtMost(30.0), Target::AtMost(80.0)],
+        Free::Seven => [Target::AtMost(45.0), Target::AtMost(120.0)],
+    }
+}
+
+fn main() {
+    if !common::wanted() {
+        return;
+    }
+    let mut criterion = criterion();
+    let over = format!("evaluation / its passes ({OVER_PASSES})");
+    let columns = ["free", "pixels", "evaluations / s and core", "passes: median", "95 %", &over];
+    let mut table = Table::new("Evaluations over the bulk of the posterior", &columns);
+    for free in [Free::Three, Free::Seven] {
+        for (pixels, points) in [(2000, 200), (5000, 200), (20_000, 80)] {
+            let bulk = Bulk::new(&scene(free, Size::pixels(pixels)), points);
+            let mut candidate = [Candidate::new(free.name(), || bulk.posterior.evaluate(black_box(&bulk.points[0])))];
+            by_criterion(&mut criterion, &format!("evaluation, {pixels} pixels"), &mut candidate);
+            measure(&bulk, free, pixels, &mut table);
+        }
+    }
+    criterion.final_summary();
+    let [three, seven] = [Free::Three, Free::Seven].map(|free| most_passes(free).map(|target| target.to_string()));
+    table.print(&format!(
+        "Objective spottedness; points drawn from a Gaussian around the maximum with the covariance found there: 200 of them, 80 on \
+         20,000 pixels; the faster of two evaluations each. Targets of passes: {} and {} in 3-D, {} and {} in 7-D. The last column \
+         is the median over points of the time of an evaluation over that of as many passes, forward and transpose in turn, at \
+         the same point.",
+        three[0], three[1], seven[0], seven[1]
+    ));
+}
+
+fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
+    let (mut times, mut pass_times, mut passes) = (Vec::new(), Vec::new(), Vec::new());
+    for theta in &bulk.points {
+        let response = response(&bulk.posterior, theta);
+        let evaluation = bulk.posterior.evaluate(theta);
+        assert_eq!(evaluation.status, Status::Converged, "{theta:?}");
+        let (mut time, mut pass_time) = (f64::INFINITY, f64::INFINITY);
+        for _ in 0..2 {
+            time = time.min(seconds(|| bulk.posterior.evaluate(theta)));
+            pass_time = pass_time.min(seconds(|| passes_of(&response, evaluation.passes)));
+        }
+        times.push(time);
+        pass_times.push(pass_time);
+        passes.push(f64::from(evaluation.passes));
+    }
+    let ratios: Vec<f64> = times.iter().zip(&pass_times).map(|(time, passes)| time / passes).collect();
+    let [at_median, at_95] = most_passes(free);
+    table.row([
+        free.name().to_owned(),
+        thousands(pixels),
+        format!("{:.1}", times.len() as f64 / times.iter().sum::<f64>()),
+        at_median.judge(quantile(&passes, 0.5), 0),
+        at_95.judge(quantile(&passes, 0.95), 0),
+        OVER_PASSES.judge(quantile(&ratios, 0.5), 2),
+    ]);
+}
+
+fn response(posterior: &Posterior, theta: &[f64]) -> Response {
+    posterior.imager().response(&posterior.space().values_at(theta).state())
+}

@@ -1,0 +1,125 @@
+//! How a pass and an evaluation grow with pixels, profiles and velocity bins.
+//!
+//! Left out: what they cost at the usual sizes beside a yardstick (`passes`, `evaluations`).
+
+mod common;
+
+use common::paper::{Free, Size, passes_of, scene, truth};
+use common::stopwatch::{Candidate, exponent, fastest, in_turn};
+use common::table::{Table, Target, thousands};
+use dimcmc::log_density::{Evaluation, LogDensity};
+use dimcmc::maxent::Problem;
+use dimcmc::objective::{ObjectiveKind, Posterior, Reference};
+use dimcmc::scene::Scene;
+use dimcmc::star::Response;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// Exponent of the cost as a power of the size.
+const EXPONENT: Target = Target::AtMost(1.1);
+
+/// Pixels where they are not what grows.
+const PIXELS: usize = 2000;
+
+/// Passes timed together.
+const PASSES: u32 = 10;
+
+/// Parameter vectors evaluated at each size.
+const POINTS: usize = 6;
+
+/// How far chi2 is brought below that of the true map. A fixed chi2 per datum would ask for another fit at every size, down to
+/// impossible ones: noise moves chi2 by the square root of twice the number of data.
+const FIT: f64 = 100.0;
+
+/// Standard deviations of K, period and phase in the paper's setup.
+const SPREAD: [f64; 3] = [0.01, 0.055, 0.03];
+
+fn main() {
+    if !common::wanted() {
+        return;
+    }
+    let (pass, evaluation) = (format!("pass, ms ({EXPONENT})"), format!("evaluation, ms ({EXPONENT})"));
+    let mut table = Table::new("Growth", &["", "size", &pass, &evaluation, "passes each"]);
+    let pixels = [1250, 5000, 20_000, 80_000];
+    family("pixels", &pixels, Size::pixels, &mut table);
+    let profiles = [25, 50, 100, 200, 400];
+    family("profiles", &profiles, |profiles| Size { profiles, ..Size::pixels(PIXELS) }, &mut table);
+    let bins = [57, 113, 225];
+    // the velocities stay those of 57 bins of 1.8 km/s
+    let finer = |bins| Size { step_kms: 1.8 * 56.0 / (bins - 1) as f64, ..Size::pixels(PIXELS) };
+    family("bins", &bins, finer, &mut table);
+    table.print(&format!(
+        "One thread; the fastest of several rounds in which all sizes of a family take turns. 50 profiles, 57 bins and {} pixels where they \
+         are not what grows. 3-D, objective spottedness, {POINTS} points as far apart as the posterior is wide, chi2 {FIT} below \
+         that of the true map. Exponents by least squares in the logarithms.",
+        thousands(PIXELS)
+    ));
+}
+
+/// One size of a family.
+struct Case {
+    response: Response,
+    posterior: Posterior,
+    points: Vec<Vec<f64>>,
+}
+
+impl Case {
+    fn new(size: Size) -> Self {
+        let scene = scene(Free::Three, size);
+        let data = scene.imager.data.depth.len() as f64;
+        let target = (chi2_of_truth(&scene) - FIT) / data;
+        // the trade-off curve that it does without costs no evaluation anything
+        let reference = Reference::provisional(&scene.imager, scene.settings.values, target).unwrap();
+        let response = reference.response.clone();
+        let start = scene.space.start();
+        let narrower = (2850.0 / data).sqrt();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut point = || -> Vec<f64> {
+            start.iter().zip(SPREAD).map(|(x, sd)| x + narrower * sd * rng.sample::<f64, _>(StandardNormal)).collect()
+        };
+        let points = (0..POINTS).map(|_| point()).collect();
+        let posterior = Posterior::new(scene.imager, scene.space, ObjectiveKind::Spottedness, reference);
+        Case { response, posterior, points }
+    }
+
+    fn passes(&self) -> f64 {
+        let passes: Vec<f64> = self.points.iter().map(|x| f64::from(self.posterior.evaluate(x).passes)).collect();
+        passes.iter().sum::<f64>() / passes.len() as f64
+    }
+}
+
+fn chi2_of_truth(scene: &Scene) -> f64 {
+    let filling = scene.true_spot_filling().expect("a simulation");
+    scene.imager.problem(scene.imager.response(&truth(scene))).linearise(&filling)
+}
+
+/// Rows for all sizes and the exponents.
+fn family(name: &str, sizes: &[usize], size: impl Fn(usize) -> Size, table: &mut Table) {
+    let cases: Vec<Case> = sizes.iter().map(|n| Case::new(size(*n))).collect();
+    let pass = |case: &Case| passes_of(&case.response, PASSES);
+    let mut passes: Vec<Candidate> = cases.iter().map(|case| Candidate::new("pass", move || pass(case))).collect();
+    let pass_times = times_of(&mut passes, 15, f64::from(PASSES));
+    let all_points = |case: &Case| case.points.iter().map(|x| case.posterior.evaluate(x)).collect::<Vec<Evaluation>>();
+    let mut evaluations: Vec<Candidate> =
+        cases.iter().map(|case| Candidate::new("evaluation", move || all_points(case))).collect();
+    let evaluation_times = times_of(&mut evaluations, 5, POINTS as f64);
+    for (k, case) in cases.iter().enumerate() {
+        let (pass, evaluation) = (1e3 * pass_times[k], 1e3 * evaluation_times[k]);
+        table.row([
+            name.to_owned(),
+            thousands(sizes[k]),
+            format!("{pass:.3}"),
+            format!("{evaluation:.1}"),
+            format!("{:.0}", case.passes()),
+        ]);
+    }
+    let sizes: Vec<f64> = sizes.iter().map(|n| *n as f64).collect();
+    let judged = |times: &[f64]| EXPONENT.judge(exponent(&sizes, times), 2);
+    table.row([name.to_owned(), "exponent".to_owned(), judged(&pass_times), judged(&evaluation_times), String::new()]);
+}
+
+/// Time of one of `parts` equal parts of every candidate, in its fastest round.
+fn times_of(candidates: &mut [Candidate], rounds: usize, parts: f64) -> Vec<f64> {
+    in_turn(candidates, rounds, 1).iter().map(|times| fastest(times) / parts).collect()
+}

@@ -1,0 +1,112 @@
+//! The response: forward, transpose and build, against the obvious loop and against a straight read of as many bytes.
+//!
+//! Left out: what a reconstruction does with it (`evaluations`), other sizes (`growth`).
+
+mod common;
+#[path = "../tests/common/plain_loop.rs"]
+mod plain_loop;
+
+use common::paper::{Free, Size, scene, truth, uneven_map};
+use common::stopwatch::{Candidate, by_criterion, criterion, fastest, in_turn};
+use common::table::{Table, Target, thousands};
+use criterion::Criterion;
+use dimcmc::scene::Scene;
+use plain_loop::PlainLoop;
+use std::hint::black_box;
+
+/// Bins of the plain loop's window: 4.5 standard deviations of the line on either side.
+const WINDOW: usize = 16;
+
+/// Times fewer nanoseconds than the plain loop.
+const OVER_PLAIN: Target = Target::AtLeast(4.0);
+
+/// Times a straight read.
+const OVER_READ: Target = Target::AtMost(3.0);
+
+const ROUNDS: usize = 50;
+
+/// Runs in a row; an evaluation makes 20 passes and more.
+const RUNS: usize = 8;
+
+/// What the response stores of a visible pair, in bytes: six weights, pixel and node.
+const PAIR_BYTES: usize = 32;
+
+fn main() {
+    if !common::wanted() {
+        return;
+    }
+    let mut criterion = criterion();
+    let fewer = format!("plain / response ({OVER_PLAIN})");
+    let read = format!("response / read ({OVER_READ})");
+    let mut table = Table::new(
+        "Passes: ns per visible (pixel, profile) pair",
+        &["pixels", "", "response", "plain loop", "read", &fewer, &read],
+    );
+    for pixels in [5000, 20_000] {
+        let scene = scene(Free::Three, Size::pixels(pixels));
+        passes(&scene, pixels, &mut criterion, &mut table);
+        builds(&scene, pixels, &mut criterion, &mut table);
+    }
+    criterion.final_summary();
+    table.print(&format!(
+        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. A pair takes {PAIR_BYTES} bytes \
+         in the response and {} in the plain loop, whose windows have {WINDOW} bins; `read` sums as many bytes as the response \
+         has. `build` is a response for new stellar parameters, `shift` one for a new orbit.",
+        PlainLoop::<WINDOW>::PAIR_BYTES,
+    ));
+}
+
+/// Forward and transpose: response, plain loop, read.
+fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut Table) {
+    let imager = &scene.imager;
+    let response = imager.response(&truth(scene));
+    let plain = PlainLoop::<WINDOW>::new(&imager.grid, &imager.star, &truth(scene), &imager.sampling);
+    let stored = vec![1_u64; response.pairs() * PAIR_BYTES / size_of::<u64>()];
+    let read = || black_box(&stored).iter().fold(0_u64, |sum, x| sum.wrapping_add(*x));
+    let x = uneven_map(response.pixels());
+    let (y, z) = (uneven_map(response.data_len()), uneven_map(response.profiles()));
+
+    let outputs = || (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
+    let ((mut line, mut continuum), (mut plain_line, mut plain_continuum)) = (outputs(), outputs());
+    let (mut map, mut plain_map) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+    let mut forward = [
+        Candidate::new("response", || response.apply(black_box(&x), &mut line, &mut continuum)),
+        Candidate::new("plain loop", || plain.apply(black_box(&x), &mut plain_line, &mut plain_continuum)),
+        Candidate::new("read", read),
+    ];
+    let mut transpose = [
+        Candidate::new("response", || response.apply_transpose(black_box(&y), black_box(&z), &mut map)),
+        Candidate::new("plain loop", || plain.apply_transpose(black_box(&y), black_box(&z), &mut plain_map)),
+        Candidate::new("read", read),
+    ];
+    for (name, candidates) in [("forward", &mut forward), ("transpose", &mut transpose)] {
+        by_criterion(criterion, &format!("{name}, {pixels} pixels"), candidates);
+        let times = in_turn(candidates, ROUNDS, RUNS);
+        let per_pair = |times: &[f64], pairs: usize| format!("{:.2}", 1e9 * fastest(times) / pairs as f64);
+        table.row([
+            thousands(pixels),
+            name.to_owned(),
+            per_pair(&times[0], response.pairs()),
+            per_pair(&times[1], plain.pairs()),
+            per_pair(&times[2], response.pairs()),
+            OVER_PLAIN.judge(fastest(&times[1]) / fastest(&times[0]), 1),
+            OVER_READ.judge(fastest(&times[0]) / fastest(&times[2]), 1),
+        ]);
+    }
+}
+
+/// Responses for new stellar parameters and for a new orbit.
+fn builds(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut Table) {
+    let (imager, state) = (&scene.imager, truth(scene));
+    let response = imager.response(&state);
+    let build = || imager.response(black_box(&state));
+    let shift = || response.with_velocities(&imager.star, black_box(&state), &imager.sampling);
+    let mut candidates = [Candidate::new("build", build), Candidate::new("shift", shift)];
+    by_criterion(criterion, &format!("response, {pixels} pixels"), &mut candidates);
+    let times = in_turn(&mut candidates, ROUNDS / 2, 1);
+    for (candidate, times) in candidates.iter().zip(times) {
+        let per_pair = format!("{:.2}", 1e9 * fastest(&times) / response.pairs() as f64);
+        let none = || "-".to_owned();
+        table.row([thousands(pixels), candidate.name.to_owned(), per_pair, none(), none(), none(), none()]);
+    }
+}
