@@ -28,9 +28,6 @@ const ROUNDS: usize = 50;
 /// Runs in a row; an evaluation makes 20 passes and more.
 const RUNS: usize = 8;
 
-/// What the response stores of a visible pair, in bytes: six weights, pixel and node.
-const PAIR_BYTES: usize = 32;
-
 fn main() {
     if !common::wanted() {
         return;
@@ -49,9 +46,8 @@ fn main() {
     }
     criterion.final_summary();
     table.print(&format!(
-        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. A pair takes {PAIR_BYTES} bytes \
-         in the response and {} in the plain loop, whose windows have {WINDOW} bins; `read` sums as many bytes as the response \
-         has. `build` is a response for new stellar parameters, `shift` one for a new orbit.",
+        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. `read` sums as many \
+         bytes as the response stores for its pairs ({} each in the plain loop, whose windows have {WINDOW} bins). `build` is a response for new stellar parameters, `shift` one for a new orbit.",
         PlainLoop::<WINDOW>::PAIR_BYTES,
     ));
 }
@@ -61,7 +57,7 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
     let imager = &scene.imager;
     let response = imager.response(&truth(scene));
     let plain = PlainLoop::<WINDOW>::new(&imager.grid, &imager.star, &truth(scene), &imager.sampling);
-    let stored = vec![1_u64; response.pairs() * PAIR_BYTES / size_of::<u64>()];
+    let stored = vec![1_u64; response.bytes() / size_of::<u64>()];
     let read = || black_box(&stored).iter().fold(0_u64, |sum, x| sum.wrapping_add(*x));
     let x = uneven_map(response.pixels());
     let (y, z) = (uneven_map(response.data_len()), uneven_map(response.profiles()));

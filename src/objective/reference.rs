@@ -6,7 +6,9 @@
 use super::parameters::ParameterValues;
 use super::tradeoff::{Node, TradeOff};
 use crate::imaging::Imager;
-use crate::maxent::{Best, Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
+use crate::maxent::{
+    Best, Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
+};
 use crate::star::Response;
 
 /// Rank of the preconditioner; directions beyond it have lambda x curvature below 1 on the paper's setup.

@@ -3,6 +3,7 @@
 //! A bin is a whole number m of grid steps wide: kept as m interleaved rows (node i is entry i / m of row i mod m), the grid
 //! is turned into bins by one short filter a row. The orbit and the systemic velocity only shift the filters. Left out: pixels.
 
+use super::correlate::{CHUNK, correlate, in_chunks};
 use super::line_profile::LineKernel;
 use crate::vector::Instructions;
 
@@ -20,9 +21,6 @@ struct Filter {
     /// The taps in reverse order, for the transpose.
     reversed: Vec<f64>,
 }
-
-/// Sums that are kept in registers together.
-const CHUNK: usize = 16;
 
 impl ProfileConvolution {
     /// For a profile whose first bin lies `first_bin_kms` above the grid's first node, in the star's frame.
@@ -50,14 +48,12 @@ impl ProfileConvolution {
     /// Line depth in every bin (overwritten) from the rows of the grid.
     #[inline(always)]
     pub fn sum_to_bins(&self, i: impl Instructions, rows: &Rows, bins: &mut [f64]) {
-        for (chunk, b) in bins.chunks_mut(CHUNK).zip((0..).step_by(CHUNK)) {
-            let mut sums = [0.0; CHUNK];
+        in_chunks(bins, |bin, sums| {
             for (row, filter) in self.filters.iter().enumerate() {
-                let first = (filter.first + rows.margin as isize) as usize + b;
-                correlate(i, &filter.taps, &rows.row(row)[first..], &mut sums);
+                let first = (filter.first + rows.margin as isize) as usize + bin;
+                correlate(i, &filter.taps, &rows.row(row)[first..], sums);
             }
-            chunk.copy_from_slice(&sums[..chunk.len()]);
-        }
+        });
     }
 
     /// Transpose of [`ProfileConvolution::sum_to_bins`]: sets the rows of the grid from the bins.
@@ -73,21 +69,7 @@ impl ProfileConvolution {
             rows.padded.resize(bins.len() + 2 * margin + CHUNK, 0.0);
             let first = (filter.first + rows.margin as isize) as usize;
             let targets = &mut rows.values[row * rows.stride + first..][..bins.len() + margin];
-            for (chunk, c) in targets.chunks_mut(CHUNK).zip((0..).step_by(CHUNK)) {
-                let mut sums = [0.0; CHUNK];
-                correlate(i, &filter.reversed, &rows.padded[c..], &mut sums);
-                chunk.copy_from_slice(&sums[..chunk.len()]);
-            }
-        }
-    }
-}
-
-/// `sums[i] += sum_q taps[q] source[q + i]`.
-#[inline(always)]
-fn correlate(i: impl Instructions, taps: &[f64], source: &[f64], sums: &mut [f64; CHUNK]) {
-    for (tap, window) in taps.iter().zip(source.windows(CHUNK)) {
-        for (sum, x) in sums.iter_mut().zip(window) {
-            *sum = i.multiply_add(*tap, *x, *sum);
+            in_chunks(targets, |column, sums| correlate(i, &filter.reversed, &rows.padded[column..], sums));
         }
     }
 }

@@ -89,10 +89,11 @@ impl Deposit {
     #[allow(unsafe_code)]
     pub fn gather<I: Instructions>(&self, i: I, k: usize, x: &[f64], moments: &mut Moments, nodes: &mut [f64]) {
         assert_eq!(x.len(), self.pixels);
-        for (cell, blocks) in self.blocks_of(k).enumerate() {
+        let mut powers = moments.powers.each_mut().map(|power| power[BEYOND..self.nodes].iter_mut());
+        for blocks in self.blocks_of(k) {
             // safe: blocks hold pixels of the grid alone
             let sums = unsafe { kernel::sum(i, blocks, x) };
-            moments.powers.iter_mut().zip(sums).for_each(|(moments, sum)| moments[BEYOND + cell] = sum);
+            powers.iter_mut().zip(sums).for_each(|(power, sum)| *power.next().expect("a cell") = sum);
         }
         nodes.fill(0.0);
         for (power, moments) in moments.powers.iter().enumerate() {
@@ -105,8 +106,8 @@ impl Deposit {
     #[allow(unsafe_code)]
     pub fn scatter<I: Instructions>(&self, i: I, k: usize, nodes: &[f64], moments: &mut Moments, out: &mut [f64]) {
         assert_eq!(out.len(), self.pixels);
-        for (power, moments) in moments.powers.iter_mut().enumerate() {
-            let cells = &mut moments[BEYOND..self.nodes];
+        for (power, coefficients) in moments.powers.iter_mut().enumerate() {
+            let cells = &mut coefficients[BEYOND..self.nodes];
             cells.fill(0.0);
             correlate(i, &std::array::from_fn(|n| DEPOSIT_WEIGHTS[n][power]), nodes, cells);
         }
@@ -121,7 +122,7 @@ impl Deposit {
 /// Nodes of a cell beyond the one that it is counted by.
 const BEYOND: usize = DEPOSIT_NODES - 1;
 
-/// Scratch of a deposit: the sums of every power of the position in every cell, and room for the cells before the first.
+/// Scratch of a deposit: of every power of the position its sum, or its coefficient, in every cell, and room before the first.
 #[derive(Clone, Debug)]
 pub struct Moments {
     powers: [Vec<f64>; DEPOSIT_NODES],
@@ -134,22 +135,13 @@ impl Moments {
     }
 }
 
-/// `out[j] += sum_n weights[n] source[j + n]`.
+/// `out[j] += sum_n weights[n] source[j + n]`, as far as there is an output or a source.
 #[inline(always)]
 fn correlate(i: impl Instructions, weights: &[f64; DEPOSIT_NODES], source: &[f64], out: &mut [f64]) {
     let sources: [&[f64]; DEPOSIT_NODES] = std::array::from_fn(|n| &source[n..n + out.len()]);
     for (j, out) in out.iter_mut().enumerate() {
-        let low = i.multiply_add(
-            weights[2],
-            sources[2][j],
-            i.multiply_add(weights[1], sources[1][j], weights[0] * sources[0][j]),
-        );
-        let high = i.multiply_add(
-            weights[5],
-            sources[5][j],
-            i.multiply_add(weights[4], sources[4][j], weights[3] * sources[3][j]),
-        );
-        *out += low + high;
+        let term = |n: usize, sum: f64| i.multiply_add(weights[n], sources[n][j], sum);
+        *out += term(2, term(1, weights[0] * sources[0][j])) + term(5, term(4, weights[3] * sources[3][j]));
     }
 }
 

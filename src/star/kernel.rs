@@ -114,10 +114,14 @@ mod avx2 {
                 *sum = _mm256_fmadd_pd(amount, power, *sum);
             }
         }
-        sums.map(|sum| {
-            let halves = _mm_add_pd(_mm256_castpd256_pd128(sum), _mm256_extractf128_pd::<1>(sum));
-            _mm_cvtsd_f64(_mm_add_sd(halves, _mm_unpackhi_pd(halves, halves)))
-        })
+        let mut totals = [0.0; DEPOSIT_NODES];
+        for (totals, pair) in totals.chunks_exact_mut(2).zip(sums.chunks_exact(2)) {
+            let neighbours = _mm256_hadd_pd(pair[0], pair[1]);
+            let both = _mm_add_pd(_mm256_castpd256_pd128(neighbours), _mm256_extractf128_pd::<1>(neighbours));
+            totals[0] = _mm_cvtsd_f64(both);
+            totals[1] = _mm_cvtsd_f64(_mm_unpackhi_pd(both, both));
+        }
+        totals
     }
 
     /// As [`super::plain_spread`].

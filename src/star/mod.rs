@@ -4,6 +4,7 @@
 //! Left out: priors, chi2, chains, files. Angles are radians here, velocities km/s, times days.
 
 mod convolution;
+mod correlate;
 mod deposit;
 pub mod grid;
 mod kernel;

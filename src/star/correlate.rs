@@ -1,0 +1,32 @@
+//! Short filters along a row of numbers, a chunk of results at a time in registers.
+//!
+//! Left out: what is filtered; the caller sees to it that rows reach far enough.
+
+use crate::vector::Instructions;
+
+/// Results that are kept in registers together.
+pub const CHUNK: usize = 16;
+
+/// `sums[j] += sum_q taps[q] source[q + j]`; the source must reach [`CHUNK`] - 1 entries beyond the last tap.
+#[inline(always)]
+pub fn correlate(i: impl Instructions, taps: &[f64], source: &[f64], sums: &mut [f64; CHUNK]) {
+    assert!(source.len() + 1 >= taps.len() + CHUNK);
+    for (tap, window) in taps.iter().zip(source.windows(CHUNK)) {
+        for (sum, x) in sums.iter_mut().zip(window) {
+            *sum = i.multiply_add(*tap, *x, *sum);
+        }
+    }
+}
+
+/// Sets `out[j]` to what `sum` makes of the chunk that begins at `j`.
+#[inline(always)]
+pub fn in_chunks(out: &mut [f64], mut sum: impl FnMut(usize, &mut [f64; CHUNK])) {
+    for (k, chunk) in out.chunks_mut(CHUNK).enumerate() {
+        let mut sums = [0.0; CHUNK];
+        sum(k * CHUNK, &mut sums);
+        match <&mut [f64; CHUNK]>::try_from(&mut *chunk) {
+            Ok(whole) => *whole = sums,
+            Err(_) => chunk.iter_mut().zip(sums).for_each(|(out, sum)| *out = sum),
+        }
+    }
+}
