@@ -33,7 +33,7 @@ pub struct SolverSettings {
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        SolverSettings { tolerance: 2e-4, cg_tolerance: 0.05, cg_iterations: 300, newton_steps: 60 }
+        SolverSettings { tolerance: 5e-5, cg_tolerance: 0.05, cg_iterations: 300, newton_steps: 60 }
     }
 }
 

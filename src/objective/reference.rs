@@ -114,7 +114,6 @@ impl Reference {
         if solution.termination != Termination::Converged {
             return Err(ReferenceError::Solver(solution.termination));
         }
-        let solver = Solver { settings: SolverSettings { tolerance: 1e-4, ..SolverSettings::default() }, ..solver };
         reference.tradeoff = follow(&solver, &mut problem, &solution);
         reference.largest_lambda = reference.tradeoff.nodes().last().expect("the reference itself").lambda;
         reference.solution = solution;
