@@ -23,6 +23,9 @@ pub enum Goal {
 pub struct SolverSettings {
     /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth where chi2 is the goal.
     pub tolerance: f64,
+    /// Error allowed besides far below the best solution, over the distance to it: a chain never sees it, and a landscape
+    /// shows it as a small part of its depth.
+    pub leniency: f64,
     /// Residual of the Newton systems over their right-hand side.
     pub cg_tolerance: f64,
     /// Most iterations of conjugate gradients for one Newton system.
@@ -33,27 +36,29 @@ pub struct SolverSettings {
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        SolverSettings { tolerance: 5e-5, cg_tolerance: 0.05, cg_iterations: 300, newton_steps: 60 }
+        SolverSettings { tolerance: 5e-5, leniency: 0.005, cg_tolerance: 0.05, cg_iterations: 40, newton_steps: 60 }
     }
 }
 
-/// Largest error allowed to a solution, over its distance from the best.
-const LENIENCY: f64 = 0.005;
-
-/// Solutions this far below the best, in units of log-likelihood, are found to twice the tolerance.
-const LENIENT_FROM: f64 = 10.0;
+/// Solutions this far below the best, in units of log-likelihood, are granted half of [`SolverSettings::leniency`], those
+/// within a quarter of it next to nothing.
+const LENIENT_FROM: f64 = 40.0;
 
 impl SolverSettings {
-    /// The error allowed to a solution that is `drop` below the best in log-likelihood: a chain never sees it, and a landscape
-    /// shows it to a small fraction of itself.
+    /// The error allowed to a solution that is `drop` below the best in log-likelihood.
     pub fn tolerance_at(&self, drop: f64) -> f64 {
-        let lenient = self.tolerance * (1.0 + (drop / LENIENT_FROM).max(0.0).powi(3));
-        lenient.min(LENIENCY * drop).max(self.tolerance)
+        let far = (drop.max(0.0) / LENIENT_FROM).powi(4);
+        self.tolerance + self.leniency * drop.max(0.0) * far / (1.0 + far)
+    }
+
+    /// As many iterations as it takes: for systems that the preconditioner is not made for.
+    pub fn patient() -> Self {
+        SolverSettings { cg_iterations: 300, ..SolverSettings::default() }
     }
 
     /// To rounding error rather than to what a chain needs: for references and tests.
     pub fn exact() -> Self {
-        SolverSettings { tolerance: 1e-9, cg_tolerance: 1e-3, ..SolverSettings::default() }
+        SolverSettings { tolerance: 1e-9, leniency: 0.0, cg_tolerance: 1e-3, ..SolverSettings::patient() }
     }
 }
 

@@ -253,11 +253,10 @@ impl Solver<'_> {
         let mut step = vec![0.0; n];
         let system = System { lambda: at.lambda, scale, curvature };
         self.solve_system(problem, system, right, &mut step);
-        let mut path = vec![0.0; n];
-        if let Goal::Chi2 { .. } = goal {
-            if guess.len() == n {
-                path = guess;
-            }
+        let mut path = guess;
+        path.resize(n, 0.0);
+        // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be
+        if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound {
             let pull: Vec<f64> = chi2_gradient.iter().map(|g| -at.lambda * g).collect();
             self.solve_system(problem, system, &pull, &mut path);
         }

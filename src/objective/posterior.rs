@@ -128,7 +128,8 @@ impl Posterior {
         }
         // so far from the reference that a blank star is the better start
         let none = Preconditioner::identity();
-        let far = Solver { preconditioner: &none, ..self.solver() };
+        let settings = SolverSettings { cg_iterations: SolverSettings::patient().cg_iterations, ..self.settings };
+        let far = Solver { preconditioner: &none, settings, ..self.solver() };
         let solution = far.solve(&mut problem, self.goal(), &self.reference.blank(&self.imager));
         (solution, problem)
     }

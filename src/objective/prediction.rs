@@ -48,7 +48,7 @@ impl Prediction {
         let solver = Solver {
             entropy: imager.entropy,
             preconditioner: &reference.preconditioner,
-            settings: SolverSettings { cg_tolerance: 0.01, ..SolverSettings::default() },
+            settings: SolverSettings { cg_tolerance: 0.01, ..SolverSettings::patient() },
         };
         let solution = &reference.solution;
         let n = imager.grid.len();

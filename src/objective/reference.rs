@@ -149,7 +149,7 @@ impl Reference {
         let coarse = Solver {
             entropy: imager.entropy,
             preconditioner: &none,
-            settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::default() },
+            settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::patient() },
         };
         let blank = Start::blank(&imager.entropy, imager.grid.len(), BLANK_LAMBDA / data);
         let mut unspotted = vec![0.0; imager.grid.len()];
@@ -162,7 +162,7 @@ impl Reference {
         let easy = coarse.solve(&mut problem, goal((FIRST_CHI2 * chi2_target).min(blank_chi2)), &blank);
         let preconditioner = precondition(imager, &mut problem, &easy);
         let fine =
-            Solver { preconditioner: &preconditioner, settings: SolverSettings::default(), entropy: imager.entropy };
+            Solver { preconditioner: &preconditioner, settings: SolverSettings::patient(), entropy: imager.entropy };
         let solution = fine.solve(&mut problem, goal(chi2_target), &start(&easy));
         let preconditioner = precondition(imager, &mut problem, &solution);
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
