@@ -10,6 +10,7 @@ pub mod preconditioner;
 pub mod problem;
 pub mod solution;
 pub mod solver;
+mod standing;
 
 pub use parallelism::parallelism;
 pub use preconditioner::Preconditioner;

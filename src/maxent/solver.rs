@@ -2,35 +2,25 @@
 //! (method section 2).
 //!
 //! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: one solve gives the Newton step
-//! at fixed lambda, a second one `ds / d ln(lambda)`, and the linearised constraint says how far to go along it. Every call
-//! starts from the image it is given and from nothing else, so the answer is a function of problem and start.
-//! Left out: what the image shows.
+//! at fixed lambda, a second one `ds / d ln(lambda)`, and the linearised constraint says how far to go along it. The steps end
+//! where a first-order forecast of what they would still change (`standing`) is good enough. Every call starts from the image
+//! it is given and from nothing else, so the answer is a function of problem and start. Left out: what the image shows.
 
 use super::cg::{self, CgLimits, axpy, dot};
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
-use super::solution::{Best, Goal, Image, Solution, SolverSettings, Start, Termination};
+use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
+use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing, lambda_step};
 
-/// Largest change of a logit in one step, and of ln(lambda).
+/// Largest change of a logit in one step.
 const LOGIT_CAP: f64 = 2.0;
-const LN_LAMBDA_CAP: f64 = 1.5;
 
 /// Largest change of ln(lambda) that is made before the first Newton step.
 const RESTORE_REACH: f64 = 0.3;
 
 /// The exact curvature is used once a step is worth less than this in `S/lambda - chi2/2`.
 const EXACT_BELOW: f64 = 100.0;
-
-/// Error of a first-order forecast of what spottedness has left to change, over the forecast.
-const FORECAST_ERROR: f64 = 0.03;
-
-/// Error of that forecast for what the preconditioner's eigenvectors do not span, over the merit of it: pixels that become
-/// spotted, where spottedness is far from linear. Both were measured on the paper's setup in three and seven dimensions.
-const REST_ERROR: f64 = 40.0;
-
-/// Bounds of lambda: far beyond any use, they keep a hopeless start finite.
-const SMALLEST_LAMBDA: f64 = 1e-12;
 
 /// The solver: entropy, preconditioner and settings.
 #[derive(Clone, Debug)]
@@ -43,55 +33,12 @@ pub struct Solver<'a> {
     pub settings: SolverSettings,
 }
 
-/// The point where the solver is, with what has been computed there.
-struct Point {
-    u: Vec<f64>,
-    s: Vec<f64>,
-    lambda: f64,
-    chi2: f64,
-    entropy: f64,
-}
-
 /// A Newton system in the entropy's metric.
 #[derive(Clone, Copy)]
 struct System<'a> {
     lambda: f64,
     scale: &'a [f64],
     curvature: Curvature,
-}
-
-/// Where a point stands: the gradient there, and what the curvature of the reference makes of it.
-struct Standing {
-    scale: Vec<f64>,
-    /// Gradient of chi2 / 2, in the metric.
-    chi2_gradient: Vec<f64>,
-    /// Minus the gradient of the merit at the point's lambda, in the metric.
-    right: Vec<f64>,
-    /// Slopes of chi2 and of spottedness along the path.
-    chi2_path: f64,
-    spottedness_path: f64,
-    /// First-order forecasts of what is left: the move of ln(lambda), and what the image's error is worth in spottedness.
-    move_lambda: f64,
-    spottedness_left: f64,
-    /// Estimate of the error left in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth.
-    error: f64,
-    /// Whether lambda is at its bound and chi2 still above the target.
-    at_bound: bool,
-}
-
-impl Standing {
-    /// About how far the solution at hand is below `best` in log-likelihood.
-    fn below(&self, best: &Best, at: &Point, goal: Goal, area: &[f64]) -> f64 {
-        match goal {
-            Goal::Lambda(lambda) => best.merit - (at.entropy / lambda - 0.5 * at.chi2),
-            Goal::Chi2 { target, .. } => {
-                let moved = (target - at.chi2) * self.spottedness_path / self.chi2_path;
-                let (more, misfit) = if self.at_bound { (0.0, at.chi2 - target) } else { (moved, 0.0) };
-                let spottedness = dot(&at.s, area) + more - best.spottedness;
-                0.5 * (misfit - spottedness * self.chi2_path / self.spottedness_path)
-            }
-        }
-    }
 }
 
 /// Step at fixed lambda and path along lambda, in the metric.
@@ -119,8 +66,9 @@ impl Solver<'_> {
             if !(at.chi2.is_finite() && at.entropy.is_finite()) {
                 return self.finish(problem, at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
-            let standing = self.stand(problem, &at, goal, &path, &start.adjoint);
-            let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal, problem.area()));
+            let guide = Guide { preconditioner: self.preconditioner, path: &path, adjoint: &start.adjoint };
+            let standing = Standing::of(problem, self.entropy, &at, goal, guide);
+            let drop = start.best.map_or(0.0, |best| standing.below(&best, problem.area(), &at, goal));
             if standing.error < self.settings.tolerance_at(drop) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
                 return self.finish(problem, at, Some(standing), path, why, newton_steps);
@@ -129,7 +77,7 @@ impl Solver<'_> {
                 return self.finish(problem, at, Some(standing), path, Termination::StepLimit, newton_steps);
             }
             let newton = self.newton(problem, &at, &standing, goal, path, curvature);
-            let move_lambda = self.lambda_step(&at, newton.chi2_path, newton.chi2_step, goal);
+            let move_lambda = lambda_step(&at, newton.chi2_path, newton.chi2_step, goal);
             at = self.advance(problem, &at, &standing.scale, &newton, move_lambda);
             // far away the curvature of the model may make the system indefinite, near by it makes the steps exact
             let near = 0.5 * newton.decrement < EXACT_BELOW * at.lambda;
@@ -176,68 +124,6 @@ impl Solver<'_> {
         self.arrive(problem, u, at.lambda * move_lambda.exp())
     }
 
-    /// Gradient at a point, and how far it is from the goal as far as the preconditioner, the path and the adjoint can tell.
-    ///
-    /// With `H path = -lambda g` (g the gradient of chi2/2), a step `H step = right` changes chi2 by `-2 path right / lambda`,
-    /// and spottedness, at the chi2 that is the goal, by `adjoint right`: both without solving for the step.
-    fn stand(&self, problem: &mut impl Problem, at: &Point, goal: Goal, path: &[f64], adjoint: &[f64]) -> Standing {
-        let n = at.u.len();
-        let (mut scale, mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        self.entropy.metric(&at.s, problem.area(), &mut scale);
-        problem.gradient(&mut chi2_gradient);
-        self.entropy.gradient(&at.u, problem.area(), &mut right);
-        for p in 0..n {
-            chi2_gradient[p] *= scale[p];
-            right[p] = -(right[p] * scale[p] + at.lambda * chi2_gradient[p]);
-        }
-        let mut standing = Standing {
-            scale,
-            chi2_gradient,
-            right,
-            chi2_path: 0.0,
-            spottedness_path: 0.0,
-            move_lambda: 0.0,
-            spottedness_left: 0.0,
-            error: f64::INFINITY,
-            at_bound: false,
-        };
-        let merits = |left: &[f64]| {
-            let (spanned, rest) = self.preconditioner.norms(at.lambda, left);
-            (0.5 * spanned / at.lambda, 0.5 * rest / at.lambda)
-        };
-        let Goal::Chi2 { target, largest_lambda } = goal else {
-            let (spanned, rest) = merits(&standing.right);
-            standing.error = spanned + rest;
-            return standing;
-        };
-        if path.len() != n {
-            return standing;
-        }
-        let (g, right) = (&standing.chi2_gradient, &standing.right);
-        standing.chi2_path = 2.0 * dot(g, path);
-        standing.spottedness_path = dot3(&standing.scale, problem.area(), path);
-        let chi2_step = -2.0 * dot(path, right) / at.lambda;
-        standing.move_lambda = self.lambda_step(at, standing.chi2_path, chi2_step, goal);
-        standing.at_bound = at.lambda >= largest_lambda && standing.move_lambda == 0.0 && at.chi2 + chi2_step > target;
-        let mut left = right.clone();
-        axpy(-standing.move_lambda * at.lambda, g, &mut left);
-        let (spanned, rest) = merits(&left);
-        standing.error = spanned + rest;
-        if standing.at_bound {
-            standing.error += 0.5 * FORECAST_ERROR * chi2_step.abs();
-            return standing;
-        }
-        standing.error += 0.5 * (standing.chi2_path * standing.move_lambda * standing.move_lambda).abs();
-        if adjoint.len() == n {
-            // no component along the path: the move of lambda is accounted for by chi2
-            let along = -2.0 * dot(g, adjoint) / standing.chi2_path;
-            standing.spottedness_left = dot(adjoint, right) + along * dot(path, right);
-            let worth = 0.5 * standing.chi2_path / standing.spottedness_path;
-            standing.error += FORECAST_ERROR * (standing.spottedness_left * worth).abs() + REST_ERROR * rest;
-        }
-        standing
-    }
-
     /// The Newton step at fixed lambda and, if chi2 is the goal, the path along lambda.
     fn newton(
         &self,
@@ -282,17 +168,6 @@ impl Solver<'_> {
         let precondition = |r: &[f64], out: &mut [f64]| self.preconditioner.apply(lambda, r, out);
         let limits = CgLimits { tolerance: self.settings.cg_tolerance, iterations: self.settings.cg_iterations };
         cg::solve(apply, precondition, right, z, limits);
-    }
-
-    /// How far to move ln(lambda) so that the linearised chi2 meets the target.
-    fn lambda_step(&self, at: &Point, chi2_path: f64, chi2_step: f64, goal: Goal) -> f64 {
-        let Goal::Chi2 { target, largest_lambda } = goal else { return 0.0 };
-        let wanted = if chi2_path < 0.0 {
-            ((target - at.chi2 - chi2_step) / chi2_path).clamp(-LN_LAMBDA_CAP, LN_LAMBDA_CAP)
-        } else {
-            LN_LAMBDA_CAP * (at.chi2 + chi2_step - target).signum()
-        };
-        wanted.min((largest_lambda / at.lambda).ln().max(0.0)).max((SMALLEST_LAMBDA / at.lambda).ln())
     }
 
     /// Takes the step, halved until the merit function at the new lambda does not grow.
@@ -349,9 +224,4 @@ impl Solver<'_> {
             newton_steps,
         }
     }
-}
-
-/// `sum a b c`.
-fn dot3(a: &[f64], b: &[f64], c: &[f64]) -> f64 {
-    a.iter().zip(b).zip(c).map(|((a, b), c)| a * b * c).sum()
 }
