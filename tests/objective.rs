@@ -114,6 +114,27 @@ fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
 }
 
 #[test]
+fn evaluations_are_as_precise_as_they_say() {
+    for posterior in posteriors() {
+        let exact = posterior.clone().with_settings(SolverSettings::exact());
+        let start = posterior.space().start();
+        // around the reference, errors of 1e-3 at most; far below it, half a per cent of the distance
+        let near = (0..12).map(|i| (nearby(&start, 3 * i + 2), 1e-3));
+        let far = [0.02, 0.04, 0.1].map(|k| {
+            let mut theta = start.clone();
+            theta[0] += k;
+            (theta, 0.0)
+        });
+        for (theta, absolute) in near.chain(far) {
+            let (got, wanted) = (posterior.evaluate(&theta).log_prob, exact.evaluate(&theta).log_prob);
+            let below = exact.evaluate(&start).log_prob - wanted;
+            let allowed = if absolute > 0.0 { absolute } else { 1e-3 + 0.005 * below };
+            assert!((got - wanted).abs() < allowed, "{theta:?}: {got} instead of {wanted}");
+        }
+    }
+}
+
+#[test]
 fn absurd_parameters_are_refused_not_computed() {
     let posterior = &posteriors()[0];
     for (parameter, value) in [(Parameter::K, f64::NAN), (Parameter::K, -0.1), (Parameter::Vsini, 1e9)] {
