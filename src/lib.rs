@@ -64,6 +64,7 @@ pub mod survey;
 pub mod text;
 pub mod units;
 pub mod vector;
+pub mod velocities;
 
 pub use fit::Fit;
 pub use log_density::LogDensity;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
 const LAYERS: &[&[&str]] = &[
-    &["units", "text", "vector", "log_density"],
+    &["units", "text", "vector", "velocities", "log_density"],
     &["observation"],
     &["star", "maxent", "chain", "landscape"],
     &["imaging", "ensemble", "optimise"],
@@ -27,6 +27,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("units", &[]),
     ("text", &[]),
     ("vector", &[]),
+    ("velocities", &[]),
     ("log_density", &[]),
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
