@@ -127,17 +127,44 @@ impl<'a> ImagingProblem<'a> {
         &self.response
     }
 
-    /// Derivative of chi2 / 2 along the image direction `v` at the current map.
-    pub fn slope(&mut self, v: &[f64]) -> f64 {
+    /// Gradient of the part of chi2 / 2 that the given profiles make, with respect to the map, at the current map.
+    pub fn gradient_of(&self, profiles: std::ops::Range<usize>, out: &mut [f64]) {
+        let (mut bins, mut constants) = (vec![0.0; self.bins.len()], vec![0.0; self.constants.len()]);
+        for k in profiles {
+            constants[k] = self.pull(k, &mut bins);
+        }
+        self.response.apply_transpose(&bins, &constants, out);
+    }
+
+    /// What profile `k` hands to the transpose for the gradient: its bins, and the constant that comes with them.
+    fn pull(&self, k: usize, bins: &mut [f64]) -> f64 {
+        let scale = -self.darkness / self.continuum[k];
+        let mut constant = 0.0;
+        for j in self.response.bins(k) {
+            bins[j] = scale * self.weighted_residual[j];
+            constant -= bins[j] * self.model[j];
+        }
+        constant
+    }
+
+    /// Change of every bin's model depth to first order in the change `v` of the map, at the current map.
+    pub fn model_change(&mut self, v: &[f64], out: &mut [f64]) {
         self.passes += 1;
-        self.response.apply(v, &mut self.bins, &mut self.constants);
-        let mut slope = 0.0;
+        self.response.apply(v, out, &mut self.constants);
         for k in 0..self.response.profiles() {
             let scale = -self.darkness / self.continuum[k];
             for j in self.response.bins(k) {
-                slope += self.weighted_residual[j] * scale * (self.bins[j] - self.model[j] * self.constants[k]);
+                out[j] = scale * (out[j] - self.model[j] * self.constants[k]);
             }
         }
+    }
+
+    /// Derivative of chi2 / 2 along the image direction `v` at the current map.
+    pub fn slope(&mut self, v: &[f64]) -> f64 {
+        let mut change = std::mem::take(&mut self.bins);
+        self.model_change(v, &mut change);
+        let slope = change.iter().zip(&self.weighted_residual).map(|(change, residual)| change * residual).sum();
+        self.bins = change;
         slope
     }
 }
@@ -165,15 +192,11 @@ impl Problem for ImagingProblem<'_> {
 
     fn gradient(&mut self, out: &mut [f64]) {
         self.passes += 1;
+        let mut bins = std::mem::take(&mut self.bins);
         for k in 0..self.response.profiles() {
-            let scale = -self.darkness / self.continuum[k];
-            let mut constant = 0.0;
-            for j in self.response.bins(k) {
-                self.bins[j] = scale * self.weighted_residual[j];
-                constant -= self.bins[j] * self.model[j];
-            }
-            self.constants[k] = constant;
+            self.constants[k] = self.pull(k, &mut bins);
         }
+        self.bins = bins;
         self.response.apply_transpose(&self.bins, &self.constants, out);
     }
 

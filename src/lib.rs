@@ -43,6 +43,7 @@
 pub mod chain;
 pub mod config;
 pub mod ensemble;
+pub mod expansion;
 pub mod fit;
 pub mod imaging;
 pub mod io;

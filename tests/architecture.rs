@@ -13,6 +13,7 @@ const LAYERS: &[&[&str]] = &[
     &["star", "maxent", "chain", "landscape"],
     &["imaging", "ensemble", "optimise"],
     &["objective"],
+    &["expansion"],
     &["simulate", "fit"],
     &["io"],
     &["config"],

@@ -93,6 +93,26 @@ impl Prior {
         }
     }
 
+    /// Mean and standard deviation, by the midpoint rule; those of a circle are those of its interval.
+    pub fn mean_and_sd(&self) -> (f64, f64) {
+        const CELLS: usize = 4000;
+        let (lo, hi) = match *self {
+            Prior::Normal { mean, sd, min, max } => {
+                // beyond there is nothing
+                let reach = 10.0 * sd + (mean.clamp(min, max) - mean).abs();
+                (min.max(mean - reach), max.min(mean + reach))
+            }
+            _ => self.bounds(),
+        };
+        let width = (hi - lo) / CELLS as f64;
+        let at = |k: usize| lo + (k as f64 + 0.5) * width;
+        let weight = |k: usize| self.log_density(at(k)).exp() * width;
+        let total: f64 = (0..CELLS).map(weight).sum();
+        let mean = (0..CELLS).map(|k| weight(k) * at(k)).sum::<f64>() / total;
+        let variance = (0..CELLS).map(|k| weight(k) * (at(k) - mean).powi(2)).sum::<f64>() / total;
+        (mean, variance.sqrt())
+    }
+
     /// A random draw, always within the bounds.
     pub fn sample(&self, rng: &mut impl Rng) -> f64 {
         let (lower, upper) = self.bounds();

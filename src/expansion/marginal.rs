@@ -1,0 +1,79 @@
+//! What is left of an expansion for the orbit's velocities when systemic velocity and stellar parameters are integrated out
+//! within their priors, each taken as a Gaussian of the same mean and variance.
+//!
+//! Left out: orbits (`periodogram`).
+
+use super::{Expansion, STELLAR};
+use crate::objective::{FreeParameter, Parameter};
+use crate::velocities::VelocityQuadratic;
+use nalgebra::{DMatrix, DVector};
+
+/// A parameter that is integrated out, with the Gaussian that stands for its prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nuisance {
+    /// Systemic velocity, or one of [`STELLAR`].
+    pub parameter: Parameter,
+    /// Mean of its prior.
+    pub mean: f64,
+    /// Standard deviation of its prior.
+    pub sd: f64,
+}
+
+/// The nuisances among the free parameters of a config.
+pub fn nuisances(free: &[FreeParameter]) -> Vec<Nuisance> {
+    let is_nuisance = |p: Parameter| p == Parameter::Vsys || STELLAR.contains(&p);
+    let nuisance = |f: &FreeParameter| {
+        let (mean, sd) = f.prior.mean_and_sd();
+        Nuisance { parameter: f.parameter, mean, sd }
+    };
+    free.iter().filter(|f| is_nuisance(f.parameter)).map(nuisance).collect()
+}
+
+impl Expansion {
+    /// The quadratic in the velocities of the orbit alone, relative to the systemic velocity of the centre, with the
+    /// `nuisances` integrated out. Stellar ones must be among the coordinates.
+    pub fn velocities(&self, nuisances: &[Nuisance]) -> VelocityQuadratic {
+        let (n, all) = (self.profiles(), self.centre.len());
+        // columns: how each nuisance changes the coordinates
+        let mut columns = DMatrix::zeros(all, nuisances.len());
+        let mut precision = DMatrix::zeros(nuisances.len(), nuisances.len());
+        let mut pull = DVector::zeros(nuisances.len());
+        for (i, nuisance) in nuisances.iter().enumerate() {
+            match self.stellar.iter().position(|&p| p == nuisance.parameter) {
+                Some(s) => columns[(n + s, i)] = 1.0,
+                None => {
+                    assert_eq!(nuisance.parameter, Parameter::Vsys, "a coordinate of the expansion");
+                    columns.rows_mut(0, n).column_mut(i).fill(1.0);
+                }
+            }
+            let weight = nuisance.sd.powi(-2);
+            precision[(i, i)] = weight;
+            pull[i] = weight * (nuisance.mean - self.values[nuisance.parameter]);
+        }
+        // at orbital velocities 0, all else as in the centre
+        let orbit = self.values.state().orbit;
+        let mut back = DVector::zeros(all);
+        back.rows_mut(0, n).copy_from_slice(&self.cycles.iter().map(|&e| orbit.velocity_kms(e)).collect::<Vec<_>>());
+        let gradient = &self.gradient + &self.information * &back;
+        // the answer of the nuisances to a change of velocities: eta = (N' I N + P)^-1 (N' (g - I v) + P (mean - centre))
+        let mut keep = DMatrix::zeros(n, all);
+        keep.view_mut((0, 0), (n, n)).fill_with_identity();
+        let across = self.information.rows(0, n) * &columns;
+        let mut offset = DVector::zeros(n);
+        if !nuisances.is_empty() {
+            let own = columns.tr_mul(&(&self.information * &columns)) + precision;
+            let inverse = own.cholesky().map(|c| c.inverse()).unwrap_or_else(|| DMatrix::zeros(pull.len(), pull.len()));
+            let response = &across * &inverse;
+            keep -= &response * columns.transpose();
+            offset = &response * pull;
+        }
+        let information = &keep * &self.information.columns(0, n);
+        VelocityQuadratic {
+            cycles: self.cycles.clone(),
+            gradient: &keep * gradient - offset,
+            information: 0.5 * (&information + information.transpose()),
+            noise: &keep * &self.noise * keep.transpose(),
+            bias: &keep * &self.bias,
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The regularised likelihood to second order around a reference, in the velocities of the profiles and in the star's own
+//! parameters (method section 4).
+//!
+//! `ln L(x) = max_s [alpha S(s) - chi2(s, x)/2]` at the alpha of the reference is very nearly a quadratic in the velocity of
+//! every profile: it holds where the map that fits best answers the change of a velocity linearly. Its gradient and
+//! curvature take one preconditioned solve a profile. Left out: orbits (`periodogram`), proposals (`surrogate`).
+
+mod marginal;
+mod model;
+
+use crate::imaging::Imager;
+use crate::maxent::{Problem, Solver, SolverSettings};
+use crate::objective::{Parameter, ParameterValues, Reference};
+use model::DisplacedModel;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+pub use marginal::{Nuisance, nuisances};
+
+/// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
+pub const STELLAR: [Parameter; 4] = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination, Parameter::Vsini];
+
+/// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic velocity
+/// together), then the stellar parameters in the units of their names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expansion {
+    /// The parameters that it was made at.
+    pub values: ParameterValues,
+    /// Rotation cycle of each profile.
+    pub cycles: Vec<f64>,
+    /// The stellar parameters among the coordinates.
+    pub stellar: Vec<Parameter>,
+    /// ln L at the centre: `alpha S - chi2/2`.
+    pub log_likelihood: f64,
+    /// Coordinates of the centre.
+    pub centre: DVector<f64>,
+    /// Derivative of ln L at the centre.
+    pub gradient: DVector<f64>,
+    /// Minus the second derivative.
+    pub information: DMatrix<f64>,
+    /// Covariance of the gradient that photon noise makes.
+    pub noise: DMatrix<f64>,
+    /// Expectation of the gradient when the star is the reference image itself: the entropy pulls the map away from it.
+    pub bias: DVector<f64>,
+    /// Applications of the response or its transpose that it took.
+    pub passes: u32,
+}
+
+/// Precision of the solves: the information is good to about this share of itself.
+const CG_TOLERANCE: f64 = 1e-4;
+
+impl Expansion {
+    /// Around `reference`, in the velocities of all profiles and the given `stellar` parameters.
+    ///
+    /// With the data weights W, the residual r, `D_x = dD/dx`, `C_x = d/dx` of the gradient of chi2/2 with respect to the map
+    /// and `M = alpha Hess(-S) + Hess(chi2/2)`: `g_x = -r W D_x` and `I_xy = D_x W D_y + r W D_xy - C_x M^-1 C_y`. Noise n in
+    /// the data changes the gradient by `(D_x - J M^-1 C_x) W n`, J the derivative of the model with respect to the map.
+    pub fn of(imager: &Imager, reference: &Reference, stellar: &[Parameter]) -> Self {
+        let model = DisplacedModel::new(imager, reference, stellar);
+        let lambda = reference.solution.image.lambda;
+        let profiles = model.profiles();
+        let (coordinates, data) = (profiles + stellar.len(), imager.data.depth.len());
+        let solver = Solver {
+            entropy: imager.entropy,
+            preconditioner: &reference.preconditioner,
+            settings: SolverSettings { cg_tolerance: CG_TOLERANCE, ..SolverSettings::patient() },
+        };
+        let pulls: Vec<Vec<f64>> = (0..coordinates).into_par_iter().map(|x| model.pull(x)).collect();
+        // M^-1 C_x, and the change of the model's depths that this change of the map makes
+        let answer = |pull: &Vec<f64>| {
+            let mut problem = model.problem();
+            let mut map = solver.apply_inverse(&mut problem, &reference.solution.image, pull);
+            map.iter_mut().for_each(|m| *m *= lambda);
+            let mut depths = vec![0.0; data];
+            problem.model_change(&map, &mut depths);
+            (map, depths, problem.passes())
+        };
+        let answers: Vec<(Vec<f64>, Vec<f64>, u32)> = pulls.par_iter().map(answer).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut information = model.curvature();
+        for (x, pull) in pulls.iter().enumerate() {
+            for (y, (map, ..)) in answers.iter().enumerate() {
+                // both halves, so that what the solves leave undone is symmetric
+                let share = 0.5 * dot(pull, map);
+                information[(x, y)] -= share;
+                information[(y, x)] -= share;
+            }
+        }
+        let root_weight: Vec<f64> = imager.data.inverse_variance.iter().map(|w| w.sqrt()).collect();
+        let mut unanswered = model.tangents();
+        for (mut column, (_, depths, _)) in unanswered.column_iter_mut().zip(&answers) {
+            for ((c, d), w) in column.iter_mut().zip(depths).zip(&root_weight) {
+                *c = (*c - d) * w;
+            }
+        }
+        let entropy_pull = model.gradient();
+        let bias = answers.iter().map(|(map, ..)| -dot(map, entropy_pull));
+        let solution = &reference.solution;
+        Expansion {
+            values: reference.values,
+            cycles: model.cycles().to_vec(),
+            stellar: stellar.to_vec(),
+            log_likelihood: solution.entropy / lambda - 0.5 * solution.chi2,
+            centre: model.centre(),
+            gradient: model.slope(),
+            noise: unanswered.tr_mul(&unanswered),
+            information,
+            bias: DVector::from_iterator(coordinates, bias),
+            passes: model.passes() + answers.iter().map(|(.., passes)| passes).sum::<u32>(),
+        }
+    }
+
+    /// Number of profiles.
+    pub fn profiles(&self) -> usize {
+        self.cycles.len()
+    }
+
+    /// The coordinates of a point of parameter space.
+    pub fn coordinates(&self, values: &ParameterValues) -> DVector<f64> {
+        let state = values.state();
+        let velocities = self.cycles.iter().map(|&cycle| state.vsys_kms + state.orbit.velocity_kms(cycle));
+        let stellar = self.stellar.iter().map(|&p| values[p]);
+        DVector::from_iterator(self.centre.len(), velocities.chain(stellar))
+    }
+
+    /// ln L there, to second order.
+    pub fn log_likelihood_at(&self, values: &ParameterValues) -> f64 {
+        let step = self.coordinates(values) - &self.centre;
+        self.log_likelihood + self.gradient.dot(&step) - 0.5 * step.dot(&(&self.information * &step))
+    }
+}

@@ -1,0 +1,231 @@
+//! The forward model at a fixed map, displaced in one or two coordinates: its derivatives by central differences.
+//!
+//! A shift of all profiles at once gives every profile's own derivative, because no profile sees another's velocity.
+//! Left out: how the map answers (`expansion`).
+
+use crate::imaging::{Imager, ImagingProblem};
+use crate::maxent::Problem;
+use crate::objective::{Parameter, ParameterValues, Reference};
+use crate::star::Response;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Step of the velocities (km/s): derivatives of a line are good to its square over that of the line's width.
+const VELOCITY_STEP_KMS: f64 = 0.02;
+
+/// Step of a stellar parameter: large enough that so many pixels come into sight at the limb that they do so smoothly.
+fn step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64 {
+    // angle (rad) that the star turns by in half the time base
+    let turn = 0.01 / (0.5 * time_base_d).max(1e-3);
+    match parameter {
+        Parameter::OmegaEq => turn,
+        Parameter::DOmega => 3.0 * turn,
+        Parameter::Inclination => 0.5,
+        _ => 1e-3 * values[parameter],
+    }
+}
+
+/// Residuals over variances of a displaced model, and what it takes to make gradients of them.
+struct Displaced<'a> {
+    problem: ImagingProblem<'a>,
+    /// Model depth of every bin.
+    depth: Vec<f64>,
+}
+
+/// The model at the reference image.
+pub(super) struct DisplacedModel<'a> {
+    imager: &'a Imager,
+    reference: &'a Reference,
+    stellar: Vec<Parameter>,
+    steps: Vec<f64>,
+    map: Vec<f64>,
+    cycles: Vec<f64>,
+    here: Displaced<'a>,
+    /// Gradient of chi2/2 with respect to the map.
+    gradient: Vec<f64>,
+    /// All profiles shifted by a step up and down.
+    shifted: [Displaced<'a>; 2],
+    /// Each stellar parameter a step up and down.
+    turned: Vec<[Displaced<'a>; 2]>,
+}
+
+impl<'a> DisplacedModel<'a> {
+    pub fn new(imager: &'a Imager, reference: &'a Reference, stellar: &[Parameter]) -> Self {
+        let mut map = vec![0.0; imager.grid.len()];
+        imager.entropy.image(&reference.solution.image.logit, &mut map);
+        let base = imager.time_base_cycles() * imager.star.rotation_period_d;
+        let steps: Vec<f64> = stellar.iter().map(|&p| step(p, &reference.values, base)).collect();
+        let at = |response: Response| displaced(imager, response, &map);
+        let mut here = at(reference.response.clone());
+        let mut gradient = vec![0.0; map.len()];
+        here.problem.gradient(&mut gradient);
+        let shift = |h: f64| at(shifted(imager, &reference.response, &reference.values, h));
+        let turn = |(&p, &h): (&Parameter, &f64)| {
+            [h, -h].map(|h| at(imager.response(&moved(&reference.values, &[(p, h)]).state())))
+        };
+        let turned = stellar.par_iter().zip(&steps).map(turn).collect();
+        DisplacedModel {
+            shifted: [VELOCITY_STEP_KMS, -VELOCITY_STEP_KMS].map(shift),
+            cycles: imager.sampling.profiles.iter().map(|p| imager.star.cycle(p.0)).collect(),
+            stellar: stellar.to_vec(),
+            imager,
+            reference,
+            steps,
+            here,
+            gradient,
+            turned,
+            map,
+        }
+    }
+
+    pub fn profiles(&self) -> usize {
+        self.cycles.len()
+    }
+
+    pub fn cycles(&self) -> &[f64] {
+        &self.cycles
+    }
+
+    pub fn gradient(&self) -> &[f64] {
+        &self.gradient
+    }
+
+    pub fn passes(&self) -> u32 {
+        // linearisations, and the pulls: two for each coordinate
+        (3 + 2 * self.turned.len() + 2 * (self.profiles() + self.turned.len())) as u32
+    }
+
+    /// The problem at the reference, linearised at its image.
+    pub fn problem(&self) -> ImagingProblem<'a> {
+        let mut problem = self.imager.problem(self.reference.response.clone());
+        problem.linearise(&self.map);
+        problem
+    }
+
+    /// Coordinates of the reference.
+    pub fn centre(&self) -> DVector<f64> {
+        let state = self.reference.values.state();
+        let velocities = self.cycles.iter().map(|&cycle| state.vsys_kms + state.orbit.velocity_kms(cycle));
+        let stellar = self.stellar.iter().map(|&p| self.reference.values[p]);
+        DVector::from_vec(velocities.chain(stellar).collect())
+    }
+
+    /// `C_x`: how coordinate `x` changes the gradient of chi2/2 with respect to the map.
+    pub fn pull(&self, x: usize) -> Vec<f64> {
+        let (pair, profiles, h) = match x.checked_sub(self.profiles()) {
+            None => (&self.shifted, x..x + 1, VELOCITY_STEP_KMS),
+            Some(i) => (&self.turned[i], 0..self.profiles(), self.steps[i]),
+        };
+        let [plus, minus] = pair.each_ref().map(|at| {
+            let mut gradient = vec![0.0; self.map.len()];
+            at.problem.gradient_of(profiles.clone(), &mut gradient);
+            gradient
+        });
+        plus.iter().zip(minus).map(|(p, m)| (p - m) / (2.0 * h)).collect()
+    }
+
+    /// `D_x` of every bin, a column a coordinate.
+    pub fn tangents(&self) -> DMatrix<f64> {
+        let mut tangents = DMatrix::zeros(self.here.depth.len(), self.profiles() + self.stellar.len());
+        let velocity = first(&self.shifted, VELOCITY_STEP_KMS);
+        for k in 0..self.profiles() {
+            for j in self.bins(k) {
+                tangents[(j, k)] = velocity[j];
+            }
+        }
+        for (i, (pair, h)) in self.turned.iter().zip(&self.steps).enumerate() {
+            tangents.column_mut(self.profiles() + i).copy_from_slice(&first(pair, *h));
+        }
+        tangents
+    }
+
+    /// `-r W D_x`: the derivative of ln L.
+    pub fn slope(&self) -> DVector<f64> {
+        let residual = DVector::from_vec(self.weighted_residual());
+        -self.tangents().tr_mul(&residual)
+    }
+
+    /// `D_x W D_y + r W D_xy`: the curvature of chi2/2 at a fixed map.
+    pub fn curvature(&self) -> DMatrix<f64> {
+        let (profiles, stellar) = (self.profiles(), self.stellar.len());
+        let mut weighted = self.tangents();
+        for (mut row, w) in weighted.row_iter_mut().zip(&self.imager.data.inverse_variance) {
+            row *= w.sqrt();
+        }
+        let mut curvature = weighted.tr_mul(&weighted);
+        let residual = self.weighted_residual();
+        let bent = |second: &[f64], bins: Range<usize>| bins.map(|j| residual[j] * second[j]).sum::<f64>();
+        let velocity = second(&self.shifted, &self.here, VELOCITY_STEP_KMS);
+        for k in 0..profiles {
+            curvature[(k, k)] += bent(&velocity, self.bins(k));
+        }
+        for i in 0..stellar {
+            let own = second(&self.turned[i], &self.here, self.steps[i]);
+            curvature[(profiles + i, profiles + i)] += bent(&own, 0..own.len());
+            let with_velocity = self.mixed((self.stellar[i], self.steps[i]), (Parameter::Vsys, VELOCITY_STEP_KMS));
+            for k in 0..profiles {
+                let share = bent(&with_velocity, self.bins(k));
+                curvature[(k, profiles + i)] += share;
+                curvature[(profiles + i, k)] += share;
+            }
+            for j in 0..i {
+                let both = self.mixed((self.stellar[i], self.steps[i]), (self.stellar[j], self.steps[j]));
+                let share = bent(&both, 0..both.len());
+                curvature[(profiles + i, profiles + j)] += share;
+                curvature[(profiles + j, profiles + i)] += share;
+            }
+        }
+        curvature
+    }
+
+    /// Mixed second difference of the depths in two parameters with their steps.
+    fn mixed(&self, (a, step_a): (Parameter, f64), (b, step_b): (Parameter, f64)) -> Vec<f64> {
+        let at = |(sign_a, sign_b): (f64, f64)| {
+            let values = moved(&self.reference.values, &[(a, sign_a * step_a), (b, sign_b * step_b)]);
+            displaced(self.imager, self.imager.response(&values.state()), &self.map).depth
+        };
+        let corners = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+        let d: Vec<Vec<f64>> = corners.into_par_iter().map(at).collect();
+        (0..d[0].len()).map(|j| (d[0][j] - d[1][j] - d[2][j] + d[3][j]) / (4.0 * step_a * step_b)).collect()
+    }
+
+    fn weighted_residual(&self) -> Vec<f64> {
+        let data = &self.imager.data;
+        let both = self.here.depth.iter().zip(&data.depth).zip(&data.inverse_variance);
+        both.map(|((model, observed), w)| (model - observed) * w).collect()
+    }
+
+    fn bins(&self, profile: usize) -> Range<usize> {
+        self.reference.response.bins(profile)
+    }
+}
+
+fn displaced<'a>(imager: &'a Imager, response: Response, map: &[f64]) -> Displaced<'a> {
+    let mut problem = imager.problem(response);
+    problem.linearise(map);
+    Displaced { depth: problem.model().to_vec(), problem }
+}
+
+/// The response with all profiles shifted by `h` (km/s).
+fn shifted(imager: &Imager, response: &Response, values: &ParameterValues, h: f64) -> Response {
+    let state = moved(values, &[(Parameter::Vsys, h)]).state();
+    response.with_velocities(&imager.star, &state, &imager.sampling)
+}
+
+fn moved(values: &ParameterValues, moves: &[(Parameter, f64)]) -> ParameterValues {
+    let mut values = *values;
+    moves.iter().for_each(|&(p, h)| values[p] += h);
+    values
+}
+
+/// Central first difference of the depths.
+fn first([plus, minus]: &[Displaced; 2], h: f64) -> Vec<f64> {
+    plus.depth.iter().zip(&minus.depth).map(|(p, m)| (p - m) / (2.0 * h)).collect()
+}
+
+/// Central second difference of the depths.
+fn second([plus, minus]: &[Displaced; 2], here: &Displaced, h: f64) -> Vec<f64> {
+    let all = plus.depth.iter().zip(&minus.depth).zip(&here.depth);
+    all.map(|((p, m), d)| (p - 2.0 * d + m) / (h * h)).collect()
+}
