@@ -61,6 +61,7 @@ pub mod scene;
 pub mod search;
 pub mod simulate;
 pub mod star;
+pub mod surrogate;
 pub mod survey;
 pub mod text;
 pub mod units;

@@ -16,6 +16,7 @@ use crate::optimise::Optimum;
 use crate::origin::{Origin, OriginError};
 use crate::scene::Scene;
 use crate::search::Found;
+use crate::surrogate::{Surrogate, SurrogateMove};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -55,6 +56,7 @@ pub struct Run {
     kinds: Vec<ParameterKind>,
     policy: StopPolicy,
     settings: ensemble::SamplerSettings,
+    surrogate: Option<Surrogate>,
     journal: Journal,
 }
 
@@ -156,7 +158,8 @@ impl Run {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, journal }
+        let surrogate = Some(&posterior).filter(|_| settings.moves.surrogate > 0.0).and_then(surrogate);
+        Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, surrogate, journal }
     }
 
     /// The step at which the run ends if its goals are not reached before.
@@ -178,9 +181,12 @@ impl Run {
         stop: &AtomicBool,
         mut on_step: impl FnMut(&[Record], Option<&Convergence>),
     ) -> Result<StopReason, RunError> {
-        let Run { posterior, chain, kinds, policy, settings, journal, .. } = self;
+        let Run { posterior, chain, kinds, policy, settings, surrogate, journal, .. } = self;
         let evaluator = Threads(&*posterior);
-        let sampler = Sampler::new(&*posterior, &evaluator, settings)?;
+        let mut sampler = Sampler::new(&*posterior, &evaluator, settings)?;
+        if let Some(surrogate) = surrogate {
+            sampler = sampler.with_move(settings.moves.surrogate, Box::new(SurrogateMove(surrogate.clone())));
+        }
         let result = ensemble::run(&sampler, chain, kinds, policy, stop, &mut |records, convergence| {
             journal.append(records)?;
             on_step(records, convergence);
@@ -192,6 +198,11 @@ impl Run {
             StepError::Callback(error) => error.into(),
         })
     }
+}
+
+/// The surrogate around the posterior's reference, if there is one.
+fn surrogate(posterior: &Posterior) -> Option<Surrogate> {
+    Surrogate::new(posterior.imager(), posterior.space(), posterior.reference())
 }
 
 fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {

@@ -14,6 +14,7 @@ const LAYERS: &[&[&str]] = &[
     &["imaging", "ensemble", "optimise"],
     &["objective"],
     &["expansion"],
+    &["surrogate"],
     &["simulate", "fit"],
     &["io"],
     &["config"],

@@ -76,6 +76,11 @@ impl<'a> Sampler<'a> {
         Ok(Sampler { density, evaluator, ensembles, walkers, seed, mix: settings.moves.mix() })
     }
 
+    /// The same sampler with one more move, its weight relative to those of the settings.
+    pub fn with_move(self, weight: f64, one: Box<dyn Move>) -> Self {
+        Sampler { mix: self.mix.with(weight, one), ..self }
+    }
+
     /// The same sampler with other moves.
     pub fn with_mix(self, mix: Mix) -> Self {
         Sampler { mix, ..self }

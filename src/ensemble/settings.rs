@@ -107,7 +107,8 @@ mod tests {
             assert!(refused(|s| s.ess = ess).starts_with("sampler.ess"));
         }
         assert!(refused(|s| s.moves.stretch = -1.0).starts_with("sampler.moves"));
-        assert!(refused(|s| s.moves = MoveWeights { stretch: 0.0, differential_evolution: 0.0 }).contains("all zero"));
+        let alone = MoveWeights { stretch: 0.0, differential_evolution: 0.0, surrogate: 1.0 };
+        assert!(refused(|s| s.moves = alone.clone()).contains("both be zero"));
     }
 
     #[test]

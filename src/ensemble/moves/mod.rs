@@ -45,33 +45,40 @@ pub struct MoveWeights {
     pub stretch: f64,
     /// Weight of differential evolution (ter Braak 2006).
     pub differential_evolution: f64,
+    /// Weight of the surrogate move: proposals from the quadratic posterior around the reference. 0 turns it off; it is left
+    /// out where there is no such quadratic (K or phi fixed).
+    pub surrogate: f64,
 }
 
 impl Default for MoveWeights {
     fn default() -> Self {
-        MoveWeights { stretch: 0.25, differential_evolution: 0.75 }
+        MoveWeights { stretch: 0.025, differential_evolution: 0.075, surrogate: 0.9 }
     }
 }
 
 impl MoveWeights {
-    /// Checks that the weights are finite, not negative and not all zero.
+    /// Checks that the weights are finite, not negative, and those of the affine-invariant moves not all zero: they find what
+    /// the surrogate misses.
     ///
     /// # Errors
     /// [`EnsembleError::Setting`].
     pub fn validate(&self) -> Result<(), EnsembleError> {
         let refuse = |problem| Err(EnsembleError::Setting { key: "sampler.moves", problem });
-        let weights: Vec<f64> = self.mix().moves.iter().map(|(weight, _)| *weight).collect();
+        let MoveWeights { stretch, differential_evolution, surrogate } = *self;
+        let weights = [stretch, differential_evolution, surrogate];
         if let Some(bad) = weights.iter().find(|weight| !(weight.is_finite() && **weight >= 0.0)) {
             return refuse(format!("a weight must be a finite number, 0 or above, not {bad}"));
         }
-        let sum: f64 = weights.iter().sum();
-        if sum == 0.0 || !sum.is_finite() {
-            return refuse("the weights must not be all zero, and their sum finite".to_owned());
+        if stretch + differential_evolution == 0.0 {
+            return refuse("the weights of stretch and differential_evolution must not both be zero".to_owned());
+        }
+        if !weights.iter().sum::<f64>().is_finite() {
+            return refuse("the sum of the weights must be finite".to_owned());
         }
         Ok(())
     }
 
-    /// The moves themselves.
+    /// The moves that need nothing but the walkers.
     pub fn mix(&self) -> Mix {
         Mix::default()
             .with(self.stretch, Box::new(Stretch::default()))
