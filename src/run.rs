@@ -30,7 +30,8 @@ pub const SUMMARY: &str = "summary.json";
 /// Where the walkers start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StartFrom {
-    /// Around the maxima that the search found, somewhat wider than their curvature.
+    /// From the quadratic posterior around the optimum, widened: all its peaks get walkers in proportion. Where there is no such
+    /// quadratic, around the maxima that the search found.
     #[default]
     Optimum,
     /// All over the prior.
@@ -56,7 +57,8 @@ pub struct Run {
     kinds: Vec<ParameterKind>,
     policy: StopPolicy,
     settings: ensemble::SamplerSettings,
-    surrogate: Option<Surrogate>,
+    /// With the share of its proposals accepted on trial.
+    surrogate: Option<(Surrogate, f64)>,
     journal: Journal,
 }
 
@@ -101,9 +103,11 @@ impl Run {
     /// [`RunError`]; nothing is written where there is no start.
     pub fn begin(scene: &Scene, folder: &Path, found: Found, from: StartFrom, replace: bool) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
-        let start = match from {
-            StartFrom::Optimum => around_maxima(&found, scene)?,
-            StartFrom::Prior => over_prior(&found.posterior, scene)?,
+        let surrogate = surrogate(&found.posterior);
+        let start = match (from, &surrogate) {
+            (StartFrom::Optimum, Some((surrogate, _))) => from_surrogate(surrogate, &found.posterior, scene)?,
+            (StartFrom::Optimum, None) => around_maxima(&found, scene)?,
+            (StartFrom::Prior, _) => over_prior(&found.posterior, scene)?,
         };
         let first = first_step(scene, &found.posterior, &start)?;
         let manifest = manifest(scene, &found, start);
@@ -119,7 +123,7 @@ impl Run {
         let mut chain = Chain::new(manifest.shape());
         journal.append(&first)?;
         chain.push_step(&first)?;
-        Ok(Run::new(scene, folder, manifest, found.posterior, (journal, chain)))
+        Ok(Run::new(scene, folder, manifest, found.posterior, surrogate, (journal, chain)))
     }
 
     /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
@@ -140,7 +144,8 @@ impl Run {
         if manifest.update(&scene.settings, extend.map(|steps| last_step + steps)) {
             manifest.write(folder)?;
         }
-        Ok(Run::new(scene, folder, manifest, posterior, (journal, chain)))
+        let surrogate = Some(&posterior).filter(|_| scene.settings.sampler.moves.surrogate > 0.0).and_then(surrogate);
+        Ok(Run::new(scene, folder, manifest, posterior, surrogate, (journal, chain)))
     }
 
     /// The run with its chain so far.
@@ -149,6 +154,7 @@ impl Run {
         folder: &Path,
         manifest: Manifest,
         posterior: Posterior,
+        surrogate: Option<(Surrogate, f64)>,
         (journal, chain): (Journal, Chain),
     ) -> Self {
         let settings = scene.settings.sampler.clone();
@@ -158,7 +164,6 @@ impl Run {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        let surrogate = Some(&posterior).filter(|_| settings.moves.surrogate > 0.0).and_then(surrogate);
         Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, surrogate, journal }
     }
 
@@ -184,8 +189,9 @@ impl Run {
         let Run { posterior, chain, kinds, policy, settings, surrogate, journal, .. } = self;
         let evaluator = Threads(&*posterior);
         let mut sampler = Sampler::new(&*posterior, &evaluator, settings)?;
-        if let Some(surrogate) = surrogate {
-            sampler = sampler.with_move(settings.moves.surrogate, Box::new(SurrogateMove(surrogate.clone())));
+        if let Some((surrogate, acceptance)) = surrogate {
+            let weight = settings.moves.surrogate * acceptance.powi(2);
+            sampler = sampler.with_move(weight, Box::new(SurrogateMove(surrogate.clone())));
         }
         let result = ensemble::run(&sampler, chain, kinds, policy, stop, &mut |records, convergence| {
             journal.append(records)?;
@@ -200,9 +206,13 @@ impl Run {
     }
 }
 
-/// The surrogate around the posterior's reference, if there is one.
-fn surrogate(posterior: &Posterior) -> Option<Surrogate> {
-    Surrogate::new(posterior.imager(), posterior.space(), posterior.reference())
+/// The surrogate of the posterior, if there is one, and the share of its proposals accepted on trial: a function of the
+/// posterior alone, so that a resumed run has the same.
+fn surrogate(posterior: &Posterior) -> Option<(Surrogate, f64)> {
+    let expansion = Surrogate::new(posterior.imager(), posterior.space(), posterior.reference())?;
+    let surrogate = expansion.corrected(posterior, &Threads(posterior));
+    let acceptance = surrogate.acceptance(posterior, &Threads(posterior));
+    Some((surrogate, acceptance))
 }
 
 fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
@@ -225,6 +235,17 @@ fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
 fn first_step(scene: &Scene, posterior: &Posterior, start: &Positions) -> Result<Vec<Record>, RunError> {
     let evaluator = Threads(posterior);
     Ok(Sampler::new(posterior, &evaluator, &scene.settings.sampler)?.start(start)?.1)
+}
+
+/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these deserve.
+fn from_surrogate(surrogate: &Surrogate, posterior: &Posterior, scene: &Scene) -> Result<Positions, RunError> {
+    let sampler = &scene.settings.sampler;
+    let Some(wide) = surrogate.tempered(OVERDISPERSION.powi(2)) else { return over_prior(posterior, scene) };
+    let walker = |ensemble: usize, walker: usize| {
+        let position = wide.draw(&mut start_numbers(sampler.seed, ensemble, walker)).ok_or(RunError::PriorStart)?;
+        Ok(posterior.to_written(&position))
+    };
+    (0..sampler.ensembles).map(|e| (0..sampler.walkers).map(|w| walker(e, w)).collect()).collect()
 }
 
 /// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of them

@@ -1,13 +1,15 @@
-//! The way to the reference: from the config's values and from several starts over the prior to the best parameters, and to
-//! the maximum-entropy image there (method section 3, step 1).
+//! The way to the reference: from the config's values, and from the peaks of the likelihood over all periods, to the best
+//! parameters and to the maximum-entropy image there (method section 3, step 1).
 //!
-//! The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last climb is on
+//! The peaks are those of the quadratic around the first climb's end (method section 4); where there is none (K or phi fixed),
+//! orbits drawn from the prior take their place. The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last climb is on
 //! the objective asked for. Left out: the maximum-entropy solver, argmin.
 
 use crate::config::{ImagingSettings, Settings};
 use crate::imaging::Imager;
 use crate::objective::{FreeParameter, ObjectiveKind, ParameterSpace, Posterior, Reference, ReferenceError};
 use crate::optimise::{OptimiseError, Optimum, climb};
+use crate::surrogate::Surrogate;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -20,8 +22,8 @@ pub struct SearchSettings {
     pub chi2_target: f64,
     /// The objective.
     pub objective: ObjectiveKind,
-    /// Number of orbits drawn from the prior to start from, beside the config's values.
-    pub prior_starts: usize,
+    /// Most other orbits to start from, beside the config's values.
+    pub other_starts: usize,
     /// Seed of those draws.
     pub seed: u64,
 }
@@ -30,12 +32,15 @@ impl SearchSettings {
     /// The search that a config asks for.
     pub fn new(settings: &Settings) -> Self {
         let ImagingSettings { chi2_target, objective, .. } = settings.imaging;
-        SearchSettings { chi2_target, objective, prior_starts: PRIOR_STARTS, seed: settings.sampler.seed }
+        SearchSettings { chi2_target, objective, other_starts: OTHER_STARTS, seed: settings.sampler.seed }
     }
 }
 
-/// Orbits drawn from the prior that a search starts from, beside the config's.
-const PRIOR_STARTS: usize = 4;
+/// Most orbits that a search starts from, beside the config's.
+const OTHER_STARTS: usize = 4;
+
+/// Peaks of the quadratic this much below its best in ln L are climbed too.
+const PEAK_DROP: f64 = 10.0;
 
 /// One start of the search and where it led.
 #[derive(Clone, Debug)]
@@ -117,16 +122,14 @@ pub fn find(
     settings: SearchSettings,
     report: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, SearchError> {
-    let SearchSettings { chi2_target, objective, prior_starts, seed } = settings;
-    let orbital = space.free().iter().any(|f| f.parameter.is_orbital());
-    let prior_starts = if orbital { prior_starts } else { 0 };
-    let (evaluations, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let SearchSettings { chi2_target, objective, .. } = settings;
+    let (evaluations, done, all) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(1));
     let at = |stage| report(Progress { stage, evaluations: evaluations.load(Relaxed) });
     at(Stage::FirstImage);
     let start = space.start();
     let first = Reference::provisional(imager, space.values_at(&start), chi2_target)?;
     let smooth = Posterior::new(imager.clone(), space.clone(), ObjectiveKind::RegularisedLikelihood, first);
-    let climbing = || at(Stage::Climbing { done: done.load(Relaxed), starts: 1 + prior_starts });
+    let climbing = || at(Stage::Climbing { done: done.load(Relaxed), starts: all.load(Relaxed) });
     let attempt = |start: Vec<f64>| {
         let tick = || {
             evaluations.fetch_add(1, Relaxed);
@@ -138,9 +141,8 @@ pub fn find(
         Attempt { start, end }
     };
     let mut attempts = vec![attempt(start)];
-    let from = attempts[0].end.as_ref().map_or(attempts[0].start.clone(), |optimum| optimum.theta.clone());
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let starts: Vec<Vec<f64>> = (0..prior_starts).map(|_| with_other_orbit(space, &from, &mut rng)).collect();
+    let starts = other_starts(imager, space, settings, &attempts[0])?;
+    all.fetch_add(starts.len(), Relaxed);
     attempts.extend(starts.into_par_iter().with_max_len(1).map(attempt).collect::<Vec<_>>());
     let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
     let best = attempts.iter().max_by(|a, b| height(a).total_cmp(&height(b))).expect("at least the config's values");
@@ -161,6 +163,29 @@ pub fn find(
         }
     }
     unreachable!("the loop returns")
+}
+
+/// Where else to climb from, after the `first` attempt.
+fn other_starts(
+    imager: &Imager,
+    space: &ParameterSpace,
+    settings: SearchSettings,
+    first: &Attempt,
+) -> Result<Vec<Vec<f64>>, ReferenceError> {
+    let from = first.end.as_ref().map_or(&first.start, |optimum| &optimum.theta);
+    if !space.free().iter().any(|f| f.parameter.is_orbital()) {
+        return Ok(Vec::new());
+    }
+    let here = Reference::provisional(imager, space.values_at(from), settings.chi2_target)?;
+    let Some(surrogate) = Surrogate::new(imager, space, &here) else {
+        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+        return Ok((0..settings.other_starts).map(|_| with_other_orbit(space, from, &mut rng)).collect());
+    };
+    let peaks = surrogate.peaks(PEAK_DROP, settings.other_starts + 1);
+    let starts = peaks.iter().map(|peak| space.to_written(&peak.position));
+    let reached = |theta: &Vec<f64>| first.end.as_ref().is_ok_and(|end| shift(space, theta, end) < RIVAL_DISTANCE);
+    let allowed = |theta: &Vec<f64>| space.log_prior(theta).is_finite();
+    Ok(starts.filter(|theta| allowed(theta) && !reached(theta)).take(settings.other_starts).collect())
 }
 
 impl Found {

@@ -105,7 +105,7 @@ pub struct Bulk {
 impl Bulk {
     /// The posterior around its maximum, where a search from the injected values has put the reference.
     pub fn new(scene: &Scene, points: usize) -> Self {
-        let settings = SearchSettings { prior_starts: 0, ..SearchSettings::new(&scene.settings) };
+        let settings = SearchSettings { other_starts: 0, ..SearchSettings::new(&scene.settings) };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let draw = StartDraw {
             centre: &found.optimum.theta,

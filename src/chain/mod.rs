@@ -7,6 +7,7 @@
 pub mod advice;
 pub mod autocorrelation;
 pub mod convergence;
+pub mod moves;
 pub mod record;
 pub mod statistics;
 pub mod store;
@@ -14,7 +15,8 @@ pub mod summary;
 pub mod table;
 
 pub use convergence::{Convergence, Diagnostic, Goals, ParameterKind};
-pub use record::{Record, Shape};
+pub use moves::MoveSummary;
+pub use record::{MoveKind, Record, Shape};
 pub use store::{Chain, Series};
 pub use summary::{ParameterSummary, Summary, summarise};
 pub use table::table;

@@ -5,6 +5,33 @@
 
 use crate::chain::ChainError;
 use crate::log_density::Status;
+use serde::{Deserialize, Serialize};
+
+/// How a proposal was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MoveKind {
+    /// The stretch move.
+    Stretch,
+    /// Differential evolution.
+    DifferentialEvolution,
+    /// A draw of the surrogate posterior.
+    Surrogate,
+}
+
+impl MoveKind {
+    /// All of them, in the order of tables.
+    pub const ALL: [MoveKind; 3] = [MoveKind::Stretch, MoveKind::DifferentialEvolution, MoveKind::Surrogate];
+
+    /// The name used in the chain and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            MoveKind::Stretch => "stretch",
+            MoveKind::DifferentialEvolution => "differential-evolution",
+            MoveKind::Surrogate => "surrogate",
+        }
+    }
+}
 
 /// A walker at a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +58,8 @@ pub struct Record {
     pub proposed: Status,
     /// Applications of the response that the evaluation of this step's proposal took.
     pub passes: u32,
+    /// How this step's proposal was made; `None` at step 0.
+    pub by: Option<MoveKind>,
 }
 
 /// What every step of a chain looks like: names of the parameters, number of ensembles, walkers of each.

@@ -12,7 +12,7 @@
 
 use crate::chain::autocorrelation::mean;
 use crate::chain::statistics::{mode, periodic_mode, quantile, shortest_interval, unwrap_around, wrap};
-use crate::chain::{Chain, ChainError, Convergence, Diagnostic, Goals, ParameterKind, advice};
+use crate::chain::{Chain, ChainError, Convergence, Diagnostic, Goals, MoveSummary, ParameterKind, advice, moves};
 use crate::log_density::Status;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -70,6 +70,12 @@ pub struct Summary {
     pub parameters: BTreeMap<String, ParameterSummary>,
     /// Accepted share of the proposals, of the steps kept.
     pub acceptance_fraction: f64,
+    /// What each kind of move is worth; empty for a chain that does not name its moves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moves: Vec<MoveSummary>,
+    /// Effective samples an evaluation, of the steps kept: that of the parameter where it is least; null where unknown.
+    #[serde(default)]
+    pub ess_per_evaluation: Option<f64>,
     /// Whether every parameter has reached the goals and no walker is stuck.
     pub converged: bool,
     /// Number of the last step (0 is the start).
@@ -105,7 +111,13 @@ pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Resul
         })
         .collect();
     let accepted = chain.series_of(discarded.max(1), |record| if record.accepted { 1.0 } else { 0.0 });
+    let kept = chain.records().iter().skip(discarded * chain.shape().size());
+    let evaluated = kept.filter(|record| record.proposed != Status::OutsidePrior).count();
+    let least = parameters.iter().map(|one| one.ess).try_fold(f64::INFINITY, |least, ess| Some(least.min(ess?)));
+    let sd: Vec<f64> = parameters.iter().map(|one| one.sd).collect();
     Ok(Summary {
+        moves: moves::summarise_moves(chain, discarded, kinds, &sd),
+        ess_per_evaluation: least.map(|ess| ess / evaluated.max(1) as f64),
         parameters: names.iter().cloned().zip(parameters).collect(),
         acceptance_fraction: mean(accepted.iter().flatten().flatten()),
         converged: convergence.reached(goals),

@@ -1,6 +1,6 @@
 //! The summary as text, aligned, one line a parameter, and a last line that says plainly whether it can be trusted.
 
-use crate::chain::{ParameterSummary, Summary};
+use crate::chain::{MoveSummary, ParameterSummary, Summary};
 use crate::text::aligned;
 use std::collections::BTreeMap;
 
@@ -36,7 +36,21 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
         summary.passes_median,
         summary.best.log_prob
     );
-    text + &verdict(summary) + "\n"
+    text + &moves(summary) + &verdict(summary) + "\n"
+}
+
+/// A line on the moves, where the chain names them.
+fn moves(summary: &Summary) -> String {
+    if summary.moves.is_empty() {
+        return String::new();
+    }
+    let share = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.2}"));
+    let one = |m: &MoveSummary| {
+        let (name, worth) = (m.kind.name(), share(m.ess_per_evaluation));
+        format!("{name} {:.2} (worth {worth}) of {}", m.acceptance_fraction, m.proposals)
+    };
+    let each: Vec<String> = summary.moves.iter().map(one).collect();
+    format!("{} effective samples an evaluation; accepted: {}\n", share(summary.ess_per_evaluation), each.join(", "))
 }
 
 fn verdict(summary: &Summary) -> String {

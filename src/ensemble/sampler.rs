@@ -6,8 +6,8 @@
 //! that of the ensemble and walker, the position in it that of the step; there is no generator state to keep.
 //! Left out: when to stop (`stop`), where to start (`start`), files, and what the parameters mean.
 
-use crate::chain::{Chain, Record};
-use crate::ensemble::{EnsembleError, Mix, Move, SamplerSettings, describe, start};
+use crate::chain::{Chain, MoveKind, Record};
+use crate::ensemble::{EnsembleError, Mix, Move, Proposal, SamplerSettings, describe, start};
 use crate::log_density::{Evaluation, Evaluator, LogDensity, Status};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
@@ -49,6 +49,7 @@ struct Trial {
     theta: Vec<f64>,
     log_factor: f64,
     log_uniform: f64,
+    by: MoveKind,
     /// Set where there is nothing to evaluate.
     refused: Option<Status>,
 }
@@ -59,6 +60,7 @@ struct Outcome {
     accepted: bool,
     proposed: Status,
     passes: u32,
+    by: Option<MoveKind>,
 }
 
 impl<'a> Sampler<'a> {
@@ -115,6 +117,7 @@ impl<'a> Sampler<'a> {
                 accepted: true,
                 proposed: evaluation.status,
                 passes: evaluation.passes,
+                by: None,
             })
             .collect();
         let ensembles = walkers.chunks(self.walkers).map(<[Walker]>::to_vec).collect();
@@ -189,7 +192,8 @@ impl<'a> Sampler<'a> {
                 let theta = self.density.to_written(&proposal.position);
                 let refused = self.refuse(&proposal.position, &theta, proposal.translation);
                 let log_uniform = rng.random::<f64>().ln();
-                trials.push(Trial { ensemble, walker, theta, log_factor: proposal.log_factor, log_uniform, refused });
+                let Proposal { log_factor, by, .. } = proposal;
+                trials.push(Trial { ensemble, walker, theta, log_factor, log_uniform, by, refused });
             }
         }
         trials
@@ -213,6 +217,7 @@ impl<'a> Sampler<'a> {
     /// Accepts or rejects a trial.
     fn decide(&self, state: &mut State, trial: Trial, evaluation: Evaluation) -> Outcome {
         let Evaluation { status: proposed, passes, .. } = evaluation;
+        let by = trial.by;
         let current = &mut state.ensembles[trial.ensemble][trial.walker];
         let candidate = Walker { theta: trial.theta, evaluation };
         let log_ratio = self.target(&candidate) - self.target(current) + trial.log_factor;
@@ -221,7 +226,7 @@ impl<'a> Sampler<'a> {
         if accepted {
             *current = candidate;
         }
-        Outcome { accepted, proposed, passes }
+        Outcome { accepted, proposed, passes, by: Some(by) }
     }
 
     /// ln of the density in internal coordinates, up to a constant.
@@ -301,6 +306,7 @@ fn records(state: &State, outcomes: &[Outcome]) -> Vec<Record> {
                 status: evaluation.status,
                 proposed: outcome.proposed,
                 passes: outcome.passes,
+                by: outcome.by,
             }
         })
         .collect()

@@ -3,7 +3,7 @@
 //! Left out: what a crash leaves of a file (`lines`), and what the numbers mean.
 
 use super::lines::{self, LineFile, Refusal};
-use crate::chain::{Chain, ChainError, Record, Shape};
+use crate::chain::{Chain, ChainError, MoveKind, Record, Shape};
 use crate::log_density::Status;
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, Visitor};
 use serde::ser::SerializeMap;
@@ -13,8 +13,19 @@ use std::path::Path;
 pub use super::lines::JournalError;
 
 /// Keys of a line that are not parameters.
-const KEYS: [&str; 10] =
-    ["ensemble", "step", "walker", "accepted", "log_prob", "spottedness", "chi2", "status", "proposed", "passes"];
+const KEYS: [&str; 11] = [
+    "ensemble",
+    "step",
+    "walker",
+    "accepted",
+    "log_prob",
+    "spottedness",
+    "chi2",
+    "status",
+    "proposed",
+    "passes",
+    "move",
+];
 
 /// A journal open for appending, locked against other processes until it is dropped.
 #[derive(Debug)]
@@ -143,6 +154,9 @@ impl Serialize for Line<'_> {
         map.serialize_entry("status", &record.status)?;
         map.serialize_entry("proposed", &record.proposed)?;
         map.serialize_entry("passes", &record.passes)?;
+        if let Some(by) = record.by {
+            map.serialize_entry("move", &by)?;
+        }
         map.end()
     }
 }
@@ -168,6 +182,7 @@ struct Slots {
     numbers: [Option<f64>; 3],
     status: [Option<Status>; 2],
     passes: Option<u32>,
+    by: Option<MoveKind>,
     theta: Vec<Option<f64>>,
 }
 
@@ -192,6 +207,7 @@ impl<'de> Visitor<'de> for LineSeed<'_> {
                 "status" => fill(&mut slots.status[0], &key, &mut map)?,
                 "proposed" => fill(&mut slots.status[1], &key, &mut map)?,
                 "passes" => fill(&mut slots.passes, &key, &mut map)?,
+                "move" => fill(&mut slots.by, &key, &mut map)?,
                 name => match self.names.iter().position(|known| known == name) {
                     Some(index) => fill(&mut slots.theta[index], &key, &mut map)?,
                     None => {
@@ -222,6 +238,7 @@ impl Slots {
             status: self.status[0].ok_or("status")?,
             proposed: self.status[1].ok_or("proposed")?,
             passes: self.passes.ok_or("passes")?,
+            by: self.by,
         })
     }
 }

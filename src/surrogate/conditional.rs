@@ -30,9 +30,19 @@ pub(super) struct LinearModel {
     /// Position of the period, or its value where it is fixed.
     period: Result<usize, f64>,
     dimension: usize,
+    correction: Option<Correction>,
     /// Precision and pull of the normal priors of linear coordinates.
     prior_precision: DVector<f64>,
     prior_pull: DVector<f64>,
+}
+
+/// What is added to ln L at every period: `constant + gradient (y - centre) - (y - centre) information (y - centre) / 2`.
+#[derive(Clone, Debug)]
+pub(super) struct Correction {
+    pub centre: DVector<f64>,
+    pub constant: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
 }
 
 /// The quadratic at one period.
@@ -83,10 +93,21 @@ impl LinearModel {
             columns,
             period: position(Parameter::PorbOverProt).ok_or(fixed[Parameter::PorbOverProt]),
             dimension: space.dimension(),
+            correction: None,
             prior_precision: DVector::from_iterator(linear.len(), normals.iter().map(|n| n.0)),
             prior_pull: DVector::from_iterator(linear.len(), normals.iter().map(|n| n.1)),
             linear,
         }
+    }
+
+    /// With a correction to ln L in place of the one that there is.
+    pub fn with_correction(self, correction: Correction) -> Self {
+        LinearModel { correction: Some(correction), ..self }
+    }
+
+    /// Number of linear coordinates.
+    pub fn linear_count(&self) -> usize {
+        self.linear.len()
     }
 
     /// The fixed period, if it is.
@@ -131,12 +152,19 @@ impl LinearModel {
         let mut gradient = DVector::zeros(count);
         gradient.rows_mut(0, 2).copy_from(&orbit.tr_mul(&self.gradient));
         gradient.rows_mut(2, count - 2).copy_from(&self.columns.tr_mul(&self.gradient));
+        let mut constant = self.constant;
+        if let Some(Correction { centre, constant: at_centre, gradient: slope, information: bend }) = &self.correction {
+            let bent = bend * centre;
+            constant += at_centre - slope.dot(centre) - 0.5 * centre.dot(&bent);
+            gradient += slope + bent;
+            information += bend;
+        }
         let mut drawn = &information / temperature;
         drawn.set_diagonal(&(drawn.diagonal() + &self.prior_precision));
         let factor = drawn.cholesky()?;
         let mode = factor.solve(&(&gradient / temperature + &self.prior_pull));
         let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|l| l.ln()).sum::<f64>();
-        Some(Conditional { information, gradient, constant: self.constant, factor, mode, log_determinant })
+        Some(Conditional { information, gradient, constant, factor, mode, log_determinant })
     }
 }
 

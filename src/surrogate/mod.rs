@@ -6,6 +6,7 @@
 //! Left out: the exact posterior, which decides what is accepted (`ensemble`).
 
 mod conditional;
+mod correction;
 mod periods;
 mod proposal;
 
@@ -19,7 +20,7 @@ use rand::{Rng, RngCore};
 pub use proposal::SurrogateMove;
 
 /// Degrees of freedom of the surrogate's tails.
-const TAIL: f64 = 30.0;
+const TAIL: f64 = 60.0;
 
 /// Steps of the walk on the surrogate that make one draw of it.
 const WALK: usize = 16;
@@ -28,6 +29,7 @@ const WALK: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Surrogate {
     space: ParameterSpace,
+    time_base_cycles: f64,
     model: LinearModel,
     periods: PeriodTable,
     /// Highest ln L over all periods.
@@ -64,19 +66,19 @@ impl Surrogate {
             return None;
         }
         let stellar: Vec<Parameter> = STELLAR.into_iter().filter(|&p| is_free(p)).collect();
-        Surrogate::of(Expansion::of(imager, reference, &stellar), space, imager.mid_cycle(), imager.time_base_cycles())
+        let expansion = Expansion::of(imager, reference, &stellar);
+        let model = LinearModel::new(&expansion, space, imager.mid_cycle());
+        Surrogate::of(model, space.clone(), imager.time_base_cycles(), 1.0)
     }
 
-    fn of(expansion: Expansion, space: &ParameterSpace, mid_cycle: f64, time_base_cycles: f64) -> Option<Self> {
-        let model = LinearModel::new(&expansion, space, mid_cycle);
-        let (periods, best) = PeriodTable::new(&model, space, time_base_cycles, 1.0)?;
-        Some(Surrogate { space: space.clone(), model, periods, best, temperature: 1.0 })
+    fn of(model: LinearModel, space: ParameterSpace, time_base_cycles: f64, temperature: f64) -> Option<Self> {
+        let (periods, best) = PeriodTable::new(&model, &space, time_base_cycles, temperature)?;
+        Some(Surrogate { space, time_base_cycles, model, periods, best, temperature })
     }
 
     /// The same with differences of ln L divided by `temperature`: wider, and with more weight on minor peaks.
-    pub fn tempered(&self, temperature: f64, time_base_cycles: f64) -> Option<Self> {
-        let (periods, best) = PeriodTable::new(&self.model, &self.space, time_base_cycles, temperature)?;
-        Some(Surrogate { periods, best, temperature, ..self.clone() })
+    pub fn tempered(&self, temperature: f64) -> Option<Self> {
+        Surrogate::of(self.model.clone(), self.space.clone(), self.time_base_cycles, temperature)
     }
 
     /// ln of the density at internal coordinates, up to a constant; minus infinity outside the priors.

@@ -2,9 +2,10 @@
 //!
 //! The walk is reversible with respect to the surrogate density q, so that the Hastings factor is `q(current) / q(proposed)`
 //! whatever q is (Liu 2001, *Monte Carlo Strategies in Scientific Computing*, section 9.4.3: surrogate transition). Where q is
-//! the posterior up to a constant, every proposal is accepted, and the next state does not depend on the last.
+//! the posterior up to a constant, every proposal is accepted, and the next state hardly depends on the last.
 
 use super::Surrogate;
+use crate::chain::MoveKind;
 use crate::ensemble::{Move, Proposal};
 use rand::RngCore;
 
@@ -14,9 +15,11 @@ pub struct SurrogateMove(pub Surrogate);
 
 impl Move for SurrogateMove {
     fn propose(&self, current: &[f64], _complement: &[Vec<f64>], rng: &mut dyn RngCore) -> Proposal {
-        let stay = || Proposal { position: current.to_vec(), log_factor: 0.0, translation: false };
-        let Some(here) = self.0.place(current) else { return stay() };
-        let there = self.0.walk(here.clone(), rng);
-        Proposal { log_factor: here.log_density - there.log_density, position: there.position, translation: false }
+        let proposal =
+            |position, log_factor| Proposal { position, log_factor, by: MoveKind::Surrogate, translation: false };
+        let Some(here) = self.0.place(current) else { return proposal(current.to_vec(), 0.0) };
+        let log_density = here.log_density;
+        let there = self.0.walk(here, rng);
+        proposal(there.position, log_density - there.log_density)
     }
 }

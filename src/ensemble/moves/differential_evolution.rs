@@ -5,6 +5,7 @@
 //! noise `e` follows the spread of the other half in each coordinate: with it, the move reaches every place even when the
 //! half has no more walkers than dimensions. Left out: the snooker update.
 
+use crate::chain::MoveKind;
 use crate::ensemble::moves::{Move, Proposal};
 use rand::{Rng, RngCore};
 use rand_distr::StandardNormal;
@@ -40,7 +41,7 @@ impl Move for DifferentialEvolution {
                 current[i] + gamma * (complement[first][i] - complement[second][i]) + noise
             })
             .collect();
-        Proposal { position, log_factor: 0.0, translation: true }
+        Proposal { position, log_factor: 0.0, by: MoveKind::DifferentialEvolution, translation: true }
     }
 }
 

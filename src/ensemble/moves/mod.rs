@@ -12,6 +12,7 @@ mod stretch;
 pub use differential_evolution::DifferentialEvolution;
 pub use stretch::Stretch;
 
+use crate::chain::MoveKind;
 use crate::ensemble::EnsembleError;
 use rand::{Rng, RngCore};
 use schemars::JsonSchema;
@@ -24,6 +25,8 @@ pub struct Proposal {
     pub position: Vec<f64>,
     /// ln of the Hastings factor: ln q(current | proposed) - ln q(proposed | current), with any Jacobian of the move.
     pub log_factor: f64,
+    /// Which move made it.
+    pub by: MoveKind,
     /// Whether the move added a vector that does not depend on `current` and whose opposite was as probable. Only such
     /// a move is still reversible after a periodic coordinate was wrapped; of any other, the sampler refuses proposals
     /// beyond the wrap.
@@ -45,14 +48,14 @@ pub struct MoveWeights {
     pub stretch: f64,
     /// Weight of differential evolution (ter Braak 2006).
     pub differential_evolution: f64,
-    /// Weight of the surrogate move: proposals from the quadratic posterior around the reference. 0 turns it off; it is left
-    /// out where there is no such quadratic (K or phi fixed).
+    /// Weight of the surrogate move (proposals from the quadratic posterior around the reference), times the square of the
+    /// share of its proposals that are accepted on trial. 0 turns it off; there is none where K or phi is fixed.
     pub surrogate: f64,
 }
 
 impl Default for MoveWeights {
     fn default() -> Self {
-        MoveWeights { stretch: 0.025, differential_evolution: 0.075, surrogate: 0.9 }
+        MoveWeights { stretch: 0.25, differential_evolution: 0.75, surrogate: 20.0 }
     }
 }
 

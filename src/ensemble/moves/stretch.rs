@@ -3,6 +3,7 @@
 //! Source: Goodman & Weare 2010, equations 7, 9 and 10: `Y = X_j + Z (X - X_j)` with `g(z) ~ 1/sqrt(z)` on [1/a, a];
 //! accepted with `Z^(d-1)` in the factor.
 
+use crate::chain::MoveKind;
 use crate::ensemble::moves::{Move, Proposal};
 use rand::{Rng, RngCore};
 
@@ -25,7 +26,8 @@ impl Move for Stretch {
         let root = (self.scale - 1.0) * rng.random::<f64>() + 1.0;
         let z = root * root / self.scale;
         let position = current.iter().zip(anchor).map(|(x, a)| a + z * (x - a)).collect();
-        Proposal { position, log_factor: (current.len() as f64 - 1.0) * z.ln(), translation: false }
+        let log_factor = (current.len() as f64 - 1.0) * z.ln();
+        Proposal { position, log_factor, by: MoveKind::Stretch, translation: false }
     }
 }
 
