@@ -56,6 +56,7 @@ pub mod observation;
 pub mod optimise;
 pub mod optimum;
 pub mod origin;
+pub mod periodogram;
 pub mod run;
 pub mod scene;
 pub mod search;
