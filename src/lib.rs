@@ -42,6 +42,7 @@
 
 pub mod chain;
 pub mod config;
+pub mod detection;
 pub mod ensemble;
 pub mod expansion;
 pub mod fit;

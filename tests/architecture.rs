@@ -15,7 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &["objective"],
     &["expansion"],
     &["surrogate"],
-    &["simulate", "fit"],
+    &["simulate", "fit", "detection"],
     &["io"],
     &["config"],
     &["scene", "search"],

@@ -118,7 +118,8 @@ fn named(cycles: &[f64], maximum: &Maximum, circle: f64) -> KeplerianOrbit {
         let slope = DVector::from_row_slice(&slope);
         covariance.as_ref().map_or(f64::NAN, |c| slope.dot(&(c * &slope)).sqrt())
     };
-    let capped = |sigma: f64, most: f64| if covariance.is_some() && !(sigma < most) { most } else { sigma };
+    // what is not a number here comes of an angle without direction
+    let capped = |sigma: f64, most: f64| if covariance.is_some() { sigma.min(most) } else { sigma };
     let (k2, e2) = (a * a + b * b, h * h + k * k);
     let (amplitude, e, omega) = (k2.sqrt(), e2.sqrt(), k.atan2(h));
     // radians from mid-time to periastron

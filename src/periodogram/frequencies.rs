@@ -93,7 +93,7 @@ impl Frequencies {
         let Sampling { time_base, median_spacing, profiles } = Sampling::of(cycles)?;
         let nyquist = NYQUIST_FACTOR * profiles / (2.0 * time_base);
         let shortest = (1.0 / nyquist).max(2.0 * median_spacing);
-        let min_d = min_period_d.unwrap_or_else(|| shortest * rotation_period_d);
+        let min_d = min_period_d.unwrap_or(shortest * rotation_period_d);
         let max_d = max_period_d.unwrap_or(LONGEST_PERIOD * time_base * rotation_period_d);
         if min_d >= max_d {
             let name = if min_period_d.is_some() { MIN } else { MAX };
