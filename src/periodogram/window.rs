@@ -16,8 +16,8 @@ const SAMPLES: f64 = 10.0;
 /// Frequencies closer than this many inverse time bases are the same.
 const SAME: f64 = 0.5;
 
-/// The window's main lobe around frequency 0 is that many inverse time bases wide to each side.
-const MAIN_LOBE: f64 = 1.0;
+/// Peaks closer to frequency 0 join what is the same anyway.
+const MAIN_LOBE: f64 = SAME;
 
 /// A peak of the window function.
 #[derive(Clone, Copy, Debug, PartialEq)]
