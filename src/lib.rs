@@ -42,6 +42,7 @@
 
 pub mod chain;
 pub mod config;
+pub mod detection;
 pub mod ensemble;
 pub mod expansion;
 pub mod fit;
@@ -56,6 +57,7 @@ pub mod observation;
 pub mod optimise;
 pub mod optimum;
 pub mod origin;
+pub mod periodogram;
 pub mod run;
 pub mod scene;
 pub mod search;

@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 const LAYERS: &[&[&str]] = &[
     &["units", "text", "vector", "velocities", "log_density"],
     &["observation"],
-    &["star", "maxent", "chain", "landscape"],
+    &["star", "maxent", "chain", "landscape", "periodogram"],
     &["imaging", "ensemble", "optimise"],
     &["objective"],
     &["expansion"],
     &["surrogate"],
-    &["simulate", "fit"],
+    &["simulate", "fit", "detection"],
     &["io"],
     &["config"],
     &["scene", "search"],
@@ -37,6 +37,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("imaging", &["maxent", "observation", "star", "units", "vector"]),
     ("chain", &["log_density", "text"]),
     ("landscape", &["log_density", "text"]),
+    ("periodogram", &["velocities"]),
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),
 ];

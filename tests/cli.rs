@@ -117,7 +117,7 @@ fn a_map_is_a_fit() {
 #[test]
 fn help_shows_an_example() {
     let here = Path::new(".");
-    for command in ["simulate", "map"] {
+    for command in ["simulate", "map", "periodogram"] {
         let output = dimcmc(&[command, "--help"], here);
         assert_eq!(output.status.code(), Some(0));
         says(&text(&output.stdout), &["Example:", &format!("dimcmc {command} configs/demo.json --out")]);

@@ -9,6 +9,7 @@ mod grid;
 mod map;
 mod optimise;
 mod output;
+mod periodogram;
 mod progress;
 mod report;
 mod sample;
@@ -46,6 +47,7 @@ pub struct Global {
 enum Command {
     Simulate(simulate::Args),
     Map(map::Args),
+    Periodogram(periodogram::Args),
     #[command(alias = "optimize")]
     Optimise(optimise::Args),
     Grid(grid::Args),
@@ -65,6 +67,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
     match &cli.command {
         Command::Simulate(args) => simulate::run(args),
         Command::Map(args) => map::run(args, &cli.global),
+        Command::Periodogram(args) => periodogram::run(args, &cli.global),
         Command::Optimise(args) => optimise::run(args, &cli.global),
         Command::Grid(args) => grid::run(args, &cli.global),
         Command::Sample(args) => sample::run(args, &cli.global),

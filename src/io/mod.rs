@@ -7,5 +7,6 @@ pub mod landscape;
 pub mod lines;
 pub mod lsd;
 pub mod map;
+pub mod periodogram;
 pub mod provenance;
 pub mod truth;

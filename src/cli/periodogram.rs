@@ -1,0 +1,133 @@
+//! `dimcmc periodogram`: the blind search for a planet.
+
+use super::output::Output;
+use super::{Failure, Global, progress};
+use clap::ValueEnum;
+use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Stage, cycles};
+use dimcmc::expansion::nuisances;
+use dimcmc::fit::Fit;
+use dimcmc::io::periodogram::PeriodogramResult;
+use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, NullModel, SearchSettings};
+use dimcmc::scene::Scene;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Search for a planet at every period, the star's spots marginalised out
+///
+/// The star is imaged without a planet, and how much better the profiles fit with an orbit of each period follows in closed
+/// form, together with radial velocities that are free of spots. Other parameters are those of the config. Writes rv.csv and
+/// covariance.csv (velocities for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, false alarms).
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc periodogram configs/demo.json --out runs/demo_periodogram")]
+pub struct Args {
+    /// Config file (JSON)
+    config: PathBuf,
+    #[command(flatten)]
+    output: Output,
+    /// Shortest period (d); by default that of 5 average Nyquist frequencies, or twice the median spacing if that is longer
+    #[arg(long, value_name = "DAYS")]
+    min_period_d: Option<f64>,
+    /// Longest period (d); by default twice the time base
+    #[arg(long, value_name = "DAYS")]
+    max_period_d: Option<f64>,
+    /// Trial frequencies to each inverse time base; 10 by default
+    #[arg(long, value_name = "N")]
+    oversampling: Option<f64>,
+    /// Fit eccentric orbits around the peaks as well
+    #[arg(long)]
+    eccentric: bool,
+    /// Number of planets to search for
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    planets: u8,
+    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors
+    #[arg(long, alias = "marginalize")]
+    marginalise: bool,
+    /// What stars without a planet are drawn from
+    #[arg(long, value_name = "MODEL", value_enum, default_value_t = Null::Information)]
+    null: Null,
+    /// Number of stars without a planet
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1000..=10_000_000))]
+    draws: u32,
+    /// Seed of the draws
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// The null models by name.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Null {
+    /// Noise and all spots that the entropy holds possible
+    Information,
+    /// Photon noise alone
+    Noise,
+    /// Photon noise about the mean for the spots of the image
+    NoiseAndBias,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    args.output.check()?;
+    let scene = Scene::load(&args.config)?;
+    let frequencies = frequencies(args, &scene)?;
+    let settings = settings(args, &scene);
+    let spinner = progress::bar(global, None, "reconstructing");
+    let report = |stage| spinner.set_message(message(stage));
+    let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &report);
+    spinner.finish_and_clear();
+    let detection = found.map_err(|e| failure(&args.config, e))?;
+    let fit = Fit::new(&scene.imager, &scene.observations, &detection.planet_free.reference);
+    let result = PeriodogramResult {
+        imager: &scene.imager,
+        detection: &detection,
+        settings: &settings,
+        fit: &fit,
+        truth: scene.truth,
+        provenance: &scene.provenance(),
+    };
+    let folder = args.output.create()?;
+    result.write(folder)?;
+    let (table, files) = (result.table(), result.files().join(", "));
+    let _ = writeln!(std::io::stdout(), "{table}written: {}: {files}", folder.display());
+    Ok(())
+}
+
+fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
+    let Args { min_period_d, max_period_d, oversampling, .. } = *args;
+    let settings = FrequencySettings { min_period_d, max_period_d, oversampling };
+    let rotation_period_d = scene.imager.star.rotation_period_d;
+    Frequencies::new(&cycles(&scene.imager), rotation_period_d, settings).map_err(|error| match error {
+        FrequencyError::TooFewTimes(_) => Failure::input(format!("{}: observations: {error}", args.config.display())),
+        error => Failure::input(error),
+    })
+}
+
+fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
+    let null = match args.null {
+        Null::Information => NullModel::Information,
+        Null::Noise => NullModel::Noise,
+        Null::NoiseAndBias => NullModel::NoiseAndBias,
+    };
+    DetectionSettings {
+        chi2_target: scene.settings.imaging.chi2_target,
+        nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
+        search: SearchSettings { null, draws: args.draws as usize, seed: args.seed },
+        eccentric: args.eccentric,
+        second_planet: args.planets == 2,
+    }
+}
+
+fn message(stage: Stage) -> String {
+    match stage {
+        Stage::PlanetFree => "reconstructing without a planet".to_owned(),
+        Stage::Search => "searching, false alarms".to_owned(),
+        Stage::BestOrbit(round) => format!("reconstructing at the best orbit, round {round}"),
+        Stage::SecondPlanet => "searching for a second planet".to_owned(),
+    }
+}
+
+fn failure(config: &Path, error: DetectionError) -> Failure {
+    match error {
+        DetectionError::Reference(error) => Failure::reference(config, error),
+        DetectionError::Unbounded(error) => Failure::failed(format!("{}: {error}", config.display())),
+    }
+}

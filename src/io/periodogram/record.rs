@@ -1,0 +1,315 @@
+//! The content of `periodogram.json`.
+
+use super::super::provenance::Provenance;
+use super::PeriodogramResult;
+use crate::detection::View;
+use crate::objective::ParameterValues;
+use crate::periodogram::null::NullModel;
+use crate::periodogram::peaks::Peak;
+use crate::periodogram::{FalseAlarm, KeplerianOrbit, Search};
+use serde::Serialize;
+
+/// False-alarm probabilities whose levels are given.
+const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
+
+/// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
+const FAR: f64 = 5.0;
+
+#[derive(Serialize)]
+pub(super) struct Record<'a> {
+    /// In the expansion around its own image; its errors count the period's.
+    pub best: OrbitRecord,
+    pub truth: Option<ParameterValues>,
+    /// Of the highest peak without a planet.
+    pub false_alarm: FalseAlarmRecord,
+    /// Without a planet, from high to low.
+    pub peaks: Vec<PeakRecord>,
+    /// Around the best orbit first, then around the other peaks.
+    pub keplerian: Option<Vec<Option<KeplerianRecord>>>,
+    pub second: Option<SecondRecord>,
+    pub search: SearchRecord,
+    pub expansion: ExpansionRecord,
+    pub co_rotation: CoRotationRecord,
+    pub warnings: Vec<String>,
+    #[serde(flatten)]
+    pub provenance: &'a Provenance,
+}
+
+#[derive(Serialize)]
+pub(super) struct OrbitRecord {
+    pub k_kms: f64,
+    pub sigma_k_kms: f64,
+    pub period_d: f64,
+    pub sigma_period_d: Option<f64>,
+    pub porb_over_prot: f64,
+    pub sigma_porb_over_prot: Option<f64>,
+    pub phi: f64,
+    pub sigma_phi: f64,
+    pub delta_ln_l: f64,
+    pub on_edge: bool,
+}
+
+#[derive(Serialize)]
+pub(super) struct PeakRecord {
+    #[serde(flatten)]
+    pub orbit: OrbitRecord,
+    pub false_alarm_probability: f64,
+    pub alias: Option<AliasRecord>,
+}
+
+#[derive(Serialize)]
+pub(super) struct AliasRecord {
+    pub window_frequency_per_d: f64,
+    pub window: f64,
+    pub relation: &'static str,
+}
+
+#[derive(Serialize)]
+pub(super) struct FalseAlarmRecord {
+    pub delta_ln_l: f64,
+    pub probability: f64,
+    pub by_draws: f64,
+    pub by_extreme_value: f64,
+    pub used: &'static str,
+    pub null_model: &'static str,
+    pub draws: usize,
+    pub kappa: f64,
+    pub w: f64,
+    pub independent_periods: f64,
+    pub levels: Vec<LevelRecord>,
+}
+
+#[derive(Serialize)]
+pub(super) struct LevelRecord {
+    pub false_alarm_probability: f64,
+    pub delta_ln_l: f64,
+}
+
+#[derive(Serialize)]
+pub(super) struct KeplerianRecord {
+    pub k_kms: f64,
+    pub sigma_k_kms: f64,
+    pub period_d: f64,
+    pub sigma_period_d: f64,
+    pub eccentricity: f64,
+    pub sigma_eccentricity: f64,
+    pub omega_deg: f64,
+    pub sigma_omega_deg: f64,
+    pub periastron_d: f64,
+    pub sigma_periastron_d: f64,
+    pub delta_ln_l: f64,
+    pub gain_over_circle: f64,
+}
+
+#[derive(Serialize)]
+pub(super) struct SecondRecord {
+    /// Gain in ln L over the first orbit alone, its period kept.
+    pub false_alarm: FalseAlarmRecord,
+    pub peaks: Vec<PeakRecord>,
+    /// Both orbits refined together.
+    pub orbits: Option<[OrbitRecord; 2]>,
+    pub gain: Option<f64>,
+}
+
+#[derive(Serialize)]
+pub(super) struct SearchRecord {
+    pub periods: usize,
+    pub min_period_d: f64,
+    pub max_period_d: f64,
+    pub time_base_d: f64,
+    pub seed: u64,
+}
+
+#[derive(Serialize)]
+pub(super) struct ExpansionRecord {
+    pub marginalised: Vec<&'static str>,
+    pub rounds: usize,
+    pub closed: bool,
+    pub data: usize,
+    pub chi2_target: f64,
+    pub chi2_per_datum_planet_free: f64,
+    pub chi2_per_datum: f64,
+}
+
+#[derive(Serialize)]
+pub(super) struct CoRotationRecord {
+    pub sigma_k_over_median: Option<f64>,
+    pub statement: String,
+}
+
+impl PeriodogramResult<'_> {
+    pub(super) fn record(&self) -> Record<'_> {
+        let found = self.detection;
+        let prot = self.imager.star.rotation_period_d;
+        let (lo, hi) = found.frequencies.range();
+        let keplerian = |orbit: &Option<KeplerianOrbit>| orbit.as_ref().map(|orbit| self.keplerian(orbit));
+        let second = found.second.as_ref().map(|second| SecondRecord {
+            false_alarm: false_alarm(&second.search),
+            peaks: self.peaks(&second.search),
+            orbits: second.both.map(|both| both.orbits.map(|peak| self.orbit(&peak))),
+            gain: second.both.map(|both| both.gain),
+        });
+        Record {
+            best: self.orbit(&found.best),
+            truth: self.truth,
+            false_alarm: false_alarm(&found.search),
+            peaks: self.peaks(&found.search),
+            keplerian: self.settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
+            second,
+            search: SearchRecord {
+                periods: found.search.rows.len(),
+                min_period_d: prot / hi,
+                max_period_d: prot / lo,
+                time_base_d: found.frequencies.time_base_cycles * prot,
+                seed: self.settings.search.seed,
+            },
+            expansion: ExpansionRecord {
+                marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name()).collect(),
+                rounds: found.rounds,
+                closed: found.closed,
+                data: self.imager.data.depth.len(),
+                chi2_target: self.settings.chi2_target,
+                chi2_per_datum_planet_free: self.per_datum(&found.planet_free),
+                chi2_per_datum: self.per_datum(found.last()),
+            },
+            co_rotation: CoRotationRecord {
+                sigma_k_over_median: found.co_rotation_penalty,
+                statement: self.co_rotation(),
+            },
+            warnings: self.warnings(),
+            provenance: self.provenance,
+        }
+    }
+
+    fn per_datum(&self, view: &View) -> f64 {
+        view.reference.solution.chi2 / self.imager.data.depth.len() as f64
+    }
+
+    pub(super) fn orbit(&self, peak: &Peak) -> OrbitRecord {
+        let prot = self.imager.star.rotation_period_d;
+        let orbit = &peak.orbit;
+        OrbitRecord {
+            k_kms: orbit.k_kms,
+            sigma_k_kms: orbit.sigma_k_kms,
+            period_d: prot * peak.porb_over_prot,
+            sigma_period_d: peak.sigma_porb_over_prot.map(|sigma| prot * sigma),
+            porb_over_prot: peak.porb_over_prot,
+            sigma_porb_over_prot: peak.sigma_porb_over_prot,
+            phi: orbit.phi,
+            sigma_phi: orbit.sigma_phi,
+            delta_ln_l: orbit.delta_ln_l,
+            on_edge: peak.on_edge,
+        }
+    }
+
+    pub(super) fn peaks(&self, search: &Search) -> Vec<PeakRecord> {
+        let prot = self.imager.star.rotation_period_d;
+        let record = |peak: &Peak| PeakRecord {
+            orbit: self.orbit(peak),
+            false_alarm_probability: search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
+            alias: peak.alias.map(|alias| AliasRecord {
+                window_frequency_per_d: alias.window.frequency / prot,
+                window: alias.window.height,
+                relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" },
+            }),
+        };
+        search.peaks.iter().map(record).collect()
+    }
+
+    pub(super) fn keplerian(&self, orbit: &KeplerianOrbit) -> KeplerianRecord {
+        let star = &self.imager.star;
+        let prot = star.rotation_period_d;
+        KeplerianRecord {
+            k_kms: orbit.k_kms,
+            sigma_k_kms: orbit.sigma_k_kms,
+            period_d: prot * orbit.porb_over_prot,
+            sigma_period_d: prot * orbit.sigma_porb_over_prot,
+            eccentricity: orbit.eccentricity,
+            sigma_eccentricity: orbit.sigma_eccentricity,
+            omega_deg: orbit.omega.to_degrees(),
+            sigma_omega_deg: orbit.sigma_omega.to_degrees(),
+            periastron_d: star.epoch_d + prot * orbit.periastron_cycle,
+            sigma_periastron_d: prot * orbit.sigma_periastron_cycle,
+            delta_ln_l: orbit.delta_ln_l,
+            gain_over_circle: orbit.gain_over_circle,
+        }
+    }
+
+    pub(super) fn co_rotation(&self) -> String {
+        match self.detection.co_rotation_penalty {
+            Some(ratio) if ratio > 1.1 => {
+                format!(
+                    "at Porb = Prot spots imitate an orbit: sigma_K is {ratio:.1} times its median at other periods"
+                )
+            }
+            Some(ratio) => format!("at Porb = Prot sigma_K is {ratio:.2} times its median at other periods"),
+            None => "at Porb = Prot spots imitate an orbit, and the data do not bound K there".to_owned(),
+        }
+    }
+
+    /// What may be wrong, a sentence each.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let found = self.detection;
+        let data = self.imager.data.depth.len() as f64;
+        let mut warnings = Vec::new();
+        for (view, whose) in
+            [(Some(&found.planet_free), "without a planet"), (found.at_best.as_ref(), "at the best orbit")]
+        {
+            let Some(view) = view else { continue };
+            let chi2 = self.per_datum(view);
+            let far = (chi2 - 1.0) / (2.0 / data).sqrt();
+            if !view.on_target {
+                let target = self.settings.chi2_target;
+                warnings.push(format!(
+                    "{whose} no map reaches the target chi2 of {target:.3} per datum ({chi2:.3} was reached): the model of \
+                     the star may be wrong, or a planet is missing in it"
+                ));
+            } else if far.abs() > FAR {
+                warnings.push(format!(
+                    "{whose} chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles \
+                     or the model of the star may be wrong, and all errors here with them"
+                ));
+            }
+        }
+        if found.best.on_edge {
+            warnings.push("the best period lies on the edge of the search: look beyond it before believing it".into());
+        } else if !found.closed {
+            let rounds = found.rounds;
+            warnings.push(format!("K still moves after {rounds} images at the best orbit: its value is not settled"));
+        }
+        if found.last().quadratic.radial_velocities().is_err() {
+            warnings.push("the data do not bound all velocities: rv.csv and covariance.csv hold no numbers".into());
+        }
+        warnings
+    }
+}
+
+pub(super) fn null_name(model: NullModel) -> &'static str {
+    match model {
+        NullModel::Information => "information",
+        NullModel::Noise => "noise",
+        NullModel::NoiseAndBias => "noise-and-bias",
+    }
+}
+
+pub(super) fn false_alarm(search: &Search) -> FalseAlarmRecord {
+    let alarm: &FalseAlarm = &search.false_alarm;
+    let delta_ln_l = search.best().orbit.delta_ln_l;
+    let found = alarm.probability(delta_ln_l);
+    FalseAlarmRecord {
+        delta_ln_l,
+        probability: found.value(),
+        by_draws: found.by_draws,
+        by_extreme_value: found.by_tail,
+        used: if found.draws_suffice { "draws" } else { "extreme value" },
+        null_model: null_name(alarm.model),
+        draws: alarm.maxima.len(),
+        kappa: alarm.tail.kappa,
+        w: alarm.tail.w,
+        independent_periods: alarm.independent_periods(),
+        levels: LEVELS
+            .map(|p| LevelRecord { false_alarm_probability: p, delta_ln_l: alarm.level(p) })
+            .into_iter()
+            .collect(),
+    }
+}

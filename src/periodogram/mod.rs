@@ -1,0 +1,130 @@
+//! The Doppler-imaging periodogram: orbits blindly searched in the velocities of the profiles, spots marginalised out (method
+//! section 4).
+//!
+//! All of it follows from one quadratic in the velocities. Periods are in rotation cycles, `Porb/Prot`; days only where the
+//! user states what to search (`frequencies`). Left out: where the quadratic comes from (`expansion`), and files
+//! (`io::periodogram`).
+
+pub mod eccentric;
+pub mod false_alarm;
+pub mod frequencies;
+pub mod kepler;
+pub mod limits;
+mod normal;
+pub mod null;
+pub mod orbits;
+pub mod peaks;
+mod refine;
+#[cfg(test)]
+mod sample;
+pub mod two_planets;
+pub mod window;
+
+pub use eccentric::KeplerianOrbit;
+pub use false_alarm::FalseAlarm;
+pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
+pub use null::NullModel;
+pub use orbits::{CircularOrbit, Trial};
+pub use peaks::Peak;
+pub use two_planets::TwoOrbits;
+
+use crate::velocities::VelocityQuadratic;
+use limits::{detection_limit_kms, upper_limit_kms};
+use rayon::prelude::*;
+use window::{window, window_peaks};
+
+/// Probability of the upper limit on K.
+const CREDENCE: f64 = 0.95;
+
+/// A detection is a peak with this false-alarm probability.
+pub const DETECTION_FAP: f64 = 0.01;
+
+/// How a search is judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchSettings {
+    /// What is drawn for stars without a planet.
+    pub null: NullModel,
+    /// Number of such draws.
+    pub draws: usize,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
+/// One trial period with all that is said of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// The trial.
+    pub trial: Trial,
+    /// 95 % upper limit on K at this period (km/s).
+    pub k_upper95_kms: Option<f64>,
+    /// The window function at this frequency.
+    pub window: f64,
+    /// The K (km/s) that reaches a false-alarm probability of 1 % with a chance of 50 %.
+    pub k_limit50_kms: Option<f64>,
+    /// The same with a chance of 95 %.
+    pub k_limit95_kms: Option<f64>,
+}
+
+/// A blind search: every trial period, the peaks, and how often stars without a planet show as high ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Search {
+    /// The trial periods, from long to short.
+    pub rows: Vec<Row>,
+    /// The peaks, from high to low; there is one at least.
+    pub peaks: Vec<Peak>,
+    /// Judges them.
+    pub false_alarm: FalseAlarm,
+}
+
+/// No trial period at which the data bound an orbit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the profiles do not bound the velocities of an orbit at any of the trial periods")]
+pub struct Unbounded;
+
+impl Search {
+    /// Searches `quadratic` at the `frequencies`.
+    ///
+    /// # Errors
+    /// [`Unbounded`].
+    pub fn new(
+        quadratic: &VelocityQuadratic,
+        frequencies: &Frequencies,
+        settings: SearchSettings,
+    ) -> Result<Self, Unbounded> {
+        let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+        let peaks = peaks::peaks(quadratic, frequencies, &trials, &window_peaks(&quadratic.cycles, frequencies));
+        if peaks.is_empty() {
+            return Err(Unbounded);
+        }
+        let SearchSettings { null, draws, seed } = settings;
+        let false_alarm = FalseAlarm::draw(quadratic, &trials, null, draws, seed);
+        let level = false_alarm.level(DETECTION_FAP);
+        let row = |(trial, scatter): (&Trial, &null::Scatter)| {
+            let limit = |chance| detection_limit_kms(trial, scatter.mean, scatter.covariance, level, chance);
+            Row {
+                trial: *trial,
+                k_upper95_kms: upper_limit_kms(trial, CREDENCE),
+                window: window(&quadratic.cycles, trial.frequency),
+                k_limit50_kms: limit(0.5),
+                k_limit95_kms: limit(0.95),
+            }
+        };
+        let rows = trials.par_iter().zip(&false_alarm.scatter).map(row).collect();
+        Ok(Search { rows, peaks, false_alarm })
+    }
+
+    /// The highest peak.
+    pub fn best(&self) -> &Peak {
+        &self.peaks[0]
+    }
+}
+
+/// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is bounded where the star's
+/// spots imitate one. `None` where the data bound none there.
+pub fn co_rotation_penalty(quadratic: &VelocityQuadratic, frequencies: &Frequencies, rows: &[Row]) -> Option<f64> {
+    let here = orbits::at(quadratic, 1.0).orbit?.sigma_k_kms;
+    let away = |row: &&Row| (row.trial.frequency - 1.0).abs() * frequencies.time_base_cycles > 1.0;
+    let mut others: Vec<f64> = rows.iter().filter(away).filter_map(|row| Some(row.trial.orbit?.sigma_k_kms)).collect();
+    others.sort_by(f64::total_cmp);
+    others.get(others.len() / 2).map(|median| here / median)
+}
