@@ -8,6 +8,7 @@
 
 use crate::expansion::{Expansion, Nuisance, STELLAR};
 use crate::imaging::Imager;
+use crate::maxent::Termination;
 use crate::objective::{Parameter, ParameterValues, Reference, ReferenceError};
 use crate::periodogram::eccentric::keplerian;
 use crate::periodogram::peaks::refined;
@@ -113,14 +114,11 @@ pub fn cycles(imager: &Imager) -> Vec<f64> {
 }
 
 impl View {
-    /// The image at `values`. Where the target chi2 is out of reach, the one that comes close.
+    /// The image at `values`. Where the target chi2 takes more than three times the entropy's weight over the number of data, the
+    /// image stops short of it: beyond, noise is turned into spots.
     fn new(imager: &Imager, values: ParameterValues, settings: &DetectionSettings) -> Result<Self, ReferenceError> {
-        let target = settings.chi2_target;
-        let (reference, on_target) = match Reference::build(imager, values, target) {
-            Ok(reference) => (reference, true),
-            Err(ReferenceError::TargetBelowFloor { .. }) => (Reference::provisional(imager, values, target)?, false),
-            Err(error) => return Err(error),
-        };
+        let reference = Reference::provisional(imager, values, settings.chi2_target)?;
+        let on_target = reference.solution.termination == Termination::Converged;
         let nuisances = &settings.nuisances;
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
         let quadratic = Expansion::of(imager, &reference, &stellar).velocities(nuisances);

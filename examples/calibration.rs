@@ -1,0 +1,253 @@
+//! Calibration of the periodogram on simulated stars: false-alarm probabilities of stars without a planet, and credible
+//! intervals of stars with one. Every star has its own spots and its own noise.
+//!
+//!     cargo run --release --example calibration -- 300 results/calibration
+//!
+//! writes null.csv and planet.csv (a line a star) and prints the tables of `results/calibration.md`.
+
+use dimcmc::config;
+use dimcmc::detection::{Detection, DetectionSettings, cycles};
+use dimcmc::imaging::Imager;
+use dimcmc::io::csv::Table;
+use dimcmc::objective::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
+use dimcmc::periodogram::{FalseAlarm, Frequencies, FrequencySettings, NullModel, SearchSettings};
+use dimcmc::scene::Scene;
+use dimcmc::simulate::Simulation;
+use dimcmc::star::Spot;
+use dimcmc::surrogate::Surrogate;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Semi-amplitude of the planets (km/s).
+const K_KMS: f64 = 0.06;
+
+/// Draws of each star's posterior.
+const DRAWS: usize = 2000;
+
+/// Periods within this share of the rotation period are near co-rotation.
+const NEAR: f64 = 0.15;
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+fn main() -> Result<(), Failure> {
+    let mut args = std::env::args().skip(1);
+    let stars: usize = args.next().as_deref().unwrap_or("300").parse()?;
+    let folder = args.next().unwrap_or_else(|| "results/calibration".into());
+    std::fs::create_dir_all(&folder)?;
+    let scene = Scene::load("configs/demo.json".as_ref())?;
+    let config::ObservationSource::Simulate(simulation) = &scene.settings.source else {
+        return Err("configs/demo.json does not simulate".into());
+    };
+    let null: Vec<NullStar> = in_parallel(stars, |seed| null_star(&scene, simulation, seed))?;
+    NullStar::table(&null, Path::new(&folder))?;
+    let planets: Vec<PlanetStar> = in_parallel(stars, |seed| planet_star(&scene, simulation, seed))?;
+    PlanetStar::table(&planets, Path::new(&folder))
+}
+
+fn in_parallel<T: Send>(stars: usize, star: impl Fn(u64) -> Result<T, Failure> + Sync) -> Result<Vec<T>, Failure> {
+    (0..stars).into_par_iter().with_max_len(1).map(|seed| star(seed as u64)).collect()
+}
+
+/// A star like the demo's with spots and noise of its own.
+fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) -> (Imager, ParameterValues) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut spot = || Spot {
+        longitude: rng.random_range(0.0..std::f64::consts::TAU),
+        latitude: rng.random_range(-0.3f64..1.0).asin(),
+        radius: rng.random_range(5f64..17.0).to_radians(),
+        filling: rng.random_range(0.5..0.92),
+    };
+    let spots = (0..12).map(|_| spot()).collect();
+    let mut truth = scene.settings.values;
+    let (period, phi) = orbit.unwrap_or((1.7, 0.5));
+    truth[Parameter::K] = if orbit.is_some() { K_KMS } else { 0.0 };
+    truth[Parameter::PorbOverProt] = period;
+    truth[Parameter::Phi] = phi;
+    let simulation = Simulation { spots, truth, seed: 1000 + seed, ..like.clone() };
+    let star = scene.imager.star.clone();
+    let observations = simulation.observe(&star);
+    let imaging = &scene.settings.imaging;
+    (Imager::new(star, &observations, imaging.pixels, imaging.default_spot), truth)
+}
+
+fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
+    let frequencies =
+        Frequencies::new(&cycles(imager), imager.star.rotation_period_d, FrequencySettings::default())?;
+    let settings = DetectionSettings {
+        chi2_target: scene.settings.imaging.chi2_target,
+        nuisances: Vec::new(),
+        search: SearchSettings { null: NullModel::default(), draws, seed: 1 },
+        eccentric: false,
+        second_planet: false,
+    };
+    Ok(Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?)
+}
+
+/// What a star without a planet showed.
+struct NullStar {
+    chi2_per_datum: f64,
+    lambda: f64,
+    delta_ln_l: f64,
+    porb_over_prot: f64,
+    /// False-alarm probabilities by [`MODELS`].
+    false_alarm: [f64; 3],
+}
+
+const MODELS: [(NullModel, &str); 3] = [
+    (NullModel::Information, "information"),
+    (NullModel::Noise, "noise"),
+    (NullModel::NoiseAndBias, "noise-and-bias"),
+];
+
+fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Failure> {
+    let (imager, _) = star(scene, like, seed, None);
+    let found = detect(scene, &imager, 10_000)?;
+    let trials: Vec<_> = found.search.rows.iter().map(|row| row.trial).collect();
+    let peak = found.search.best();
+    let probability = |(model, _): (NullModel, &str)| {
+        let quadratic = &found.planet_free.quadratic;
+        FalseAlarm::draw(quadratic, &trials, model, 10_000, 1).probability(peak.orbit.delta_ln_l).value()
+    };
+    let solution = &found.planet_free.reference.solution;
+    Ok(NullStar {
+        chi2_per_datum: solution.chi2 / imager.data.depth.len() as f64,
+        lambda: solution.image.lambda,
+        delta_ln_l: peak.orbit.delta_ln_l,
+        porb_over_prot: peak.porb_over_prot,
+        false_alarm: MODELS.map(probability),
+    })
+}
+
+impl NullStar {
+    fn table(stars: &[NullStar], folder: &Path) -> Result<(), Failure> {
+        let columns = ["chi2_per_datum", "lambda", "delta_ln_l", "porb_over_prot"];
+        let names: Vec<&str> = columns.into_iter().chain(MODELS.map(|m| m.1)).collect();
+        let mut csv = Table::new(&names);
+        for star in stars {
+            let [a, b, c] = star.false_alarm;
+            csv.row(&[star.chi2_per_datum, star.lambda, star.delta_ln_l, star.porb_over_prot, a, b, c]);
+        }
+        std::fs::write(folder.join("null.csv"), csv.into_bytes())?;
+        println!("{} stars without a planet\n", stars.len());
+        println!("| null model | KS distance | p | below 1 % | below 5 % | below 10 % | below 50 % |");
+        println!("|---|---|---|---|---|---|---|");
+        for (i, (_, name)) in MODELS.into_iter().enumerate() {
+            let mut values: Vec<f64> = stars.iter().map(|star| star.false_alarm[i]).collect();
+            values.sort_by(f64::total_cmp);
+            let (distance, p) = kolmogorov_smirnov(&values);
+            let below = |level: f64| share(values.iter().filter(|v| **v <= level).count(), values.len());
+            let shares = [0.01, 0.05, 0.1, 0.5].map(below).join(" | ");
+            println!("| {name} | {distance:.3} | {p:.2e} | {shares} |");
+        }
+        println!();
+        Ok(())
+    }
+}
+
+/// What a star with a planet showed.
+struct PlanetStar {
+    porb_over_prot: f64,
+    /// Highest peak of the blind search, and its false-alarm probability.
+    delta_ln_l: f64,
+    found_porb_over_prot: f64,
+    false_alarm: f64,
+    k_kms: f64,
+    sigma_k_kms: f64,
+    /// Share of the posterior below the truth in K, Porb/Prot, phi; of a phase, in half a turn either way.
+    ranks: [f64; 3],
+}
+
+fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar, Failure> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(1);
+    let (period, phi) = (rng.random_range(0.5f64.ln()..4f64.ln()).exp(), rng.random::<f64>());
+    let (imager, truth) = star(scene, like, 10_000 + seed, Some((period, phi)));
+    let found = detect(scene, &imager, 2000)?;
+    let peak = found.search.best();
+    let free = [
+        (Parameter::K, Prior::Uniform { min: 0.0, max: 0.3 }),
+        (Parameter::PorbOverProt, Prior::LogUniform { min: 0.5, max: 4.0 }),
+        (Parameter::Phi, Prior::Periodic),
+    ];
+    let free = free.into_iter().map(|(parameter, prior)| FreeParameter { parameter, prior }).collect();
+    let reference = &found.last().reference;
+    let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
+    let space = ParameterSpace::new(free, reference.values, mid, base, imager.star.rotation_period_d);
+    let surrogate = Surrogate::new(&imager, &space, reference).ok_or("the likelihood has no maximum")?;
+    let draws: Vec<Vec<f64>> =
+        (0..DRAWS).filter_map(|_| Some(space.to_written(&surrogate.draw(&mut rng)?))).collect();
+    let below = |i: usize, x: f64| draws.iter().filter(|d| d[i] < x).count() as f64 / draws.len() as f64;
+    // the phase around its mean direction
+    let turn = |phi: f64| (std::f64::consts::TAU * phi).sin_cos();
+    let (sin, cos) = draws.iter().map(|d| turn(d[2])).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let centre = sin.atan2(cos) / std::f64::consts::TAU;
+    let from_centre = |phi: f64| phi - centre - (phi - centre).round();
+    let phase = draws.iter().filter(|d| from_centre(d[2]) < from_centre(phi)).count() as f64 / draws.len() as f64;
+    Ok(PlanetStar {
+        porb_over_prot: period,
+        delta_ln_l: peak.orbit.delta_ln_l,
+        found_porb_over_prot: found.best.porb_over_prot,
+        false_alarm: found.search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
+        k_kms: found.best.orbit.k_kms,
+        sigma_k_kms: found.best.orbit.sigma_k_kms,
+        ranks: [below(0, truth[Parameter::K]), below(1, period), phase],
+    })
+}
+
+impl PlanetStar {
+    fn near(&self) -> bool {
+        (self.porb_over_prot - 1.0).abs() < NEAR
+    }
+
+    fn table(stars: &[PlanetStar], folder: &Path) -> Result<(), Failure> {
+        let mut csv = Table::new(&[
+            "porb_over_prot", "found_porb_over_prot", "delta_ln_l", "false_alarm", "k_kms", "sigma_k_kms", "rank_k",
+            "rank_p", "rank_phi",
+        ]);
+        for s in stars {
+            let [k, p, phi] = s.ranks;
+            let found = s.found_porb_over_prot;
+            csv.row(&[s.porb_over_prot, found, s.delta_ln_l, s.false_alarm, s.k_kms, s.sigma_k_kms, k, p, phi]);
+        }
+        std::fs::write(folder.join("planet.csv"), csv.into_bytes())?;
+        println!("{} stars with a planet of {} m/s\n", stars.len(), 1000.0 * K_KMS);
+        println!("| period | stars | found (false alarm < 1 %) | | K 68 % | K 95 % | P 68 % | P 95 % | phi 68 % | phi 95 % |");
+        println!("|---|---|---|---|---|---|---|---|---|---|");
+        let groups: [(&str, fn(&PlanetStar) -> bool); 3] = [
+            ("all", |_| true),
+            ("away from co-rotation", |s| !s.near()),
+            ("within 15 % of co-rotation", |s| s.near()),
+        ];
+        for (name, member) in groups {
+            let group: Vec<&PlanetStar> = stars.iter().filter(|s| member(s)).collect();
+            let count = |test: &dyn Fn(&PlanetStar) -> bool| {
+                share(group.iter().filter(|s| test(s)).count(), group.len())
+            };
+            let inside = |i: usize, level: f64| count(&|s| (s.ranks[i] - 0.5).abs() < 0.5 * level);
+            let cells: Vec<String> =
+                (0..3).flat_map(|i| [inside(i, 0.68), inside(i, 0.95)]).collect();
+            let found = count(&|s| s.false_alarm < 0.01);
+            println!("| {name} | {} | {found} | | {} |", group.len(), cells.join(" | "));
+        }
+        Ok(())
+    }
+}
+
+/// A share in per cent with its binomial error.
+fn share(count: usize, of: usize) -> String {
+    let n = of.max(1) as f64;
+    let p = count as f64 / n;
+    format!("{:.1} +- {:.1} %", 100.0 * p, 100.0 * (p * (1.0 - p) / n).sqrt())
+}
+
+/// Distance of sorted values from the uniform distribution, and the probability of a larger one by chance (Kolmogorov).
+fn kolmogorov_smirnov(sorted: &[f64]) -> (f64, f64) {
+    let n = sorted.len() as f64;
+    let distance = sorted.iter().enumerate().map(|(i, x)| (x - i as f64 / n).abs().max(((i + 1) as f64 / n - x).abs()));
+    let distance = distance.fold(0.0, f64::max);
+    let z = distance * (n.sqrt() + 0.12 + 0.11 / n.sqrt());
+    let p = (1..100).map(|k| 2.0 * (-1f64).powi(k - 1) * (-2.0 * (k as f64 * z).powi(2)).exp()).sum::<f64>();
+    (distance, p.clamp(0.0, 1.0))
+}
