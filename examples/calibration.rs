@@ -73,8 +73,7 @@ fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) 
 }
 
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
-    let frequencies =
-        Frequencies::new(&cycles(imager), imager.star.rotation_period_d, FrequencySettings::default())?;
+    let frequencies = Frequencies::new(&cycles(imager), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
         chi2_target: scene.settings.imaging.chi2_target,
         nuisances: Vec::new(),
@@ -95,11 +94,8 @@ struct NullStar {
     false_alarm: [f64; 3],
 }
 
-const MODELS: [(NullModel, &str); 3] = [
-    (NullModel::Information, "information"),
-    (NullModel::Noise, "noise"),
-    (NullModel::NoiseAndBias, "noise-and-bias"),
-];
+const MODELS: [(NullModel, &str); 3] =
+    [(NullModel::Information, "information"), (NullModel::Noise, "noise"), (NullModel::NoiseAndBias, "noise-and-bias")];
 
 fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Failure> {
     let (imager, _) = star(scene, like, seed, None);
@@ -176,8 +172,7 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
     let space = ParameterSpace::new(free, reference.values, mid, base, imager.star.rotation_period_d);
     let surrogate = Surrogate::new(&imager, &space, reference).ok_or("the likelihood has no maximum")?;
-    let draws: Vec<Vec<f64>> =
-        (0..DRAWS).filter_map(|_| Some(space.to_written(&surrogate.draw(&mut rng)?))).collect();
+    let draws: Vec<Vec<f64>> = (0..DRAWS).filter_map(|_| Some(space.to_written(&surrogate.draw(&mut rng)?))).collect();
     let below = |i: usize, x: f64| draws.iter().filter(|d| d[i] < x).count() as f64 / draws.len() as f64;
     // the phase around its mean direction
     let turn = |phi: f64| (std::f64::consts::TAU * phi).sin_cos();
@@ -203,8 +198,15 @@ impl PlanetStar {
 
     fn table(stars: &[PlanetStar], folder: &Path) -> Result<(), Failure> {
         let mut csv = Table::new(&[
-            "porb_over_prot", "found_porb_over_prot", "delta_ln_l", "false_alarm", "k_kms", "sigma_k_kms", "rank_k",
-            "rank_p", "rank_phi",
+            "porb_over_prot",
+            "found_porb_over_prot",
+            "delta_ln_l",
+            "false_alarm",
+            "k_kms",
+            "sigma_k_kms",
+            "rank_k",
+            "rank_p",
+            "rank_phi",
         ]);
         for s in stars {
             let [k, p, phi] = s.ranks;
@@ -213,21 +215,18 @@ impl PlanetStar {
         }
         std::fs::write(folder.join("planet.csv"), csv.into_bytes())?;
         println!("{} stars with a planet of {} m/s\n", stars.len(), 1000.0 * K_KMS);
-        println!("| period | stars | found (false alarm < 1 %) | | K 68 % | K 95 % | P 68 % | P 95 % | phi 68 % | phi 95 % |");
+        println!(
+            "| period | stars | found (false alarm < 1 %) | | K 68 % | K 95 % | P 68 % | P 95 % | phi 68 % | phi 95 % |"
+        );
         println!("|---|---|---|---|---|---|---|---|---|---|");
-        let groups: [(&str, fn(&PlanetStar) -> bool); 3] = [
-            ("all", |_| true),
-            ("away from co-rotation", |s| !s.near()),
-            ("within 15 % of co-rotation", |s| s.near()),
-        ];
+        let groups: [(&str, fn(&PlanetStar) -> bool); 3] =
+            [("all", |_| true), ("away from co-rotation", |s| !s.near()), ("within 15 % of co-rotation", |s| s.near())];
         for (name, member) in groups {
             let group: Vec<&PlanetStar> = stars.iter().filter(|s| member(s)).collect();
-            let count = |test: &dyn Fn(&PlanetStar) -> bool| {
-                share(group.iter().filter(|s| test(s)).count(), group.len())
-            };
+            let count =
+                |test: &dyn Fn(&PlanetStar) -> bool| share(group.iter().filter(|s| test(s)).count(), group.len());
             let inside = |i: usize, level: f64| count(&|s| (s.ranks[i] - 0.5).abs() < 0.5 * level);
-            let cells: Vec<String> =
-                (0..3).flat_map(|i| [inside(i, 0.68), inside(i, 0.95)]).collect();
+            let cells: Vec<String> = (0..3).flat_map(|i| [inside(i, 0.68), inside(i, 0.95)]).collect();
             let found = count(&|s| s.false_alarm < 0.01);
             println!("| {name} | {} | {found} | | {} |", group.len(), cells.join(" | "));
         }
