@@ -1,6 +1,6 @@
 //! Journal and summary from outside: torn tails against corruption, exact floats, circular statistics, advice.
 
-use dimcmc::chain::{Chain, Goals, ParameterKind, Record, Shape, Summary, summarise, table};
+use dimcmc::chain::{Chain, Goals, MoveKind, ParameterKind, Record, Shape, Summary, summarise, table};
 use dimcmc::io::journal::{self, Journal};
 use dimcmc::log_density::Status;
 use rand::{Rng, SeedableRng};
@@ -35,6 +35,7 @@ fn chain(names: &[&str], size: [usize; 3], draw: &mut dyn FnMut(&mut ChaCha8Rng,
                     status: Status::Converged,
                     proposed,
                     passes: rng.random_range(20..60),
+                    by: (step > 0).then_some(MoveKind::Stretch),
                 });
             }
         }

@@ -336,7 +336,8 @@ fn optimise_finds_the_injected_planet_with_error_bars() {
         assert!((variance / (sd * sd) - 1.0).abs() < 1e-12);
     }
     assert_eq!(optimum["covariance"][0][1], optimum["covariance"][1][0]);
-    assert!(optimum["starts"].as_array().unwrap().len() > 1, "from several starts");
+    // at a fixed period the quadratic has one maximum, and the climb from the config's values has found it
+    assert_eq!(optimum["starts"].as_array().unwrap().len(), 1);
 }
 
 #[test]

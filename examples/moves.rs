@@ -1,0 +1,97 @@
+//! The sampler with and without the surrogate move: the same posterior, at what cost? Also where the surrogate is poor.
+//!
+//!     cargo run --release --example moves
+//!
+//! prints the tables of `results/moves.md`. Every case is `configs/demo.json` (5,000 pixels) with another planet, or
+//! `configs/paper_7d.json`.
+
+use dimcmc::chain::{MoveKind, Summary, summarise};
+use dimcmc::manifest::kinds_and_goals;
+use dimcmc::run::{Run, StartFrom};
+use dimcmc::scene::Scene;
+use dimcmc::search::{SearchSettings, find};
+use serde_json::{Value, json};
+use std::sync::atomic::AtomicBool;
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Name, config, what is changed in it.
+fn cases() -> Vec<(&'static str, &'static str, Value)> {
+    let planet = |k: f64, period: f64| json!({ "planet": { "k_kms": k, "porb_over_prot": period, "phi": 0.5 } });
+    let wide = json!({ "parameters": { "k_kms": { "prior": "uniform", "min": 0.0, "max": 0.8 } } });
+    let mut strong = planet(0.4, 1.7);
+    merge(&mut strong, &wide);
+    vec![
+        ("K = 100 m/s, P = 1.7", "demo", json!({})),
+        ("K = 400 m/s, P = 1.7", "demo", strong),
+        ("K = 100 m/s, P = 1.0", "demo", planet(0.1, 1.0)),
+        ("K = 0", "demo", planet(0.0, 1.7)),
+        ("7-D, K = 100 m/s, P = 1.7", "paper_7d", json!({})),
+    ]
+}
+
+fn main() -> Result<(), Failure> {
+    let only = std::env::args().nth(1);
+    let head = ["case", "moves", "evaluations", "ESS / evaluation", "accepted (surrogate)"].join(" | ");
+    println!("| {head} | parameters: median (-, + of 68 %) |\n|---|---|---|---|---|---|");
+    for (name, config, change) in cases() {
+        if only.as_ref().is_some_and(|only| !name.contains(only.as_str())) {
+            continue;
+        }
+        let mut config: Value = serde_json::from_str(&std::fs::read_to_string(format!("configs/{config}.json"))?)?;
+        config.as_object_mut().map(|c| c.remove("$schema"));
+        config["imaging"]["pixels"] = json!(5000);
+        merge(&mut config, &change);
+        let with = chain(&config, 20.0, 3000.0)?;
+        let without = chain(&config, 0.0, 2000.0)?;
+        for (moves, summary) in [("with surrogate", &with), ("without", &without)] {
+            println!("| {name} | {moves} | {} |", row(summary));
+        }
+    }
+    Ok(())
+}
+
+/// The summary of a chain with this weight of the surrogate and this goal.
+fn chain(config: &Value, surrogate: f64, ess: f64) -> Result<Summary, Failure> {
+    let mut config = config.clone();
+    let seed = if surrogate > 0.0 { 1 } else { 2 };
+    merge(&mut config, &json!({ "sampler": { "ess": ess, "seed": seed, "moves": { "surrogate": surrogate } } }));
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("config.json");
+    std::fs::write(&file, config.to_string())?;
+    let scene = Scene::load(&file)?;
+    let found = find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ())?;
+    let mut run = Run::begin(&scene, &folder.path().join("run"), found, StartFrom::default(), false)?;
+    run.go(&AtomicBool::new(false), |_, _| ())?;
+    let (kinds, goals) = kinds_and_goals(&scene.settings);
+    Ok(summarise(&run.chain, &kinds, &goals)?)
+}
+
+fn row(summary: &Summary) -> String {
+    let surrogate = summary.moves.iter().find(|m| m.kind == MoveKind::Surrogate);
+    let accepted = surrogate.map_or("-".to_owned(), |m| format!("{:.2}", m.acceptance_fraction));
+    let worth = summary.ess_per_evaluation.map_or("-".to_owned(), |x| format!("{x:.3}"));
+    let parameters: Vec<String> = summary
+        .names
+        .iter()
+        .map(|name| {
+            let p = &summary.parameters[name];
+            let digits = (1.0 - p.sd.log10().floor()).max(0.0) as usize;
+            let (low, high) = (p.median - p.ci68[0], p.ci68[1] - p.median);
+            format!("{name} {:.digits$} (-{low:.digits$}, +{high:.digits$})", p.median)
+        })
+        .collect();
+    format!("{} | {worth} | {accepted} | {}", summary.evaluations, parameters.join(", "))
+}
+
+/// Puts the members of `change` into `value`, objects member by member.
+fn merge(value: &mut Value, change: &Value) {
+    match (value, change) {
+        (Value::Object(value), Value::Object(change)) => {
+            for (key, change) in change {
+                merge(value.entry(key.clone()).or_insert(Value::Null), change);
+            }
+        }
+        (value, change) => *value = change.clone(),
+    }
+}
