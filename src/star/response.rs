@@ -4,7 +4,7 @@
 //! Method section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile. Left out: brightness
 //! (what x is), the division by the continuum, data.
 
-use super::convolution::{ProfileConvolution, Rows};
+use super::convolution::{ProfileConvolution, Rows, VelocityGrid};
 use super::deposit::{Deposit, Moments};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
@@ -46,7 +46,7 @@ pub const MOST_STEPS_PER_BIN: f64 = 200.0;
 pub struct Response {
     deposit: Arc<Deposit>,
     convolutions: Vec<ProfileConvolution>,
-    steps_per_bin: usize,
+    grid: VelocityGrid,
     /// First bin of each profile, and the end.
     starts: Vec<usize>,
 }
@@ -74,22 +74,26 @@ impl Response {
     }
 
     fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        let steps_per_bin = LineKernel::steps_per_bin(star.line, sampling.step_kms);
         let kernel = LineKernel::new(star.line, deposit.step_kms);
+        let grid = VelocityGrid {
+            nodes: deposit.nodes,
+            step_kms: deposit.step_kms,
+            steps_per_bin: LineKernel::steps_per_bin(star.line, sampling.step_kms),
+        };
         let mut starts = vec![0];
         let mut convolutions = Vec::with_capacity(sampling.profiles.len());
         for &(time, first_velocity, bins) in &sampling.profiles {
             let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
             let first_bin = first_velocity - shift - deposit.origin_kms;
-            convolutions.push(ProfileConvolution::new(&kernel, deposit.step_kms, steps_per_bin, first_bin));
+            convolutions.push(ProfileConvolution::new(&kernel, grid, first_bin, bins));
             starts.push(starts[starts.len() - 1] + bins);
         }
-        Response { deposit, convolutions, steps_per_bin, starts }
+        Response { deposit, convolutions, grid, starts }
     }
 
     fn rows(&self) -> Rows {
         let bins = self.starts.windows(2).map(|s| s[1] - s[0]);
-        Rows::new(self.deposit.nodes, self.steps_per_bin, self.convolutions.iter().zip(bins))
+        Rows::new(self.grid, self.convolutions.iter().zip(bins))
     }
 
     /// Number of pixels.
