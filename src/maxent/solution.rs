@@ -93,8 +93,9 @@ pub struct Start {
     pub path: Vec<f64>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,
-    /// The adjoint of spottedness at fixed chi2, in the entropy's metric: how much of it a residual of the Newton system is
-    /// worth. Empty for none: then what is left of spottedness when the solver stops is not forecast.
+    /// The adjoint of spottedness at fixed chi2: how much of it a residual of the Newton system is worth. In the entropy's
+    /// metric, over the scale of the metric. Empty for none: then what is left of spottedness when the solver stops is not
+    /// forecast.
     pub adjoint: Vec<f64>,
     /// The best solution there is, so that effort is spared far below it; none to be precise everywhere.
     pub best: Option<Best>,

@@ -105,7 +105,7 @@ impl Posterior {
         Solver { entropy: self.imager.entropy, preconditioner: &self.reference.preconditioner, settings: self.settings }
     }
 
-    fn goal(&self) -> Goal {
+    pub(super) fn goal(&self) -> Goal {
         match self.kind {
             ObjectiveKind::RegularisedLikelihood => Goal::Lambda(self.reference.solution.image.lambda),
             ObjectiveKind::Spottedness | ObjectiveKind::Entropy => {
@@ -136,7 +136,7 @@ impl Posterior {
 
     /// The evaluation that a reconstruction of so many passes makes with its prior.
     fn evaluation(&self, solution: &Solution, passes: u32, log_prior: f64) -> Evaluation {
-        let &Solution { spottedness, chi2, .. } = solution;
+        let (spottedness, chi2) = (self.spottedness(solution), solution.chi2);
         match self.judge(solution) {
             Ok((log_likelihood, status)) => {
                 Evaluation { log_prob: log_likelihood + log_prior, spottedness, chi2, passes, status }

@@ -21,7 +21,7 @@ pub struct Prediction {
     image: Vec<Vec<f64>>,
     /// Change of ln(lambda) per unit of each coordinate.
     ln_lambda: Vec<f64>,
-    /// Adjoint of spottedness at fixed chi2, in the entropy's metric; empty at a fixed lambda.
+    /// Adjoint of spottedness at fixed chi2, as [`Start::adjoint`]; empty where spottedness does not matter.
     adjoint: Vec<f64>,
 }
 
@@ -66,7 +66,7 @@ impl Prediction {
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &imager.grid.area);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
                 let adjoint = inverse.iter().zip(&scale).zip(&solution.path);
-                adjoint.map(|((y, scale), path)| y / scale + along_path * path).collect()
+                adjoint.map(|((y, scale), path)| (y / scale + along_path * path) / scale).collect()
             }
         };
         let (mut image, mut ln_lambda) = (Vec::new(), Vec::new());
