@@ -104,7 +104,7 @@ impl Preconditioner {
     /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
     pub fn norms(&self, lambda: f64, r: &[f64]) -> (f64, f64) {
         let components = vector::run(Components { basis: self, r });
-        let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(c * c) / (1.0 + lambda * e));
+        let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));
         let mut rest = r.to_vec();
         vector::run(Subtract { basis: self, components: &components, out: &mut rest });
         (spanned.sum(), dot(&rest, &rest))
