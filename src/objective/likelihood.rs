@@ -56,7 +56,7 @@ impl Posterior {
     }
 
     /// Spottedness of a reconstruction; at the target chi2 what a first-order forecast says that the solver's next steps would
-    /// make of it.
+    /// make of it (along the path alone where spottedness is not the objective).
     pub(super) fn spottedness(&self, solution: &Solution) -> f64 {
         match (self.goal(), solution.termination) {
             (Goal::Chi2 { target, .. }, Termination::Converged) => {
