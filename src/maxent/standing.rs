@@ -21,7 +21,8 @@ pub(super) const SMALLEST_LAMBDA: f64 = 1e-12;
 /// A lambda this close to its bound, in logarithm, is there.
 const AT_BOUND: f64 = 1e-12;
 
-/// Error of a first-order forecast of what spottedness has left to change, over the forecast.
+/// Error of a first-order forecast of what spottedness has left to change, over the forecast: a good one. Those of small changes
+/// are often worse, which is why errors come out several times the tolerance.
 const FORECAST_ERROR: f64 = 0.03;
 
 /// Error left at the bound of lambda, over the forecast of what chi2/2 has left to change, which is not applied there.
