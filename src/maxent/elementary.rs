@@ -1,4 +1,5 @@
-//! Exponential and logarithm for loops that are compiled into vector instructions, without branches: to two units in the last place.
+//! Exponential and logarithm for loops that are compiled into vector instructions: without branches, to two units in the last
+//! place.
 //!
 //! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for the logarithm, and the series to r^13 over
 //! |r| < ln(2)/2 for the exponential. Left out: infinities, and results that are not normal numbers.

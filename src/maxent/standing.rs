@@ -3,8 +3,8 @@
 //! With H the Newton system, g the gradient of chi2/2 and r minus the gradient of the merit, the path of solutions obeys
 //! `H path = -lambda g`, so that a step `H step = r` changes chi2 by `-2 path r / lambda`; and the adjoint of spottedness at
 //! fixed chi2 says that the step changes that by `adjoint r`. Path and adjoint of a solution near by serve as well, to first
-//! order in the distance. Where data say little, an adjoint is in proportion to the scale of the metric, and is kept relative to it:
-//! a pixel that has become spotted since then weighs what it weighs now. Left out: the steps (`solver`).
+//! order in the distance. Where data say little, an adjoint is in proportion to the scale of the metric, and is kept relative
+//! to it: a pixel that has become spotted since then weighs what it weighs now. Left out: the steps (`solver`).
 
 use super::cg::{axpy, dot};
 use super::entropy::Entropy;
@@ -21,8 +21,8 @@ pub(super) const SMALLEST_LAMBDA: f64 = 1e-12;
 /// A lambda this close to its bound, in logarithm, is there.
 const AT_BOUND: f64 = 1e-12;
 
-/// Error of a first-order forecast of what spottedness has left to change, over the forecast: a good one. Those of small changes
-/// are often worse, which is why errors come out several times the tolerance.
+/// Error of a first-order forecast of what spottedness has left to change, over the forecast: of a good one. Those of small
+/// changes are often worse, which is why errors come out several times the tolerance.
 const FORECAST_ERROR: f64 = 0.03;
 
 /// Error left at the bound of lambda, over the forecast of what chi2/2 has left to change, which is not applied there.
