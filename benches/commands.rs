@@ -7,14 +7,39 @@ mod common;
 
 use common::paper::file;
 use common::table::Table;
+use std::io::Read;
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// A command of the program, and the word after the number of reconstructions in what it prints.
-const COMMANDS: [(&str, &str, &str); 3] = [
-    ("sample", "configs/demo.json", "evaluations"),
-    ("grid", "configs/paper_grid.json", "reconstructions"),
-    ("sample", "configs/paper_7d.json", "evaluations"),
+/// A command of the program.
+struct Case {
+    command: &'static str,
+    config: &'static str,
+    /// The word after the number of reconstructions in what it prints.
+    counted: &'static str,
+    /// What it prints if all went well.
+    good: &'static str,
+    /// Whether it takes so long that it is run by name only.
+    long: bool,
+}
+
+const CASES: [Case; 3] = [
+    Case { command: "sample", config: "configs/demo.json", counted: "evaluations", good: "\nconverged", long: false },
+    Case {
+        command: "grid",
+        config: "configs/paper_grid.json",
+        counted: "reconstructions",
+        good: " 0 failed",
+        long: false,
+    },
+    Case {
+        command: "sample",
+        config: "configs/paper_7d.json",
+        counted: "evaluations",
+        good: "\nconverged",
+        long: true,
+    },
 ];
 
 /// Ticks of processor time in `/proc` a second, on every Linux.
@@ -27,14 +52,18 @@ fn main() {
     let columns = ["command", "seconds", "processor seconds", "peak memory, MiB", "reconstructions"];
     let mut table = Table::new("Whole commands", &columns);
     let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
-    for (command, config, counted) in COMMANDS {
+    for Case { command, config, counted, good, long } in CASES {
         let name = format!("`dimcmc {command} {config}`");
-        if !name.contains(&filter) {
+        if !name.contains(&filter) || (long && filter.is_empty()) {
             continue;
         }
         println!("{name} ...");
         let unknown = || "-".to_owned();
         let cells = match run(command, config) {
+            Ok(run) if !run.stdout.contains(good) => {
+                let last = run.stdout.lines().last().unwrap_or("nothing").to_owned();
+                [name, format!("ended in: {last}"), unknown(), unknown(), unknown()]
+            }
             Ok(run) => [
                 name,
                 format!("{:.1}", run.seconds),
@@ -46,7 +75,10 @@ fn main() {
         };
         table.row(cells);
     }
-    table.print("All processors. Reconstructions of a chain are those of its steps, without the search before them.");
+    table.print(
+        "All processors. Reconstructions of a chain are those of its steps, without the search before them. `-- 7d` runs the chain \
+         of seven parameters, which takes minutes.",
+    );
 }
 
 /// A command that has run.
@@ -68,13 +100,25 @@ fn run(command: &str, config: &str) -> Result<Run, String> {
         .stderr(Stdio::piped())
         .spawn()
         .map_err(|e| e.to_string())?;
+    // read as they come, so that the command never waits for a full pipe
+    let (stdout, stderr) = (drain(child.stdout.take()), drain(child.stderr.take()));
     let usage = Usage::until_the_end_of(&mut child);
-    let output = child.wait_with_output().map_err(|e| e.to_string())?;
+    let status = child.wait().map_err(|e| e.to_string())?;
     let seconds = began.elapsed().as_secs_f64();
-    match output.status.success() {
-        true => Ok(Run { seconds, usage, stdout: String::from_utf8_lossy(&output.stdout).into_owned() }),
-        false => Err(String::from_utf8_lossy(&output.stderr).lines().next().unwrap_or("no message").to_owned()),
+    let [stdout, stderr] = [stdout, stderr].map(|text| text.join().unwrap_or_default());
+    match status.success() {
+        true => Ok(Run { seconds, usage, stdout }),
+        false => Err(stderr.lines().next().unwrap_or("no message").to_owned()),
     }
+}
+
+/// Reads a pipe to its end beside everything else.
+fn drain(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
+        String::from_utf8_lossy(&bytes).into_owned()
+    })
 }
 
 /// What a process used.

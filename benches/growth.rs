@@ -4,10 +4,10 @@
 
 mod common;
 
-use common::paper::{Free, Size, passes_of, scene, truth};
+use common::paper::{Free, Passes, Size, scene, truth};
 use common::stopwatch::{Candidate, exponent, fastest, in_turn};
 use common::table::{Table, Target, thousands};
-use dimcmc::log_density::{Evaluation, LogDensity};
+use dimcmc::log_density::{Evaluation, LogDensity, Status};
 use dimcmc::maxent::Problem;
 use dimcmc::objective::{ObjectiveKind, Posterior, Reference};
 use dimcmc::scene::Scene;
@@ -83,9 +83,20 @@ impl Case {
         Case { response, posterior, points }
     }
 
+    fn pass(&self) -> Candidate<'_> {
+        let mut passes = Passes::new(&self.response);
+        Candidate::new("pass", move || passes.run(&self.response, PASSES))
+    }
+
+    fn evaluate(&self) -> Vec<Evaluation> {
+        self.points.iter().map(|x| self.posterior.evaluate(x)).collect()
+    }
+
+    /// Passes of an evaluation in the mean, all of which reach their target.
     fn passes(&self) -> f64 {
-        let passes: Vec<f64> = self.points.iter().map(|x| f64::from(self.posterior.evaluate(x).passes)).collect();
-        passes.iter().sum::<f64>() / passes.len() as f64
+        let evaluations = self.evaluate();
+        assert!(evaluations.iter().all(|evaluation| evaluation.status == Status::Converged), "{evaluations:?}");
+        evaluations.iter().map(|evaluation| f64::from(evaluation.passes)).sum::<f64>() / evaluations.len() as f64
     }
 }
 
@@ -97,13 +108,11 @@ fn chi2_of_truth(scene: &Scene) -> f64 {
 /// Rows for all sizes and the exponents.
 fn family(name: &str, sizes: &[usize], size: impl Fn(usize) -> Size, table: &mut Table) {
     let cases: Vec<Case> = sizes.iter().map(|n| Case::new(size(*n))).collect();
-    let pass = |case: &Case| passes_of(&case.response, PASSES);
-    let mut passes: Vec<Candidate> = cases.iter().map(|case| Candidate::new("pass", move || pass(case))).collect();
+    let mut passes: Vec<Candidate> = cases.iter().map(Case::pass).collect();
     let pass_times = times_of(&mut passes, 15, f64::from(PASSES));
-    let all_points = |case: &Case| case.points.iter().map(|x| case.posterior.evaluate(x)).collect::<Vec<Evaluation>>();
     let mut evaluations: Vec<Candidate> =
-        cases.iter().map(|case| Candidate::new("evaluation", move || all_points(case))).collect();
-    let evaluation_times = times_of(&mut evaluations, 5, POINTS as f64);
+        cases.iter().map(|case| Candidate::new("evaluation", move || case.evaluate())).collect();
+    let evaluation_times = times_of(&mut evaluations, 3, POINTS as f64);
     for (k, case) in cases.iter().enumerate() {
         let (pass, evaluation) = (1e3 * pass_times[k], 1e3 * evaluation_times[k]);
         table.row([

@@ -11,6 +11,7 @@ use common::stopwatch::{Candidate, by_criterion, criterion, fastest, in_turn};
 use common::table::{Table, Target, thousands};
 use criterion::Criterion;
 use dimcmc::scene::Scene;
+use dimcmc::vector::{self, Instructions, Task};
 use plain_loop::PlainLoop;
 use std::hint::black_box;
 
@@ -47,9 +48,21 @@ fn main() {
     criterion.final_summary();
     table.print(&format!(
         "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. `read` sums as many \
-         bytes as the response stores for its pairs ({} each in the plain loop, whose windows have {WINDOW} bins). `build` is a response for new stellar parameters, `shift` one for a new orbit.",
+         bytes as the response stores for its pairs, by the same instructions ({} each in the plain loop, whose windows have {WINDOW} bins). `build` is a response for new stellar parameters, `shift` one for a new orbit.",
         PlainLoop::<WINDOW>::PAIR_BYTES,
     ));
+}
+
+/// A straight read with the instructions that the response has.
+struct Read<'a>(&'a [u64]);
+
+impl Task for Read<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, _: I) -> u64 {
+        self.0.iter().fold(0, |sum, x| sum.wrapping_add(*x))
+    }
 }
 
 /// Forward and transpose: response, plain loop, read.
@@ -58,7 +71,7 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
     let response = imager.response(&truth(scene));
     let plain = PlainLoop::<WINDOW>::new(&imager.grid, &imager.star, &truth(scene), &imager.sampling);
     let stored = vec![1_u64; response.bytes() / size_of::<u64>()];
-    let read = || black_box(&stored).iter().fold(0_u64, |sum, x| sum.wrapping_add(*x));
+    let read = || vector::run(Read(black_box(&stored)));
     let x = uneven_map(response.pixels());
     let (y, z) = (uneven_map(response.data_len()), uneven_map(response.profiles()));
 

@@ -35,9 +35,9 @@ impl Status {
 pub struct Evaluation {
     /// ln(likelihood) + ln(prior) in the coordinates of the parameters as named; minus infinity where not allowed.
     pub log_prob: f64,
-    /// Fractional spot coverage of the reconstruction.
+    /// Fractional spot coverage of the reconstruction, as [`Likelihood::spottedness`].
     pub spottedness: f64,
-    /// chi2 of the reconstruction.
+    /// chi2 of the reconstruction, as [`Likelihood::chi2`].
     pub chi2: f64,
     /// Applications of the response or its transpose that this evaluation took.
     pub passes: u32,
@@ -57,11 +57,12 @@ impl Evaluation {
 pub struct Likelihood {
     /// ln(likelihood); only differences mean something.
     pub log_likelihood: f64,
-    /// Fractional spot coverage of the image.
+    /// Fractional spot coverage of the image; where the target chi2 is reached, what a first-order forecast says that it
+    /// is at the target, of which the log-likelihood is made.
     pub spottedness: f64,
-    /// Entropy of the image.
+    /// Entropy of the image at which the solver stopped.
     pub entropy: f64,
-    /// chi2 of the image.
+    /// chi2 of that image: near the target, where that is reached, as far as the forecast is good enough.
     pub chi2: f64,
     /// Lagrange multiplier of chi2/2 in `S - lambda chi2/2`, which the image maximises.
     pub lambda: f64,

@@ -1,7 +1,8 @@
 //! Vector instructions: hot loops are compiled for AVX2 with fused multiply-add as well, and chosen at run time.
 //!
-//! A hot loop is a [`Task`]: written once, inlined into an entry compiled for either set of instructions. The sums are in the
-//! same order in both, but fused or not: results differ between processors in the last digits, never on one.
+//! A hot loop is a [`Task`]: written once, inlined into an entry compiled for either set of instructions. Products are fused
+//! with sums in one of them, and the innermost loops (`star::kernel`) sum in another order too: results differ in the last
+//! digits between processors with and without AVX2, never between runs on one.
 
 /// Work that is compiled for every set of instructions.
 pub trait Task {
@@ -12,8 +13,8 @@ pub trait Task {
     fn run<I: Instructions>(self, instructions: I) -> Self::Output;
 }
 
-/// A set of instructions; having one at hand proves that the processor has them.
-pub trait Instructions: Copy {
+/// A set of instructions; having one at hand proves that the processor has them. There are no others than those of this file.
+pub trait Instructions: Copy + sealed::Sealed {
     /// Whether AVX2 and FMA are there.
     const AVX2: bool;
 
@@ -28,6 +29,13 @@ pub struct Portable;
 /// AVX2 and fused multiply-add.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
+
+/// What unsafe code relies on, out of reach for anybody else.
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for super::Portable {}
+    impl Sealed for super::Avx2 {}
+}
 
 impl Instructions for Portable {
     const AVX2: bool = false;

@@ -122,6 +122,19 @@ fn orbit_and_systemic_velocity_shift_the_profile_as_a_whole() {
 }
 
 #[test]
+fn a_profile_far_from_the_line_is_flat() {
+    let grid = SurfaceGrid::equal_area(500, Quadrature::Centre);
+    let (star, sampling) = (oracle().star, sampling(&[0.0, 0.4]));
+    for vsys_kms in [200.0, -200.0, 1e9, -1e9, 1e300] {
+        let response = Response::new(&grid, &star, &StarState { vsys_kms, ..state() }, &sampling);
+        assert!(response.depths(&vec![1.0; grid.len()]).iter().all(|depth| *depth == 0.0), "{vsys_kms}");
+        let mut map = vec![f64::NAN; grid.len()];
+        response.apply_transpose(&vec![1.0; response.data_len()], &[0.0; 2], &mut map);
+        assert!(map.iter().all(|x| *x == 0.0), "{vsys_kms}");
+    }
+}
+
+#[test]
 fn a_spot_crosses_from_blue_to_red_and_shear_delays_high_latitudes() {
     let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);
     let spotted: Vec<f64> = (0..grid.len())

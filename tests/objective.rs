@@ -14,7 +14,7 @@ const KINDS: [ObjectiveKind; 3] =
     [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];
 
 /// All eight parameters free, with the reference near the optimum of the oracle's data.
-fn posteriors() -> Vec<Posterior> {
+fn setup() -> (Imager, ParameterSpace, Reference) {
     let oracle = oracle();
     let imager = Imager {
         grid: SurfaceGrid::equal_area(1200, Quadrature::Gauss2x2),
@@ -38,6 +38,11 @@ fn posteriors() -> Vec<Posterior> {
     ];
     let space = ParameterSpace::new(free, values, imager.mid_cycle(), imager.time_base_cycles(), 3.0);
     let reference = Reference::build(&imager, values, 0.97).unwrap();
+    (imager, space, reference)
+}
+
+fn posteriors() -> Vec<Posterior> {
+    let (imager, space, reference) = setup();
     KINDS.map(|kind| Posterior::new(imager.clone(), space.clone(), kind, reference.clone())).to_vec()
 }
 
@@ -131,6 +136,41 @@ fn evaluations_are_as_precise_as_they_say() {
             let allowed = if absolute > 0.0 { absolute } else { 1e-3 + 0.005 * below };
             assert!((got - wanted).abs() < allowed, "{theta:?}: {got} instead of {wanted}");
         }
+    }
+}
+
+#[test]
+fn lambda_stays_within_its_bound() {
+    let (imager, space, mut reference) = setup();
+    // so tight that the way to almost every solution would lead beyond it
+    reference.largest_lambda = 1.02 * reference.solution.image.lambda;
+    let largest = reference.largest_lambda;
+    let posterior = Posterior::new(imager, space, ObjectiveKind::Spottedness, reference);
+    let exact = posterior.clone().with_settings(SolverSettings::exact());
+    let start = posterior.space().start();
+    let walk = [-0.04, -0.02, -0.01, -0.004, 0.004, 0.01, 0.02, 0.04].map(|k| {
+        let mut theta = start.clone();
+        theta[0] += k;
+        theta
+    });
+    let target = posterior.reference().chi2_target;
+    for theta in (0..8).map(|i| nearby(&start, i)).chain(walk) {
+        let (got, wanted) = (posterior.reconstruct(&theta).0, exact.reconstruct(&theta).0);
+        println!("{:?} {:.9} {} {}", got.termination, got.image.lambda / largest, got.chi2, wanted.chi2);
+        assert_eq!(got.termination, wanted.termination, "{theta:?}");
+        assert!(
+            got.image.lambda <= largest * (1.0 + 1e-12),
+            "{theta:?}: {} times the bound",
+            got.image.lambda / largest
+        );
+        // the error allowed in chi2/2, and at the target what the first-order move to it covers
+        let beyond = (wanted.chi2 - target).max(0.0);
+        assert!(
+            (got.chi2 - wanted.chi2).abs() < 0.05 + 0.01 * beyond,
+            "{theta:?}: {} instead of {}",
+            got.chi2,
+            wanted.chi2
+        );
     }
 }
 

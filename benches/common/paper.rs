@@ -10,6 +10,7 @@ use dimcmc::scene::Scene;
 use dimcmc::search::{self, SearchSettings};
 use dimcmc::star::{Response, StarState};
 use serde_json::{Value, json};
+use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
 /// What is free.
@@ -83,17 +84,29 @@ pub fn uneven_map(pixels: usize) -> Vec<f64> {
     (0..pixels).map(|p| 0.8 + 0.2 * (0.7 * p as f64).sin()).collect()
 }
 
-/// That many passes, forward and transpose in turn.
-pub fn passes_of(response: &Response, passes: u32) {
-    let (x, y, z) = (uneven_map(response.pixels()), uneven_map(response.data_len()), uneven_map(response.profiles()));
-    let (mut map, mut line, mut continuum) = (x.clone(), y.clone(), z.clone());
-    for pass in 0..passes {
-        match pass % 2 {
-            0 => response.apply(&x, &mut line, &mut continuum),
-            _ => response.apply_transpose(&y, &z, &mut map),
-        }
+/// Passes alone: maps and profiles are there before the time is taken.
+pub struct Passes {
+    from: [Vec<f64>; 3],
+    to: [Vec<f64>; 3],
+}
+
+impl Passes {
+    pub fn new(response: &Response) -> Self {
+        let from = [response.pixels(), response.data_len(), response.profiles()].map(uneven_map);
+        Passes { to: from.clone(), from }
     }
-    std::hint::black_box((map, line, continuum));
+
+    /// That many passes, forward and transpose in turn.
+    pub fn run(&mut self, response: &Response, passes: u32) {
+        let ([x, y, z], [map, line, continuum]) = (&self.from, &mut self.to);
+        for pass in 0..passes {
+            match pass % 2 {
+                0 => response.apply(black_box(x), line, continuum),
+                _ => response.apply_transpose(black_box(y), black_box(z), map),
+            }
+        }
+        black_box(&self.to);
+    }
 }
 
 /// A posterior and points drawn from its bulk: a Gaussian around the maximum, as wide as the curvature there says.

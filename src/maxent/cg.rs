@@ -4,13 +4,15 @@
 /// When to stop, and what to do it with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CgLimits {
-    /// Residual over right-hand side, in the preconditioner's norm.
+    /// Residual over right-hand side, in the norm of the inverse.
     pub tolerance: f64,
     /// Most iterations.
     pub iterations: usize,
 }
 
 /// Solves `A z = b` from the start `z`; returns the number of iterations.
+///
+/// The residual is measured against `b A^-1 b`: about `b z` where the start is good, about `b P b` where there is none.
 pub(super) fn solve(
     mut apply: impl FnMut(&[f64], &mut [f64]),
     precondition: impl Fn(&[f64], &mut [f64]),
@@ -20,8 +22,12 @@ pub(super) fn solve(
 ) -> usize {
     let n = b.len();
     let (mut residual, mut applied, mut preconditioned) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
-    precondition(b, &mut preconditioned);
-    let goal = limits.tolerance * limits.tolerance * dot(b, &preconditioned);
+    let mut scale = dot(b, z);
+    if scale <= 0.0 {
+        precondition(b, &mut preconditioned);
+        scale = dot(b, &preconditioned);
+    }
+    let goal = limits.tolerance * limits.tolerance * scale;
     if z.iter().any(|&z| z != 0.0) {
         apply(z, &mut applied);
         residual.iter_mut().zip(&applied).for_each(|(r, a)| *r -= a);

@@ -4,6 +4,10 @@
 //! The solver works in `u = logit(s)`, which keeps s inside (0, 1), and measures steps in the entropy's own metric,
 //! `z = ds / sqrt(s (1-s) / a)`. Left out: other images (bright and dark), data.
 
+use super::cg::dot;
+use super::elementary::{exp_minus, ln_1p};
+use crate::vector::{self, Instructions, Task};
+
 /// The two-component entropy with its default filling factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entropy {
@@ -34,26 +38,12 @@ impl Entropy {
 
     /// Logits moved by the image step `ds`, no logit by more than `cap`; whether any reached the cap.
     pub fn step(&self, u: &[f64], s: &[f64], ds: &[f64], scale: f64, cap: f64, out: &mut [f64]) -> bool {
-        let mut capped = false;
-        for (((out, u), s), ds) in out.iter_mut().zip(u).zip(s).zip(ds) {
-            let du = logit_step(*s, scale * ds);
-            capped |= du.abs() > cap;
-            *out = (u + du.clamp(-cap, cap)).clamp(-LOGIT_LIMIT, LOGIT_LIMIT);
-        }
-        capped
+        vector::run(Step { u, s, ds, scale, cap, out })
     }
 
     /// Entropy of the image with logits `u` (at most 0, and 0 at the default), and the image s itself.
     pub fn value(&self, u: &[f64], area: &[f64], s: &mut [f64]) -> f64 {
-        // s u - ln(1 + e^u) is s ln s + (1-s) ln(1-s); both parts from one exponential
-        let at_default = softplus(self.default_logit, (-self.default_logit.abs()).exp());
-        let mut sum = 0.0;
-        for ((s, &u), a) in s.iter_mut().zip(u).zip(area) {
-            let small = (-u.abs()).exp();
-            *s = if u > 0.0 { 1.0 } else { small } / (1.0 + small);
-            sum += a * (*s * (u - self.default_logit) - softplus(u, small) + at_default);
-        }
-        -sum
+        -vector::run(NegativeValue { default_logit: self.default_logit, u, area, s })
     }
 
     /// Gradient of -S with respect to s.
@@ -71,21 +61,75 @@ impl Entropy {
     }
 }
 
+/// The work of [`Entropy::step`].
+struct Step<'a> {
+    u: &'a [f64],
+    s: &'a [f64],
+    ds: &'a [f64],
+    scale: f64,
+    cap: f64,
+    out: &'a mut [f64],
+}
+
+impl Task for Step<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, i: I) -> bool {
+        let Step { u, s, ds, scale, cap, out } = self;
+        let mut capped = false;
+        for (((out, u), s), ds) in out.iter_mut().zip(u).zip(s).zip(ds) {
+            let du = logit_step(i, *s, scale * ds);
+            capped |= du.abs() > cap;
+            *out = (u + du.clamp(-cap, cap)).clamp(-LOGIT_LIMIT, LOGIT_LIMIT);
+        }
+        capped
+    }
+}
+
+/// The work of [`Entropy::value`].
+struct NegativeValue<'a> {
+    default_logit: f64,
+    u: &'a [f64],
+    area: &'a [f64],
+    s: &'a mut [f64],
+}
+
+impl Task for NegativeValue<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, i: I) -> f64 {
+        let NegativeValue { default_logit, u, area, s } = self;
+        // s u - ln(1 + e^u) is s ln s + (1-s) ln(1-s); both parts from one exponential
+        let at_default = softplus(i, default_logit, exp_minus(i, default_logit.abs()));
+        let mut terms = vec![0.0; u.len()];
+        for ((s, &u), term) in s.iter_mut().zip(u).zip(&mut terms) {
+            let small = exp_minus(i, u.abs());
+            *s = if u > 0.0 { 1.0 } else { small } / (1.0 + small);
+            *term = *s * (u - default_logit) - softplus(i, u, small) + at_default;
+        }
+        dot(area, &terms)
+    }
+}
+
 /// Change of the logit that moves s by `ds`: exact up to half way to 0 or 1, beyond that along the tangent.
 ///
 /// Data are nearly linear in s, so that a step straight in s keeps what the stiff directions have gained; a step straight in
 /// the logit, equal to first order, would undo it to second order.
-fn logit_step(s: f64, ds: f64) -> f64 {
+#[inline(always)]
+fn logit_step(i: impl Instructions, s: f64, ds: f64) -> f64 {
     let room = if ds < 0.0 { s } else { 1.0 - s };
     let straight = ds.abs().min(0.5 * room) * ds.signum();
     let (there, rest) = (s + straight, ds - straight);
     let left = 1.0 - there;
-    (straight / (s * left)).ln_1p() + rest / (there * left)
+    ln_1p(i, straight / (s * left)) + rest / (there * left)
 }
 
 /// `ln(1 + e^u)`, given `e^-|u|`.
-fn softplus(u: f64, small: f64) -> f64 {
-    u.max(0.0) + small.ln_1p()
+#[inline(always)]
+fn softplus(i: impl Instructions, u: f64, small: f64) -> f64 {
+    u.max(0.0) + ln_1p(i, small)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! Knows images, data misfits and their curvature through [`Problem`] alone. Left out: stars, velocities, files.
 
 mod cg;
+mod elementary;
 pub mod entropy;
 mod parallelism;
 pub mod preconditioner;

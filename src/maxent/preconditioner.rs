@@ -16,11 +16,20 @@ use rand_distr::{Distribution, StandardNormal};
 pub struct Preconditioner {
     /// Largest eigenvalues of M.
     eigenvalues: Vec<f64>,
-    /// Pixels on which the basis lives.
-    active: Vec<u32>,
-    /// Eigenvectors, one row of `eigenvalues.len()` components an active pixel.
-    rows: Vec<f32>,
+    /// Pixels on which the basis lives, and others with rows of zeros to make the number of rows a multiple of [`GROUP`].
+    pixels: Vec<u32>,
+    /// How many of them are not there to fill up.
+    active: usize,
+    /// Eigenvectors: one row of components a pixel, filled up with zeros to a multiple of [`LANES`].
+    rows: Vec<Lanes>,
 }
+
+/// Components of a row that are computed side by side.
+const LANES: usize = 8;
+type Lanes = [f32; LANES];
+
+/// Rows that are read together, so that the components are loaded once for all of them.
+const GROUP: usize = 4;
 
 /// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
 const DROPPED_ENERGY: f64 = 1e-3;
@@ -72,8 +81,16 @@ impl Preconditioner {
         let first = faint.count();
         let mut active = by_energy.split_off(first);
         active.sort_unstable();
-        let rows = active.iter().flat_map(|&p| vectors.row(p as usize).iter().map(|x| *x as f32).collect::<Vec<_>>());
-        Preconditioner { rows: rows.collect(), eigenvalues, active }
+        let mut rows = Vec::new();
+        for &p in &active {
+            let row: Vec<f32> = vectors.row(p as usize).iter().map(|x| *x as f32).collect();
+            rows.extend(row.chunks(LANES).map(|part| std::array::from_fn(|i| part.get(i).copied().unwrap_or(0.0))));
+        }
+        let (mut pixels, width) = (active, eigenvalues.len().div_ceil(LANES));
+        let active = pixels.len();
+        pixels.resize(active.next_multiple_of(GROUP), 0);
+        rows.resize(pixels.len() * width, [0.0; LANES]);
+        Preconditioner { eigenvalues, pixels, active, rows }
     }
 
     /// Number of eigenvectors.
@@ -83,7 +100,21 @@ impl Preconditioner {
 
     /// Number of pixels on which they live.
     pub fn active_pixels(&self) -> usize {
-        self.active.len()
+        self.active
+    }
+
+    /// Groups of components in a row.
+    fn width(&self) -> usize {
+        self.eigenvalues.len().div_ceil(LANES)
+    }
+
+    /// Rows and their pixels, [`GROUP`] at a time.
+    #[inline(always)]
+    fn groups(&self) -> impl DoubleEndedIterator<Item = ([&[Lanes]; GROUP], &[u32; GROUP])> {
+        let width = self.width();
+        let rows = self.rows.chunks_exact((GROUP * width).max(1));
+        rows.map(move |rows| std::array::from_fn(|j| &rows[j * width..][..width]))
+            .zip(self.pixels.as_chunks::<GROUP>().0)
     }
 
     /// Eigenvalues of M, largest first.
@@ -95,7 +126,7 @@ impl Preconditioner {
     pub fn apply(&self, lambda: f64, r: &[f64], out: &mut [f64]) {
         out.copy_from_slice(r);
         let mut components = vector::run(Components { basis: self, r });
-        for (c, e) in components.iter_mut().zip(&self.eigenvalues) {
+        for (c, e) in components.as_flattened_mut().iter_mut().zip(&self.eigenvalues) {
             *c *= (lambda * e / (1.0 + lambda * e)) as f32;
         }
         vector::run(Subtract { basis: self, components: &components, out });
@@ -104,7 +135,11 @@ impl Preconditioner {
     /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
     pub fn norms(&self, lambda: f64, r: &[f64]) -> (f64, f64) {
         let components = vector::run(Components { basis: self, r });
-        let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(c * c) / (1.0 + lambda * e));
+        let spanned = components
+            .as_flattened()
+            .iter()
+            .zip(&self.eigenvalues)
+            .map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));
         let mut rest = r.to_vec();
         vector::run(Subtract { basis: self, components: &components, out: &mut rest });
         (spanned.sum(), dot(&rest, &rest))
@@ -118,14 +153,19 @@ struct Components<'a> {
 }
 
 impl Task for Components<'_> {
-    type Output = Vec<f32>;
+    type Output = Vec<Lanes>;
 
     #[inline(always)]
-    fn run<I: Instructions>(self, _: I) -> Vec<f32> {
-        let mut components = vec![0.0; self.basis.rank()];
-        for (row, &p) in self.basis.rows.chunks_exact(components.len().max(1)).zip(&self.basis.active) {
-            let r = self.r[p as usize] as f32;
-            components.iter_mut().zip(row).for_each(|(c, v)| *c += r * v);
+    fn run<I: Instructions>(self, _: I) -> Vec<Lanes> {
+        let mut components = vec![[0.0; LANES]; self.basis.width()];
+        for (rows, pixels) in self.basis.groups() {
+            let r = pixels.map(|p| self.r[p as usize] as f32);
+            for (k, sums) in components.iter_mut().enumerate() {
+                for lane in 0..LANES {
+                    let of_row = |j: usize| r[j] * rows[j][k][lane];
+                    sums[lane] += (of_row(0) + of_row(1)) + (of_row(2) + of_row(3));
+                }
+            }
         }
         components
     }
@@ -134,7 +174,7 @@ impl Task for Components<'_> {
 /// Subtracts a combination of the eigenvectors from `out`.
 struct Subtract<'a> {
     basis: &'a Preconditioner,
-    components: &'a [f32],
+    components: &'a [Lanes],
     out: &'a mut [f64],
 }
 
@@ -143,14 +183,19 @@ impl Task for Subtract<'_> {
 
     #[inline(always)]
     fn run<I: Instructions>(self, _: I) {
-        const LANES: usize = 16;
-        let rank = self.components.len();
-        for (row, &p) in self.basis.rows.chunks_exact(rank.max(1)).zip(&self.basis.active) {
-            let mut sums = [0.0; LANES];
-            for (v, c) in row.chunks(LANES).zip(self.components.chunks(LANES)) {
-                sums.iter_mut().zip(v).zip(c).for_each(|((sum, v), c)| *sum += v * c);
+        // backwards: the last rows are still in the cache
+        for (rows, pixels) in self.basis.groups().rev() {
+            let mut sums = [[0.0; LANES]; GROUP];
+            for (k, components) in self.components.iter().enumerate() {
+                for j in 0..GROUP {
+                    for lane in 0..LANES {
+                        sums[j][lane] += rows[j][k][lane] * components[lane];
+                    }
+                }
             }
-            self.out[p as usize] -= f64::from(sums.iter().sum::<f32>());
+            for (p, sums) in pixels.iter().zip(sums) {
+                self.out[*p as usize] -= f64::from(sums.iter().sum::<f32>());
+            }
         }
     }
 }

@@ -21,7 +21,8 @@ pub enum Goal {
 /// Precision and effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings {
-    /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth where chi2 is the goal.
+    /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth where chi2 is the goal: by the
+    /// solver's estimate, which is no bound (`results/performance.md`: up to eight times it over the bulk of a posterior).
     pub tolerance: f64,
     /// Error allowed besides far below the best solution, over the distance to it: a chain never sees it, and a landscape
     /// shows it as a small part of its depth.
@@ -93,8 +94,9 @@ pub struct Start {
     pub path: Vec<f64>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,
-    /// The adjoint of spottedness at fixed chi2, in the entropy's metric: how much of it a residual of the Newton system is
-    /// worth. Empty for none: then what is left of spottedness when the solver stops is not forecast.
+    /// The adjoint of spottedness at fixed chi2: how much of it a residual of the Newton system is worth. In the entropy's
+    /// metric, over the scale of the metric. Empty for none: then what is left of spottedness when the solver stops is not
+    /// forecast.
     pub adjoint: Vec<f64>,
     /// The best solution there is, so that effort is spared far below it; none to be precise everywhere.
     pub best: Option<Best>,
@@ -141,7 +143,8 @@ pub struct Solution {
     pub chi2_slope: f64,
     /// `d spottedness / d ln(lambda)` along the path (0 if the goal was a lambda).
     pub spottedness_slope: f64,
-    /// `dz / d ln(lambda)` (empty if the goal was a lambda).
+    /// `dz / d ln(lambda)` as last computed, before the last step: in the entropy's metric there, good to first order in the
+    /// step. The start's guess if there was no step; of no meaning if the goal was a lambda.
     pub path: Vec<f64>,
     /// Newton steps taken.
     pub newton_steps: usize,

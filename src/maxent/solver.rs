@@ -60,6 +60,9 @@ impl Solver<'_> {
             at.lambda = lambda;
         }
         let mut at = self.restore(problem, at, goal, start);
+        if let Goal::Chi2 { largest_lambda, .. } = goal {
+            at.lambda = at.lambda.min(largest_lambda);
+        }
         let mut path = start.path.clone();
         let mut curvature = Curvature::GaussNewton;
         for newton_steps in 0.. {

@@ -3,7 +3,8 @@
 //! With H the Newton system, g the gradient of chi2/2 and r minus the gradient of the merit, the path of solutions obeys
 //! `H path = -lambda g`, so that a step `H step = r` changes chi2 by `-2 path r / lambda`; and the adjoint of spottedness at
 //! fixed chi2 says that the step changes that by `adjoint r`. Path and adjoint of a solution near by serve as well, to first
-//! order in the distance. Left out: the steps (`solver`).
+//! order in the distance. Where data say little, an adjoint is in proportion to the scale of the metric, and is kept relative
+//! to it: a pixel that has become spotted since then weighs what it weighs now. Left out: the steps (`solver`).
 
 use super::cg::{axpy, dot};
 use super::entropy::Entropy;
@@ -20,8 +21,12 @@ pub(super) const SMALLEST_LAMBDA: f64 = 1e-12;
 /// A lambda this close to its bound, in logarithm, is there.
 const AT_BOUND: f64 = 1e-12;
 
-/// Error of a first-order forecast of what spottedness or chi2 has left to change, over the forecast.
+/// Error of a first-order forecast of what spottedness has left to change, over the forecast: of a good one. Those of small
+/// changes are often worse, which is why errors come out several times the tolerance.
 const FORECAST_ERROR: f64 = 0.03;
+
+/// Error left at the bound of lambda, over the forecast of what chi2/2 has left to change, which is not applied there.
+const BOUND_ERROR: f64 = 0.3;
 
 /// Error of the forecast of spottedness from what the preconditioner's eigenvectors do not span, over the merit of that: pixels
 /// that become spotted, where spottedness is far from linear. Like the constant above it was measured against exact
@@ -64,7 +69,7 @@ pub(super) struct Guide<'a> {
     pub preconditioner: &'a Preconditioner,
     /// `dz / d ln(lambda)` in the metric; empty for unknown.
     pub path: &'a [f64],
-    /// Adjoint of spottedness at fixed chi2, in the metric; empty for unknown.
+    /// Adjoint of spottedness at fixed chi2, in the metric, over the scale of the metric; empty for unknown.
     pub adjoint: &'a [f64],
 }
 
@@ -113,15 +118,20 @@ impl Standing {
         let (spanned, rest) = (0.5 * spanned / at.lambda, 0.5 * rest / at.lambda);
         self.error = spanned + rest;
         if self.at_bound {
-            self.error += FORECAST_ERROR * 0.5 * chi2_step.abs();
+            self.error += BOUND_ERROR * 0.5 * chi2_step.abs();
             return;
+        }
+        // what is left of the way to the target where the move of lambda is cut short
+        if let Goal::Chi2 { target, .. } = goal {
+            self.error += 0.5 * (target - at.chi2 - chi2_step - self.chi2_path * move_lambda).abs();
         }
         // of second order in the move along the path
         self.error += 0.5 * (self.chi2_path * move_lambda * move_lambda).abs();
         if adjoint.len() == path.len() {
+            let adjoint: Vec<f64> = adjoint.iter().zip(&self.scale).map(|(y, scale)| y * scale).collect();
             // no component along the path: the move of lambda is accounted for by chi2
-            let along = -2.0 * dot(g, adjoint) / self.chi2_path;
-            self.spottedness_left = dot(adjoint, right) + along * dot(path, right);
+            let along = -2.0 * dot(g, &adjoint) / self.chi2_path;
+            self.spottedness_left = dot(&adjoint, right) + along * dot(path, right);
             self.error += FORECAST_ERROR * (self.spottedness_left * self.worth()).abs() + REST_ERROR * rest;
         }
     }

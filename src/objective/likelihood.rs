@@ -7,7 +7,7 @@ use super::kind::ObjectiveKind;
 use super::posterior::Posterior;
 use super::tradeoff::Measure;
 use crate::log_density::{Likelihood, Reconstruction, Status};
-use crate::maxent::{Problem, Solution, Termination};
+use crate::maxent::{Goal, Problem, Solution, Termination};
 
 /// A chi2 this many times the target is far from any fit.
 const FAR: f64 = 1.05;
@@ -22,7 +22,7 @@ impl Posterior {
         let passes = problem.passes();
         match self.judge(&solution) {
             Ok((log_likelihood, status)) => {
-                let (spottedness, entropy) = (solution.spottedness, solution.entropy);
+                let (spottedness, entropy) = (self.spottedness(&solution), solution.entropy);
                 let (chi2, lambda) = (solution.chi2, solution.image.lambda);
                 let likelihood = Likelihood { log_likelihood, spottedness, entropy, chi2, lambda };
                 Reconstruction { likelihood: Some(likelihood), passes, status }
@@ -42,21 +42,29 @@ impl Posterior {
             ObjectiveKind::Entropy => Measure::NegativeEntropy,
         };
         let target = self.reference().chi2_target;
-        // to first order along the path to the target; where that is out of reach, its misfit counts as it is
+        // where the target is out of reach, its misfit counts as it is
         let (to_target, misfit) = match solution.termination {
             Termination::Converged => (target - solution.chi2, 0.0),
             _ => (0.0, solution.chi2 - target),
         };
         let value = match measure {
-            Measure::Spottedness if to_target == 0.0 => solution.spottedness,
-            Measure::Spottedness => {
-                let moved = to_target * solution.spottedness_slope / solution.chi2_slope;
-                solution.spottedness + moved + solution.spottedness_left
-            }
+            Measure::Spottedness => self.spottedness(solution),
             Measure::NegativeEntropy => -solution.entropy - 0.5 * solution.image.lambda * to_target,
         };
         let (on_curve, slope) = self.reference().tradeoff.chi2_at(measure, value);
         (-0.5 * (target - on_curve + misfit), slope)
+    }
+
+    /// Spottedness of a reconstruction; at the target chi2 what a first-order forecast says that the solver's next steps would
+    /// make of it (along the path alone where spottedness is not the objective).
+    pub(super) fn spottedness(&self, solution: &Solution) -> f64 {
+        match (self.goal(), solution.termination) {
+            (Goal::Chi2 { target, .. }, Termination::Converged) => {
+                let moved = (target - solution.chi2) * solution.spottedness_slope / solution.chi2_slope;
+                solution.spottedness + moved + solution.spottedness_left
+            }
+            _ => solution.spottedness,
+        }
     }
 
     /// ln L of a reconstruction and how it ended, or the status of its failure.

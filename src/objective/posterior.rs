@@ -27,7 +27,7 @@ pub struct Posterior {
     velocities_only: bool,
 }
 
-/// Widest velocity grid (half-width in km/s over the step) that is tried; beyond it a parameter vector is absurd.
+/// Fastest velocity of any latitude (km/s, projected) that is tried; beyond it a parameter vector is absurd.
 const LARGEST_VSINI_KMS: f64 = 2000.0;
 
 /// Newton steps from the reference before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
@@ -47,7 +47,7 @@ impl Posterior {
         let mut posterior = Posterior { imager, space, kind, reference, settings, prediction: None, velocities_only };
         let response = |theta: &[f64]| posterior.response(theta);
         let Posterior { imager, space, reference, .. } = &posterior;
-        posterior.prediction = Some(Prediction::new(imager, space, reference, posterior.goal(), response));
+        posterior.prediction = Some(Prediction::new(imager, space, reference, kind, response));
         posterior
     }
 
@@ -105,13 +105,8 @@ impl Posterior {
         Solver { entropy: self.imager.entropy, preconditioner: &self.reference.preconditioner, settings: self.settings }
     }
 
-    fn goal(&self) -> Goal {
-        match self.kind {
-            ObjectiveKind::RegularisedLikelihood => Goal::Lambda(self.reference.solution.image.lambda),
-            ObjectiveKind::Spottedness | ObjectiveKind::Entropy => {
-                Goal::Chi2 { target: self.reference.chi2_target, largest_lambda: self.reference.largest_lambda }
-            }
-        }
+    pub(super) fn goal(&self) -> Goal {
+        self.reference.goal(self.kind)
     }
 
     /// The reconstruction at `theta`, whatever the prior says.
@@ -136,7 +131,7 @@ impl Posterior {
 
     /// The evaluation that a reconstruction of so many passes makes with its prior.
     fn evaluation(&self, solution: &Solution, passes: u32, log_prior: f64) -> Evaluation {
-        let &Solution { spottedness, chi2, .. } = solution;
+        let (spottedness, chi2) = (self.spottedness(solution), solution.chi2);
         match self.judge(solution) {
             Ok((log_likelihood, status)) => {
                 Evaluation { log_prob: log_likelihood + log_prior, spottedness, chi2, passes, status }

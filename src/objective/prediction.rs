@@ -5,6 +5,7 @@
 //! Newton step or two; what it ends at does not depend on it beyond the solver's tolerance. Left out: the solver.
 
 use super::coordinates::ParameterSpace;
+use super::kind::ObjectiveKind;
 use super::reference::Reference;
 use crate::imaging::Imager;
 use crate::maxent::{Goal, Problem, Solver, SolverSettings, Start};
@@ -21,7 +22,7 @@ pub struct Prediction {
     image: Vec<Vec<f64>>,
     /// Change of ln(lambda) per unit of each coordinate.
     ln_lambda: Vec<f64>,
-    /// Adjoint of spottedness at fixed chi2, in the entropy's metric; empty at a fixed lambda.
+    /// Adjoint of spottedness at fixed chi2, as [`Start::adjoint`]; empty where spottedness does not matter.
     adjoint: Vec<f64>,
 }
 
@@ -35,12 +36,12 @@ const REACH: f64 = 3.0;
 const LN_LAMBDA_REACH: f64 = 1.0;
 
 impl Prediction {
-    /// Of the solutions around `reference` for `goal`, with `response(theta)` at points of `space` (written coordinates).
+    /// Of the solutions around `reference` for the goal of `kind`, with `response(theta)` at points of `space` (written coordinates).
     pub fn new(
         imager: &Imager,
         space: &ParameterSpace,
         reference: &Reference,
-        goal: Goal,
+        kind: ObjectiveKind,
         response: impl Fn(&[f64]) -> Response,
     ) -> Self {
         let origin = space.to_internal(&space.theta_of(&reference.values));
@@ -60,13 +61,14 @@ impl Prediction {
         problem.linearise(&map);
         let mut gradient = vec![0.0; n];
         problem.gradient(&mut gradient);
-        let adjoint = match goal {
-            Goal::Lambda(_) => Vec::new(),
-            Goal::Chi2 { .. } => {
+        let goal = reference.goal(kind);
+        let adjoint = match kind {
+            ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => Vec::new(),
+            ObjectiveKind::Spottedness => {
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &imager.grid.area);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
                 let adjoint = inverse.iter().zip(&scale).zip(&solution.path);
-                adjoint.map(|((y, scale), path)| y / scale + along_path * path).collect()
+                adjoint.map(|((y, scale), path)| (y / scale + along_path * path) / scale).collect()
             }
         };
         let (mut image, mut ln_lambda) = (Vec::new(), Vec::new());

@@ -3,6 +3,7 @@
 //!
 //! Built once, deterministically, before a chain begins; never changed by it. Left out: how the point was found.
 
+use super::kind::ObjectiveKind;
 use super::parameters::ParameterValues;
 use super::tradeoff::{Node, TradeOff};
 use crate::imaging::Imager;
@@ -168,6 +169,16 @@ impl Reference {
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
         let passes = problem.passes();
         Ok(Reference { values, response, largest_lambda, solution, preconditioner, tradeoff, chi2_target, passes })
+    }
+
+    /// What every evaluation by `kind` solves for.
+    pub fn goal(&self, kind: ObjectiveKind) -> Goal {
+        match kind {
+            ObjectiveKind::RegularisedLikelihood => Goal::Lambda(self.solution.image.lambda),
+            ObjectiveKind::Spottedness | ObjectiveKind::Entropy => {
+                Goal::Chi2 { target: self.chi2_target, largest_lambda: self.largest_lambda }
+            }
+        }
     }
 
     /// A blank star, where an evaluation far from the reference starts.

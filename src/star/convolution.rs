@@ -7,6 +7,17 @@ use super::correlate::{CHUNK, correlate, in_chunks};
 use super::line_profile::LineKernel;
 use crate::vector::Instructions;
 
+/// The velocity grid, as far as filters need to know it.
+#[derive(Clone, Copy, Debug)]
+pub struct VelocityGrid {
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Step (km/s).
+    pub step_kms: f64,
+    /// Grid steps in a bin.
+    pub steps_per_bin: usize,
+}
+
 /// The local line, sampled for one profile: a filter for every row of the grid.
 #[derive(Clone, Debug)]
 pub struct ProfileConvolution {
@@ -23,15 +34,20 @@ struct Filter {
 }
 
 impl ProfileConvolution {
-    /// For a profile whose first bin lies `first_bin_kms` above the grid's first node, in the star's frame.
-    pub fn new(kernel: &LineKernel, grid_step: f64, steps_per_bin: usize, first_bin_kms: f64) -> Self {
-        let position = first_bin_kms / grid_step;
-        let reach = kernel.reach_kms() / grid_step;
-        let (m, first, last) =
-            (steps_per_bin as isize, (position - reach).ceil() as isize, (position + reach).floor() as isize);
+    /// For a profile of so many bins, the first of which lies `first_bin_kms` above the grid's first node, in the star's frame.
+    ///
+    /// Left out of the filters are nodes that lie beyond the grid for every bin, however far the profile is from the grid.
+    pub fn new(kernel: &LineKernel, grid: VelocityGrid, first_bin_kms: f64, bins: usize) -> Self {
+        let VelocityGrid { nodes, step_kms, steps_per_bin } = grid;
+        let position = first_bin_kms / step_kms;
+        let reach = kernel.reach_kms() / step_kms;
+        let (m, end) = (steps_per_bin as isize, nodes as isize);
+        let lowest = -m * bins as isize;
+        let first = ((position - reach).ceil() as isize).clamp(lowest, end);
+        let last = ((position + reach).floor() as isize).min(end - 1);
         let filter = |row: isize| {
             let nodes = (first..=last).filter(|node| node.rem_euclid(m) == row);
-            let taps: Vec<f64> = nodes.map(|node| kernel.at((position - node as f64) * grid_step)).collect();
+            let taps: Vec<f64> = nodes.map(|node| kernel.at((position - node as f64) * step_kms)).collect();
             let reversed = taps.iter().rev().copied().collect();
             Filter { first: (first - row + m - 1).div_euclid(m), taps, reversed }
         };
@@ -87,12 +103,9 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Rows for a grid of `nodes` nodes and profiles of the given numbers of bins.
-    pub fn new<'a>(
-        nodes: usize,
-        steps_per_bin: usize,
-        profiles: impl Iterator<Item = (&'a ProfileConvolution, usize)>,
-    ) -> Self {
+    /// Rows for a grid and profiles of the given numbers of bins.
+    pub fn new<'a>(grid: VelocityGrid, profiles: impl Iterator<Item = (&'a ProfileConvolution, usize)>) -> Self {
+        let VelocityGrid { nodes, steps_per_bin, .. } = grid;
         let (mut margin, mut end) = (0, nodes.div_ceil(steps_per_bin));
         for (convolution, bins) in profiles {
             let (before, after) = convolution.reach();

@@ -97,7 +97,7 @@ impl Deposit {
         }
         nodes.fill(0.0);
         for (power, moments) in moments.powers.iter().enumerate() {
-            correlate(i, &std::array::from_fn(|n| DEPOSIT_WEIGHTS[BEYOND - n][power]), moments, nodes);
+            weigh_neighbours(i, &std::array::from_fn(|n| DEPOSIT_WEIGHTS[BEYOND - n][power]), moments, nodes);
         }
     }
 
@@ -109,7 +109,7 @@ impl Deposit {
         for (power, coefficients) in moments.powers.iter_mut().enumerate() {
             let cells = &mut coefficients[BEYOND..self.nodes];
             cells.fill(0.0);
-            correlate(i, &std::array::from_fn(|n| DEPOSIT_WEIGHTS[n][power]), nodes, cells);
+            weigh_neighbours(i, &std::array::from_fn(|n| DEPOSIT_WEIGHTS[n][power]), nodes, cells);
         }
         for (cell, blocks) in self.blocks_of(k).enumerate() {
             let coefficients = std::array::from_fn(|power| moments.powers[power][BEYOND + cell]);
@@ -137,7 +137,7 @@ impl Moments {
 
 /// `out[j] += sum_n weights[n] source[j + n]`, as far as there is an output or a source.
 #[inline(always)]
-fn correlate(i: impl Instructions, weights: &[f64; DEPOSIT_NODES], source: &[f64], out: &mut [f64]) {
+fn weigh_neighbours(i: impl Instructions, weights: &[f64; DEPOSIT_NODES], source: &[f64], out: &mut [f64]) {
     let sources: [&[f64]; DEPOSIT_NODES] = std::array::from_fn(|n| &source[n..n + out.len()]);
     for (j, out) in out.iter_mut().enumerate() {
         let term = |n: usize, sum: f64| i.multiply_add(weights[n], sources[n][j], sum);

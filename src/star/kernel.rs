@@ -1,6 +1,6 @@
 //! The innermost loops: sums over the visible pixels that lie in one cell of the velocity grid, and their transpose.
 //!
-//! A pixel is a weight at a position t in [0, 1) of the cell. What it leaves on the grid is a polynomial in t (see
+//! A pixel is a weight at a position t in [0, 1] of the cell. What it leaves on the grid is a polynomial in t (see
 //! `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in registers however many pixels
 //! there are. Each loop is written twice: as it reads, and in AVX2, which the compiler does not find by itself (four times
 //! slower). Left out: which pixels lie in which cell.
@@ -16,7 +16,7 @@ pub const LANES: usize = 4;
 pub struct Block {
     /// Projected area times limb darkening.
     pub weight: [f32; LANES],
-    /// Distance of the mean velocity from the cell's lower border over the grid's step, in [0, 1).
+    /// Distance of the mean velocity from the cell's lower border over the grid's step; in [0, 1], as single precision rounds up.
     pub position: [f32; LANES],
     /// Variance of the velocity over twice the squared step.
     pub spread: [f32; LANES],

@@ -4,7 +4,7 @@
 //! Method section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile. Left out: brightness
 //! (what x is), the division by the continuum, data.
 
-use super::convolution::{ProfileConvolution, Rows};
+use super::convolution::{ProfileConvolution, Rows, VelocityGrid};
 use super::deposit::{Deposit, Moments};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
@@ -35,8 +35,9 @@ impl Sampling {
     }
 }
 
-/// Most nodes of the velocity grid, which spans twice the fastest velocity in steps of a fraction of the local line's width.
-pub const MOST_NODES: f64 = u16::MAX as f64;
+/// Most nodes of the velocity grid, which spans twice the fastest velocity in steps of a fraction of the local line's width. A
+/// star has a few hundred; this many have more cells than a map has pixels, and every pass goes through all of them.
+pub const MOST_NODES: f64 = 65_535.0;
 
 /// Most grid steps in a velocity bin; beyond it the line is so much narrower than a bin that it hides between two of them.
 pub const MOST_STEPS_PER_BIN: f64 = 200.0;
@@ -46,7 +47,7 @@ pub const MOST_STEPS_PER_BIN: f64 = 200.0;
 pub struct Response {
     deposit: Arc<Deposit>,
     convolutions: Vec<ProfileConvolution>,
-    steps_per_bin: usize,
+    grid: VelocityGrid,
     /// First bin of each profile, and the end.
     starts: Vec<usize>,
 }
@@ -74,22 +75,26 @@ impl Response {
     }
 
     fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        let steps_per_bin = LineKernel::steps_per_bin(star.line, sampling.step_kms);
         let kernel = LineKernel::new(star.line, deposit.step_kms);
+        let grid = VelocityGrid {
+            nodes: deposit.nodes,
+            step_kms: deposit.step_kms,
+            steps_per_bin: LineKernel::steps_per_bin(star.line, sampling.step_kms),
+        };
         let mut starts = vec![0];
         let mut convolutions = Vec::with_capacity(sampling.profiles.len());
         for &(time, first_velocity, bins) in &sampling.profiles {
             let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
             let first_bin = first_velocity - shift - deposit.origin_kms;
-            convolutions.push(ProfileConvolution::new(&kernel, deposit.step_kms, steps_per_bin, first_bin));
+            convolutions.push(ProfileConvolution::new(&kernel, grid, first_bin, bins));
             starts.push(starts[starts.len() - 1] + bins);
         }
-        Response { deposit, convolutions, steps_per_bin, starts }
+        Response { deposit, convolutions, grid, starts }
     }
 
     fn rows(&self) -> Rows {
         let bins = self.starts.windows(2).map(|s| s[1] - s[0]);
-        Rows::new(self.deposit.nodes, self.steps_per_bin, self.convolutions.iter().zip(bins))
+        Rows::new(self.grid, self.convolutions.iter().zip(bins))
     }
 
     /// Number of pixels.
@@ -200,4 +205,53 @@ fn total(x: &[f64]) -> f64 {
         sums.iter_mut().zip(chunk).for_each(|(sum, x)| *sum += x);
     }
     sums.iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation};
+    use crate::vector::Portable;
+
+    fn noise(n: usize) -> Vec<f64> {
+        (0..n).map(|i| (0.7 * (i * i) as f64).sin()).collect()
+    }
+
+    fn assert_close(a: &[f64], b: &[f64]) {
+        let largest = b.iter().fold(0.0, |m: f64, b| m.max(b.abs()));
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13 * largest), "{a:?}\n{b:?}");
+    }
+
+    #[test]
+    fn the_instructions_of_this_processor_give_what_the_portable_ones_give() {
+        let star = StarSettings {
+            rotation_period_d: 3.0,
+            epoch_d: 0.0,
+            limb_darkening: LimbDarkening::Linear(0.7),
+            contrast: 0.5,
+            line: LocalLine { sigma_kms: 3.0, equivalent_width_kms: 5.8 },
+        };
+        let state = StarState {
+            rotation: Rotation { omega_eq_rad_d: 2.1, domega_rad_d: 0.05 },
+            inclination: 0.7,
+            vsini_kms: 40.0,
+            vsys_kms: 0.3,
+            orbit: Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.4 },
+        };
+        let sampling = Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (0.7 * k as f64, -50.0, 57)).collect() };
+        let grid = SurfaceGrid::equal_area(700, Quadrature::Gauss2x2);
+        // built and shifted by this processor's instructions: both see the same pairs
+        let response = &Response::new(&grid, &star, &state, &sampling);
+        let (x, y, z) = (noise(grid.len()), noise(response.data_len()), noise(response.profiles()));
+        let profiles = || (vec![f64::NAN; y.len()], vec![f64::NAN; z.len()], vec![f64::NAN; x.len()]);
+        let (mut line, mut continuum, mut map) = profiles();
+        response.apply(&x, &mut line, &mut continuum);
+        response.apply_transpose(&y, &z, &mut map);
+        let (mut plain_line, mut plain_continuum, mut plain_map) = profiles();
+        Apply { response, x: &x, line: &mut plain_line, continuum: &mut plain_continuum }.run(Portable);
+        ApplyTranspose { response, line: &y, continuum: &z, out: &mut plain_map }.run(Portable);
+        assert_close(&line, &plain_line);
+        assert_close(&continuum, &plain_continuum);
+        assert_close(&map, &plain_map);
+    }
 }

@@ -1,0 +1,123 @@
+//! Exponential and logarithm for loops that are compiled into vector instructions: without branches, to two units in the last
+//! place.
+//!
+//! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for the logarithm, and the series to r^13 over
+//! |r| < ln(2)/2 for the exponential. Left out: infinities, and results that are not normal numbers.
+
+use crate::vector::Instructions;
+
+/// ln 2 in two parts: the first is exact times any exponent.
+const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
+
+/// 2^52 and half as much: the sum with a number below 2^51 ends in that number, rounded to an integer.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// Beyond it e^-x is no normal number.
+const LARGEST_EXPONENT: f64 = 708.0;
+
+/// Coefficients of `(ln((1 + s) / (1 - s)) - 2 s) / s` in s^2.
+const LOGARITHM: [f64; 7] = [
+    6.666_666_666_666_735e-1,
+    3.999_999_999_940_942e-1,
+    2.857_142_874_366_239e-1,
+    2.222_219_843_214_978_4e-1,
+    1.818_357_216_161_805e-1,
+    1.531_383_769_920_937_3e-1,
+    1.479_819_860_511_658_6e-1,
+];
+
+/// 1/2!, 1/3!, ... 1/13!.
+const EXPONENTIAL: [f64; 12] = {
+    let mut coefficients = [0.5; 12];
+    let mut n = 1;
+    while n < 12 {
+        coefficients[n] = coefficients[n - 1] / (n + 2) as f64;
+        n += 1;
+    }
+    coefficients
+};
+
+/// `c_0 + c_1 x + ...`
+#[inline(always)]
+fn polynomial<const N: usize>(i: impl Instructions, coefficients: &[f64; N], x: f64) -> f64 {
+    let mut sum = coefficients[N - 1];
+    for c in coefficients[..N - 1].iter().rev() {
+        sum = i.multiply_add(sum, x, *c);
+    }
+    sum
+}
+
+/// `e^-x` for x >= 0; that of 708 beyond it.
+#[inline(always)]
+pub(super) fn exp_minus(i: impl Instructions, x: f64) -> f64 {
+    let x = if x > LARGEST_EXPONENT { LARGEST_EXPONENT } else { x };
+    let rounded = i.multiply_add(-x, std::f64::consts::LOG2_E, ROUND);
+    let exponent = rounded - ROUND;
+    let r = i.multiply_add(-exponent, LN_2[1], i.multiply_add(-exponent, LN_2[0], -x));
+    let more = i.multiply_add(r * r, polynomial(i, &EXPONENTIAL, r), r);
+    // the exponent stands in the last bits of the rounded sum
+    (1.0 + more) * f64::from_bits((rounded.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
+}
+
+/// `ln(1 + x)` for x > -1.
+#[inline(always)]
+pub(super) fn ln_1p(i: impl Instructions, x: f64) -> f64 {
+    const HALF_ROOT: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
+    const MANTISSA: u64 = (1 << 52) - 1;
+    const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
+    // 1 + x = 2^exponent mantissa, the mantissa within a root of 2 from 1
+    let y = 1.0 + x;
+    let bits = y.to_bits().wrapping_add(1.0_f64.to_bits() - HALF_ROOT);
+    let exponent = f64::from_bits((bits >> 52) | TWO_TO_52.to_bits()) - (TWO_TO_52 + 1023.0);
+    let mantissa = f64::from_bits((bits & MANTISSA) + HALF_ROOT);
+    // what the sum has lost
+    let lost = if x > 1.0 { 1.0 - (y - x) } else { x - (y - 1.0) } / y;
+    let (f, lost) = if exponent == 0.0 { (x, 0.0) } else { (mantissa - 1.0, lost) };
+    let s = f / (2.0 + f);
+    let (square, half) = (s * s, 0.5 * f * f);
+    let rest = s * (half + square * polynomial(i, &LOGARITHM, square)) + (exponent * LN_2[1] + lost);
+    exponent * LN_2[0] - ((half - rest) - f)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::{self, Portable, Task};
+
+    struct Both(f64);
+
+    impl Task for Both {
+        type Output = [f64; 2];
+
+        #[inline(always)]
+        fn run<I: Instructions>(self, i: I) -> [f64; 2] {
+            [exp_minus(i, self.0), ln_1p(i, self.0)]
+        }
+    }
+
+    fn assert_close(x: f64, got: f64, wanted: f64) {
+        let ulp = f64::from_bits(wanted.abs().to_bits() + 1) - wanted.abs();
+        assert!((got - wanted).abs() <= 2.0 * ulp, "{x:e}: {got:e} instead of {wanted:e}");
+    }
+
+    #[test]
+    fn both_are_those_of_the_standard_library_to_two_units_in_the_last_place() {
+        // every decade, and densely where exponentials and logarithms are taken
+        let decades = (-3000..3000).map(|k| 10_f64.powf(0.1 * f64::from(k) + 0.037));
+        let dense = (0..400_000).map(|k| 1e-4 * f64::from(k));
+        let near_minus_one = (1..52).map(|k| 0.5_f64.powi(k) - 1.0).chain((1..1000).map(|k| -1e-3 * f64::from(k)));
+        for x in decades.chain(dense).filter(|x| *x < 1e300) {
+            for [exponential, logarithm] in [vector::run(Both(x)), Both(x).run(Portable)] {
+                assert_close(x, exponential, (-x.min(LARGEST_EXPONENT)).exp());
+                assert_close(x, logarithm, x.ln_1p());
+            }
+        }
+        for x in near_minus_one.flat_map(|x| [x, x * 1e-3, x * 1e-9, x * 1e-200]) {
+            for [_, logarithm] in [vector::run(Both(x)), Both(x).run(Portable)] {
+                assert_close(x, logarithm, x.ln_1p());
+            }
+        }
+        assert_eq!(vector::run(Both(0.0)), [1.0, 0.0]);
+        assert!(vector::run(Both(f64::NAN)).iter().all(|x| x.is_nan()));
+    }
+}
