@@ -67,7 +67,7 @@ impl Expansion {
             keep -= &response * columns.transpose();
             offset = &response * pull;
         }
-        let information = &keep * &self.information.columns(0, n);
+        let information = &keep * self.information.columns(0, n);
         VelocityQuadratic {
             cycles: self.cycles.clone(),
             gradient: &keep * gradient - offset,
