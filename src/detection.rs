@@ -11,6 +11,7 @@ use crate::imaging::Imager;
 use crate::maxent::Termination;
 use crate::objective::{Parameter, ParameterValues, Reference, ReferenceError};
 use crate::periodogram::eccentric::keplerian;
+use crate::periodogram::offset::{Offset, offset};
 use crate::periodogram::peaks::refined;
 use crate::periodogram::two_planets::{both, without};
 use crate::periodogram::{
@@ -80,6 +81,8 @@ pub struct Detection {
     pub keplerian: Vec<Option<KeplerianOrbit>>,
     /// The second planet, if asked for.
     pub second: Option<SecondPlanet>,
+    /// A constant velocity left free beside the orbit, without a planet in the image.
+    pub offset: Option<Offset>,
     /// sigma_K at Porb = Prot over its median away from it, without a planet.
     pub co_rotation_penalty: Option<f64>,
 }
@@ -145,6 +148,8 @@ impl Detection {
         report(Stage::Search);
         let search = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
         let co_rotation_penalty = co_rotation_penalty(&planet_free.quadratic, &frequencies, &search.rows);
+        let best = search.best().orbit.delta_ln_l;
+        let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         let mut found = Detection {
             best: *search.best(),
             planet_free,
@@ -155,6 +160,7 @@ impl Detection {
             closed: false,
             keplerian: Vec::new(),
             second: None,
+            offset,
             co_rotation_penalty,
         };
         found.close(imager, values, settings, report)?;

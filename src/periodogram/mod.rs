@@ -12,6 +12,7 @@ pub mod kepler;
 pub mod limits;
 mod normal;
 pub mod null;
+pub mod offset;
 pub mod orbits;
 pub mod peaks;
 mod refine;

@@ -31,6 +31,15 @@ pub enum NullModel {
 }
 
 impl NullModel {
+    /// The name used by the command and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            NullModel::Information => "information",
+            NullModel::Noise => "noise",
+            NullModel::NoiseAndBias => "noise-and-bias",
+        }
+    }
+
     /// Covariance of the gradient.
     pub fn covariance(self, quadratic: &VelocityQuadratic) -> &DMatrix<f64> {
         match self {

@@ -22,8 +22,12 @@ pub struct TwoOrbits {
 
 /// The quadratic with the orbit of that frequency (orbits a rotation cycle) left free; `None` where it is not bounded.
 pub fn without(quadratic: &VelocityQuadratic, frequency: f64) -> Option<VelocityQuadratic> {
-    let x = design(&quadratic.cycles, &[frequency]);
-    let ix = &quadratic.information * &x;
+    eliminated(quadratic, &design(&quadratic.cycles, &[frequency]))
+}
+
+/// The quadratic with the amplitudes of the columns of `x` left free.
+pub(super) fn eliminated(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> Option<VelocityQuadratic> {
+    let ix = &quadratic.information * x;
     let answer = x.tr_mul(&ix).cholesky()?.solve(&x.transpose());
     let keep = DMatrix::identity(quadratic.len(), quadratic.len()) - &ix * answer;
     let information = &keep * &quadratic.information;

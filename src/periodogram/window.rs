@@ -16,9 +16,6 @@ const SAMPLES: f64 = 10.0;
 /// Frequencies closer than this many inverse time bases are the same.
 const SAME: f64 = 0.5;
 
-/// Peaks closer to frequency 0 join what is the same anyway.
-const MAIN_LOBE: f64 = SAME;
-
 /// A peak of the window function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowPeak {
@@ -44,7 +41,8 @@ pub fn window(cycles: &[f64], frequency: f64) -> f64 {
     (sin * sin + cos * cos) / (cycles.len() as f64).powi(2)
 }
 
-/// Strong peaks of the window function up to the sum of any two of the `frequencies`, its main lobe left out.
+/// Strong peaks of the window function up to the sum of any two of the `frequencies`, but for those so low that they join
+/// what is the same anyway.
 pub fn window_peaks(cycles: &[f64], frequencies: &Frequencies) -> Vec<WindowPeak> {
     let base = frequencies.time_base_cycles;
     let last = 2.0 * frequencies.range().1 + SAME / base;
@@ -55,7 +53,7 @@ pub fn window_peaks(cycles: &[f64], frequencies: &Frequencies) -> Vec<WindowPeak
     (1..samples - 1)
         .filter(is_peak)
         .map(|k| WindowPeak { frequency: k as f64 * step, height: heights[k] })
-        .filter(|peak| peak.height >= STRONG && peak.frequency > MAIN_LOBE / base)
+        .filter(|peak| peak.height >= STRONG && peak.frequency > SAME / base)
         .collect()
 }
 

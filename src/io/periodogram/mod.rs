@@ -4,6 +4,7 @@
 //! Left out: the numbers themselves (`detection`, `periodogram`).
 
 mod record;
+mod remarks;
 mod report;
 
 use super::atomic::{WriteError, write, write_json};

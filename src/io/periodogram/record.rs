@@ -4,16 +4,12 @@ use super::super::provenance::Provenance;
 use super::PeriodogramResult;
 use crate::detection::View;
 use crate::objective::ParameterValues;
-use crate::periodogram::null::NullModel;
 use crate::periodogram::peaks::Peak;
 use crate::periodogram::{FalseAlarm, KeplerianOrbit, Search};
 use serde::Serialize;
 
 /// False-alarm probabilities whose levels are given.
 const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
-
-/// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
-const FAR: f64 = 5.0;
 
 #[derive(Serialize)]
 pub(super) struct Record<'a> {
@@ -76,7 +72,7 @@ pub(super) struct FalseAlarmRecord {
     pub kappa: f64,
     pub w: f64,
     pub independent_periods: f64,
-    pub levels: Vec<LevelRecord>,
+    pub levels: [LevelRecord; 3],
 }
 
 #[derive(Serialize)]
@@ -181,7 +177,7 @@ impl PeriodogramResult<'_> {
         }
     }
 
-    fn per_datum(&self, view: &View) -> f64 {
+    pub(super) fn per_datum(&self, view: &View) -> f64 {
         view.reference.solution.chi2 / self.imager.data.depth.len() as f64
     }
 
@@ -234,62 +230,6 @@ impl PeriodogramResult<'_> {
             gain_over_circle: orbit.gain_over_circle,
         }
     }
-
-    pub(super) fn co_rotation(&self) -> String {
-        match self.detection.co_rotation_penalty {
-            Some(ratio) if ratio > 1.1 => {
-                format!(
-                    "at Porb = Prot spots imitate an orbit: sigma_K is {ratio:.1} times its median at other periods"
-                )
-            }
-            Some(ratio) => format!("at Porb = Prot sigma_K is {ratio:.2} times its median at other periods"),
-            None => "at Porb = Prot spots imitate an orbit, and the data do not bound K there".to_owned(),
-        }
-    }
-
-    /// What may be wrong, a sentence each.
-    pub(super) fn warnings(&self) -> Vec<String> {
-        let found = self.detection;
-        let data = self.imager.data.depth.len() as f64;
-        let mut warnings = Vec::new();
-        for (view, whose) in
-            [(Some(&found.planet_free), "without a planet"), (found.at_best.as_ref(), "at the best orbit")]
-        {
-            let Some(view) = view else { continue };
-            let chi2 = self.per_datum(view);
-            let far = (chi2 - 1.0) / (2.0 / data).sqrt();
-            if !view.on_target {
-                let target = self.settings.chi2_target;
-                warnings.push(format!(
-                    "{whose} no map reaches the target chi2 of {target:.3} per datum ({chi2:.3} was reached): the model of \
-                     the star may be wrong, or a planet is missing in it"
-                ));
-            } else if far.abs() > FAR {
-                warnings.push(format!(
-                    "{whose} chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles \
-                     or the model of the star may be wrong, and all errors here with them"
-                ));
-            }
-        }
-        if found.best.on_edge {
-            warnings.push("the best period lies on the edge of the search: look beyond it before believing it".into());
-        } else if !found.closed {
-            let rounds = found.rounds;
-            warnings.push(format!("K still moves after {rounds} images at the best orbit: its value is not settled"));
-        }
-        if found.last().quadratic.radial_velocities().is_err() {
-            warnings.push("the data do not bound all velocities: rv.csv and covariance.csv hold no numbers".into());
-        }
-        warnings
-    }
-}
-
-pub(super) fn null_name(model: NullModel) -> &'static str {
-    match model {
-        NullModel::Information => "information",
-        NullModel::Noise => "noise",
-        NullModel::NoiseAndBias => "noise-and-bias",
-    }
 }
 
 pub(super) fn false_alarm(search: &Search) -> FalseAlarmRecord {
@@ -302,14 +242,11 @@ pub(super) fn false_alarm(search: &Search) -> FalseAlarmRecord {
         by_draws: found.by_draws,
         by_extreme_value: found.by_tail,
         used: if found.draws_suffice { "draws" } else { "extreme value" },
-        null_model: null_name(alarm.model),
+        null_model: alarm.model.name(),
         draws: alarm.maxima.len(),
         kappa: alarm.tail.kappa,
         w: alarm.tail.w,
         independent_periods: alarm.independent_periods(),
-        levels: LEVELS
-            .map(|p| LevelRecord { false_alarm_probability: p, delta_ln_l: alarm.level(p) })
-            .into_iter()
-            .collect(),
+        levels: LEVELS.map(|p| LevelRecord { false_alarm_probability: p, delta_ln_l: alarm.level(p) }),
     }
 }

@@ -89,13 +89,18 @@ fn probability(alarm: &FalseAlarmRecord) -> String {
     format!(
         "Delta ln L {delta_ln_l:.2}, false-alarm probability {} by {used} ({draws} draws, null {null_model}, some \
          {independent_periods:.0} independent periods)\nDelta ln L of 10, 1, 0.1 % false alarms: {}",
-        percentage(*probability),
+        rounded(*probability),
         levels.join(", ")
     )
 }
 
-fn percentage(p: f64) -> String {
-    if p >= 1e-3 { format!("{p:.4}") } else { format!("{p:.1e}") }
+fn rounded(p: f64) -> String {
+    match p {
+        // what is smaller is no double any more
+        0.0 => "< 1e-300".to_owned(),
+        p if p >= 1e-3 => format!("{p:.4}"),
+        p => format!("{p:.1e}"),
+    }
 }
 
 fn peaks(peaks: &[PeakRecord]) -> String {
@@ -116,7 +121,7 @@ fn peaks(peaks: &[PeakRecord]) -> String {
             format!("{k_kms:.digits$}"),
             format!("{sigma_k_kms:.digits$}"),
             format!("{delta_ln_l:.2}"),
-            percentage(peak.false_alarm_probability),
+            rounded(peak.false_alarm_probability),
             note,
         ]);
     }

@@ -1,0 +1,69 @@
+//! What is to be said of a blind search in words: the blind spot at co-rotation, and what may be wrong.
+
+use super::PeriodogramResult;
+use crate::objective::Parameter;
+use crate::periodogram::offset::Offset;
+
+/// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
+const FAR: f64 = 5.0;
+
+/// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
+const OFFSET_GAIN: f64 = 12.5;
+
+impl PeriodogramResult<'_> {
+    pub(super) fn co_rotation(&self) -> String {
+        match self.detection.co_rotation_penalty {
+            Some(ratio) if ratio > 1.1 => {
+                format!(
+                    "at Porb = Prot spots imitate an orbit: sigma_K is {ratio:.1} times its median at other periods"
+                )
+            }
+            Some(ratio) => format!("at Porb = Prot sigma_K is {ratio:.2} times its median at other periods"),
+            None => "at Porb = Prot spots imitate an orbit, and the data do not bound K there".to_owned(),
+        }
+    }
+
+    /// What may be wrong, a sentence each.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let found = self.detection;
+        let data = self.imager.data.depth.len() as f64;
+        let mut warnings = Vec::new();
+        for (view, whose) in
+            [(Some(&found.planet_free), "without a planet"), (found.at_best.as_ref(), "at the best orbit")]
+        {
+            let Some(view) = view else { continue };
+            let chi2 = self.per_datum(view);
+            let far = (chi2 - 1.0) / (2.0 / data).sqrt();
+            if !view.on_target {
+                let target = self.settings.chi2_target;
+                warnings.push(format!(
+                    "{whose} no map reaches the target chi2 of {target:.3} per datum ({chi2:.3} was reached): the model of \
+                     the star may be wrong, or a planet is missing in it"
+                ));
+            } else if far.abs() > FAR {
+                warnings.push(format!(
+                    "{whose} chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles \
+                     or the model of the star may be wrong, and all errors here with them"
+                ));
+            }
+        }
+        let fixed = self.settings.nuisances.iter().all(|nuisance| nuisance.parameter != Parameter::Vsys);
+        if let Some(offset) = found.offset.filter(|offset| fixed && offset.gain > OFFSET_GAIN) {
+            let Offset { velocity_kms, sigma_kms, gain } = offset;
+            warnings.push(format!(
+                "with a constant velocity of {velocity_kms:+.3} +- {sigma_kms:.3} km/s beside an orbit ln L is {gain:.0} \
+                 higher: star.vsys_kms may be wrong, which makes false peaks; make it free and use --marginalise"
+            ));
+        }
+        if found.best.on_edge {
+            warnings.push("the best period lies on the edge of the search: look beyond it before believing it".into());
+        } else if !found.closed {
+            let rounds = found.rounds;
+            warnings.push(format!("K still moves after {rounds} images at the best orbit: its value is not settled"));
+        }
+        if found.last().quadratic.radial_velocities().is_err() {
+            warnings.push("the data do not bound all velocities: rv.csv and covariance.csv hold no numbers".into());
+        }
+        warnings
+    }
+}
