@@ -6,7 +6,7 @@
 //! of the draws by maximum likelihood, those below the tail counting as such.
 
 use super::null::{NullModel, Scatter, maxima, scatter};
-use super::orbits::Trial;
+use super::orbits::{Trial, eigenvalues};
 use crate::velocities::VelocityQuadratic;
 
 /// The tail to which W is fitted: this part of the draws.
@@ -95,7 +95,7 @@ impl FalseAlarm {
         let scatter = scatter(quadratic, trials, model);
         let variance = |(trial, scatter): (&Trial, &Scatter)| {
             let inverse = trial.orbit.and(trial.information.cholesky())?.l().try_inverse()?;
-            Some((inverse * scatter.covariance * inverse.transpose()).symmetric_eigenvalues().max())
+            Some(eigenvalues(&(inverse * scatter.covariance * inverse.transpose())).1)
         };
         let kappa = trials.iter().zip(&scatter).filter_map(variance).fold(f64::MIN_POSITIVE, f64::max);
         let tail = Tail::fit(kappa, &maxima);

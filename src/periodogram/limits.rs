@@ -8,7 +8,7 @@
 //! that another period might do still better, which makes the limit a little too high.
 
 use super::normal::{cumulative, erfc};
-use super::orbits::Trial;
+use super::orbits::{Trial, eigenvalues};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
@@ -39,9 +39,9 @@ fn direction(k: usize, of: usize) -> Vector2<f64> {
 /// The semi-amplitude (km/s) below which it lies with probability `credence`, at the period of `trial`.
 pub fn upper_limit_kms(trial: &Trial, credence: f64) -> Option<f64> {
     let best = trial.orbit?;
-    let eigenvalues = trial.information.symmetric_eigenvalues();
+    let (least, most) = eigenvalues(&trial.information);
     // the posterior of the phase is no narrower than this many radians
-    let narrowest = (eigenvalues.min() / eigenvalues.max()).sqrt() / (1.0 + 2.0 * best.delta_ln_l).sqrt();
+    let narrowest = (least / most).sqrt() / (1.0 + 2.0 * best.delta_ln_l).sqrt();
     let phases = (PHASES / narrowest.min(1.0)).min(1e5) as usize;
     // (weight, centre, 1/width) of the Gaussian along each direction
     let slices: Vec<(f64, f64, f64)> = (0..phases)
@@ -60,7 +60,7 @@ pub fn upper_limit_kms(trial: &Trial, credence: f64) -> Option<f64> {
         };
         slices.iter().map(part).sum::<f64>()
     };
-    let high = best.k_kms + 9.0 / eigenvalues.min().sqrt();
+    let high = best.k_kms + 9.0 / least.sqrt();
     Some(rising(credence * below(high), high, below))
 }
 
@@ -90,8 +90,8 @@ pub fn detection_limit_kms(
         };
         (0..DETECTION_PHASES).map(chance).sum::<f64>() / DETECTION_PHASES as f64
     };
-    let least = trial.information.symmetric_eigenvalues().min().sqrt();
-    let widest = scatter.symmetric_eigenvalues().max().sqrt();
+    let least = eigenvalues(&trial.information).0.sqrt();
+    let widest = eigenvalues(&scatter).1.sqrt();
     Some(rising(probability, (threshold + mean.norm() + 6.0 * widest) / least, detected))
 }
 

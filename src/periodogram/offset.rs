@@ -7,9 +7,10 @@ use super::orbits::scan;
 use super::two_planets::{eliminated, without};
 use crate::velocities::VelocityQuadratic;
 use nalgebra::DMatrix;
+use serde::Serialize;
 
 /// A constant velocity beside the orbit that is the best with it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Offset {
     /// The velocity (km/s).
     pub velocity_kms: f64,

@@ -103,10 +103,16 @@ pub fn at(quadratic: &VelocityQuadratic, frequency: f64) -> Trial {
     scan(quadratic, &[frequency])[0]
 }
 
+/// Smallest and largest eigenvalue of a symmetric matrix; NaN if it holds one.
+pub(super) fn eigenvalues(m: &Matrix2<f64>) -> (f64, f64) {
+    let (mean, half) = (0.5 * m.trace(), 0.5 * (m[(0, 0)] - m[(1, 1)]));
+    let spread = half.hypot(m[(0, 1)]);
+    (mean - spread, mean + spread)
+}
+
 /// (a, b) where ln L is highest, their covariance, and that height. `None` where some direction is not bounded.
 fn best(a: Matrix2<f64>, b: Vector2<f64>, least: f64) -> Option<(Vector2<f64>, Matrix2<f64>, f64)> {
-    // not the negation: NaN is not bounded either
-    let bounded = a.symmetric_eigenvalues().min() > least;
+    let bounded = eigenvalues(&a).0 > least;
     let covariance = a.try_inverse().filter(|_| bounded)?;
     let ab = covariance * b;
     Some((ab, covariance, 0.5 * b.dot(&ab)))

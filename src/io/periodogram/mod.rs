@@ -3,6 +3,7 @@
 //!
 //! Left out: the numbers themselves (`detection`, `periodogram`).
 
+mod alarm;
 mod record;
 mod remarks;
 mod report;

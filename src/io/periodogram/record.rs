@@ -2,14 +2,13 @@
 
 use super::super::provenance::Provenance;
 use super::PeriodogramResult;
+use super::alarm::{FalseAlarmRecord, false_alarm};
 use crate::detection::View;
 use crate::objective::ParameterValues;
+use crate::periodogram::offset::Offset;
 use crate::periodogram::peaks::Peak;
-use crate::periodogram::{FalseAlarm, KeplerianOrbit, Search};
+use crate::periodogram::{KeplerianOrbit, Search};
 use serde::Serialize;
-
-/// False-alarm probabilities whose levels are given.
-const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
 
 #[derive(Serialize)]
 pub(super) struct Record<'a> {
@@ -25,6 +24,8 @@ pub(super) struct Record<'a> {
     pub second: Option<SecondRecord>,
     pub search: SearchRecord,
     pub expansion: ExpansionRecord,
+    /// A constant velocity left free beside the orbit.
+    pub offset: Option<Offset>,
     pub co_rotation: CoRotationRecord,
     pub warnings: Vec<String>,
     #[serde(flatten)]
@@ -58,27 +59,6 @@ pub(super) struct AliasRecord {
     pub window_frequency_per_d: f64,
     pub window: f64,
     pub relation: &'static str,
-}
-
-#[derive(Serialize)]
-pub(super) struct FalseAlarmRecord {
-    pub delta_ln_l: f64,
-    pub probability: f64,
-    pub by_draws: f64,
-    pub by_extreme_value: f64,
-    pub used: &'static str,
-    pub null_model: &'static str,
-    pub draws: usize,
-    pub kappa: f64,
-    pub w: f64,
-    pub independent_periods: f64,
-    pub levels: [LevelRecord; 3],
-}
-
-#[derive(Serialize)]
-pub(super) struct LevelRecord {
-    pub false_alarm_probability: f64,
-    pub delta_ln_l: f64,
 }
 
 #[derive(Serialize)]
@@ -168,6 +148,7 @@ impl PeriodogramResult<'_> {
                 chi2_per_datum_planet_free: self.per_datum(&found.planet_free),
                 chi2_per_datum: self.per_datum(found.last()),
             },
+            offset: found.offset,
             co_rotation: CoRotationRecord {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: self.co_rotation(),
@@ -229,24 +210,5 @@ impl PeriodogramResult<'_> {
             delta_ln_l: orbit.delta_ln_l,
             gain_over_circle: orbit.gain_over_circle,
         }
-    }
-}
-
-pub(super) fn false_alarm(search: &Search) -> FalseAlarmRecord {
-    let alarm: &FalseAlarm = &search.false_alarm;
-    let delta_ln_l = search.best().orbit.delta_ln_l;
-    let found = alarm.probability(delta_ln_l);
-    FalseAlarmRecord {
-        delta_ln_l,
-        probability: found.value(),
-        by_draws: found.by_draws,
-        by_extreme_value: found.by_tail,
-        used: if found.draws_suffice { "draws" } else { "extreme value" },
-        null_model: alarm.model.name(),
-        draws: alarm.maxima.len(),
-        kappa: alarm.tail.kappa,
-        w: alarm.tail.w,
-        independent_periods: alarm.independent_periods(),
-        levels: LEVELS.map(|p| LevelRecord { false_alarm_probability: p, delta_ln_l: alarm.level(p) }),
     }
 }

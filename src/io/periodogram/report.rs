@@ -1,7 +1,8 @@
 //! The result of a blind search as text: the best orbit, how often chance does as well, the peaks, and what may be wrong.
 
 use super::PeriodogramResult;
-use super::record::{FalseAlarmRecord, OrbitRecord, PeakRecord, false_alarm};
+use super::alarm::{FalseAlarmRecord, false_alarm};
+use super::record::{OrbitRecord, PeakRecord};
 use crate::objective::Parameter;
 use crate::text::aligned;
 
