@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, alias = "marginalize")]
     marginalise: bool,
     /// What stars without a planet are drawn from
-    #[arg(long, value_name = "MODEL", value_enum, default_value_t = Null::Information)]
+    #[arg(long, value_name = "MODEL", value_enum, default_value_t = Null::NoiseAndBias)]
     null: Null,
     /// Number of stars without a planet
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1000..=10_000_000))]
@@ -58,6 +58,8 @@ pub struct Args {
 enum Null {
     /// Noise and all spots that the entropy holds possible
     Information,
+    /// The same about the mean for the spots of the image
+    InformationAndBias,
     /// Photon noise alone
     Noise,
     /// Photon noise about the mean for the spots of the image
@@ -104,6 +106,7 @@ fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
 fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
     let null = match args.null {
         Null::Information => NullModel::Information,
+        Null::InformationAndBias => NullModel::InformationAndBias,
         Null::Noise => NullModel::Noise,
         Null::NoiseAndBias => NullModel::NoiseAndBias,
     };

@@ -2,8 +2,9 @@
 //!
 //! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z/kappa) exp(-z/kappa)`, hence
 //! `FAP = 1 - exp(-tau)` (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). kappa is the
-//! largest variance of a whitened amplitude, 1 where the null model is the one of the likelihood. W comes from the upper tail
-//! of the draws by maximum likelihood, those below the tail counting as such.
+//! variance of a whitened amplitude, 1 where the null model is the one of the likelihood. Where the gradient has a mean, the
+//! amplitude `sqrt(2 z)` is shortened by the whitened mean first. Both differ from period to period, and tau is the average over
+//! the trial periods. W comes from the upper tail of the draws by maximum likelihood, those below the tail counting as such.
 
 use super::null::{NullModel, Scatter, maxima, scatter};
 use super::orbits::{Trial, eigenvalues};
@@ -28,11 +29,20 @@ pub struct FalseAlarm {
     pub tail: Tail,
 }
 
-/// `1 - exp(-W sqrt(z/kappa) exp(-z/kappa))`.
+/// The whitened amplitudes at one trial period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tail {
-    /// Largest variance of a whitened amplitude.
+pub struct Amplitude {
+    /// Their largest variance.
     pub kappa: f64,
+    /// Length of their mean.
+    pub mean: f64,
+}
+
+/// `1 - exp(-tau)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tail {
+    /// The amplitudes at the trial periods.
+    pub amplitudes: Vec<Amplitude>,
     /// Number of independent peaks that the search looks at, but for a factor of order 1.
     pub w: f64,
 }
@@ -48,42 +58,64 @@ pub struct Probability {
     pub draws_suffice: bool,
 }
 
-impl Probability {
-    /// The one to use.
-    pub fn value(&self) -> f64 {
-        if self.draws_suffice { self.by_draws } else { self.by_tail }
+impl Amplitude {
+    fn of((trial, scatter): (&Trial, &Scatter)) -> Option<Self> {
+        let inverse = trial.orbit.and(trial.information.cholesky())?.l().try_inverse()?;
+        let kappa = eigenvalues(&(inverse * scatter.covariance * inverse.transpose())).1;
+        Some(Amplitude { kappa, mean: (inverse * scatter.mean).norm() })
+    }
+
+    /// `z/kappa` without the mean; the form falls from 1/2 on.
+    fn reduced(&self, delta_ln_l: f64) -> f64 {
+        let length = (2.0 * delta_ln_l).sqrt() - self.mean;
+        (0.5 * length.max(0.0).powi(2) / self.kappa).max(0.5)
     }
 }
 
 impl Tail {
-    /// Mean number of peaks above `z`, over W.
-    fn shape(kappa: f64, z: f64) -> f64 {
-        (z / kappa).sqrt() * (-z / kappa).exp()
-    }
-
     /// Fits W to the upper tail of `maxima`, sorted from low to high.
-    fn fit(kappa: f64, maxima: &[f64]) -> Self {
+    fn fit(amplitudes: Vec<Amplitude>, maxima: &[f64]) -> Self {
+        let unit = Tail { amplitudes, w: 1.0 };
         let below = maxima.len() - (TAIL * maxima.len() as f64).ceil() as usize;
-        let threshold = maxima[below];
-        let above: f64 = maxima[below..].iter().map(|z| Tail::shape(kappa, *z)).sum();
-        let w = (maxima.len() - below) as f64 / (above + below as f64 * Tail::shape(kappa, threshold));
-        Tail { kappa, w }
+        let above: f64 = maxima[below..].iter().map(|z| unit.peaks(*z)).sum();
+        let w = (maxima.len() - below) as f64 / (above + below as f64 * unit.peaks(maxima[below]));
+        Tail { w, ..unit }
     }
 
-    /// Probability of a peak above `z`; valid where it is small.
-    pub fn probability(&self, z: f64) -> f64 {
-        -(-self.w * Tail::shape(self.kappa, z)).exp_m1()
+    /// The average over periods of a function of z/kappa.
+    fn average(&self, delta_ln_l: f64, f: impl Fn(f64) -> f64) -> f64 {
+        self.amplitudes.iter().map(|a| f(a.reduced(delta_ln_l))).sum::<f64>() / self.amplitudes.len() as f64
+    }
+
+    /// tau: mean number of peaks above `delta_ln_l`.
+    fn peaks(&self, delta_ln_l: f64) -> f64 {
+        self.w * self.average(delta_ln_l, |z| z.sqrt() * (-z).exp())
+    }
+
+    /// Probability of a peak of at least `delta_ln_l`; valid where it is small.
+    pub fn probability(&self, delta_ln_l: f64) -> f64 {
+        -(-self.peaks(delta_ln_l)).exp_m1()
     }
 
     /// The height that is exceeded with probability `p`.
     fn level(&self, p: f64) -> f64 {
-        // the form falls from z = kappa/2 on
-        let (mut lo, mut hi) = (0.5 * self.kappa, 700.0 * self.kappa);
-        while hi - lo > 1e-9 * self.kappa {
+        let mut hi = 1.0;
+        while self.probability(hi) > p {
+            hi *= 2.0;
+        }
+        let mut lo = 0.0;
+        while hi - lo > 1e-9 * hi {
             let middle = 0.5 * (lo + hi);
             if self.probability(middle) > p { lo = middle } else { hi = middle }
         }
         0.5 * (lo + hi)
+    }
+}
+
+impl Probability {
+    /// The one to use.
+    pub fn value(&self) -> f64 {
+        if self.draws_suffice { self.by_draws } else { self.by_tail }
     }
 }
 
@@ -93,12 +125,8 @@ impl FalseAlarm {
         let mut maxima = maxima(quadratic, trials, model, draws, seed);
         maxima.sort_by(f64::total_cmp);
         let scatter = scatter(quadratic, trials, model);
-        let variance = |(trial, scatter): (&Trial, &Scatter)| {
-            let inverse = trial.orbit.and(trial.information.cholesky())?.l().try_inverse()?;
-            Some(eigenvalues(&(inverse * scatter.covariance * inverse.transpose())).1)
-        };
-        let kappa = trials.iter().zip(&scatter).filter_map(variance).fold(f64::MIN_POSITIVE, f64::max);
-        let tail = Tail::fit(kappa, &maxima);
+        let amplitudes = trials.iter().zip(&scatter).filter_map(Amplitude::of).collect();
+        let tail = Tail::fit(amplitudes, &maxima);
         FalseAlarm { model, scatter, maxima, tail }
     }
 
@@ -123,7 +151,7 @@ impl FalseAlarm {
     /// How many independent periods would exceed the 1 % level as often as the search does.
     pub fn independent_periods(&self) -> f64 {
         let p: f64 = 0.01;
-        (-p).ln_1p() / (-(-self.level(p) / self.tail.kappa).exp()).ln_1p()
+        (-p).ln_1p() / (-self.tail.average(self.level(p), |z| (-z).exp())).ln_1p()
     }
 }
 
@@ -135,7 +163,8 @@ mod tests {
     use super::*;
     use nalgebra::DVector;
 
-    const MODELS: [NullModel; 3] = [NullModel::Information, NullModel::Noise, NullModel::NoiseAndBias];
+    const MODELS: [NullModel; 4] =
+        [NullModel::Information, NullModel::InformationAndBias, NullModel::Noise, NullModel::NoiseAndBias];
 
     fn star() -> (VelocityQuadratic, Vec<Trial>) {
         let cycles = uneven(30, 3.0);
@@ -174,7 +203,7 @@ mod tests {
     #[test]
     fn the_tail_agrees_with_the_draws() {
         let (quadratic, trials) = star();
-        for model in [NullModel::Information, NullModel::Noise] {
+        for model in MODELS {
             let few = FalseAlarm::draw(&quadratic, &trials, model, 10_000, 1);
             let many = FalseAlarm::draw(&quadratic, &trials, model, 200_000, 2);
             for p in [0.05, 0.01, 1e-3] {

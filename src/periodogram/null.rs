@@ -18,15 +18,18 @@ const DRAWS: usize = 250;
 /// Directions of the gradient with less than this part of the largest variance do not move.
 const STILL: f64 = 1e-13;
 
-/// How the gradient is distributed for stars without a planet.
+/// How the gradient is distributed for stars without a planet: about 0, or about what the entropy's pull on the reference image
+/// leaves in it; with the scatter of photon noise, or with the information, which counts spots that might be there as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NullModel {
-    /// Mean 0 and the information as covariance: noise and all spots that the entropy holds possible.
-    #[default]
+    /// Mean 0, the information as covariance: the null model of the likelihood itself.
     Information,
-    /// Mean 0 and the covariance of photon noise alone.
+    /// The information about the mean for the spots of the reference.
+    InformationAndBias,
+    /// Mean 0, the covariance of photon noise.
     Noise,
-    /// Photon noise about the mean for the spots of the reference.
+    /// Photon noise about the mean for the spots of the reference. Peaks come at harmonics of the rotation first.
+    #[default]
     NoiseAndBias,
 }
 
@@ -35,6 +38,7 @@ impl NullModel {
     pub fn name(self) -> &'static str {
         match self {
             NullModel::Information => "information",
+            NullModel::InformationAndBias => "information-and-bias",
             NullModel::Noise => "noise",
             NullModel::NoiseAndBias => "noise-and-bias",
         }
@@ -43,7 +47,7 @@ impl NullModel {
     /// Covariance of the gradient.
     pub fn covariance(self, quadratic: &VelocityQuadratic) -> &DMatrix<f64> {
         match self {
-            NullModel::Information => &quadratic.information,
+            NullModel::Information | NullModel::InformationAndBias => &quadratic.information,
             NullModel::Noise | NullModel::NoiseAndBias => &quadratic.noise,
         }
     }
@@ -51,7 +55,7 @@ impl NullModel {
     /// Mean of the gradient.
     pub fn mean(self, quadratic: &VelocityQuadratic) -> DVector<f64> {
         match self {
-            NullModel::NoiseAndBias => quadratic.bias.clone(),
+            NullModel::InformationAndBias | NullModel::NoiseAndBias => quadratic.bias.clone(),
             NullModel::Information | NullModel::Noise => DVector::zeros(quadratic.len()),
         }
     }

@@ -1,5 +1,6 @@
 //! False alarms in `periodogram.json`.
 
+use crate::periodogram::false_alarm::Amplitude;
 use crate::periodogram::{FalseAlarm, Search};
 use serde::Serialize;
 
@@ -15,7 +16,9 @@ pub(super) struct FalseAlarmRecord {
     pub used: &'static str,
     pub null_model: &'static str,
     pub draws: usize,
+    /// Largest variance of a whitened amplitude, and longest mean.
     pub kappa: f64,
+    pub mean: f64,
     pub w: f64,
     pub independent_periods: f64,
     pub levels: [LevelRecord; 3],
@@ -32,6 +35,7 @@ pub(super) fn false_alarm(search: &Search) -> FalseAlarmRecord {
     let alarm: &FalseAlarm = &search.false_alarm;
     let delta_ln_l = search.best().orbit.delta_ln_l;
     let found = alarm.probability(delta_ln_l);
+    let largest = |f: fn(&Amplitude) -> f64| alarm.tail.amplitudes.iter().map(f).fold(0.0, f64::max);
     FalseAlarmRecord {
         delta_ln_l,
         probability: found.value(),
@@ -40,7 +44,8 @@ pub(super) fn false_alarm(search: &Search) -> FalseAlarmRecord {
         used: if found.draws_suffice { "draws" } else { "extreme value" },
         null_model: alarm.model.name(),
         draws: alarm.maxima.len(),
-        kappa: alarm.tail.kappa,
+        kappa: largest(|a| a.kappa),
+        mean: largest(|a| a.mean),
         w: alarm.tail.w,
         independent_periods: alarm.independent_periods(),
         levels: LEVELS.map(|p| LevelRecord { false_alarm_probability: p, delta_ln_l: alarm.level(p) }),
