@@ -7,10 +7,11 @@
 
 use dimcmc::config;
 use dimcmc::detection::{Detection, DetectionSettings, cycles};
+use dimcmc::expansion::Expansion;
 use dimcmc::imaging::Imager;
 use dimcmc::io::csv::Table;
 use dimcmc::objective::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
-use dimcmc::periodogram::{FalseAlarm, Frequencies, FrequencySettings, NullModel, SearchSettings};
+use dimcmc::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings};
 use dimcmc::scene::Scene;
 use dimcmc::simulate::Simulation;
 use dimcmc::star::Spot;
@@ -72,64 +73,66 @@ fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) 
     (Imager::new(star, &observations, imaging.pixels, imaging.default_spot), truth)
 }
 
+fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
+    let settings = FrequencySettings::default();
+    Ok(Frequencies::new(&cycles(imager), imager.star.rotation_period_d, settings)?)
+}
+
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
-    let frequencies = Frequencies::new(&cycles(imager), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
         chi2_target: scene.settings.imaging.chi2_target,
         nuisances: Vec::new(),
-        search: SearchSettings { null: NullModel::default(), draws, seed: 1 },
+        search: SearchSettings { draws, seed: 1 },
         eccentric: false,
         second_planet: false,
     };
-    Ok(Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?)
+    Ok(Detection::find(imager, scene.settings.values, frequencies(imager)?, &settings, &|_| ())?)
 }
 
 /// What a star without a planet showed.
 struct NullStar {
     chi2_per_datum: f64,
-    lambda: f64,
-    delta_ln_l: f64,
-    porb_over_prot: f64,
-    /// False-alarm probabilities by [`MODELS`].
-    false_alarm: [f64; 3],
+    spots_left: f64,
+    /// Of the highest peak, for each of [`MODELS`].
+    delta_ln_l: [f64; 2],
+    porb_over_prot: [f64; 2],
+    false_alarm: [f64; 2],
 }
 
-const MODELS: [(NullModel, &str); 3] =
-    [(NullModel::Information, "information"), (NullModel::Noise, "noise"), (NullModel::NoiseAndBias, "noise-and-bias")];
+/// What is known of the spots that the map leaves over.
+const MODELS: [&str; 2] = ["as the entropy has it", "fitted"];
 
 fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Failure> {
     let (imager, _) = star(scene, like, seed, None);
+    let frequencies = frequencies(&imager)?;
     let found = detect(scene, &imager, 10_000)?;
-    let trials: Vec<_> = found.search.rows.iter().map(|row| row.trial).collect();
-    let peak = found.search.best();
-    let probability = |(model, _): (NullModel, &str)| {
-        let quadratic = &found.planet_free.quadratic;
-        FalseAlarm::draw(quadratic, &trials, model, 10_000, 1).probability(peak.orbit.delta_ln_l).value()
-    };
-    let solution = &found.planet_free.reference.solution;
+    let view = &found.planet_free;
+    let trusting = Search::new(&view.regularised, &frequencies, SearchSettings { draws: 10_000, seed: 1 })?;
+    let both = [&trusting, &found.search];
+    let height = |search: &Search| search.best().orbit.delta_ln_l;
     Ok(NullStar {
-        chi2_per_datum: solution.chi2 / imager.data.depth.len() as f64,
-        lambda: solution.image.lambda,
-        delta_ln_l: peak.orbit.delta_ln_l,
-        porb_over_prot: peak.porb_over_prot,
-        false_alarm: MODELS.map(probability),
+        chi2_per_datum: view.reference.solution.chi2 / imager.data.depth.len() as f64,
+        spots_left: view.spots_left,
+        delta_ln_l: both.map(height),
+        porb_over_prot: both.map(|search| search.best().porb_over_prot),
+        false_alarm: both.map(|search| search.false_alarm.probability(height(search)).value()),
     })
 }
 
 impl NullStar {
     fn table(stars: &[NullStar], folder: &Path) -> Result<(), Failure> {
-        let columns = ["chi2_per_datum", "lambda", "delta_ln_l", "porb_over_prot"];
-        let names: Vec<&str> = columns.into_iter().chain(MODELS.map(|m| m.1)).collect();
-        let mut csv = Table::new(&names);
+        let columns = "chi2_per_datum,spots_left,delta_ln_l_entropy,porb_over_prot_entropy,false_alarm_entropy,\
+                       delta_ln_l,porb_over_prot,false_alarm";
+        let mut csv = Table::new(&columns.split(',').collect::<Vec<_>>());
         for star in stars {
-            let [a, b, c] = star.false_alarm;
-            csv.row(&[star.chi2_per_datum, star.lambda, star.delta_ln_l, star.porb_over_prot, a, b, c]);
+            let of = |i: usize| [star.delta_ln_l[i], star.porb_over_prot[i], star.false_alarm[i]];
+            csv.row(&[&[star.chi2_per_datum, star.spots_left][..], &of(0), &of(1)].concat());
         }
         std::fs::write(folder.join("null.csv"), csv.into_bytes())?;
         println!("{} stars without a planet\n", stars.len());
-        println!("| null model | KS distance | p | below 1 % | below 5 % | below 10 % | below 50 % |");
+        println!("| spots left over | KS distance | p | below 1 % | below 5 % | below 10 % | below 50 % |");
         println!("|---|---|---|---|---|---|---|");
-        for (i, (_, name)) in MODELS.into_iter().enumerate() {
+        for (i, name) in MODELS.into_iter().enumerate() {
             let mut values: Vec<f64> = stars.iter().map(|star| star.false_alarm[i]).collect();
             values.sort_by(f64::total_cmp);
             let (distance, p) = kolmogorov_smirnov(&values);
@@ -151,8 +154,8 @@ struct PlanetStar {
     false_alarm: f64,
     k_kms: f64,
     sigma_k_kms: f64,
-    /// Share of the posterior below the truth in K, Porb/Prot, phi; of a phase, in half a turn either way.
-    ranks: [f64; 3],
+    /// For each of [`MODELS`], the share of the posterior below the truth in K, Porb/Prot, phi (within half a turn).
+    ranks: [[f64; 3]; 2],
 }
 
 fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar, Failure> {
@@ -171,15 +174,19 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
     let reference = &found.last().reference;
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
     let space = ParameterSpace::new(free, reference.values, mid, base, imager.star.rotation_period_d);
-    let surrogate = Surrogate::new(&imager, &space, reference).ok_or("the likelihood has no maximum")?;
-    let draws: Vec<Vec<f64>> = (0..DRAWS).filter_map(|_| Some(space.to_written(&surrogate.draw(&mut rng)?))).collect();
-    let below = |i: usize, x: f64| draws.iter().filter(|d| d[i] < x).count() as f64 / draws.len() as f64;
-    // the phase around its mean direction
-    let turn = |phi: f64| (std::f64::consts::TAU * phi).sin_cos();
-    let (sin, cos) = draws.iter().map(|d| turn(d[2])).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-    let centre = sin.atan2(cos) / std::f64::consts::TAU;
-    let from_centre = |phi: f64| phi - centre - (phi - centre).round();
-    let phase = draws.iter().filter(|d| from_centre(d[2]) < from_centre(phi)).count() as f64 / draws.len() as f64;
+    let expansion = Expansion::of(&imager, reference, &[]);
+    let honest = &found.last().quadratic;
+    let fitted = Expansion {
+        gradient: &honest.gradient - &honest.information * &expansion.centre,
+        information: honest.information.clone(),
+        ..expansion.clone()
+    };
+    let ranks = [&expansion, &fitted].map(|expansion| {
+        let surrogate = Surrogate::of_expansion(expansion, &space, &imager)?;
+        let draws = (0..DRAWS).filter_map(|_| Some(space.to_written(&surrogate.draw(&mut rng)?)));
+        Some(ranks(&draws.collect::<Vec<_>>(), [truth[Parameter::K], period, phi]))
+    });
+    let [Some(entropy), Some(fitted)] = ranks else { return Err("the likelihood has no maximum".into()) };
     Ok(PlanetStar {
         porb_over_prot: period,
         delta_ln_l: peak.orbit.delta_ln_l,
@@ -187,8 +194,19 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
         false_alarm: found.search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
         k_kms: found.best.orbit.k_kms,
         sigma_k_kms: found.best.orbit.sigma_k_kms,
-        ranks: [below(0, truth[Parameter::K]), below(1, period), phase],
+        ranks: [entropy, fitted],
     })
+}
+
+/// Share of the draws below the truth; of phases, around their mean direction.
+fn ranks(draws: &[Vec<f64>], truth: [f64; 3]) -> [f64; 3] {
+    let share =
+        |below: &dyn Fn(&Vec<f64>) -> bool| draws.iter().filter(|d| below(d)).count() as f64 / draws.len() as f64;
+    let turn = |phi: f64| (std::f64::consts::TAU * phi).sin_cos();
+    let (sin, cos) = draws.iter().map(|d| turn(d[2])).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let centre = sin.atan2(cos) / std::f64::consts::TAU;
+    let from_centre = |phi: f64| phi - centre - (phi - centre).round();
+    [share(&|d| d[0] < truth[0]), share(&|d| d[1] < truth[1]), share(&|d| from_centre(d[2]) < from_centre(truth[2]))]
 }
 
 impl PlanetStar {
@@ -197,38 +215,38 @@ impl PlanetStar {
     }
 
     fn table(stars: &[PlanetStar], folder: &Path) -> Result<(), Failure> {
-        let mut csv = Table::new(&[
-            "porb_over_prot",
-            "found_porb_over_prot",
-            "delta_ln_l",
-            "false_alarm",
-            "k_kms",
-            "sigma_k_kms",
-            "rank_k",
-            "rank_p",
-            "rank_phi",
-        ]);
+        let columns = "porb_over_prot,found_porb_over_prot,delta_ln_l,false_alarm,k_kms,sigma_k_kms,rank_k_entropy,\
+                       rank_p_entropy,rank_phi_entropy,rank_k,rank_p,rank_phi";
+        let mut csv = Table::new(&columns.split(',').collect::<Vec<_>>());
         for s in stars {
-            let [k, p, phi] = s.ranks;
-            let found = s.found_porb_over_prot;
-            csv.row(&[s.porb_over_prot, found, s.delta_ln_l, s.false_alarm, s.k_kms, s.sigma_k_kms, k, p, phi]);
+            let found = [s.porb_over_prot, s.found_porb_over_prot, s.delta_ln_l, s.false_alarm, s.k_kms, s.sigma_k_kms];
+            csv.row(&[&found[..], &s.ranks.concat()].concat());
         }
         std::fs::write(folder.join("planet.csv"), csv.into_bytes())?;
         println!("{} stars with a planet of {} m/s\n", stars.len(), 1000.0 * K_KMS);
-        println!(
-            "| period | stars | found (false alarm < 1 %) | | K 68 % | K 95 % | P 68 % | P 95 % | phi 68 % | phi 95 % |"
-        );
-        println!("|---|---|---|---|---|---|---|---|---|---|");
-        let groups: [(&str, fn(&PlanetStar) -> bool); 3] =
-            [("all", |_| true), ("away from co-rotation", |s| !s.near()), ("within 15 % of co-rotation", |s| s.near())];
-        for (name, member) in groups {
-            let group: Vec<&PlanetStar> = stars.iter().filter(|s| member(s)).collect();
-            let count =
-                |test: &dyn Fn(&PlanetStar) -> bool| share(group.iter().filter(|s| test(s)).count(), group.len());
-            let inside = |i: usize, level: f64| count(&|s| (s.ranks[i] - 0.5).abs() < 0.5 * level);
-            let cells: Vec<String> = (0..3).flat_map(|i| [inside(i, 0.68), inside(i, 0.95)]).collect();
-            let found = count(&|s| s.false_alarm < 0.01);
-            println!("| {name} | {} | {found} | | {} |", group.len(), cells.join(" | "));
+        println!("| period | stars | spots left over | K 68 % | K 95 % | P 68 % | P 95 % | phi 68 % | phi 95 % |");
+        println!("|---|---|---|---|---|---|---|---|---|");
+        let all: Vec<&PlanetStar> = stars.iter().collect();
+        let (near, away): (Vec<&PlanetStar>, Vec<&PlanetStar>) = stars.iter().partition(|s| s.near());
+        let groups = [("all", all), ("away from co-rotation", away), ("within 15 % of co-rotation", near)];
+        for (name, group) in &groups {
+            for (m, model) in MODELS.into_iter().enumerate() {
+                let inside = |i: usize, level: f64| {
+                    let count = group.iter().filter(|s| (s.ranks[m][i] - 0.5).abs() < 0.5 * level).count();
+                    share(count, group.len())
+                };
+                let cells: Vec<String> = (0..3).flat_map(|i| [inside(i, 0.68), inside(i, 0.95)]).collect();
+                println!("| {name} | {} | {model} | {} |", group.len(), cells.join(" | "));
+            }
+        }
+        println!("\n| period | stars | false alarm below 1 % | and at the right period |\n|---|---|---|---|");
+        for (name, group) in &groups {
+            let found = |s: &&&PlanetStar| s.false_alarm < 0.01;
+            // within a third of the resolution of the time base
+            let right = |s: &&&PlanetStar| (1.0 / s.porb_over_prot - 1.0 / s.found_porb_over_prot).abs() < 0.12;
+            let detected = share(group.iter().filter(found).count(), group.len());
+            let rightly = share(group.iter().filter(found).filter(right).count(), group.len());
+            println!("| {name} | {} | {detected} | {rightly} |", group.len());
         }
         Ok(())
     }

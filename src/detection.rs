@@ -15,9 +15,11 @@ use crate::periodogram::offset::{Offset, offset};
 use crate::periodogram::peaks::refined;
 use crate::periodogram::two_planets::{both, without};
 use crate::periodogram::{
-    Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
+    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
 };
-use crate::velocities::VelocityQuadratic;
+use crate::star::Orbit;
+use crate::velocities::{NotConcave, VelocityQuadratic};
+use nalgebra::DVector;
 
 /// Expansions around the best orbit at most.
 const MOST_ROUNDS: usize = 6;
@@ -45,8 +47,13 @@ pub struct DetectionSettings {
 pub struct View {
     /// The image.
     pub reference: Reference,
-    /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image.
+    /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over count as
+    /// noise.
     pub quadratic: VelocityQuadratic,
+    /// The same with spots as the entropy sees them: the regularised likelihood itself.
+    pub regularised: VelocityQuadratic,
+    /// How many times larger than the entropy expects the spots left over are, in variance.
+    pub spots_left: f64,
     /// Whether the image reaches the target chi2.
     pub on_target: bool,
 }
@@ -119,13 +126,17 @@ pub fn cycles(imager: &Imager) -> Vec<f64> {
 impl View {
     /// The image at `values`. Where the target chi2 takes more than three times the entropy's weight over the number of data, the
     /// image stops short of it: beyond, noise is turned into spots.
-    fn new(imager: &Imager, values: ParameterValues, settings: &DetectionSettings) -> Result<Self, ReferenceError> {
+    fn new(imager: &Imager, values: ParameterValues, settings: &DetectionSettings) -> Result<Self, DetectionError> {
         let reference = Reference::provisional(imager, values, settings.chi2_target)?;
         let on_target = reference.solution.termination == Termination::Converged;
         let nuisances = &settings.nuisances;
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
-        let quadratic = Expansion::of(imager, &reference, &stellar).velocities(nuisances);
-        Ok(View { reference, quadratic, on_target })
+        let regularised = Expansion::of(imager, &reference, &stellar).velocities(nuisances);
+        let orbit = values.state().orbit;
+        let velocities = regularised.cycles.iter().map(|&cycle| orbit.velocity_kms(cycle));
+        let velocities = DVector::from_iterator(regularised.len(), velocities);
+        let (quadratic, spots_left) = regularised.with_spots_left(&velocities).map_err(|NotConcave| Unbounded)?;
+        Ok(View { reference, quadratic, regularised, spots_left, on_target })
     }
 }
 
@@ -177,6 +188,15 @@ impl Detection {
     /// The last expansion.
     pub fn last(&self) -> &View {
         self.at_best.as_ref().unwrap_or(&self.planet_free)
+    }
+
+    /// Delta ln L of the best orbit in the regularised likelihood.
+    pub fn regularised_delta_ln_l(&self) -> f64 {
+        let CircularOrbit { k_kms, phi, .. } = self.best.orbit;
+        let orbit = Orbit { k_kms, porb_over_prot: self.best.porb_over_prot, phi };
+        let regularised = &self.last().regularised;
+        let velocities = regularised.cycles.iter().map(|&cycle| orbit.velocity_kms(cycle));
+        regularised.log_likelihood(&DVector::from_iterator(regularised.len(), velocities))
     }
 
     /// Images the star with the best orbit until that orbit stays.

@@ -29,9 +29,6 @@ pub struct VelocityQuadratic {
     /// Covariance of the gradient that photon noise makes. It is smaller than the information, which counts spots that
     /// might be there as well.
     pub noise: DMatrix<f64>,
-    /// Expectation of the gradient for a star without a planet whose spots are those of the reference: what the entropy's
-    /// pull on the map leaves in it.
-    pub bias: DVector<f64>,
 }
 
 /// The information is not positive definite: to second order, some velocities are not bounded by the data.
@@ -72,7 +69,6 @@ impl VelocityQuadratic {
             gradient: answer.tr_mul(&self.gradient),
             noise: information.clone(),
             information,
-            bias: DVector::zeros(self.len()),
         };
         Ok((quadratic, factor))
     }
@@ -153,7 +149,6 @@ mod tests {
                 gradient: gradient.column(0).into_owned(),
                 information: &noise + &spots,
                 noise: noise.clone(),
-                bias: DVector::zeros(n),
             };
             let (honest, factor) = quadratic.with_spots_left(&DVector::zeros(n)).unwrap();
             let (before, _) = quadratic.radial_velocities().unwrap();
@@ -182,7 +177,6 @@ mod tests {
             gradient: DVector::from_vec(vec![3.0, -1.0]),
             information: DMatrix::from_row_slice(2, 2, &[4.0, 1.0, 1.0, 2.0]),
             noise: DMatrix::identity(2, 2),
-            bias: DVector::zeros(2),
         };
         let (v, covariance) = quadratic.radial_velocities().unwrap();
         assert!((&v - DVector::from_vec(vec![1.0, -1.0])).norm() < 1e-12);

@@ -147,7 +147,7 @@ fn options_that_make_no_sense_are_refused_by_name() {
         let options: Vec<&str> = options.iter().map(String::as_str).collect();
         says(&desk.refusal(&[&["periodogram", "config.json", "--out", "x"], &options[..]].concat()), &[part]);
     }
-    for (option, value) in [("--planets", "3"), ("--planets", "0"), ("--draws", "10"), ("--null", "flat")] {
+    for (option, value) in [("--planets", "3"), ("--planets", "0"), ("--draws", "10")] {
         let output = dimcmc(&["periodogram", "config.json", "--out", "x", option, value], &desk.path(""));
         assert_eq!(output.status.code(), Some(2));
         says(&text(&output.stderr), &["error: ", option]);

@@ -2,12 +2,11 @@
 
 use super::output::Output;
 use super::{Failure, Global, progress};
-use clap::ValueEnum;
 use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Stage, cycles};
 use dimcmc::expansion::nuisances;
 use dimcmc::fit::Fit;
 use dimcmc::io::periodogram::PeriodogramResult;
-use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, NullModel, SearchSettings};
+use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
 use dimcmc::scene::Scene;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -42,28 +41,12 @@ pub struct Args {
     /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors
     #[arg(long, alias = "marginalize")]
     marginalise: bool,
-    /// What stars without a planet are drawn from
-    #[arg(long, value_name = "MODEL", value_enum, default_value_t = Null::NoiseAndBias)]
-    null: Null,
     /// Number of stars without a planet
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1000..=10_000_000))]
     draws: u32,
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-}
-
-/// The null models by name.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Null {
-    /// Noise and all spots that the entropy holds possible
-    Information,
-    /// The same about the mean for the spots of the image
-    InformationAndBias,
-    /// Photon noise alone
-    Noise,
-    /// Photon noise about the mean for the spots of the image
-    NoiseAndBias,
 }
 
 /// Runs the command.
@@ -104,16 +87,10 @@ fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
 }
 
 fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
-    let null = match args.null {
-        Null::Information => NullModel::Information,
-        Null::InformationAndBias => NullModel::InformationAndBias,
-        Null::Noise => NullModel::Noise,
-        Null::NoiseAndBias => NullModel::NoiseAndBias,
-    };
     DetectionSettings {
         chi2_target: scene.settings.imaging.chi2_target,
         nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
-        search: SearchSettings { null, draws: args.draws as usize, seed: args.seed },
+        search: SearchSettings { draws: args.draws as usize, seed: args.seed },
         eccentric: args.eccentric,
         second_planet: args.planets == 2,
     }

@@ -73,7 +73,6 @@ impl Expansion {
             gradient: &keep * gradient - offset,
             information: 0.5 * (&information + information.transpose()),
             noise: &keep * &self.noise * keep.transpose(),
-            bias: &keep * &self.bias,
         }
     }
 }

@@ -40,8 +40,6 @@ pub struct Expansion {
     pub information: DMatrix<f64>,
     /// Covariance of the gradient that photon noise makes.
     pub noise: DMatrix<f64>,
-    /// Expectation of the gradient when the star is the reference image itself: the entropy pulls the map away from it.
-    pub bias: DVector<f64>,
     /// Applications of the response or its transpose that it took.
     pub passes: u32,
 }
@@ -93,8 +91,6 @@ impl Expansion {
                 *c = (*c - d) * w;
             }
         }
-        let entropy_pull = model.gradient();
-        let bias = answers.iter().map(|(map, ..)| -dot(map, entropy_pull));
         let solution = &reference.solution;
         Expansion {
             values: reference.values,
@@ -105,7 +101,6 @@ impl Expansion {
             gradient: model.slope(),
             noise: unanswered.tr_mul(&unanswered),
             information,
-            bias: DVector::from_iterator(coordinates, bias),
             passes: model.passes() + answers.iter().map(|(.., passes)| passes).sum::<u32>(),
         }
     }

@@ -42,8 +42,6 @@ pub(super) struct DisplacedModel<'a> {
     map: Vec<f64>,
     cycles: Vec<f64>,
     here: Displaced<'a>,
-    /// Gradient of chi2/2 with respect to the map.
-    gradient: Vec<f64>,
     /// All profiles shifted by a step up and down.
     shifted: [Displaced<'a>; 2],
     /// Each stellar parameter a step up and down.
@@ -57,9 +55,7 @@ impl<'a> DisplacedModel<'a> {
         let base = imager.time_base_cycles() * imager.star.rotation_period_d;
         let steps: Vec<f64> = stellar.iter().map(|&p| step(p, &reference.values, base)).collect();
         let at = |response: Response| displaced(imager, response, &map);
-        let mut here = at(reference.response.clone());
-        let mut gradient = vec![0.0; map.len()];
-        here.problem.gradient(&mut gradient);
+        let here = at(reference.response.clone());
         let shift = |h: f64| at(shifted(imager, &reference.response, &reference.values, h));
         let turn = |(&p, &h): (&Parameter, &f64)| {
             [h, -h].map(|h| at(imager.response(&moved(&reference.values, &[(p, h)]).state())))
@@ -73,7 +69,6 @@ impl<'a> DisplacedModel<'a> {
             reference,
             steps,
             here,
-            gradient,
             turned,
             map,
         }
@@ -85,10 +80,6 @@ impl<'a> DisplacedModel<'a> {
 
     pub fn cycles(&self) -> &[f64] {
         &self.cycles
-    }
-
-    pub fn gradient(&self) -> &[f64] {
-        &self.gradient
     }
 
     pub fn passes(&self) -> u32 {

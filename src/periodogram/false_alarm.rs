@@ -1,13 +1,11 @@
 //! How often stars without a planet show a peak as high: by draws, and beyond their reach by extreme-value theory.
 //!
-//! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z/kappa) exp(-z/kappa)`, hence
-//! `FAP = 1 - exp(-tau)` (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). kappa is the
-//! variance of a whitened amplitude, 1 where the null model is the one of the likelihood. Where the gradient has a mean, the
-//! amplitude `sqrt(2 z)` is shortened by the whitened mean first. Both differ from period to period, and tau is the average over
-//! the trial periods. W comes from the upper tail of the draws by maximum likelihood, those below the tail counting as such.
+//! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z) exp(-z)`, hence `FAP = 1 - exp(-tau)`
+//! (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). W comes from the upper tail of the draws
+//! by maximum likelihood, those below the tail counting as such.
 
-use super::null::{NullModel, Scatter, maxima, scatter};
-use super::orbits::{Trial, eigenvalues};
+use super::draws::maxima;
+use super::orbits::Trial;
 use crate::velocities::VelocityQuadratic;
 
 /// The tail to which W is fitted: this part of the draws.
@@ -19,30 +17,15 @@ const ENOUGH: usize = 30;
 /// The distribution of the highest Delta ln L without a planet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FalseAlarm {
-    /// What "without a planet" means.
-    pub model: NullModel,
-    /// Its scatter at every trial period.
-    pub scatter: Vec<Scatter>,
     /// The highest Delta ln L of each draw, from low to high.
     pub maxima: Vec<f64>,
     /// The form of the tail.
     pub tail: Tail,
 }
 
-/// The whitened amplitudes at one trial period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Amplitude {
-    /// Their largest variance.
-    pub kappa: f64,
-    /// Length of their mean.
-    pub mean: f64,
-}
-
 /// `1 - exp(-tau)`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tail {
-    /// The amplitudes at the trial periods.
-    pub amplitudes: Vec<Amplitude>,
     /// Number of independent peaks that the search looks at, but for a factor of order 1.
     pub w: f64,
 }
@@ -58,38 +41,19 @@ pub struct Probability {
     pub draws_suffice: bool,
 }
 
-impl Amplitude {
-    fn of((trial, scatter): (&Trial, &Scatter)) -> Option<Self> {
-        let inverse = trial.orbit.and(trial.information.cholesky())?.l().try_inverse()?;
-        let kappa = eigenvalues(&(inverse * scatter.covariance * inverse.transpose())).1;
-        Some(Amplitude { kappa, mean: (inverse * scatter.mean).norm() })
-    }
-
-    /// `z/kappa` without the mean; the form falls from 1/2 on.
-    fn reduced(&self, delta_ln_l: f64) -> f64 {
-        let length = (2.0 * delta_ln_l).sqrt() - self.mean;
-        (0.5 * length.max(0.0).powi(2) / self.kappa).max(0.5)
-    }
-}
-
 impl Tail {
     /// Fits W to the upper tail of `maxima`, sorted from low to high.
-    fn fit(amplitudes: Vec<Amplitude>, maxima: &[f64]) -> Self {
-        let unit = Tail { amplitudes, w: 1.0 };
+    fn fit(maxima: &[f64]) -> Self {
+        let unit = Tail { w: 1.0 };
         let below = maxima.len() - (TAIL * maxima.len() as f64).ceil() as usize;
         let above: f64 = maxima[below..].iter().map(|z| unit.peaks(*z)).sum();
-        let w = (maxima.len() - below) as f64 / (above + below as f64 * unit.peaks(maxima[below]));
-        Tail { w, ..unit }
+        Tail { w: (maxima.len() - below) as f64 / (above + below as f64 * unit.peaks(maxima[below])) }
     }
 
-    /// The average over periods of a function of z/kappa.
-    fn average(&self, delta_ln_l: f64, f: impl Fn(f64) -> f64) -> f64 {
-        self.amplitudes.iter().map(|a| f(a.reduced(delta_ln_l))).sum::<f64>() / self.amplitudes.len() as f64
-    }
-
-    /// tau: mean number of peaks above `delta_ln_l`.
+    /// tau: mean number of peaks above `delta_ln_l`; it falls from 1/2 on.
     fn peaks(&self, delta_ln_l: f64) -> f64 {
-        self.w * self.average(delta_ln_l, |z| z.sqrt() * (-z).exp())
+        let z = delta_ln_l.max(0.5);
+        self.w * z.sqrt() * (-z).exp()
     }
 
     /// Probability of a peak of at least `delta_ln_l`; valid where it is small.
@@ -120,14 +84,12 @@ impl Probability {
 }
 
 impl FalseAlarm {
-    /// From `draws` gradients of the null model.
-    pub fn draw(quadratic: &VelocityQuadratic, trials: &[Trial], model: NullModel, draws: usize, seed: u64) -> Self {
-        let mut maxima = maxima(quadratic, trials, model, draws, seed);
+    /// From `draws` gradients without a planet.
+    pub fn draw(quadratic: &VelocityQuadratic, trials: &[Trial], draws: usize, seed: u64) -> Self {
+        let mut maxima = maxima(quadratic, trials, draws, seed);
         maxima.sort_by(f64::total_cmp);
-        let scatter = scatter(quadratic, trials, model);
-        let amplitudes = trials.iter().zip(&scatter).filter_map(Amplitude::of).collect();
-        let tail = Tail::fit(amplitudes, &maxima);
-        FalseAlarm { model, scatter, maxima, tail }
+        let tail = Tail::fit(&maxima);
+        FalseAlarm { maxima, tail }
     }
 
     /// Probability that a star without a planet shows a peak of at least `z`.
@@ -151,7 +113,7 @@ impl FalseAlarm {
     /// How many independent periods would exceed the 1 % level as often as the search does.
     pub fn independent_periods(&self) -> f64 {
         let p: f64 = 0.01;
-        (-p).ln_1p() / (-self.tail.average(self.level(p), |z| (-z).exp())).ln_1p()
+        (-p).ln_1p() / (-(-self.level(p)).exp()).ln_1p()
     }
 }
 
@@ -163,13 +125,9 @@ mod tests {
     use super::*;
     use nalgebra::DVector;
 
-    const MODELS: [NullModel; 4] =
-        [NullModel::Information, NullModel::InformationAndBias, NullModel::Noise, NullModel::NoiseAndBias];
-
     fn star() -> (VelocityQuadratic, Vec<Trial>) {
         let cycles = uneven(30, 3.0);
-        let mut quadratic = sample::correlated(&cycles, &DVector::zeros(30), 5);
-        quadratic.bias = 10.0 * sample::normal(30, 2);
+        let quadratic = sample::correlated(&cycles, &DVector::zeros(30), 5);
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
         let trials = scan(&quadratic, &frequencies.per_cycle);
         (quadratic, trials)
@@ -180,41 +138,36 @@ mod tests {
     fn the_probability_is_uniform_under_its_own_null() {
         let (quadratic, trials) = star();
         let frequencies: Vec<f64> = trials.iter().map(|t| t.frequency).collect();
-        for model in MODELS {
-            let alarm = FalseAlarm::draw(&quadratic, &trials, model, 10_000, 1);
-            let factor = model.covariance(&quadratic).clone().cholesky().unwrap().unpack();
-            let n = 1000;
-            let mut found: Vec<f64> = (0..n)
-                .map(|k| {
-                    let gradient = model.mean(&quadratic) + &factor * sample::normal(30, 1000 + k);
-                    let star = VelocityQuadratic { gradient, ..quadratic.clone() };
-                    let heights = scan(&star, &frequencies).into_iter().filter_map(|t| t.orbit);
-                    alarm.probability(heights.map(|o| o.delta_ln_l).fold(0.0, f64::max)).by_draws
-                })
-                .collect();
-            found.sort_by(f64::total_cmp);
-            let apart = |(k, p): (usize, &f64)| (p - (k as f64 + 0.5) / n as f64).abs();
-            let distance = found.iter().enumerate().map(apart).fold(0.0, f64::max);
-            // exceeded once in a thousand by chance: 1.95 / sqrt(n), with both samples counted
-            assert!(distance < 1.95 * (1.0 / n as f64 + 1e-4_f64).sqrt(), "{model:?}: {distance}");
-        }
+        let alarm = FalseAlarm::draw(&quadratic, &trials, 10_000, 1);
+        let factor = quadratic.information.clone().cholesky().unwrap().unpack();
+        let n = 1000;
+        let mut found: Vec<f64> = (0..n)
+            .map(|k| {
+                let star = VelocityQuadratic { gradient: &factor * sample::normal(30, 1000 + k), ..quadratic.clone() };
+                let heights = scan(&star, &frequencies).into_iter().filter_map(|t| t.orbit);
+                alarm.probability(heights.map(|o| o.delta_ln_l).fold(0.0, f64::max)).by_draws
+            })
+            .collect();
+        found.sort_by(f64::total_cmp);
+        let apart = |(k, p): (usize, &f64)| (p - (k as f64 + 0.5) / n as f64).abs();
+        let distance = found.iter().enumerate().map(apart).fold(0.0, f64::max);
+        // exceeded once in a thousand by chance: 1.95 / sqrt(n), with both samples counted
+        assert!(distance < 1.95 * (1.0 / n as f64 + 1e-4_f64).sqrt(), "{distance}");
     }
 
     #[test]
     fn the_tail_agrees_with_the_draws() {
         let (quadratic, trials) = star();
-        for model in MODELS {
-            let few = FalseAlarm::draw(&quadratic, &trials, model, 10_000, 1);
-            let many = FalseAlarm::draw(&quadratic, &trials, model, 200_000, 2);
-            for p in [0.05, 0.01, 1e-3] {
-                let z = many.level(p);
-                let found = few.tail.probability(z);
-                // the form is an upper bound in theory; W of a thousand draws in the tail is good to 3 %
-                assert!((found / p).ln().abs() < 0.3, "{model:?}: {found} for {p} at {z}");
-                assert!((few.probability(few.level(p)).value() / p).ln().abs() < 0.1);
-            }
-            assert!(few.level(0.1) < few.level(0.01) && few.level(0.01) < few.level(0.001));
+        let few = FalseAlarm::draw(&quadratic, &trials, 10_000, 1);
+        let many = FalseAlarm::draw(&quadratic, &trials, 200_000, 2);
+        for p in [0.05, 0.01, 1e-3] {
+            let z = many.level(p);
+            let found = few.tail.probability(z);
+            // the form is an upper bound in theory; W of a thousand draws in the tail is good to 3 %
+            assert!((found / p).ln().abs() < 0.3, "{found} for {p} at {z}");
+            assert!((few.probability(few.level(p)).value() / p).ln().abs() < 0.1);
         }
+        assert!(few.level(0.1) < few.level(0.01) && few.level(0.01) < few.level(0.001));
     }
 
     #[test]
@@ -222,7 +175,7 @@ mod tests {
         let (quadratic, trials) = star();
         let draw = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| FalseAlarm::draw(&quadratic, &trials, NullModel::Noise, 1001, 3))
+            pool.install(|| FalseAlarm::draw(&quadratic, &trials, 1001, 3))
         };
         assert_eq!(draw(1), draw(3));
     }

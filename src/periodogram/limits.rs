@@ -9,7 +9,7 @@
 
 use super::normal::{cumulative, erfc};
 use super::orbits::{Trial, eigenvalues};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// Directions of phase for the upper limit: at least this many, and this many more for a phase known to a radian.
@@ -65,34 +65,20 @@ pub fn upper_limit_kms(trial: &Trial, credence: f64) -> Option<f64> {
 }
 
 /// The semi-amplitude (km/s) with which a planet at the period of `trial` lifts ln L above `level` with that probability.
-/// `mean` and `covariance` are those of `X' gradient` without a planet.
-pub fn detection_limit_kms(
-    trial: &Trial,
-    mean: Vector2<f64>,
-    covariance: Matrix2<f64>,
-    level: f64,
-    probability: f64,
-) -> Option<f64> {
+pub fn detection_limit_kms(trial: &Trial, level: f64, probability: f64) -> Option<f64> {
     trial.orbit?;
     let factor = trial.information.cholesky()?.l();
-    let inverse = factor.try_inverse()?;
-    let (mean, scatter) = (inverse * mean, inverse * covariance * inverse.transpose());
     let threshold = (2.0 * level).sqrt();
     let detected = |k: f64| {
         let chance = |j: usize| {
-            let centre = factor.tr_mul(&direction(j, DETECTION_PHASES)) * k + mean;
-            let length = centre.norm().max(f64::MIN_POSITIVE);
-            let along = centre / length;
-            let across = Vector2::new(-along.y, along.x);
-            let variance = |u: Vector2<f64>| u.dot(&(scatter * u));
-            let longer = 0.5 * variance(across) / length.max(1.0);
-            cumulative((length + longer - threshold) / variance(along).max(f64::MIN_POSITIVE).sqrt())
+            let length = (factor.tr_mul(&direction(j, DETECTION_PHASES)) * k).norm();
+            let longer = 0.5 / length.max(1.0);
+            cumulative(length + longer - threshold)
         };
         (0..DETECTION_PHASES).map(chance).sum::<f64>() / DETECTION_PHASES as f64
     };
     let least = eigenvalues(&trial.information).0.sqrt();
-    let widest = eigenvalues(&scatter).1.sqrt();
-    Some(rising(probability, (threshold + mean.norm() + 6.0 * widest) / least, detected))
+    Some(rising(probability, (threshold + 6.0) / least, detected))
 }
 
 #[cfg(test)]

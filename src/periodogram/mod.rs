@@ -5,13 +5,13 @@
 //! user states what to search (`frequencies`). Left out: where the quadratic comes from (`expansion`), and files
 //! (`io::periodogram`).
 
+mod draws;
 pub mod eccentric;
 pub mod false_alarm;
 pub mod frequencies;
 pub mod kepler;
 pub mod limits;
 mod normal;
-pub mod null;
 pub mod offset;
 pub mod orbits;
 pub mod peaks;
@@ -24,7 +24,6 @@ pub mod window;
 pub use eccentric::KeplerianOrbit;
 pub use false_alarm::FalseAlarm;
 pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
-pub use null::NullModel;
 pub use orbits::{CircularOrbit, Trial};
 pub use peaks::Peak;
 pub use two_planets::TwoOrbits;
@@ -43,8 +42,6 @@ pub const DETECTION_FAP: f64 = 0.01;
 /// How a search is judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchSettings {
-    /// What is drawn for stars without a planet.
-    pub null: NullModel,
     /// Number of such draws.
     pub draws: usize,
     /// Seed of the draws.
@@ -97,20 +94,16 @@ impl Search {
         if peaks.is_empty() {
             return Err(Unbounded);
         }
-        let SearchSettings { null, draws, seed } = settings;
-        let false_alarm = FalseAlarm::draw(quadratic, &trials, null, draws, seed);
+        let false_alarm = FalseAlarm::draw(quadratic, &trials, settings.draws, settings.seed);
         let level = false_alarm.level(DETECTION_FAP);
-        let row = |(trial, scatter): (&Trial, &null::Scatter)| {
-            let limit = |chance| detection_limit_kms(trial, scatter.mean, scatter.covariance, level, chance);
-            Row {
-                trial: *trial,
-                k_upper95_kms: upper_limit_kms(trial, CREDENCE),
-                window: window(&quadratic.cycles, trial.frequency),
-                k_limit50_kms: limit(0.5),
-                k_limit95_kms: limit(0.95),
-            }
+        let row = |trial: &Trial| Row {
+            trial: *trial,
+            k_upper95_kms: upper_limit_kms(trial, CREDENCE),
+            window: window(&quadratic.cycles, trial.frequency),
+            k_limit50_kms: detection_limit_kms(trial, level, 0.5),
+            k_limit95_kms: detection_limit_kms(trial, level, 0.95),
         };
-        let rows = trials.par_iter().zip(&false_alarm.scatter).map(row).collect();
+        let rows = trials.par_iter().map(row).collect();
         Ok(Search { rows, peaks, false_alarm })
     }
 

@@ -36,7 +36,6 @@ pub(super) fn eliminated(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> Opt
         gradient: &keep * &quadratic.gradient,
         information: 0.5 * (&information + information.transpose()),
         noise: &keep * &quadratic.noise * keep.transpose(),
-        bias: &keep * &quadratic.bias,
     })
 }
 
@@ -75,7 +74,6 @@ pub fn both(
 #[cfg(test)]
 mod tests {
     use super::super::frequencies::FrequencySettings;
-    use super::super::null::NullModel;
     use super::super::sample::{self, uneven};
     use super::super::{Search, SearchSettings};
     use super::*;
@@ -102,7 +100,7 @@ mod tests {
         let rv = sample::orbit(&cycles, 0.1, 1.7, 0.3) + sample::orbit(&cycles, 0.04, 0.63, 0.8);
         let quadratic = sample::correlated(&cycles, &rv, 4);
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
-        let settings = SearchSettings { draws: 1000, seed: 1, null: NullModel::Information };
+        let settings = SearchSettings { draws: 1000, seed: 1 };
         let first = Search::new(&quadratic, &frequencies, settings).unwrap();
         let rest = without(&quadratic, 1.0 / first.peaks[0].porb_over_prot).unwrap();
         let second = Search::new(&rest, &frequencies, settings).unwrap();

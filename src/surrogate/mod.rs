@@ -66,8 +66,13 @@ impl Surrogate {
             return None;
         }
         let stellar: Vec<Parameter> = STELLAR.into_iter().filter(|&p| is_free(p)).collect();
-        let expansion = Expansion::of(imager, reference, &stellar);
-        let model = LinearModel::new(&expansion, space, imager.mid_cycle());
+        Surrogate::of_expansion(&Expansion::of(imager, reference, &stellar), space, imager)
+    }
+
+    /// Of an expansion whose stellar coordinates are those that `space` leaves free, as K and phi are; `None` where the
+    /// likelihood has no maximum.
+    pub fn of_expansion(expansion: &Expansion, space: &ParameterSpace, imager: &Imager) -> Option<Self> {
+        let model = LinearModel::new(expansion, space, imager.mid_cycle());
         Surrogate::of(model, space.clone(), imager.time_base_cycles(), 1.0)
     }
 

@@ -99,6 +99,10 @@ pub(super) struct SearchRecord {
 #[derive(Serialize)]
 pub(super) struct ExpansionRecord {
     pub marginalised: Vec<&'static str>,
+    /// How many times larger than the entropy expects spots left over are, in variance: without a planet, at the best orbit.
+    pub spots_left: [f64; 2],
+    /// Delta ln L of the best orbit with spots as the entropy sees them.
+    pub regularised_delta_ln_l: f64,
     pub rounds: usize,
     pub closed: bool,
     pub data: usize,
@@ -141,6 +145,8 @@ impl PeriodogramResult<'_> {
             },
             expansion: ExpansionRecord {
                 marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name()).collect(),
+                spots_left: [found.planet_free.spots_left, found.last().spots_left],
+                regularised_delta_ln_l: found.regularised_delta_ln_l(),
                 rounds: found.rounds,
                 closed: found.closed,
                 data: self.imager.data.depth.len(),

@@ -28,24 +28,20 @@ impl PeriodogramResult<'_> {
         let found = self.detection;
         let data = self.imager.data.depth.len() as f64;
         let mut warnings = Vec::new();
-        for (view, whose) in
-            [(Some(&found.planet_free), "without a planet"), (found.at_best.as_ref(), "at the best orbit")]
-        {
-            let Some(view) = view else { continue };
-            let chi2 = self.per_datum(view);
-            let far = (chi2 - 1.0) / (2.0 / data).sqrt();
-            if !view.on_target {
-                let target = self.settings.chi2_target;
-                warnings.push(format!(
-                    "{whose} no map reaches the target chi2 of {target:.3} per datum ({chi2:.3} was reached): the model of \
-                     the star may be wrong, or a planet is missing in it"
-                ));
-            } else if far.abs() > FAR {
-                warnings.push(format!(
-                    "{whose} chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles \
-                     or the model of the star may be wrong, and all errors here with them"
-                ));
-            }
+        let view = found.last();
+        let chi2 = self.per_datum(view);
+        let far = (chi2 - 1.0) / (2.0 / data).sqrt();
+        if !view.on_target {
+            let target = self.settings.chi2_target;
+            warnings.push(format!(
+                "no map reaches the target chi2 of {target:.3} per datum without turning noise into spots ({chi2:.3} was \
+                 reached): the target may be too low, or the model of the star wrong"
+            ));
+        } else if far.abs() > FAR {
+            warnings.push(format!(
+                "chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles or the model \
+                 of the star may be wrong, and all errors here with them"
+            ));
         }
         let fixed = self.settings.nuisances.iter().all(|nuisance| nuisance.parameter != Parameter::Vsys);
         if let Some(offset) = found.offset.filter(|offset| fixed && offset.gain > OFFSET_GAIN) {

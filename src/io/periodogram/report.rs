@@ -85,10 +85,10 @@ fn decimals(sigma: f64) -> usize {
 }
 
 fn probability(alarm: &FalseAlarmRecord) -> String {
-    let FalseAlarmRecord { delta_ln_l, probability, used, draws, null_model, independent_periods, .. } = alarm;
+    let FalseAlarmRecord { delta_ln_l, probability, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
     format!(
-        "Delta ln L {delta_ln_l:.2}, false-alarm probability {} by {used} ({draws} draws, null {null_model}, some \
+        "Delta ln L {delta_ln_l:.2}, false-alarm probability {} by {used} ({draws} draws, some \
          {independent_periods:.0} independent periods)\nDelta ln L of 10, 1, 0.1 % false alarms: {}",
         rounded(*probability),
         levels.join(", ")
