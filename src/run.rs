@@ -210,9 +210,7 @@ impl Run {
 /// posterior alone, so that a resumed run has the same.
 fn surrogate(posterior: &Posterior) -> Option<(Surrogate, f64)> {
     let expansion = Surrogate::new(posterior.imager(), posterior.space(), posterior.reference())?;
-    let surrogate = expansion.corrected(posterior, &Threads(posterior));
-    let acceptance = surrogate.acceptance(posterior, &Threads(posterior));
-    Some((surrogate, acceptance))
+    Some(expansion.fitted(posterior, &Threads(posterior)))
 }
 
 fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {

@@ -164,7 +164,7 @@ fn a_massive_planet_is_found_in_spite_of_the_target() {
     desk.config.as_object_mut().unwrap().remove("grid");
     desk.set("/planet", json!({ "k_kms": 2.0, "porb_over_prot": 1.7, "phi": 0.5 }));
     let table = desk.succeed(&["periodogram", "config.json", "--out", "a"]);
-    says(&table, &["warning: without a planet no map reaches the target"]);
+    assert!(!table.contains("warning"), "{table}");
     let best = &desk.json("a/periodogram.json")["best"];
     let off = (number(&best["k_kms"]) - 2.0) / number(&best["sigma_k_kms"]);
     assert!(off.abs() < 4.0, "{off} sigma");

@@ -121,7 +121,7 @@ mod tests {
         let level = 8.0;
         let factor = trial.information.cholesky().unwrap().l();
         for probability in [0.5, 0.95] {
-            let k = detection_limit_kms(&trial, Vector2::zeros(), trial.information, level, probability).unwrap();
+            let k = detection_limit_kms(&trial, level, probability).unwrap();
             let mut rng = ChaCha8Rng::seed_from_u64(5);
             let n = 40_000;
             let mut found = 0;

@@ -17,6 +17,9 @@ const POINTS: usize = 8;
 /// Temperature at which the points are drawn: a little wider than where the fit is used.
 const TEMPERATURE: f64 = 1.5;
 
+/// Points this much below the highest in ln P do not count: the quadratic need not be right there.
+const REACH: f64 = 20.0;
+
 /// Fewest points for each coefficient that must have given a log-probability.
 const ENOUGH: f64 = 3.0;
 
@@ -24,15 +27,24 @@ const ENOUGH: f64 = 3.0;
 const TRIALS: usize = 64;
 
 impl Surrogate {
-    /// Fitted to `density` by least squares over draws of the surrogate itself, which depend on nothing but it. As it was where
-    /// the fit makes no sense: too few draws inside the priors, or no maximum left.
-    pub fn corrected(self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> Self {
+    /// The surrogate fitted to `density`, if that is better than as it was, and the share of its proposals that are accepted.
+    pub fn fitted(self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> (Self, f64) {
+        let own = (self.acceptance(density, evaluator), self);
+        let fitted = own.1.corrected(density, evaluator).map(|fitted| (fitted.acceptance(density, evaluator), fitted));
+        let (acceptance, best) = fitted.filter(|fitted| fitted.0 > own.0).unwrap_or(own);
+        (best, acceptance)
+    }
+
+    /// The surrogate with what `density` says beyond it, by least squares over draws of the surrogate itself, which depend on
+    /// nothing but it. `None` where too few draws say anything, or no maximum is left.
+    fn corrected(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> Option<Self> {
         let count = self.model.linear_count();
         let terms = 1 + count + count * (count + 1) / 2;
-        let Some(wide) = self.tempered(TEMPERATURE) else { return self };
-        let points: Vec<(DVector<f64>, f64)> = wide
-            .evaluated(POINTS * terms, density, evaluator)
+        let draws = self.tempered(TEMPERATURE)?.evaluated(POINTS * terms, density, evaluator);
+        let highest = draws.iter().map(|draw| draw.2).fold(f64::NEG_INFINITY, f64::max);
+        let points: Vec<(DVector<f64>, f64)> = draws
             .iter()
+            .filter(|(.., log_prob)| *log_prob > highest - REACH)
             .filter_map(|(position, theta, log_prob)| {
                 let linear = self.model.linear_of(position);
                 let model = self.model.at(self.model.period_of(position), 1.0)?.log_likelihood(&linear);
@@ -41,26 +53,23 @@ impl Surrogate {
             })
             .collect();
         if (points.len() as f64) < ENOUGH * terms as f64 {
-            return self;
+            return None;
         }
-        let corrected = fit(&points, count).and_then(|correction| {
-            let model = self.model.clone().with_correction(correction);
-            Surrogate::of(model, self.space.clone(), self.time_base_cycles, self.temperature)
-        });
-        corrected.unwrap_or(self)
+        let model = self.model.clone().with_correction(fit(&points, count)?);
+        Surrogate::of(model, self.space.clone(), self.time_base_cycles, self.temperature)
     }
 
     /// Share of the surrogate's draws that `density` would accept, one after the other.
-    pub fn acceptance(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> f64 {
+    fn acceptance(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> f64 {
         let beyond: Vec<f64> = self
             .evaluated(TRIALS, density, evaluator)
             .iter()
             .map(|(position, theta, log_prob)| log_prob + density.log_jacobian(theta) - self.log_density(position))
             .collect();
-        // from each draw to every other; none is accepted where there is no log-probability, none is left out for it
+        // from each draw to every other; what has no log-probability is never accepted, and neither is what cannot be drawn
         let pairs = beyond.iter().flat_map(|from| beyond.iter().map(move |to| (from, to)));
         let accepted = |(from, to): (&f64, &f64)| if from.is_finite() { (to - from).exp().min(1.0) } else { 0.0 };
-        pairs.map(accepted).sum::<f64>() / (beyond.len() as f64).powi(2).max(1.0)
+        pairs.map(accepted).sum::<f64>() / (TRIALS as f64).powi(2)
     }
 
     /// So many draws: internal and written coordinates, and log-probability.
