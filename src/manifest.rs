@@ -3,7 +3,7 @@
 //! Written before the first step; afterwards only length and goals of the run change (`--extend`, or `steps`, `rhat` and `ess`
 //! of the config). Everything that a chain is a function of is in it or checked against it. Left out: the chain itself (`io::journal`).
 
-use crate::chain::{Goals, ParameterKind, Shape};
+use crate::chain::{Goals, ParameterKind, Shape, Summary};
 use crate::config::{self, Settings};
 use crate::ensemble::Positions;
 use crate::io::atomic::{WriteError, write_json};
@@ -15,6 +15,9 @@ use std::path::Path;
 
 /// Name of the file in a run's folder.
 pub const FILE: &str = "manifest.json";
+
+/// Share of the rotation period, or of a fraction of it, within which spots imitate an orbit (`results/calibration.md`).
+const NEAR_ROTATION: f64 = 0.15;
 
 /// The content of `manifest.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,6 +52,23 @@ impl Manifest {
             format!("another maximum, not much lower, where walkers started too: {}", place(rival))
         };
         self.origin.rivals.iter().map(line).chain(self.origin.reference.warning()).collect()
+    }
+
+    /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an orbit
+    /// there, and the posterior does not know of them.
+    pub fn co_rotation(&self, summary: &Summary) -> Option<String> {
+        let period = summary.parameters.get(Parameter::PorbOverProt.name())?;
+        let [low, high] = period.ci68;
+        let fraction = (1..=4).find(|&n| {
+            let here = 1.0 / f64::from(n);
+            low < here * (1.0 + NEAR_ROTATION) && high > here * (1.0 - NEAR_ROTATION)
+        })?;
+        let rotation = if fraction == 1 { "Prot".to_owned() } else { format!("Prot/{fraction}") };
+        Some(format!(
+            "the period is within {:.0} % of {rotation}, where spots imitate an orbit: K is less certain than its interval \
+             says; see what `dimcmc periodogram` makes of it",
+            100.0 * NEAR_ROTATION
+        ))
     }
 
     /// Reads the manifest in a run's folder.

@@ -34,7 +34,7 @@ pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), F
         .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
     write_json(&folder.join(SUMMARY), &summary)?;
     let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.origin.truth.as_ref()).trim_end());
-    for warning in manifest.warnings() {
+    for warning in manifest.warnings().into_iter().chain(manifest.co_rotation(&summary)) {
         let _ = writeln!(std::io::stdout(), "note: {warning}");
     }
     Ok(())
