@@ -108,7 +108,7 @@ fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Fa
     let found = detect(scene, &imager, 10_000)?;
     let view = &found.planet_free;
     let trusting = Search::new(&view.regularised, &frequencies, SearchSettings { draws: 10_000, seed: 1 })?;
-    let both = [&trusting, &found.search];
+    let both = [&trusting, &found.blind];
     let height = |search: &Search| search.best().orbit.delta_ln_l;
     Ok(NullStar {
         chi2_per_datum: view.reference.solution.chi2 / imager.data.depth.len() as f64,
@@ -164,7 +164,7 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
     let (period, phi) = (rng.random_range(0.5f64.ln()..4f64.ln()).exp(), rng.random::<f64>());
     let (imager, truth) = star(scene, like, 10_000 + seed, Some((period, phi)));
     let found = detect(scene, &imager, 2000)?;
-    let peak = found.search.best();
+    let peak = found.blind.best();
     let free = [
         (Parameter::K, Prior::Uniform { min: 0.0, max: 0.3 }),
         (Parameter::PorbOverProt, Prior::LogUniform { min: 0.5, max: 4.0 }),
@@ -191,7 +191,7 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
         porb_over_prot: period,
         delta_ln_l: peak.orbit.delta_ln_l,
         found_porb_over_prot: found.best.porb_over_prot,
-        false_alarm: found.search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
+        false_alarm: found.blind.false_alarm.probability(peak.orbit.delta_ln_l).value(),
         k_kms: found.best.orbit.k_kms,
         sigma_k_kms: found.best.orbit.sigma_k_kms,
         ranks: [entropy, fitted],

@@ -15,10 +15,11 @@ use crate::periodogram::offset::{Offset, offset};
 use crate::periodogram::peaks::refined;
 use crate::periodogram::two_planets::{both, without};
 use crate::periodogram::{
-    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
+    CircularOrbit, DETECTION_FAP, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
+    co_rotation_penalty,
 };
 use crate::star::Orbit;
-use crate::velocities::{NotConcave, VelocityQuadratic};
+use crate::velocities::VelocityQuadratic;
 use nalgebra::DVector;
 
 /// Expansions around the best orbit at most.
@@ -47,6 +48,8 @@ pub struct DetectionSettings {
 pub struct View {
     /// The image.
     pub reference: Reference,
+    /// ln L around it.
+    pub expansion: Expansion,
     /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over count as
     /// noise.
     pub quadratic: VelocityQuadratic,
@@ -74,8 +77,11 @@ pub struct Detection {
     pub frequencies: Frequencies,
     /// Without a planet.
     pub planet_free: View,
-    /// The search there.
-    pub search: Search,
+    /// The blind search there, by which a planet is found or not. The planet itself counts among the spots left over, which
+    /// makes the false-alarm probability a cautious one.
+    pub blind: Search,
+    /// The same search, where a planet is found, with spots left over as large as they are beside it.
+    pub beside: Option<Search>,
     /// At the best orbit; `None` if it was not imaged, because its period lies on the edge of the search.
     pub at_best: Option<View>,
     /// Expansions that it took to get there.
@@ -131,12 +137,11 @@ impl View {
         let on_target = reference.solution.termination == Termination::Converged;
         let nuisances = &settings.nuisances;
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
-        let regularised = Expansion::of(imager, &reference, &stellar).velocities(nuisances);
-        let orbit = values.state().orbit;
-        let velocities = regularised.cycles.iter().map(|&cycle| orbit.velocity_kms(cycle));
-        let velocities = DVector::from_iterator(regularised.len(), velocities);
-        let (quadratic, spots_left) = regularised.with_spots_left(&velocities).map_err(|NotConcave| Unbounded)?;
-        Ok(View { reference, quadratic, regularised, spots_left, on_target })
+        let expansion = Expansion::of(imager, &reference, &stellar);
+        let regularised = expansion.velocities(nuisances);
+        let spots_left = expansion.spots_left(nuisances).ok_or(Unbounded)?;
+        let quadratic = expansion.with_spots_left(spots_left).ok_or(Unbounded)?.velocities(nuisances);
+        Ok(View { reference, expansion, quadratic, regularised, spots_left, on_target })
     }
 }
 
@@ -157,14 +162,14 @@ impl Detection {
         alone[Parameter::K] = 0.0;
         let planet_free = View::new(imager, alone, settings)?;
         report(Stage::Search);
-        let search = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
-        let co_rotation_penalty = co_rotation_penalty(&planet_free.quadratic, &frequencies, &search.rows);
-        let best = search.best().orbit.delta_ln_l;
+        let blind = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
+        let best = blind.best().orbit.delta_ln_l;
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         let mut found = Detection {
-            best: *search.best(),
+            best: *blind.best(),
             planet_free,
-            search,
+            blind,
+            beside: None,
             frequencies,
             at_best: None,
             rounds: 0,
@@ -172,9 +177,10 @@ impl Detection {
             keplerian: Vec::new(),
             second: None,
             offset,
-            co_rotation_penalty,
+            co_rotation_penalty: None,
         };
         found.close(imager, values, settings, report)?;
+        found.look_beside(settings)?;
         if settings.eccentric {
             found.keplerian = found.eccentric();
         }
@@ -197,6 +203,34 @@ impl Detection {
         let regularised = &self.last().regularised;
         let velocities = regularised.cycles.iter().map(|&cycle| orbit.velocity_kms(cycle));
         regularised.log_likelihood(&DVector::from_iterator(regularised.len(), velocities))
+    }
+
+    /// Whether the blind search found a planet.
+    pub fn is_planet(&self) -> bool {
+        self.blind.false_alarm.probability(self.blind.best().orbit.delta_ln_l).value() < DETECTION_FAP
+    }
+
+    /// n, if the time base does not tell the best period from `Prot/n`, n up to 4.
+    pub fn fraction_of_rotation(&self) -> Option<u32> {
+        let frequency = 1.0 / self.best.porb_over_prot;
+        (1..=4).find(|&n| (frequency - f64::from(n)).abs() * self.frequencies.time_base_cycles < 0.5)
+    }
+
+    /// The search that periods are judged by.
+    pub fn search(&self) -> &Search {
+        self.beside.as_ref().unwrap_or(&self.blind)
+    }
+
+    /// The search with spots left over as large as they are beside a planet, and what it says of co-rotation.
+    fn look_beside(&mut self, settings: &DetectionSettings) -> Result<(), Unbounded> {
+        let factor = self.last().spots_left.min(self.planet_free.spots_left);
+        let planet_free = self.planet_free.expansion.with_spots_left(factor).ok_or(Unbounded)?;
+        let quadratic = planet_free.velocities(&settings.nuisances);
+        if self.is_planet() && self.at_best.is_some() {
+            self.beside = Some(Search::new(&quadratic, &self.frequencies, settings.search)?);
+        }
+        self.co_rotation_penalty = co_rotation_penalty(&quadratic, &self.frequencies, &self.search().rows);
+        Ok(())
     }
 
     /// Images the star with the best orbit until that orbit stays.
@@ -225,7 +259,7 @@ impl Detection {
 
     /// The Keplerian orbits of all peaks.
     fn eccentric(&self) -> Vec<Option<KeplerianOrbit>> {
-        let others = self.search.peaks[1..].iter().map(|peak| (&self.planet_free, peak));
+        let others = self.search().peaks[1..].iter().map(|peak| (&self.planet_free, peak));
         let all = std::iter::once((self.last(), &self.best)).chain(others);
         all.map(|(view, peak)| keplerian(&view.quadratic, &self.frequencies, peak)).collect()
     }

@@ -41,6 +41,9 @@ pub enum StartFrom {
 /// Starts are wider than the curvature by this factor, so that R-hat can tell whether the chain has forgotten them.
 const OVERDISPERSION: f64 = 1.5;
 
+/// Draws from the surrogate tried for one walker.
+const DRAW_TRIES: usize = 3;
+
 /// Draws from the prior tried for one walker.
 const PRIOR_TRIES: usize = 100;
 
@@ -105,8 +108,11 @@ impl Run {
         scene.settings.sampler.validate(scene.space.dimension())?;
         let surrogate = surrogate(&found.posterior);
         let start = match (from, &surrogate) {
-            (StartFrom::Optimum, Some((surrogate, _))) => from_surrogate(surrogate, &found.posterior, scene)?,
-            (StartFrom::Optimum, None) => around_maxima(&found, scene)?,
+            (StartFrom::Optimum, surrogate) => {
+                let drawn =
+                    surrogate.as_ref().and_then(|(surrogate, _)| from_surrogate(surrogate, &found.posterior, scene));
+                drawn.map_or_else(|| around_maxima(&found, scene), Ok)?
+            }
             (StartFrom::Prior, _) => over_prior(&found.posterior, scene)?,
         };
         let first = first_step(scene, &found.posterior, &start)?;
@@ -235,15 +241,19 @@ fn first_step(scene: &Scene, posterior: &Posterior, start: &Positions) -> Result
     Ok(Sampler::new(posterior, &evaluator, &scene.settings.sampler)?.start(start)?.1)
 }
 
-/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these deserve.
-fn from_surrogate(surrogate: &Surrogate, posterior: &Posterior, scene: &Scene) -> Result<Positions, RunError> {
+/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these deserve;
+/// `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.
+fn from_surrogate(surrogate: &Surrogate, posterior: &Posterior, scene: &Scene) -> Option<Positions> {
     let sampler = &scene.settings.sampler;
-    let Some(wide) = surrogate.tempered(OVERDISPERSION.powi(2)) else { return over_prior(posterior, scene) };
-    let walker = |ensemble: usize, walker: usize| {
-        let position = wide.draw(&mut start_numbers(sampler.seed, ensemble, walker)).ok_or(RunError::PriorStart)?;
-        Ok(posterior.to_written(&position))
+    let wide = surrogate.tempered(OVERDISPERSION.powi(2))?;
+    let draw = |index: usize| {
+        let mut rng = start_numbers(sampler.seed, index / sampler.walkers, index % sampler.walkers);
+        let mut draws = (0..DRAW_TRIES).map(|_| Some(posterior.to_written(&wide.draw(&mut rng)?)));
+        draws.find_map(|theta| theta.filter(|theta| posterior.evaluate(theta).log_prob.is_finite()))
     };
-    (0..sampler.ensembles).map(|e| (0..sampler.walkers).map(|w| walker(e, w)).collect()).collect()
+    let walkers = 0..sampler.ensembles * sampler.walkers;
+    let positions: Vec<Vec<f64>> = walkers.into_par_iter().with_max_len(1).map(draw).collect::<Option<_>>()?;
+    Some(positions.chunks(sampler.walkers).map(<[_]>::to_vec).collect())
 }
 
 /// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of them

@@ -7,7 +7,7 @@
 
 use crate::config::{ImagingSettings, Settings};
 use crate::imaging::Imager;
-use crate::objective::{FreeParameter, ObjectiveKind, ParameterSpace, Posterior, Reference, ReferenceError};
+use crate::objective::{FreeParameter, ObjectiveKind, ParameterSpace, Posterior, Prior, Reference, ReferenceError};
 use crate::optimise::{OptimiseError, Optimum, climb};
 use crate::surrogate::Surrogate;
 use rand::SeedableRng;
@@ -182,10 +182,22 @@ fn other_starts(
         return Ok((0..settings.other_starts).map(|_| with_other_orbit(space, from, &mut rng)).collect());
     };
     let peaks = surrogate.peaks(PEAK_DROP, settings.other_starts + 1);
-    let starts = peaks.iter().map(|peak| space.to_written(&peak.position));
+    let starts = peaks.iter().map(|peak| within(space, space.to_written(&peak.position)));
     let reached = |theta: &Vec<f64>| first.end.as_ref().is_ok_and(|end| shift(space, theta, end) < RIVAL_DISTANCE);
     let allowed = |theta: &Vec<f64>| space.log_prior(theta).is_finite();
     Ok(starts.filter(|theta| allowed(theta) && !reached(theta)).take(settings.other_starts).collect())
+}
+
+/// `theta` brought into the bounds of the priors, a little inside.
+fn within(space: &ParameterSpace, mut theta: Vec<f64>) -> Vec<f64> {
+    for (x, f) in theta.iter_mut().zip(space.free()) {
+        let (low, high) = f.prior.bounds();
+        let margin = if (high - low).is_finite() { 0.02 * (high - low) } else { 0.0 };
+        if f.prior != Prior::Periodic && !f.prior.contains(*x) {
+            *x = x.clamp(low + margin, high - margin);
+        }
+    }
+    theta
 }
 
 impl Found {

@@ -206,7 +206,8 @@ fn co_rotation_hides_a_planet() {
     let mut alone = truth(&oracle);
     alone[Parameter::K] = 0.0;
     let reference = Reference::provisional(&imager, alone, 0.97).unwrap();
-    let quadratic = Expansion::of(&imager, &reference, &[]).velocities(&[]);
+    let expansion = Expansion::of(&imager, &reference, &[]);
+    let quadratic = expansion.velocities(&[]);
     let sigma = |period: f64| {
         let x = nalgebra::DMatrix::from_fn(quadratic.len(), 2, |k, c| {
             let angle = TAU * (quadratic.cycles[k] - imager.mid_cycle()) / period;
@@ -219,6 +220,6 @@ fn co_rotation_hides_a_planet() {
     println!("sigma of an amplitude at Porb = Prot over that at 1.7: {loss:.2}");
     assert!(loss > 2.0);
     // photon noise alone scatters the gradient less than the information says
-    let eigen = (&quadratic.information - &quadratic.noise).symmetric_eigenvalues();
+    let eigen = (&expansion.information - &expansion.noise).symmetric_eigenvalues();
     assert!(eigen.min() > -1e-2 * quadratic.information.diagonal().max());
 }

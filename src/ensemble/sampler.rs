@@ -188,9 +188,14 @@ impl<'a> Sampler<'a> {
             let complement: Vec<Vec<f64>> = others.iter().map(internal).collect();
             for &walker in moved {
                 let mut rng = random_numbers(self.seed, stream(Purpose::Walker, ensemble, walker), state.step);
-                let proposal = self.mix.propose(&internal(&walker), &complement, &mut rng);
+                let here = internal(&walker);
+                let proposal = self.mix.propose(&here, &complement, &mut rng);
                 let theta = self.density.to_written(&proposal.position);
-                let refused = self.refuse(&proposal.position, &theta, proposal.translation);
+                let refused = match proposal.position == here {
+                    // nothing new to look at
+                    true => Some(Status::OutsidePrior),
+                    false => self.refuse(&proposal.position, &theta, proposal.translation),
+                };
                 let log_uniform = rng.random::<f64>().ln();
                 let Proposal { log_factor, by, .. } = proposal;
                 trials.push(Trial { ensemble, walker, theta, log_factor, log_uniform, by, refused });

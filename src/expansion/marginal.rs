@@ -34,10 +34,36 @@ impl Expansion {
     /// `nuisances` integrated out. Stellar ones must be among the coordinates.
     pub fn velocities(&self, nuisances: &[Nuisance]) -> VelocityQuadratic {
         let (n, all) = (self.profiles(), self.centre.len());
-        // columns: how each nuisance changes the coordinates
-        let mut columns = DMatrix::zeros(all, nuisances.len());
-        let mut precision = DMatrix::zeros(nuisances.len(), nuisances.len());
-        let mut pull = DVector::zeros(nuisances.len());
+        let columns = self.columns(nuisances);
+        let (sd, offset) = self.priors(nuisances);
+        let weight = sd.map(|sd| sd.powi(-2));
+        // at orbital velocities 0, all else as in the centre
+        let orbit = self.values.state().orbit;
+        let mut back = DVector::zeros(all);
+        back.rows_mut(0, n).copy_from(&DVector::from_iterator(n, self.cycles.iter().map(|&e| orbit.velocity_kms(e))));
+        let gradient = &self.gradient + &self.information * &back;
+        // the answer of the nuisances to a change of velocities: eta = (N' I N + P)^-1 (N' (g - I v) + P offset)
+        let mut keep = DMatrix::zeros(n, all);
+        keep.view_mut((0, 0), (n, n)).fill_with_identity();
+        let mut pulled = DVector::zeros(n);
+        let own = columns.tr_mul(&(&self.information * &columns)) + DMatrix::from_diagonal(&weight);
+        if let Some(own) = own.cholesky() {
+            let response = self.information.rows(0, n) * &columns * own.inverse();
+            keep -= &response * columns.transpose();
+            pulled = &response * weight.component_mul(&offset);
+        }
+        let information = &keep * self.information.columns(0, n);
+        VelocityQuadratic {
+            cycles: self.cycles.clone(),
+            gradient: &keep * gradient - pulled,
+            information: 0.5 * (&information + information.transpose()),
+        }
+    }
+
+    /// How each nuisance changes the coordinates, a column each.
+    pub(super) fn columns(&self, nuisances: &[Nuisance]) -> DMatrix<f64> {
+        let n = self.profiles();
+        let mut columns = DMatrix::zeros(self.centre.len(), nuisances.len());
         for (i, nuisance) in nuisances.iter().enumerate() {
             match self.stellar.iter().position(|&p| p == nuisance.parameter) {
                 Some(s) => columns[(n + s, i)] = 1.0,
@@ -46,33 +72,7 @@ impl Expansion {
                     columns.rows_mut(0, n).column_mut(i).fill(1.0);
                 }
             }
-            let weight = nuisance.sd.powi(-2);
-            precision[(i, i)] = weight;
-            pull[i] = weight * (nuisance.mean - self.values[nuisance.parameter]);
         }
-        // at orbital velocities 0, all else as in the centre
-        let orbit = self.values.state().orbit;
-        let mut back = DVector::zeros(all);
-        back.rows_mut(0, n).copy_from_slice(&self.cycles.iter().map(|&e| orbit.velocity_kms(e)).collect::<Vec<_>>());
-        let gradient = &self.gradient + &self.information * &back;
-        // the answer of the nuisances to a change of velocities: eta = (N' I N + P)^-1 (N' (g - I v) + P (mean - centre))
-        let mut keep = DMatrix::zeros(n, all);
-        keep.view_mut((0, 0), (n, n)).fill_with_identity();
-        let across = self.information.rows(0, n) * &columns;
-        let mut offset = DVector::zeros(n);
-        if !nuisances.is_empty() {
-            let own = columns.tr_mul(&(&self.information * &columns)) + precision;
-            let inverse = own.cholesky().map(|c| c.inverse()).unwrap_or_else(|| DMatrix::zeros(pull.len(), pull.len()));
-            let response = &across * &inverse;
-            keep -= &response * columns.transpose();
-            offset = &response * pull;
-        }
-        let information = &keep * self.information.columns(0, n);
-        VelocityQuadratic {
-            cycles: self.cycles.clone(),
-            gradient: &keep * gradient - offset,
-            information: 0.5 * (&information + information.transpose()),
-            noise: &keep * &self.noise * keep.transpose(),
-        }
+        columns
     }
 }

@@ -7,6 +7,7 @@
 
 mod marginal;
 mod model;
+mod spots;
 
 use crate::imaging::Imager;
 use crate::maxent::{Problem, Solver, SolverSettings};
@@ -16,6 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 pub use marginal::{Nuisance, nuisances};
+pub use spots::SPOTS_LEFT;
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
 pub const STELLAR: [Parameter; 4] = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination, Parameter::Vsini];
@@ -38,7 +40,8 @@ pub struct Expansion {
     pub gradient: DVector<f64>,
     /// Minus the second derivative.
     pub information: DMatrix<f64>,
-    /// Covariance of the gradient that photon noise makes.
+    /// Covariance of the gradient that photon noise makes, and spots left over where they are counted as noise. Otherwise it is
+    /// smaller than the information, which counts spots that might be there as well.
     pub noise: DMatrix<f64>,
     /// Applications of the response or its transpose that it took.
     pub passes: u32,

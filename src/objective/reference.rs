@@ -63,7 +63,7 @@ pub enum ReferenceError {
     /// No map fits the data that well.
     #[error(
         "the target chi2 of {target:.4} per datum is below the reachable floor: at these parameters the fit comes down to \
-         {floor:.4} per datum and no further"
+         {floor:.5} per datum and no further"
     )]
     TargetBelowFloor {
         /// Target, per datum.

@@ -26,7 +26,7 @@ pub fn normal(n: usize, seed: u64) -> DVector<f64> {
 
 /// The quadratic of velocities `rv` whose information is given.
 pub fn with_information(cycles: &[f64], rv: &DVector<f64>, information: DMatrix<f64>) -> VelocityQuadratic {
-    VelocityQuadratic { cycles: cycles.to_vec(), gradient: &information * rv, noise: 0.6 * &information, information }
+    VelocityQuadratic { cycles: cycles.to_vec(), gradient: &information * rv, information }
 }
 
 /// The quadratic of independent velocities.

@@ -35,7 +35,6 @@ pub(super) fn eliminated(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> Opt
         cycles: quadratic.cycles.clone(),
         gradient: &keep * &quadratic.gradient,
         information: 0.5 * (&information + information.transpose()),
-        noise: &keep * &quadratic.noise * keep.transpose(),
     })
 }
 

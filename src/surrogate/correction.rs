@@ -61,15 +61,20 @@ impl Surrogate {
 
     /// Share of the surrogate's draws that `density` would accept, one after the other.
     fn acceptance(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> f64 {
-        let beyond: Vec<f64> = self
-            .evaluated(TRIALS, density, evaluator)
+        let draws = self.evaluated(TRIALS, density, evaluator);
+        let beyond: Vec<f64> = draws
             .iter()
             .map(|(position, theta, log_prob)| log_prob + density.log_jacobian(theta) - self.log_density(position))
             .collect();
         // from each draw to every other; what has no log-probability is never accepted, and neither is what cannot be drawn
+        // a walk that never moves proposes nothing new
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let moves =
+            |position: &Vec<f64>| self.place(position).is_some_and(|at| self.walk(at, &mut rng).position != *position);
+        let moved = draws.iter().map(|draw| &draw.0).map(moves).filter(|moved| *moved).count() as f64 / TRIALS as f64;
         let pairs = beyond.iter().flat_map(|from| beyond.iter().map(move |to| (from, to)));
         let accepted = |(from, to): (&f64, &f64)| if from.is_finite() { (to - from).exp().min(1.0) } else { 0.0 };
-        pairs.map(accepted).sum::<f64>() / (TRIALS as f64).powi(2)
+        moved * pairs.map(accepted).sum::<f64>() / (TRIALS as f64).powi(2)
     }
 
     /// So many draws: internal and written coordinates, and log-probability.

@@ -11,6 +11,9 @@ const OVERSAMPLING: f64 = 60.0;
 /// Most cells.
 const MOST_CELLS: usize = 40_000;
 
+/// Where the prior holds period 0, the table ends at this share of the longest.
+const SHORTEST: f64 = 0.01;
+
 /// Share of the draws that is spread over all periods alike.
 const EVEN: f64 = 0.02;
 
@@ -51,8 +54,10 @@ impl PeriodTable {
         let prior = space.free().iter().find(|f| f.parameter == Parameter::PorbOverProt)?.prior;
         let (mean, sd) = prior.mean_and_sd();
         let (least, most) = prior.bounds();
-        // an unbounded prior is followed as far as it matters
-        let (least, most) = (least.max(mean - 8.0 * sd).max(0.02 * mean.abs()), most.min(mean + 8.0 * sd));
+        // an unbounded prior is followed as far as it matters, and periods are positive
+        let least = if least.is_finite() { least } else { mean - 8.0 * sd };
+        let most = if most.is_finite() { most } else { mean + 8.0 * sd };
+        let least = if least > 0.0 { least } else { SHORTEST * most };
         let (lowest, highest) = (1.0 / most, 1.0 / least);
         let cells = (OVERSAMPLING * time_base_cycles.max(1.0) * (highest - lowest)).ceil() as usize;
         let cells = cells.clamp(50, MOST_CELLS);

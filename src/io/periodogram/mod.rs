@@ -16,6 +16,7 @@ use crate::fit::Fit;
 use crate::imaging::Imager;
 use crate::objective::ParameterValues;
 use crate::periodogram::Search;
+use crate::periodogram::orbits::scan;
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 
@@ -67,7 +68,7 @@ impl PeriodogramResult<'_> {
         let (velocities, covariance) = self.velocities();
         write(&folder.join("rv.csv"), &self.rv(&velocities, &covariance).into_bytes())?;
         write(&folder.join("covariance.csv"), matrix(&covariance).as_bytes())?;
-        write(&folder.join("periodogram.csv"), &self.periodogram(&self.detection.search).into_bytes())?;
+        write(&folder.join("periodogram.csv"), &self.first_periodogram().into_bytes())?;
         if let Some(second) = &self.detection.second {
             write(&folder.join("periodogram_2.csv"), &self.periodogram(&second.search).into_bytes())?;
         }
@@ -93,10 +94,28 @@ impl PeriodogramResult<'_> {
         table
     }
 
+    /// That of the first search, with Delta ln L of the regularised likelihood beside it.
+    fn first_periodogram(&self) -> Table {
+        let found = self.detection;
+        let regularised = scan(&found.planet_free.regularised, &found.frequencies.per_cycle);
+        let mut table = Table::new(&[&COLUMNS[..], &["regularised_delta_ln_l"]].concat());
+        for (mut numbers, trial) in self.rows(found.search()).zip(regularised) {
+            numbers.push(trial.orbit.map_or(f64::NAN, |orbit| orbit.delta_ln_l));
+            table.row(&numbers);
+        }
+        table
+    }
+
     fn periodogram(&self, search: &Search) -> Table {
-        let rotation_period_d = self.imager.star.rotation_period_d;
         let mut table = Table::new(&COLUMNS);
-        for row in &search.rows {
+        self.rows(search).for_each(|numbers| table.row(&numbers));
+        table
+    }
+
+    /// The numbers under [`COLUMNS`].
+    fn rows<'a>(&self, search: &'a Search) -> impl Iterator<Item = Vec<f64>> + 'a {
+        let rotation_period_d = self.imager.star.rotation_period_d;
+        search.rows.iter().map(move |row| {
             let frequency = row.trial.frequency;
             let mut numbers = vec![rotation_period_d / frequency, 1.0 / frequency, frequency / rotation_period_d];
             match row.trial.orbit {
@@ -106,9 +125,8 @@ impl PeriodogramResult<'_> {
             let or_missing = |x: Option<f64>| x.unwrap_or(f64::NAN);
             let (upper, fair, safe) = (row.k_upper95_kms, row.k_limit50_kms, row.k_limit95_kms);
             numbers.extend([or_missing(upper), row.window, or_missing(fair), or_missing(safe)]);
-            table.row(&numbers);
-        }
-        table
+            numbers
+        })
     }
 }
 

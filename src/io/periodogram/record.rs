@@ -17,7 +17,7 @@ pub(super) struct Record<'a> {
     pub truth: Option<ParameterValues>,
     /// Of the highest peak without a planet.
     pub false_alarm: FalseAlarmRecord,
-    /// Without a planet, from high to low.
+    /// Around the planet-free image, from high to low.
     pub peaks: Vec<PeakRecord>,
     /// Around the best orbit first, then around the other peaks.
     pub keplerian: Option<Vec<Option<KeplerianRecord>>>,
@@ -50,7 +50,8 @@ pub(super) struct OrbitRecord {
 pub(super) struct PeakRecord {
     #[serde(flatten)]
     pub orbit: OrbitRecord,
-    pub false_alarm_probability: f64,
+    /// Null for what may be left of the highest.
+    pub false_alarm_probability: Option<f64>,
     pub alias: Option<AliasRecord>,
 }
 
@@ -132,12 +133,12 @@ impl PeriodogramResult<'_> {
         Record {
             best: self.orbit(&found.best),
             truth: self.truth,
-            false_alarm: false_alarm(&found.search),
-            peaks: self.peaks(&found.search),
+            false_alarm: false_alarm(&found.blind),
+            peaks: self.first_peaks(),
             keplerian: self.settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
             second,
             search: SearchRecord {
-                periods: found.search.rows.len(),
+                periods: found.blind.rows.len(),
                 min_period_d: prot / hi,
                 max_period_d: prot / lo,
                 time_base_d: found.frequencies.time_base_cycles * prot,
@@ -185,11 +186,23 @@ impl PeriodogramResult<'_> {
         }
     }
 
+    /// The peaks of the first search. Where a planet is found, its false-alarm probability is that of the blind search, and the
+    /// others have none: they may be what the planet leaves at other periods.
+    pub(super) fn first_peaks(&self) -> Vec<PeakRecord> {
+        let found = self.detection;
+        let mut peaks = self.peaks(found.search());
+        if found.beside.is_some() {
+            peaks.iter_mut().for_each(|peak| peak.false_alarm_probability = None);
+            peaks[0].false_alarm_probability = Some(false_alarm(&found.blind).probability);
+        }
+        peaks
+    }
+
     pub(super) fn peaks(&self, search: &Search) -> Vec<PeakRecord> {
         let prot = self.imager.star.rotation_period_d;
         let record = |peak: &Peak| PeakRecord {
             orbit: self.orbit(peak),
-            false_alarm_probability: search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
+            false_alarm_probability: Some(search.false_alarm.probability(peak.orbit.delta_ln_l).value()),
             alias: peak.alias.map(|alias| AliasRecord {
                 window_frequency_per_d: alias.window.frequency / prot,
                 window: alias.window.height,

@@ -1,11 +1,15 @@
 //! What is to be said of a blind search in words: the blind spot at co-rotation, and what may be wrong.
 
 use super::PeriodogramResult;
+use crate::expansion::SPOTS_LEFT;
 use crate::objective::Parameter;
 use crate::periodogram::offset::Offset;
 
 /// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
 const FAR: f64 = 5.0;
+
+/// Fewer profiles than this hardly tell how large the spots left over are.
+const FEW: usize = 12;
 
 /// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
 const OFFSET_GAIN: f64 = 12.5;
@@ -49,6 +53,25 @@ impl PeriodogramResult<'_> {
             warnings.push(format!(
                 "with a constant velocity of {velocity_kms:+.3} +- {sigma_kms:.3} km/s beside an orbit ln L is {gain:.0} \
                  higher: star.vsys_kms may be wrong, which makes false peaks; make it free and use --marginalise"
+            ));
+        }
+        let profiles = self.imager.sampling.profiles.len();
+        if profiles < FEW {
+            warnings.push(format!(
+                "{profiles} profiles hardly tell how large the spots are that the map leaves over: planets are missed, and \
+                 errors are rough"
+            ));
+        }
+        if view.spots_left > 0.5 * SPOTS_LEFT.1 {
+            warnings.push(
+                "the profiles have nothing to do with the model of the star: what the map leaves over is without bounds".into(),
+            );
+        }
+        if let Some(n) = found.fraction_of_rotation().filter(|_| found.is_planet()) {
+            let rotation = if n == 1 { "Prot".to_owned() } else { format!("Prot/{n}") };
+            warnings.push(format!(
+                "the best period is not told from {rotation}, where spots imitate orbits: look at the other peaks before \
+                 believing it"
             ));
         }
         if found.best.on_edge {

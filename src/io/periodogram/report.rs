@@ -14,9 +14,9 @@ impl PeriodogramResult<'_> {
     pub fn table(&self) -> String {
         let found = self.detection;
         let mut text = self.orbits(&[self.orbit(&found.best)]);
-        let alarm = false_alarm(&found.search);
+        let alarm = false_alarm(&found.blind);
         text += &format!("{}\n", probability(&alarm));
-        text += &peaks(&self.peaks(&found.search));
+        text += &peaks(&self.first_peaks());
         for orbit in found.keplerian.iter().take(1).flatten() {
             let orbit = self.keplerian(orbit);
             text += &format!(
@@ -122,7 +122,7 @@ fn peaks(peaks: &[PeakRecord]) -> String {
             format!("{k_kms:.digits$}"),
             format!("{sigma_k_kms:.digits$}"),
             format!("{delta_ln_l:.2}"),
-            rounded(peak.false_alarm_probability),
+            peak.false_alarm_probability.map_or_else(|| "-".to_owned(), rounded),
             note,
         ]);
     }
