@@ -201,8 +201,8 @@ impl Detection {
         let CircularOrbit { k_kms, phi, .. } = self.best.orbit;
         let orbit = Orbit { k_kms, porb_over_prot: self.best.porb_over_prot, phi };
         let regularised = &self.last().regularised;
-        let velocities = regularised.cycles.iter().map(|&cycle| orbit.velocity_kms(cycle));
-        regularised.log_likelihood(&DVector::from_iterator(regularised.len(), velocities))
+        let velocities = DVector::from_iterator(regularised.len(), orbit.velocities_kms(&regularised.cycles));
+        regularised.log_likelihood(&velocities)
     }
 
     /// Whether the blind search found a planet.

@@ -393,3 +393,48 @@ fn help_shows_an_example() {
     }
     says(&text(&dimcmc(&["analyse", "--help"], Path::new(".")).stdout), &["Example:", "dimcmc analyse runs/demo"]);
 }
+
+/// Half of the config's own amplitude is all that the prior allows: the chain begins there all the same.
+#[test]
+fn a_prior_that_excludes_the_best_orbit_is_no_obstacle() {
+    let mut config = tiny();
+    config["parameters"]["k_kms"]["max"] = json!(0.1);
+    config["planet"]["k_kms"] = json!(0.05);
+    config["observations"]["simulate"]["truth"] = json!({ "k_kms": 0.2 });
+    let desk = Desk::new(config);
+    let table = desk.succeed(&["sample", CONFIG, "--out", "a"]);
+    says(&table, &["k_kms", "phi"]);
+    let highest = desk.json("a/summary.json")["parameters"]["k_kms"]["ci95"][1].as_f64().unwrap();
+    assert!(highest <= 0.1);
+}
+
+/// Wherever the walkers start, and whichever moves they make, the posterior is the same.
+#[test]
+fn starts_and_moves_make_no_difference() {
+    let mut config = tiny();
+    config["sampler"]["ess"] = json!(600);
+    config["sampler"]["rhat"] = json!(1.05);
+    config["sampler"]["steps"] = json!(5000);
+    let desk = Desk::new(config);
+    desk.succeed(&["sample", CONFIG, "--out", "a"]);
+    desk.succeed(&["sample", CONFIG, "--out", "b", "--start", "prior"]);
+    let mut config = desk.config.clone();
+    config["sampler"]["moves"] = json!({ "surrogate": 0.0 });
+    desk.write(CONFIG, &config.to_string());
+    desk.succeed(&["sample", CONFIG, "--out", "c"]);
+    let summaries = ["a", "b", "c"].map(|out| desk.json(&format!("{out}/summary.json")));
+    for summary in &summaries {
+        assert_eq!(summary["converged"], json!(true));
+    }
+    let kinds =
+        |i: usize| summaries[i]["moves"].as_array().unwrap().iter().filter(|m| m["move"] == "surrogate").count();
+    assert_eq!([kinds(0), kinds(1), kinds(2)], [1, 1, 0]);
+    for name in ["k_kms", "phi"] {
+        let of = |i: usize, key: &str| summaries[i]["parameters"][name][key].as_f64().unwrap();
+        for other in [1, 2] {
+            let error = of(0, "sd") * (1.6 / of(0, "ess") + 1.6 / of(other, "ess")).sqrt();
+            let difference = of(0, "median") - of(other, "median");
+            assert!(difference.abs() < 4.5 * error, "{name} {other}: {difference} with error {error}");
+        }
+    }
+}

@@ -26,6 +26,11 @@ const KINDS: [ParameterKind; 5] = [
 
 /// The surrogate of five parameters on few pixels; a normal prior that matters on one of them.
 fn surrogate(k_kms: f64) -> (Surrogate, ParameterSpace) {
+    surrogate_with(k_kms, Prior::Uniform { min: 0.5, max: 4.0 })
+}
+
+/// The same with another prior of the period.
+fn surrogate_with(k_kms: f64, period: Prior) -> (Surrogate, ParameterSpace) {
     let oracle = oracle();
     let imager = Imager {
         grid: SurfaceGrid::equal_area(500, Quadrature::Gauss2x2),
@@ -37,7 +42,7 @@ fn surrogate(k_kms: f64) -> (Surrogate, ParameterSpace) {
     let prior = |parameter, prior| FreeParameter { parameter, prior };
     let free = vec![
         prior(Parameter::K, Prior::Uniform { min: 0.0, max: 0.3 }),
-        prior(Parameter::PorbOverProt, Prior::Uniform { min: 0.5, max: 4.0 }),
+        prior(Parameter::PorbOverProt, period),
         prior(Parameter::Phi, Prior::Periodic),
         prior(Parameter::Inclination, Prior::Isotropic { min: 10.0, max: 80.0 }),
         prior(Parameter::Vsys, Prior::Normal { mean: 0.02, sd: 0.01, min: -0.01, max: 0.5 }),
@@ -148,4 +153,20 @@ fn peaks_are_where_the_likelihood_is_highest() {
     let best = space.to_written(&peaks[0].position);
     // the injected planet: 0.1 km/s at 1.7 rotation periods, errors 0.01 and 0.07
     assert!((best[0] - 0.1).abs() < 0.04 && (best[1] - 1.7).abs() < 0.2, "{best:?}");
+}
+
+/// Whatever the prior of the period, its peak is in the table and is drawn.
+#[test]
+fn a_wide_prior_of_the_period_is_covered_whole() {
+    for period in [
+        Prior::Uniform { min: 0.5, max: 200.0 },
+        Prior::LogUniform { min: 0.05, max: 500.0 },
+        Prior::Normal { mean: 1.7, sd: 0.5, min: f64::NEG_INFINITY, max: f64::INFINITY },
+    ] {
+        let (surrogate, space) = surrogate_with(0.1, period);
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut periods: Vec<f64> = (0..200).map(|_| space.to_written(&surrogate.draw(&mut rng).unwrap())[1]).collect();
+        periods.sort_by(f64::total_cmp);
+        assert!((periods[100] - 1.75).abs() < 0.1, "{period:?}: {}", periods[100]);
+    }
 }

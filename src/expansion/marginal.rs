@@ -40,7 +40,7 @@ impl Expansion {
         // at orbital velocities 0, all else as in the centre
         let orbit = self.values.state().orbit;
         let mut back = DVector::zeros(all);
-        back.rows_mut(0, n).copy_from(&DVector::from_iterator(n, self.cycles.iter().map(|&e| orbit.velocity_kms(e))));
+        back.iter_mut().zip(orbit.velocities_kms(&self.cycles)).for_each(|(v, orbit)| *v = orbit);
         let gradient = &self.gradient + &self.information * &back;
         // the answer of the nuisances to a change of velocities: eta = (N' I N + P)^-1 (N' (g - I v) + P offset)
         let mut keep = DMatrix::zeros(n, all);

@@ -60,13 +60,13 @@ impl Expansion {
         let model = DisplacedModel::new(imager, reference, stellar);
         let lambda = reference.solution.image.lambda;
         let profiles = model.profiles();
-        let (coordinates, data) = (profiles + stellar.len(), imager.data.depth.len());
+        let (count, data) = (profiles + stellar.len(), imager.data.depth.len());
         let solver = Solver {
             entropy: imager.entropy,
             preconditioner: &reference.preconditioner,
             settings: SolverSettings { cg_tolerance: CG_TOLERANCE, ..SolverSettings::patient() },
         };
-        let pulls: Vec<Vec<f64>> = (0..coordinates).into_par_iter().map(|x| model.pull(x)).collect();
+        let pulls: Vec<Vec<f64>> = (0..count).into_par_iter().map(|x| model.pull(x)).collect();
         // M^-1 C_x, and the change of the model's depths that this change of the map makes
         let answer = |pull: &Vec<f64>| {
             let mut problem = model.problem();
@@ -100,7 +100,7 @@ impl Expansion {
             cycles: model.cycles().to_vec(),
             stellar: stellar.to_vec(),
             log_likelihood: solution.entropy / lambda - 0.5 * solution.chi2,
-            centre: model.centre(),
+            centre: coordinates(&reference.values, model.cycles(), stellar),
             gradient: model.slope(),
             noise: unanswered.tr_mul(&unanswered),
             information,
@@ -115,10 +115,7 @@ impl Expansion {
 
     /// The coordinates of a point of parameter space.
     pub fn coordinates(&self, values: &ParameterValues) -> DVector<f64> {
-        let state = values.state();
-        let velocities = self.cycles.iter().map(|&cycle| state.vsys_kms + state.orbit.velocity_kms(cycle));
-        let stellar = self.stellar.iter().map(|&p| values[p]);
-        DVector::from_iterator(self.centre.len(), velocities.chain(stellar))
+        coordinates(values, &self.cycles, &self.stellar)
     }
 
     /// ln L there, to second order.
@@ -126,4 +123,11 @@ impl Expansion {
         let step = self.coordinates(values) - &self.centre;
         self.log_likelihood + self.gradient.dot(&step) - 0.5 * step.dot(&(&self.information * &step))
     }
+}
+
+/// Velocities of the profiles at these rotation cycles, and stellar parameters.
+fn coordinates(values: &ParameterValues, cycles: &[f64], stellar: &[Parameter]) -> DVector<f64> {
+    let state = values.state();
+    let velocities = state.orbit.velocities_kms(cycles).map(|orbit| state.vsys_kms + orbit);
+    DVector::from_vec(velocities.chain(stellar.iter().map(|&p| values[p])).collect())
 }

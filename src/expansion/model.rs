@@ -83,8 +83,9 @@ impl<'a> DisplacedModel<'a> {
     }
 
     pub fn passes(&self) -> u32 {
-        // linearisations, and the pulls: two for each coordinate
-        (3 + 2 * self.turned.len() + 2 * (self.profiles() + self.turned.len())) as u32
+        let (profiles, stellar) = (self.profiles(), self.turned.len());
+        // linearisations, those of mixed differences, and two pulls a coordinate
+        (3 + 2 * stellar + 4 * (stellar + stellar * stellar.saturating_sub(1) / 2) + 2 * (profiles + stellar)) as u32
     }
 
     /// The problem at the reference, linearised at its image.
@@ -92,14 +93,6 @@ impl<'a> DisplacedModel<'a> {
         let mut problem = self.imager.problem(self.reference.response.clone());
         problem.linearise(&self.map);
         problem
-    }
-
-    /// Coordinates of the reference.
-    pub fn centre(&self) -> DVector<f64> {
-        let state = self.reference.values.state();
-        let velocities = self.cycles.iter().map(|&cycle| state.vsys_kms + state.orbit.velocity_kms(cycle));
-        let stellar = self.stellar.iter().map(|&p| self.reference.values[p]);
-        DVector::from_vec(velocities.chain(stellar).collect())
     }
 
     /// `C_x`: how coordinate `x` changes the gradient of chi2/2 with respect to the map.

@@ -16,6 +16,9 @@ use rayon::prelude::*;
 /// Draws that share one matrix product, and one stream of random numbers.
 const DRAWS: usize = 250;
 
+/// Rows, two a trial period, whose product with the draws is held at once.
+const ROWS: usize = 1024;
+
 /// Directions of the gradient with less than this part of the largest variance do not move.
 const STILL: f64 = 1e-13;
 
@@ -27,12 +30,15 @@ pub fn maxima(quadratic: &VelocityQuadratic, trials: &[Trial], draws: usize, see
         rng.set_stream(block as u64);
         let size = DRAWS.min(draws - block * DRAWS);
         let deviates = DMatrix::from_fn(rows.ncols(), size, |_, _| rng.sample::<f64, _>(StandardNormal));
-        let amplitudes = &rows * deviates;
-        let highest = |draw: usize| {
-            let column = amplitudes.column(draw);
-            column.as_slice().chunks_exact(2).map(|w| 0.5 * (w[0] * w[0] + w[1] * w[1])).fold(0.0, f64::max)
-        };
-        (0..size).map(highest).collect::<Vec<f64>>()
+        let mut highest = vec![0.0f64; size];
+        for first in (0..rows.nrows()).step_by(ROWS) {
+            let amplitudes = rows.rows(first, ROWS.min(rows.nrows() - first)) * &deviates;
+            for (highest, column) in highest.iter_mut().zip(amplitudes.column_iter()) {
+                let pairs = column.as_slice().chunks_exact(2).map(|w| 0.5 * (w[0] * w[0] + w[1] * w[1]));
+                *highest = pairs.fold(*highest, f64::max);
+            }
+        }
+        highest
     };
     (0..draws.div_ceil(DRAWS)).into_par_iter().flat_map_iter(block).collect()
 }

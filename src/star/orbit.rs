@@ -21,4 +21,9 @@ impl Orbit {
     pub fn velocity_kms(&self, cycle: f64) -> f64 {
         self.k_kms * (TAU * (cycle / self.porb_over_prot - self.phi)).cos()
     }
+
+    /// The same at several rotation cycles.
+    pub fn velocities_kms<'a>(&'a self, cycles: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        cycles.iter().map(|&cycle| self.velocity_kms(cycle))
+    }
 }
