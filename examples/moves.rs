@@ -42,8 +42,8 @@ fn main() -> Result<(), Failure> {
         config.as_object_mut().map(|c| c.remove("$schema"));
         config["imaging"]["pixels"] = json!(5000);
         merge(&mut config, &change);
-        let with = chain(&config, 20.0, 3000.0)?;
-        let without = chain(&config, 0.0, 2000.0)?;
+        let with = chain(&config, 20.0, 2000.0)?;
+        let without = chain(&config, 0.0, 1000.0)?;
         for (moves, summary) in [("with surrogate", &with), ("without", &without)] {
             println!("| {name} | {moves} | {} |", row(summary));
         }

@@ -32,7 +32,7 @@ impl Expansion {
                 log_determinant + left.dot(&factor.solve(&left))
             })
         };
-        let best = minimum(&misfit, (SPOTS_LEFT.0.ln(), SPOTS_LEFT.1.ln()));
+        let best = minimum(misfit, (SPOTS_LEFT.0.ln(), SPOTS_LEFT.1.ln()));
         misfit(best).is_finite().then(|| best.exp())
     }
 
