@@ -24,6 +24,9 @@ pub const HEADER: &str = "landscape.json";
 /// Name of the file with its nodes.
 pub const NODES: &str = "landscape.jsonl";
 
+/// Name of the file with its paraboloid, where the landscape is whole.
+pub const PARABOLOID: &str = "paraboloid.json";
+
 /// Nodes of a batch for each thread: enough that threads seldom wait for the slowest node.
 const BATCH_PER_THREAD: usize = 8;
 
@@ -82,6 +85,11 @@ impl Survey {
         let header = Header { origin: Origin::of(scene, &found), grid: grid.clone() };
         // the nodes first: whoever holds them may write the header
         let file = LineFile::create(&folder.join(NODES), replace)?;
+        let path = folder.join(PARABOLOID);
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(WriteError { path, source })?,
+            _ => {}
+        }
         write_json(&folder.join(HEADER), &header)?;
         Ok(Survey { header, posterior: found.posterior, landscape: Landscape::new(grid.clone()), file })
     }

@@ -22,6 +22,7 @@ const LAYERS: &[&[&str]] = &[
     &["origin"],
     &["manifest", "survey", "optimum"],
     &["run"],
+    &["comparison"],
 ];
 
 /// Modules, and all that they may import. What is not listed here may import whatever lies lower.

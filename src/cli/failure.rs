@@ -1,5 +1,6 @@
 //! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 1 for anything else.
 
+use dimcmc::comparison::PairError;
 use dimcmc::config::ConfigError;
 use dimcmc::io::atomic::WriteError;
 use dimcmc::io::journal::JournalError;
@@ -117,6 +118,12 @@ impl From<WriteError> for Failure {
 
 impl From<JournalError> for Failure {
     fn from(error: JournalError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<PairError> for Failure {
+    fn from(error: PairError) -> Self {
         Failure::input(error)
     }
 }

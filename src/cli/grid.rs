@@ -1,13 +1,15 @@
-//! `dimcmc grid`: the landscape.
+//! `dimcmc grid`: the landscape and its paraboloid.
 
 use super::output::Output;
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, progress};
-use dimcmc::landscape::{Landscape, table};
+use dimcmc::io::paraboloid::ParaboloidFile;
+use dimcmc::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
 use dimcmc::scene::Scene;
-use dimcmc::survey::{HEADER, NODES, Survey};
+use dimcmc::survey::{HEADER, NODES, PARABOLOID, Survey};
 use std::io::Write as _;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -15,8 +17,10 @@ use std::time::{Duration, Instant};
 ///
 /// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values. ln L is
 /// the log-probability of `sample` without the prior, relative to the same reference: the best parameters along the axes,
-/// which are searched for first. Writes landscape.json (what it was begun with) and landscape.jsonl (a line per node). A
-/// landscape that was stopped, by whatever, goes on with --resume and comes to the same bytes as one that was not.
+/// which are searched for first. Around the highest node a paraboloid is fitted to chi2 = -2 ln L: its vertex is the estimate,
+/// and the projection of its surface one above the minimum the error bar. Writes landscape.json (what it was begun with),
+/// landscape.jsonl (a line per node) and paraboloid.json. A landscape that was stopped, by whatever, goes on with --resume and
+/// comes to the same bytes as one that was not; a finished one gets its paraboloid anew.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc grid configs/demo.json --out runs/demo_grid\n  \
                         dimcmc grid configs/demo.json --out runs/demo_grid --resume")]
@@ -28,6 +32,12 @@ pub struct Args {
     /// Go on with the landscape in the folder
     #[arg(long)]
     resume: bool,
+    /// Fit the paraboloid to the N highest nodes; by default to all up to 4 above the lowest chi2, or as many as it takes
+    #[arg(long, value_name = "N")]
+    fit_nodes: Option<NonZeroUsize>,
+    /// Fit it to nodes no farther than N from the highest one along any axis
+    #[arg(long, value_name = "N")]
+    fit_radius: Option<NonZeroUsize>,
 }
 
 /// Runs the command.
@@ -62,14 +72,19 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         )));
     }
     let Survey { header, landscape, .. } = &survey;
+    let truth = header.origin.truth.as_ref();
+    let rule = Rule { nodes: args.fit_nodes.map(NonZeroUsize::get), radius: args.fit_radius.map(NonZeroUsize::get) };
+    let found = paraboloid(landscape, rule);
+    ParaboloidFile::new(landscape.grid(), rule, truth, &found).write(&folder.join(PARABOLOID))?;
     let mut stdout = std::io::stdout().lock();
     // whoever reads may stop reading
-    let _ = write!(stdout, "{}", table(landscape, header.origin.truth.as_ref()));
+    let _ = write!(stdout, "{}", table(landscape, truth));
+    let _ = write!(stdout, "{}", paraboloid_table(&found, landscape.grid(), truth));
     let _ = writeln!(stdout, "{}", meter.cost(landscape));
     if let Some(warning) = header.origin.reference.warning() {
         let _ = writeln!(stdout, "note: {warning}");
     }
-    let _ = writeln!(stdout, "written: {}: {HEADER}, {NODES}", folder.display());
+    let _ = writeln!(stdout, "written: {}: {HEADER}, {NODES}, {PARABOLOID}", folder.display());
     Ok(())
 }
 

@@ -4,6 +4,7 @@
 //! line each in [`Command`] and [`run`]. Both spellings of a name: `#[command(alias = "analyze")]`.
 
 mod analyse;
+mod compare;
 mod failure;
 mod grid;
 mod map;
@@ -54,6 +55,7 @@ enum Command {
     Sample(sample::Args),
     #[command(alias = "analyze")]
     Analyse(analyse::Args),
+    Compare(compare::Args),
 }
 
 /// Runs the command.
@@ -72,6 +74,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Grid(args) => grid::run(args, &cli.global),
         Command::Sample(args) => sample::run(args, &cli.global),
         Command::Analyse(args) => analyse::run(args, &cli.global),
+        Command::Compare(args) => compare::run(args, &cli.global),
     }
 }
 

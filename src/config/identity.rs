@@ -1,5 +1,6 @@
-//! The fingerprint of a config: what must be the same for a chain to be resumed.
+//! The fingerprint of a config: what must be the same for a chain to be resumed; and what two configs that belong together share.
 
+use crate::objective::Parameter;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -11,14 +12,45 @@ pub(super) fn fingerprint(resolved: &Value) -> String {
     format!("{:x}", Sha256::digest(text))
 }
 
-/// The first key that matters for the fingerprint and is not the same in both resolved configs, with both values.
-pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
-    difference("", &decisive(then), &decisive(now))
+/// A key that is not the same in two configs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The key with all its parents, dotted.
+    pub key: String,
+    /// Its value in the one, for a message.
+    pub first: String,
+    /// Its value in the other.
+    pub second: String,
 }
 
-fn difference(key: &str, then: &Value, now: &Value) -> Option<String> {
-    let (Value::Object(a), Value::Object(b)) = (then, now) else {
-        return (then != now).then(|| format!("{key} ({} then, {} now)", brief(then), brief(now)));
+/// The first key that matters for the fingerprint and is not the same in both resolved configs, with both values.
+pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
+    let Difference { key, first, second } = difference("", &decisive(then), &decisive(now))?;
+    Some(format!("{key} ({first} then, {second} now)"))
+}
+
+/// The first key in which two resolved configs do not ask for the same model: star, instrument and image, whatever the values
+/// of the parameters that may be free.
+pub fn model_difference(first: &Value, second: &Value) -> Option<Difference> {
+    ["star", "instrument", "imaging"].iter().find_map(|name| section_difference(name, first, second))
+}
+
+/// The same within one section, which need not be there.
+pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<Difference> {
+    let without_parameters = |resolved: &Value| {
+        let mut section = resolved.get(name).cloned().unwrap_or(Value::Null);
+        if let Some(map) = section.as_object_mut() {
+            map.retain(|key, _| Parameter::from_name(key).is_none());
+        }
+        section
+    };
+    difference(name, &without_parameters(first), &without_parameters(second))
+}
+
+fn difference(key: &str, first: &Value, second: &Value) -> Option<Difference> {
+    let (Value::Object(a), Value::Object(b)) = (first, second) else {
+        let differ = || Difference { key: key.to_owned(), first: brief(first), second: brief(second) };
+        return (first != second).then(differ);
     };
     let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
     names.sort();

@@ -17,7 +17,7 @@ mod suggest;
 
 pub use crate::ensemble::SamplerSettings;
 pub use error::ConfigError;
-pub use identity::first_difference;
+pub use identity::{Difference, first_difference, model_difference, section_difference};
 pub use raw_parts::EquivalentWidth;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 

@@ -7,6 +7,7 @@ pub mod landscape;
 pub mod lines;
 pub mod lsd;
 pub mod map;
+pub mod paraboloid;
 pub mod periodogram;
 pub mod provenance;
 pub mod truth;

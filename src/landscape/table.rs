@@ -1,6 +1,6 @@
-//! The landscape in a few lines: where it is highest, whether that is on an edge, and what it cost.
+//! The landscape in a few lines: where it is highest, whether that is on an edge, and what it cost; and its paraboloid.
 
-use super::{Axis, Landscape};
+use super::{Axis, Grid, Landscape, Paraboloid, Undefined};
 use crate::log_density::Status;
 use crate::text::aligned;
 use std::collections::BTreeMap;
@@ -51,7 +51,48 @@ fn best(landscape: &Landscape, truth: Option<&BTreeMap<String, f64>>) -> Option<
     Some(text)
 }
 
+/// The paraboloid, or why there is none.
+pub fn paraboloid_table(
+    found: &Result<Paraboloid, Undefined>,
+    grid: &Grid,
+    truth: Option<&BTreeMap<String, f64>>,
+) -> String {
+    let paraboloid = match found {
+        Ok(paraboloid) => paraboloid,
+        Err(undefined) => return format!("{undefined}\n"),
+    };
+    let mut head = vec!["parameter", "vertex", "error"];
+    if truth.is_some() {
+        head.insert(1, "truth");
+    }
+    let mut rows: Vec<Vec<String>> = vec![head.into_iter().map(str::to_owned).collect()];
+    for name in grid.names() {
+        let Some(one) = paraboloid.parameters.get(name) else { continue };
+        let number = |value: f64| format!("{value:.*}", digits(one.error, 2));
+        let mut row = vec![name.to_owned(), number(one.vertex), number(one.error)];
+        if let Some(truth) = truth {
+            row.insert(1, truth.get(name).map_or_else(|| "-".into(), |value| number(*value)));
+        }
+        rows.push(row);
+    }
+    let Paraboloid { nodes, delta_chi2, rms_chi2, unreachable, failed, .. } = paraboloid;
+    let mut text = format!(
+        "paraboloid through the {nodes} nodes up to {delta_chi2:.1} above the lowest chi2, residuals {:.*}\n",
+        digits(rms_chi2.max(1e-6), 2),
+        rms_chi2
+    );
+    if unreachable + failed > 0 {
+        text += &format!("left out among them: {unreachable} beyond the reach of the target chi2, {failed} failed\n");
+    }
+    text + &aligned(&rows)
+}
+
+/// Decimals that show so many digits of `value`.
+fn digits(value: f64, digits: usize) -> usize {
+    (digits as f64 - 1.0 - value.log10().floor()).clamp(0.0, 12.0) as usize
+}
+
 /// Decimals that show three digits of the spacing.
 fn decimals(axis: &Axis) -> usize {
-    (2.0 - axis.spacing().log10().floor()).clamp(0.0, 12.0) as usize
+    digits(axis.spacing(), 3)
 }

@@ -1,0 +1,40 @@
+//! `dimcmc compare`: a chain against a landscape.
+
+use super::output::Output;
+use super::{Failure, Global};
+use dimcmc::comparison::{Comparison, FILE, Pair};
+use dimcmc::io::atomic::write_json;
+use dimcmc::io::paraboloid;
+use dimcmc::run::CHAIN;
+use dimcmc::survey::PARABOLOID;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Compare a chain with a landscape of the same data
+///
+/// Parameter by parameter: the chain's median and 68 % interval; vertex and error bar of the paraboloid; median and 68 %
+/// interval of the whole landscape under the chain's prior; how far they are apart, and what each took. The two must be of the
+/// same data, star, image and objective. Writes comparison.json.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc compare runs/demo runs/demo_grid --out runs/demo_comparison")]
+pub struct Args {
+    /// Folder of the run that `sample` wrote
+    run: PathBuf,
+    /// Folder of the landscape that `grid` wrote
+    grid: PathBuf,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    args.output.check()?;
+    let pair = Pair::read(&args.run, &args.grid)?;
+    let rule = paraboloid::rule(&args.grid.join(PARABOLOID));
+    let comparison =
+        Comparison::of(&pair, rule).map_err(|e| Failure::input(format!("{}: {e}", args.run.join(CHAIN).display())))?;
+    let folder = args.output.create()?;
+    write_json(&folder.join(FILE), &comparison)?;
+    let _ = write!(std::io::stdout(), "{}written: {}: {FILE}\n", comparison.table(), folder.display());
+    Ok(())
+}
