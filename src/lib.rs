@@ -14,7 +14,7 @@
 //! | the map at an assumed orbit, and radial velocities without the spots | [`fit`] |
 //! | "the orbit that needs the fewest spots" (section 3) | [`objective`]: spottedness, entropy or regularised likelihood as a log-probability |
 //! | the landscape of spottedness on a grid of orbits | [`landscape`], computed by [`survey`] |
-//! | orbital parameters and error bars from a grid and a paraboloid | [`landscape::paraboloid`]; in its place [`search`] and [`optimise`] for the optimum, [`ensemble`] for the posterior, and [`comparison`] of the two |
+//! | orbital parameters and error bars from a grid and a paraboloid | [`landscape::paraboloid()`]; in its place [`search`] and [`optimise`] for the optimum, [`ensemble`] for the posterior, and [`comparison`] of the two |
 //! | beyond the paper: a blind search for orbits, radial velocities free of spots | [`detection`]: [`expansion`] makes a quadratic in the [`velocities`] of the profiles, [`periodogram`] searches it |
 //! | convergence and credible intervals | [`chain`] |
 //!

@@ -122,6 +122,8 @@ fn help_shows_an_example() {
         assert_eq!(output.status.code(), Some(0));
         says(&text(&output.stdout), &["Example:", &format!("dimcmc {command} configs/demo.json --out")]);
     }
+    let output = dimcmc(&["compare", "--help"], here);
+    says(&text(&output.stdout), &["Example:", "dimcmc compare runs/demo runs/demo_grid --out"]);
     for (args, part) in [(&["map"][..], "CONFIG"), (&["mapp"], "map"), (&["map", "x", "--threads", "0"], "threads")] {
         let output = dimcmc(args, here);
         assert_eq!(output.status.code(), Some(2), "{args:?}");

@@ -20,6 +20,8 @@ const HEADER: &str = "landscape.json";
 
 const NODES: &str = "landscape.jsonl";
 
+const PARABOLOID: &str = "paraboloid.json";
+
 /// The injected orbit (0.2, 1.7, 0.5) is nearest to value 2 of K, 1 of the period and 0 of the phase. The last K is outside its
 /// prior.
 const AXES: &str = r#"{ "k_kms": [0.11, 0.26, 4], "porb_over_prot": [1.62, 1.92, 4], "phi": [0.49, 0.55, 3] }"#;
@@ -73,7 +75,7 @@ fn numbers(nodes: &[Value], key: &str) -> Vec<f64> {
 }
 
 fn same_landscape(desk: &Desk, a: &str, b: &str) {
-    for file in [HEADER, NODES] {
+    for file in [HEADER, NODES, PARABOLOID] {
         let [a, b] = [a, b].map(|folder| desk.read(&format!("{folder}/{file}")));
         assert!(a == b, "{file} differs");
     }
@@ -106,7 +108,7 @@ fn the_landscape_is_that_of_the_chain() {
         assert!((nodes[best][name].as_f64().unwrap() - value).abs() < 1e-12, "{name}");
     }
     says(&table, &["truth", "k_kms", "0.2100", "at node 27", "48 reconstructions", "0 failed", "48 nodes in"]);
-    says(&table, &["may lie outside: widen grid.axes.phi\n", "landscape.json, landscape.jsonl"]);
+    says(&table, &["may lie outside: widen grid.axes.phi\n", "landscape.json, landscape.jsonl, paraboloid.json"]);
 
     // every value is that of the posterior without its prior, parameters told apart by name
     let scene = Scene::load(&desk.path(CONFIG)).unwrap();
@@ -202,7 +204,10 @@ fn a_torn_landscape_is_recovered() {
 #[test]
 fn ctrl_c_stops_cleanly_and_says_how_to_go_on() {
     let desk = finished(line());
-    let mut child = desk.start(&["grid", CONFIG, "--out", "stopped", "--threads", "1"]);
+    // the paraboloid of an earlier landscape does not outlive it
+    std::fs::create_dir(desk.path("stopped")).unwrap();
+    desk.write(&format!("stopped/{PARABOLOID}"), "{}");
+    let mut child = desk.start(&["grid", CONFIG, "--out", "stopped", "--threads", "1", "--force"]);
     desk.wait_for_lines(&format!("stopped/{NODES}"), &mut child, 1);
     let message = interrupt(child);
     says(
@@ -210,7 +215,7 @@ fn ctrl_c_stops_cleanly_and_says_how_to_go_on() {
         &["error: interrupted after ", " nodes; go on with: dimcmc grid config.json --out stopped --resume"],
     );
     assert_eq!(message.matches('\n').count(), 1);
-    assert!(desk.lines(&format!("stopped/{NODES}")) < 41);
+    assert!(desk.lines(&format!("stopped/{NODES}")) < 41 && !desk.path("stopped").join(PARABOLOID).exists());
     desk.succeed(&["grid", CONFIG, "--out", "stopped", "--resume"]);
     same_landscape(&desk, "whole", "stopped");
 }
@@ -301,6 +306,45 @@ fn a_phase_axis_may_wrap_or_go_once_around() {
         assert!(phi.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12), "{phi:?}");
         assert_eq!(table.contains("on the edge of the grid"), expected.len() == 3, "a circle has no edge");
     }
+}
+
+/// The paraboloid beside the landscape: its error bar is that of the curvature at the best parameters, for which the search has
+/// derivatives; and the user may say which nodes.
+#[test]
+fn the_paraboloid_is_the_curvature() {
+    let mut config = config();
+    config["grid"] = json!({ "axes": { "k_kms": [0.15, 0.25, 11], "phi": [0.46, 0.54, 11] } });
+    let desk = Desk::new(config);
+    let table = desk.succeed(&["grid", CONFIG, "--out", "whole"]);
+    says(&table, &["paraboloid through the ", " above the lowest chi2, residuals ", "vertex", "error"]);
+    let (header, found) = (desk.json(&format!("whole/{HEADER}")), desk.json(&format!("whole/{PARABOLOID}")));
+    assert_eq!((&found["names"], &found["refused"]), (&json!(["k_kms", "phi"]), &Value::Null));
+    for (i, name) in ["k_kms", "phi"].into_iter().enumerate() {
+        let number = |value: &Value| value.as_f64().unwrap();
+        let (vertex, error) =
+            (number(&found["parameters"][name]["vertex"]), number(&found["parameters"][name]["error"]));
+        let optimum = &header["optimum"];
+        let (best, sd) = (number(&optimum["parameters"][name]), number(&optimum["sd"][name]));
+        // ln L is a parabola to a tenth or so within two error bars
+        assert!(
+            (vertex - best).abs() < 0.15 * sd && (error / sd - 1.0).abs() < 0.15,
+            "{name}: {vertex} {best} {error} {sd}"
+        );
+        assert!((number(&found["covariance"][i][i]).sqrt() / error - 1.0).abs() < 1e-12);
+        assert_eq!(found["truth"][name], if name == "phi" { json!(0.5) } else { json!(0.2) });
+    }
+    let before = desk.read(&format!("whole/{NODES}"));
+    let table = desk.succeed(&["grid", CONFIG, "--out", "whole", "--resume", "--fit-nodes", "30", "--fit-radius", "4"]);
+    says(&table, &["paraboloid through the 30 nodes"]);
+    assert_eq!(desk.json(&format!("whole/{PARABOLOID}"))["rule"], json!({ "nodes": 30, "radius": 4 }));
+    assert!(desk.read(&format!("whole/{NODES}")) == before);
+    // no minimum is a result too
+    desk.set("/grid/axes", json!({ "k_kms": [0.0, 0.1, 4] }));
+    let table = desk.succeed(&["grid", CONFIG, "--out", "edge"]);
+    let reason = "no well-defined minimum: the highest node lies on the edge of k_kms";
+    says(&table, &[reason]);
+    let refused = desk.json(&format!("edge/{PARABOLOID}"));
+    assert_eq!((&refused["refused"], &refused["parameters"]), (&json!(reason), &Value::Null));
 }
 
 #[test]

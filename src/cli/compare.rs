@@ -35,6 +35,6 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
         Comparison::of(&pair, rule).map_err(|e| Failure::input(format!("{}: {e}", args.run.join(CHAIN).display())))?;
     let folder = args.output.create()?;
     write_json(&folder.join(FILE), &comparison)?;
-    let _ = write!(std::io::stdout(), "{}written: {}: {FILE}\n", comparison.table(), folder.display());
+    let _ = writeln!(std::io::stdout(), "{}written: {}: {FILE}", comparison.table(), folder.display());
     Ok(())
 }

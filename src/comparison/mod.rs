@@ -6,26 +6,26 @@
 //! which no file records because equal runs would not give equal files then; passes stand for them.
 
 mod cost;
+mod draws;
 mod notes;
 pub mod pair;
 mod table;
 
 pub use cost::{ChainCost, Cost, LandscapeCost};
+pub use draws::Distance;
 pub use pair::{Pair, PairError};
 
 use crate::chain::statistics::wrap;
-use crate::chain::{ChainError, ParameterSummary, Summary, summarise};
+use crate::chain::{ChainError, Summary, summarise};
 use crate::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
 use crate::manifest::kinds_and_goals;
 use crate::objective::Parameter;
+use draws::Draws;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Name of the file.
 pub const FILE: &str = "comparison.json";
-
-/// Kolmogorov's statistic, times the root of the number of draws, that chance exceeds once in twenty times.
-const KOLMOGOROV95: f64 = 1.358;
 
 /// The content of `comparison.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -99,15 +99,6 @@ pub struct AgainstChain {
     pub width_ratio: f64,
 }
 
-/// How far apart two cumulative distributions are.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Distance {
-    /// Largest difference at a node of the axis, among the draws that are inside the grid.
-    pub largest: f64,
-    /// What the finite number of effective draws alone exceeds once in twenty times; null where that number is unknown.
-    pub by_chance95: Option<f64>,
-}
-
 impl Interval {
     fn half_width(&self) -> f64 {
         0.5 * (self.ci68[1] - self.ci68[0])
@@ -156,48 +147,6 @@ impl Comparison {
     }
 }
 
-/// The chain's draws after the burn-in, on the axes of the landscape.
-struct Draws {
-    marginals: Vec<Option<Marginal>>,
-    /// Of those inside the grid: sorted, axis by axis.
-    inside: Vec<Vec<f64>>,
-    /// Share outside, of all axes together and of each.
-    outside: f64,
-    outside_axis: Vec<f64>,
-}
-
-impl Draws {
-    fn of(pair: &Pair, summary: &Summary) -> Self {
-        let grid = &pair.header.grid;
-        let marginal = |axis: usize| Marginal::of(&pair.landscape, axis, &|i, x| pair.prior(i, x));
-        let marginals: Vec<Option<Marginal>> = (0..grid.axes.len()).map(marginal).collect();
-        let columns: Vec<Option<usize>> =
-            grid.names().map(|name| summary.names.iter().position(|sampled| sampled == name)).collect();
-        let kept = &pair.chain.records()[summary.discarded_steps * pair.chain.shape().size()..];
-        let mut inside = vec![Vec::new(); grid.axes.len()];
-        let mut outside_axis = vec![0.0; grid.axes.len()];
-        let mut outside = 0.0;
-        let share = 1.0 / kept.len() as f64;
-        for record in kept {
-            let place = |(axis, column): (usize, &Option<usize>)| {
-                let x = record.theta[(*column)?];
-                marginals[axis].as_ref().map_or(Some(x), |marginal| marginal.place(x))
-            };
-            let places: Vec<Option<f64>> = columns.iter().enumerate().map(place).collect();
-            outside_axis
-                .iter_mut()
-                .zip(&places)
-                .for_each(|(sum, place)| *sum += if place.is_none() { share } else { 0.0 });
-            match places.into_iter().collect::<Option<Vec<f64>>>() {
-                Some(places) => inside.iter_mut().zip(places).for_each(|(axis, x)| axis.push(x)),
-                None => outside += share,
-            }
-        }
-        inside.iter_mut().for_each(|axis| axis.sort_unstable_by(f64::total_cmp));
-        Draws { marginals, inside, outside, outside_axis }
-    }
-}
-
 /// Sampled parameter number `i`.
 fn parameter(
     pair: &Pair,
@@ -237,7 +186,7 @@ fn parameter(
         truth,
         paraboloid: vertex,
         landscape: marginal.map(|marginal| interval(marginal, periodic).against(&chain, periodic)),
-        distribution: marginal.and_then(|marginal| distance(marginal, &draws.inside[k], one)),
+        distribution: draws.distance(k, one),
         fixed_at: None,
         outside: draws.outside_axis[k],
         spacing: Some(axis.spacing() / chain.half_width()),
@@ -250,14 +199,4 @@ fn interval(marginal: &Marginal, periodic: bool) -> Interval {
     let median = marginal.quantile(0.5);
     let value = if periodic { wrap(median) } else { median };
     Interval { value, ci68: [0.16, 0.84].map(|p| marginal.quantile(p) + value - median) }
-}
-
-/// Largest difference of the cumulative distributions at the nodes; `None` where no draw is inside.
-fn distance(marginal: &Marginal, draws: &[f64], chain: &ParameterSummary) -> Option<Distance> {
-    let share = |x: f64| draws.partition_point(|draw| *draw <= x) as f64 / draws.len() as f64;
-    let apart = |x: f64| (share(x) - marginal.cumulative(x)).abs();
-    (!draws.is_empty()).then(|| Distance {
-        largest: marginal.nodes().into_iter().map(apart).fold(0.0, f64::max),
-        by_chance95: chain.ess.map(|ess| KOLMOGOROV95 / ess.sqrt()),
-    })
 }

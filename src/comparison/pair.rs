@@ -10,7 +10,7 @@ use crate::io::lines::JournalError;
 use crate::landscape::Landscape;
 use crate::manifest::Manifest;
 use crate::objective::Parameter;
-use crate::origin::{self, OriginError};
+use crate::origin::{self, Origin, OriginError};
 use crate::run::CHAIN;
 use crate::survey::{HEADER, Header, NODES};
 use std::path::{Path, PathBuf};
@@ -112,17 +112,26 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
     if let Some(key) = config::model_difference(&run.config, &grid.config) {
         return Some(both(key));
     }
-    if run.data_sha256 != grid.data_sha256 {
-        let key = config::section_difference("observations", &run.config, &grid.config);
-        let key = key.map_or_else(String::new, |key| format!(": {}", both(key)));
-        return Some(format!("the observations are not the same{key}"));
-    }
     if let Some(name) = header.grid.names().find(|name| !manifest.names.iter().any(|sampled| sampled == name)) {
         return Some(format!("{name} is an axis of the landscape and not sampled in the run"));
     }
     let fixed = |p: &Parameter| !manifest.names.iter().any(|name| name == p.name());
     let values = |p: Parameter| (settings.values[p], grid_settings.values[p]);
-    let moved = Parameter::ALL.into_iter().filter(fixed).find(|p| values(*p).0 != values(*p).1)?;
-    let (first, second) = values(moved);
-    Some(format!("{} is fixed at {first} in the run and at {second} in the landscape", moved.name()))
+    if let Some(p) = Parameter::ALL.into_iter().filter(fixed).find(|p| values(*p).0 != values(*p).1) {
+        let (first, second) = values(p);
+        return Some(format!("{} is fixed at {first} in the run and at {second} in the landscape", p.name()));
+    }
+    (run.data_sha256 != grid.data_sha256).then(|| {
+        let key = config::section_difference("observations", &run.config, &grid.config).map(both);
+        let why = key.or_else(|| injected(run, grid)).map_or_else(String::new, |why| format!(": {why}"));
+        format!("the observations are not the same{why}")
+    })
+}
+
+/// The first parameter that two simulations have another value of.
+fn injected(run: &Origin, grid: &Origin) -> Option<String> {
+    let (first, second) = (run.truth.as_ref()?, grid.truth.as_ref()?);
+    let differs = |(name, value): &(&String, &f64)| second.get(*name) != Some(*value);
+    let (name, value) = first.iter().find(differs)?;
+    Some(format!("injected {name} {value} in the run and {} in the landscape", second.get(name)?))
 }

@@ -87,8 +87,8 @@ impl Marginal {
 /// ln of L at each value of axis `target`, the other axes integrated over under their priors.
 fn integrated(landscape: &Landscape, target: usize, prior: &dyn Fn(usize, f64) -> f64) -> Vec<f64> {
     let grid = landscape.grid();
-    let weights: Vec<Vec<f64>> =
-        grid.axes.iter().enumerate().map(|(i, axis)| weights(axis, &|x| prior(i, x))).collect();
+    let weights_of = |(i, axis)| if i == target { Vec::new() } else { weights(axis, &|x| prior(i, x)) };
+    let weights: Vec<Vec<f64>> = grid.axes.iter().enumerate().map(weights_of).collect();
     let mut log_terms: Vec<Vec<f64>> = vec![Vec::new(); grid.axes[target].nodes];
     for node in landscape.nodes() {
         let Some(likelihood) = node.reconstruction.likelihood else { continue };

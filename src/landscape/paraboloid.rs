@@ -113,12 +113,12 @@ pub enum Undefined {
 pub fn paraboloid(landscape: &Landscape, rule: Rule) -> Result<Paraboloid, Undefined> {
     let grid = landscape.grid();
     let (top, best) = landscape.best().ok_or(Undefined::Nothing)?;
-    if top.reconstruction.status != Status::Converged {
-        return Err(Undefined::Unreachable(top.index));
-    }
     let edges = grid.edges(top.index);
     if !edges.is_empty() {
         return Err(Undefined::Edge { axes: edges.iter().map(|axis| axis.name.clone()).collect() });
+    }
+    if top.reconstruction.status != Status::Converged {
+        return Err(Undefined::Unreachable(top.index));
     }
     let coefficients = terms(&vec![0.0; grid.axes.len()]).len();
     let times = |factor: f64| (factor * coefficients as f64).ceil() as usize;

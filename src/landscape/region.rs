@@ -62,10 +62,11 @@ pub fn region(landscape: &Landscape, centre: usize, rule: Rule, enough: impl Fn(
         level = level.max(delta_chi2);
         for (neighbour, offset) in neighbours(grid, index, &offset) {
             let near = rule.radius.is_none_or(|radius| offset.iter().all(|o| o.unsigned_abs() <= radius));
-            if near && seen.insert(neighbour) {
-                if let Some(height) = height(neighbour) {
-                    shore.insert(((2.0 * (top - height)).max(0.0).to_bits(), neighbour), offset);
-                }
+            if near
+                && seen.insert(neighbour)
+                && let Some(height) = height(neighbour)
+            {
+                shore.insert(((2.0 * (top - height)).max(0.0).to_bits(), neighbour), offset);
             }
         }
         region.push(Member { index, offset, delta_chi2 });
