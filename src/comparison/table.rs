@@ -12,8 +12,8 @@ impl Comparison {
             rows.extend(self.rows(name, &self.parameters[name]));
         }
         let mut text = aligned(&rows);
-        text += "difference from the chain in its error bars, width over the chain's; cdf: largest difference of the cumulative \
-                 distributions, and what chance exceeds once in twenty times\n";
+        text +=
+            "difference, width: in error bars of the chain; cdf: largest difference of the cumulative distributions\n";
         if let Some(refused) = &self.paraboloid_refused {
             text += &format!("paraboloid: {refused}\n");
         }
