@@ -2,8 +2,7 @@
 //!
 //!     cargo run --release --example moves
 //!
-//! prints the tables of `results/moves.md`. Every case is `configs/demo.json` (5,000 pixels) with another planet, or
-//! `configs/paper_7d.json`.
+//! prints the table of `results/moves.md`. Every case is `configs/demo.json` with another planet (on 5,000 pixels where there is one), or `configs/paper_7d.json`; a part of a name after `--` runs that case alone.
 
 use dimcmc::chain::{MoveKind, Summary, summarise};
 use dimcmc::manifest::kinds_and_goals;
@@ -17,16 +16,23 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Name, config, what is changed in it.
 fn cases() -> Vec<(&'static str, &'static str, Value)> {
-    let planet = |k: f64, period: f64| json!({ "planet": { "k_kms": k, "porb_over_prot": period, "phi": 0.5 } });
+    let fine = json!({ "imaging": { "pixels": 5000 } });
+    let planet = |k: f64, period: f64| {
+        let mut change = json!({ "planet": { "k_kms": k, "porb_over_prot": period, "phi": 0.5 } });
+        if k > 0.0 {
+            merge(&mut change, &fine);
+        }
+        change
+    };
     let wide = json!({ "parameters": { "k_kms": { "prior": "uniform", "min": 0.0, "max": 0.8 } } });
     let mut strong = planet(0.4, 1.7);
     merge(&mut strong, &wide);
     vec![
-        ("K = 100 m/s, P = 1.7", "demo", json!({})),
+        ("K = 100 m/s, P = 1.7", "demo", fine.clone()),
         ("K = 400 m/s, P = 1.7", "demo", strong),
         ("K = 100 m/s, P = 1.0", "demo", planet(0.1, 1.0)),
-        ("K = 0", "demo", planet(0.0, 1.7)),
         ("7-D, K = 100 m/s, P = 1.7", "paper_7d", json!({})),
+        ("K = 0", "demo", planet(0.0, 1.7)),
     ]
 }
 
@@ -40,7 +46,6 @@ fn main() -> Result<(), Failure> {
         }
         let mut config: Value = serde_json::from_str(&std::fs::read_to_string(format!("configs/{config}.json"))?)?;
         config.as_object_mut().map(|c| c.remove("$schema"));
-        config["imaging"]["pixels"] = json!(5000);
         merge(&mut config, &change);
         let with = chain(&config, 20.0, 2000.0)?;
         let without = chain(&config, 0.0, 1000.0)?;
