@@ -59,6 +59,10 @@ impl Manifest {
     pub fn co_rotation(&self, summary: &Summary) -> Option<String> {
         let period = summary.parameters.get(Parameter::PorbOverProt.name())?;
         let [low, high] = period.ci68;
+        // a period that may be anything says nothing
+        if high > low * (1.0 + 2.0 * NEAR_ROTATION) {
+            return None;
+        }
         let fraction = (1..=4).find(|&n| {
             let here = 1.0 / f64::from(n);
             low < here * (1.0 + NEAR_ROTATION) && high > here * (1.0 - NEAR_ROTATION)
