@@ -6,7 +6,7 @@
 //! writes null.csv and planet.csv (a line a star) and prints the tables of `results/calibration.md`.
 
 use dimcmc::config;
-use dimcmc::detection::{Detection, DetectionSettings, cycles};
+use dimcmc::detection::{Detection, DetectionSettings};
 use dimcmc::expansion::Expansion;
 use dimcmc::imaging::Imager;
 use dimcmc::io::csv::Table;
@@ -75,7 +75,7 @@ fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) 
 
 fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
     let settings = FrequencySettings::default();
-    Ok(Frequencies::new(&cycles(imager), imager.star.rotation_period_d, settings)?)
+    Ok(Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, settings)?)
 }
 
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {

@@ -75,7 +75,7 @@ pub struct SecondPlanet {
 pub struct Detection {
     /// The trial periods.
     pub frequencies: Frequencies,
-    /// Without a planet.
+    /// Without a planet; its quadratic is the one that `search` is of.
     pub planet_free: View,
     /// The blind search there, by which a planet is found or not. The planet itself counts among the spots left over, which
     /// makes the false-alarm probability a cautious one.
@@ -122,11 +122,6 @@ pub enum Stage {
     BestOrbit(usize),
     /// The second planet.
     SecondPlanet,
-}
-
-/// Rotation cycles of the profiles.
-pub fn cycles(imager: &Imager) -> Vec<f64> {
-    imager.sampling.profiles.iter().map(|profile| imager.star.cycle(profile.0)).collect()
 }
 
 impl View {
@@ -221,15 +216,16 @@ impl Detection {
         self.beside.as_ref().unwrap_or(&self.blind)
     }
 
-    /// The search with spots left over as large as they are beside a planet, and what it says of co-rotation.
+    /// Where a planet is found: the search with spots left over as large as they are beside it. And what is said of co-rotation.
     fn look_beside(&mut self, settings: &DetectionSettings) -> Result<(), Unbounded> {
-        let factor = self.last().spots_left.min(self.planet_free.spots_left);
-        let planet_free = self.planet_free.expansion.with_spots_left(factor).ok_or(Unbounded)?;
-        let quadratic = planet_free.velocities(&settings.nuisances);
-        if self.is_planet() && self.at_best.is_some() {
-            self.beside = Some(Search::new(&quadratic, &self.frequencies, settings.search)?);
+        if let Some(at_best) = self.at_best.as_ref().filter(|_| self.is_planet()) {
+            let factor = at_best.spots_left.min(self.planet_free.spots_left);
+            let expansion = self.planet_free.expansion.with_spots_left(factor).ok_or(Unbounded)?;
+            self.planet_free.quadratic = expansion.velocities(&settings.nuisances);
+            self.beside = Some(Search::new(&self.planet_free.quadratic, &self.frequencies, settings.search)?);
         }
-        self.co_rotation_penalty = co_rotation_penalty(&quadratic, &self.frequencies, &self.search().rows);
+        let rows = &self.search().rows;
+        self.co_rotation_penalty = co_rotation_penalty(&self.planet_free.quadratic, &self.frequencies, rows);
         Ok(())
     }
 

@@ -65,18 +65,26 @@ impl Imager {
         ImagingProblem::new(&self.grid.area, &self.data, response, self.star.contrast)
     }
 
+    /// Rotation cycle of each profile.
+    pub fn cycles(&self) -> Vec<f64> {
+        self.sampling.profiles.iter().map(|profile| self.star.cycle(profile.0)).collect()
+    }
+
     /// Middle of the time base in rotation cycles.
     pub fn mid_cycle(&self) -> f64 {
-        let cycles = self.sampling.profiles.iter().map(|p| self.star.cycle(p.0));
-        let (lo, hi) = cycles.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), e| (lo.min(e), hi.max(e)));
-        0.5 * (lo + hi)
+        let (first, last) = self.span();
+        0.5 * (first + last)
     }
 
     /// Length of the time base in rotation cycles.
     pub fn time_base_cycles(&self) -> f64 {
-        let cycles: Vec<f64> = self.sampling.profiles.iter().map(|p| self.star.cycle(p.0)).collect();
-        let lo = cycles.iter().copied().fold(f64::INFINITY, f64::min);
-        cycles.iter().copied().fold(f64::NEG_INFINITY, f64::max) - lo
+        let (first, last) = self.span();
+        last - first
+    }
+
+    /// First and last rotation cycle.
+    fn span(&self) -> (f64, f64) {
+        self.cycles().into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), e| (lo.min(e), hi.max(e)))
     }
 }
 

@@ -17,6 +17,7 @@ use crate::origin::{Origin, OriginError};
 use crate::scene::Scene;
 use crate::search::Found;
 use crate::surrogate::{Surrogate, SurrogateMove};
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -106,14 +107,14 @@ impl Run {
     /// [`RunError`]; nothing is written where there is no start.
     pub fn begin(scene: &Scene, folder: &Path, found: Found, from: StartFrom, replace: bool) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
-        let surrogate = surrogate(&found.posterior);
-        let start = match (from, &surrogate) {
-            (StartFrom::Optimum, surrogate) => {
-                let drawn =
-                    surrogate.as_ref().and_then(|(surrogate, _)| from_surrogate(surrogate, &found.posterior, scene));
+        let needed = from == StartFrom::Optimum || scene.settings.sampler.moves.surrogate > 0.0;
+        let surrogate = Some(&found.posterior).filter(|_| needed).and_then(surrogate);
+        let start = match from {
+            StartFrom::Optimum => {
+                let drawn = surrogate.as_ref().and_then(|(s, _)| from_surrogate(s, &found.posterior, scene));
                 drawn.map_or_else(|| around_maxima(&found, scene), Ok)?
             }
-            (StartFrom::Prior, _) => over_prior(&found.posterior, scene)?,
+            StartFrom::Prior => over_prior(&found.posterior, scene)?,
         };
         let first = first_step(scene, &found.posterior, &start)?;
         let manifest = manifest(scene, &found, start);
@@ -244,16 +245,9 @@ fn first_step(scene: &Scene, posterior: &Posterior, start: &Positions) -> Result
 /// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these deserve;
 /// `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.
 fn from_surrogate(surrogate: &Surrogate, posterior: &Posterior, scene: &Scene) -> Option<Positions> {
-    let sampler = &scene.settings.sampler;
     let wide = surrogate.tempered(OVERDISPERSION.powi(2))?;
-    let draw = |index: usize| {
-        let mut rng = start_numbers(sampler.seed, index / sampler.walkers, index % sampler.walkers);
-        let mut draws = (0..DRAW_TRIES).map(|_| Some(posterior.to_written(&wide.draw(&mut rng)?)));
-        draws.find_map(|theta| theta.filter(|theta| posterior.evaluate(theta).log_prob.is_finite()))
-    };
-    let walkers = 0..sampler.ensembles * sampler.walkers;
-    let positions: Vec<Vec<f64>> = walkers.into_par_iter().with_max_len(1).map(draw).collect::<Option<_>>()?;
-    Some(positions.chunks(sampler.walkers).map(<[_]>::to_vec).collect())
+    let draw = |rng: &mut ChaCha8Rng| Some(posterior.to_written(&wide.draw(rng)?));
+    reconstructed(posterior, scene, DRAW_TRIES, draw)
 }
 
 /// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of them
@@ -286,13 +280,24 @@ fn around_maxima(found: &Found, scene: &Scene) -> Result<Positions, RunError> {
 
 /// Draws from the prior at which the reconstruction succeeds.
 fn over_prior(posterior: &Posterior, scene: &Scene) -> Result<Positions, RunError> {
+    let draw = |rng: &mut ChaCha8Rng| Some(scene.space.sample_prior(rng));
+    reconstructed(posterior, scene, PRIOR_TRIES, draw).ok_or(RunError::PriorStart)
+}
+
+/// The first of so many draws, for each walker, at which the reconstruction succeeds; `None` if a walker finds none.
+fn reconstructed(
+    posterior: &Posterior,
+    scene: &Scene,
+    tries: usize,
+    draw: impl Fn(&mut ChaCha8Rng) -> Option<Vec<f64>> + Sync,
+) -> Option<Positions> {
     let sampler = &scene.settings.sampler;
-    let draw = |index: usize| {
+    let walker = |index: usize| {
         let mut rng = start_numbers(sampler.seed, index / sampler.walkers, index % sampler.walkers);
-        let mut draws = (0..PRIOR_TRIES).map(|_| scene.space.sample_prior(&mut rng));
-        draws.find(|theta| posterior.evaluate(theta).log_prob.is_finite()).ok_or(RunError::PriorStart)
+        let mut draws = (0..tries).filter_map(|_| draw(&mut rng));
+        draws.find(|theta| posterior.evaluate(theta).log_prob.is_finite())
     };
     let walkers = 0..sampler.ensembles * sampler.walkers;
-    let positions: Vec<Vec<f64>> = walkers.into_par_iter().with_max_len(1).map(draw).collect::<Result<_, _>>()?;
-    Ok(positions.chunks(sampler.walkers).map(<[_]>::to_vec).collect())
+    let positions: Vec<Vec<f64>> = walkers.into_par_iter().with_max_len(1).map(walker).collect::<Option<_>>()?;
+    Some(positions.chunks(sampler.walkers).map(<[_]>::to_vec).collect())
 }

@@ -2,11 +2,10 @@
 
 mod common;
 
-use common::{Oracle, json, numbers, oracle, values};
+use common::{Oracle, imager, json, numbers, oracle, truth};
 use dimcmc::expansion::{Expansion, Nuisance, STELLAR};
 use dimcmc::imaging::Imager;
 use dimcmc::maxent::SolverSettings;
-use dimcmc::maxent::entropy::Entropy;
 use dimcmc::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
@@ -16,18 +15,11 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
-fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
-    Imager {
-        grid,
-        star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
-        data: oracle.data.clone(),
-        entropy: Entropy::new(oracle.default_spot),
-    }
-}
-
-fn truth(oracle: &Oracle) -> ParameterValues {
-    values(&oracle.json["results"]["fixed_lambda"][0]["theta"], oracle.star.rotation_period_d)
+/// The image without a planet that a search begins with, and the parameters there.
+fn planet_free(oracle: &Oracle, imager: &Imager) -> (Reference, ParameterValues) {
+    let mut alone = truth(oracle);
+    alone[Parameter::K] = 0.0;
+    (Reference::provisional(imager, alone, 0.97).unwrap(), alone)
 }
 
 /// A space in which everything is free, within wide bounds.
@@ -69,9 +61,7 @@ fn oracle_chi2(oracle: &Oracle) -> f64 {
 fn orbits_of_up_to_150_metres_per_second() {
     let oracle = oracle();
     let imager = imager(&oracle, oracle.grid.clone());
-    let mut alone = truth(&oracle);
-    alone[Parameter::K] = 0.0;
-    let reference = Reference::provisional(&imager, alone, 0.97).unwrap();
+    let (reference, alone) = planet_free(&oracle, &imager);
     let expansion = Expansion::of(&imager, &reference, &[]);
     let exact = exact(&imager, &reference);
     let none = exact(&alone);
@@ -203,9 +193,7 @@ fn step_of(p: Parameter) -> f64 {
 fn co_rotation_hides_a_planet() {
     let oracle = oracle();
     let imager = imager(&oracle, oracle.grid.clone());
-    let mut alone = truth(&oracle);
-    alone[Parameter::K] = 0.0;
-    let reference = Reference::provisional(&imager, alone, 0.97).unwrap();
+    let (reference, _) = planet_free(&oracle, &imager);
     let expansion = Expansion::of(&imager, &reference, &[]);
     let quadratic = expansion.velocities(&[]);
     let sigma = |period: f64| {

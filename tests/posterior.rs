@@ -7,12 +7,10 @@
 
 mod common;
 
-use common::{Oracle, json, numbers, oracle, values};
+use common::{Oracle, imager, json, numbers, oracle, truth};
 use dimcmc::chain::{Chain, Goals, ParameterKind, Shape, Summary, summarise};
 use dimcmc::ensemble::{self, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start};
-use dimcmc::imaging::Imager;
 use dimcmc::log_density::{LogDensity, Threads};
-use dimcmc::maxent::entropy::Entropy;
 use dimcmc::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference};
 use dimcmc::optimise::climb;
 use dimcmc::star::{Quadrature, SurfaceGrid};
@@ -20,16 +18,6 @@ use dimcmc::surrogate::{Surrogate, SurrogateMove};
 use std::sync::atomic::AtomicBool;
 
 const KINDS: [ParameterKind; 3] = [ParameterKind::Amplitude, ParameterKind::Linear, ParameterKind::Periodic];
-
-fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
-    Imager {
-        grid,
-        star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
-        data: oracle.data.clone(),
-        entropy: Entropy::new(oracle.default_spot),
-    }
-}
 
 /// The posterior of K, P and phi, with the reference at the oracle's injected values.
 fn posterior(oracle: &Oracle, grid: SurfaceGrid, kind: ObjectiveKind, chi2_per_datum: f64) -> Posterior {
@@ -40,7 +28,7 @@ fn posterior(oracle: &Oracle, grid: SurfaceGrid, kind: ObjectiveKind, chi2_per_d
         FreeParameter { parameter: Parameter::Phi, prior: Prior::Periodic },
     ];
     let period = oracle.star.rotation_period_d;
-    let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], period);
+    let truth = truth(oracle);
     let space = ParameterSpace::new(free, truth, imager.mid_cycle(), imager.time_base_cycles(), period);
     let reference = Reference::build(&imager, truth, chi2_per_datum).unwrap();
     Posterior::new(imager, space, kind, reference)

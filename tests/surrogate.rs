@@ -3,12 +3,10 @@
 
 mod common;
 
-use common::oracle;
+use common::{imager, oracle, truth};
 use dimcmc::chain::{Chain, Goals, MoveKind, ParameterKind, Shape, Summary, summarise};
 use dimcmc::ensemble::{Sampler, SamplerSettings};
-use dimcmc::imaging::Imager;
 use dimcmc::log_density::{Evaluation, LogDensity, Status, Threads};
-use dimcmc::maxent::entropy::Entropy;
 use dimcmc::objective::{FreeParameter, Parameter, ParameterSpace, Prior, Reference};
 use dimcmc::star::{Quadrature, SurfaceGrid};
 use dimcmc::surrogate::{Surrogate, SurrogateMove};
@@ -32,13 +30,7 @@ fn surrogate(k_kms: f64) -> (Surrogate, ParameterSpace) {
 /// The same with another prior of the period.
 fn surrogate_with(k_kms: f64, period: Prior) -> (Surrogate, ParameterSpace) {
     let oracle = oracle();
-    let imager = Imager {
-        grid: SurfaceGrid::equal_area(500, Quadrature::Gauss2x2),
-        star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
-        data: oracle.data.clone(),
-        entropy: Entropy::new(oracle.default_spot),
-    };
+    let imager = imager(&oracle, SurfaceGrid::equal_area(500, Quadrature::Gauss2x2));
     let prior = |parameter, prior| FreeParameter { parameter, prior };
     let free = vec![
         prior(Parameter::K, Prior::Uniform { min: 0.0, max: 0.3 }),
@@ -47,7 +39,7 @@ fn surrogate_with(k_kms: f64, period: Prior) -> (Surrogate, ParameterSpace) {
         prior(Parameter::Inclination, Prior::Isotropic { min: 10.0, max: 80.0 }),
         prior(Parameter::Vsys, Prior::Normal { mean: 0.02, sd: 0.01, min: -0.01, max: 0.5 }),
     ];
-    let mut values = common::values(&oracle.json["results"]["fixed_lambda"][0]["theta"], oracle.star.rotation_period_d);
+    let mut values = truth(&oracle);
     values[Parameter::K] = k_kms;
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
     let space = ParameterSpace::new(free, values, mid, base, oracle.star.rotation_period_d);

@@ -2,7 +2,7 @@
 
 use super::output::Output;
 use super::{Failure, Global, progress};
-use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Stage, cycles};
+use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Stage};
 use dimcmc::expansion::nuisances;
 use dimcmc::fit::Fit;
 use dimcmc::io::periodogram::PeriodogramResult;
@@ -80,7 +80,7 @@ fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
     let Args { min_period_d, max_period_d, oversampling, .. } = *args;
     let settings = FrequencySettings { min_period_d, max_period_d, oversampling };
     let rotation_period_d = scene.imager.star.rotation_period_d;
-    Frequencies::new(&cycles(&scene.imager), rotation_period_d, settings).map_err(|error| match error {
+    Frequencies::new(&scene.imager.cycles(), rotation_period_d, settings).map_err(|error| match error {
         FrequencyError::TooFewTimes(_) => Failure::input(format!("{}: observations: {error}", args.config.display())),
         error => Failure::input(error),
     })

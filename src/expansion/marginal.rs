@@ -62,16 +62,9 @@ impl Expansion {
 
     /// How each nuisance changes the coordinates, a column each.
     pub(super) fn columns(&self, nuisances: &[Nuisance]) -> DMatrix<f64> {
-        let n = self.profiles();
         let mut columns = DMatrix::zeros(self.centre.len(), nuisances.len());
-        for (i, nuisance) in nuisances.iter().enumerate() {
-            match self.stellar.iter().position(|&p| p == nuisance.parameter) {
-                Some(s) => columns[(n + s, i)] = 1.0,
-                None => {
-                    assert_eq!(nuisance.parameter, Parameter::Vsys, "a coordinate of the expansion");
-                    columns.rows_mut(0, n).column_mut(i).fill(1.0);
-                }
-            }
+        for (mut column, nuisance) in columns.column_iter_mut().zip(nuisances) {
+            column.copy_from(&self.direction(nuisance.parameter));
         }
         columns
     }

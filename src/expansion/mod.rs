@@ -10,7 +10,7 @@ mod model;
 mod spots;
 
 use crate::imaging::Imager;
-use crate::maxent::{Problem, Solver, SolverSettings};
+use crate::maxent::{Solver, SolverSettings};
 use crate::objective::{Parameter, ParameterValues, Reference};
 use model::DisplacedModel;
 use nalgebra::{DMatrix, DVector};
@@ -43,8 +43,6 @@ pub struct Expansion {
     /// Covariance of the gradient that photon noise makes, and spots left over where they are counted as noise. Otherwise it is
     /// smaller than the information, which counts spots that might be there as well.
     pub noise: DMatrix<f64>,
-    /// Applications of the response or its transpose that it took.
-    pub passes: u32,
 }
 
 /// Precision of the solves: the information is good to about this share of itself.
@@ -74,13 +72,13 @@ impl Expansion {
             map.iter_mut().for_each(|m| *m *= lambda);
             let mut depths = vec![0.0; data];
             problem.model_change(&map, &mut depths);
-            (map, depths, problem.passes())
+            (map, depths)
         };
-        let answers: Vec<(Vec<f64>, Vec<f64>, u32)> = pulls.par_iter().map(answer).collect();
+        let answers: Vec<(Vec<f64>, Vec<f64>)> = pulls.par_iter().map(answer).collect();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut information = model.curvature();
         for (x, pull) in pulls.iter().enumerate() {
-            for (y, (map, ..)) in answers.iter().enumerate() {
+            for (y, (map, _)) in answers.iter().enumerate() {
                 // both halves, so that what the solves leave undone is symmetric
                 let share = 0.5 * dot(pull, map);
                 information[(x, y)] -= share;
@@ -89,7 +87,7 @@ impl Expansion {
         }
         let root_weight: Vec<f64> = imager.data.inverse_variance.iter().map(|w| w.sqrt()).collect();
         let mut unanswered = model.tangents();
-        for (mut column, (_, depths, _)) in unanswered.column_iter_mut().zip(&answers) {
+        for (mut column, (_, depths)) in unanswered.column_iter_mut().zip(&answers) {
             for ((c, d), w) in column.iter_mut().zip(depths).zip(&root_weight) {
                 *c = (*c - d) * w;
             }
@@ -104,7 +102,6 @@ impl Expansion {
             gradient: model.slope(),
             noise: unanswered.tr_mul(&unanswered),
             information,
-            passes: model.passes() + answers.iter().map(|(.., passes)| passes).sum::<u32>(),
         }
     }
 
@@ -116,6 +113,19 @@ impl Expansion {
     /// The coordinates of a point of parameter space.
     pub fn coordinates(&self, values: &ParameterValues) -> DVector<f64> {
         coordinates(values, &self.cycles, &self.stellar)
+    }
+
+    /// How the coordinates change with the systemic velocity or one of the stellar parameters among them.
+    pub fn direction(&self, parameter: Parameter) -> DVector<f64> {
+        let mut direction = DVector::zeros(self.centre.len());
+        match self.stellar.iter().position(|&p| p == parameter) {
+            Some(s) => direction[self.profiles() + s] = 1.0,
+            None => {
+                assert_eq!(parameter, Parameter::Vsys, "a coordinate of the expansion");
+                direction.rows_mut(0, self.profiles()).fill(1.0);
+            }
+        }
+        direction
     }
 
     /// ln L there, to second order.

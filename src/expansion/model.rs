@@ -26,13 +26,6 @@ fn step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64
     }
 }
 
-/// Residuals over variances of a displaced model, and what it takes to make gradients of them.
-struct Displaced<'a> {
-    problem: ImagingProblem<'a>,
-    /// Model depth of every bin.
-    depth: Vec<f64>,
-}
-
 /// The model at the reference image.
 pub(super) struct DisplacedModel<'a> {
     imager: &'a Imager,
@@ -41,11 +34,11 @@ pub(super) struct DisplacedModel<'a> {
     steps: Vec<f64>,
     map: Vec<f64>,
     cycles: Vec<f64>,
-    here: Displaced<'a>,
+    here: ImagingProblem<'a>,
     /// All profiles shifted by a step up and down.
-    shifted: [Displaced<'a>; 2],
+    shifted: [ImagingProblem<'a>; 2],
     /// Each stellar parameter a step up and down.
-    turned: Vec<[Displaced<'a>; 2]>,
+    turned: Vec<[ImagingProblem<'a>; 2]>,
 }
 
 impl<'a> DisplacedModel<'a> {
@@ -63,7 +56,7 @@ impl<'a> DisplacedModel<'a> {
         let turned = stellar.par_iter().zip(&steps).map(turn).collect();
         DisplacedModel {
             shifted: [VELOCITY_STEP_KMS, -VELOCITY_STEP_KMS].map(shift),
-            cycles: imager.sampling.profiles.iter().map(|p| imager.star.cycle(p.0)).collect(),
+            cycles: imager.cycles(),
             stellar: stellar.to_vec(),
             imager,
             reference,
@@ -82,17 +75,9 @@ impl<'a> DisplacedModel<'a> {
         &self.cycles
     }
 
-    pub fn passes(&self) -> u32 {
-        let (profiles, stellar) = (self.profiles(), self.turned.len());
-        // linearisations, those of mixed differences, and two pulls a coordinate
-        (3 + 2 * stellar + 4 * (stellar + stellar * stellar.saturating_sub(1) / 2) + 2 * (profiles + stellar)) as u32
-    }
-
     /// The problem at the reference, linearised at its image.
     pub fn problem(&self) -> ImagingProblem<'a> {
-        let mut problem = self.imager.problem(self.reference.response.clone());
-        problem.linearise(&self.map);
-        problem
+        displaced(self.imager, self.reference.response.clone(), &self.map)
     }
 
     /// `C_x`: how coordinate `x` changes the gradient of chi2/2 with respect to the map.
@@ -103,7 +88,7 @@ impl<'a> DisplacedModel<'a> {
         };
         let [plus, minus] = pair.each_ref().map(|at| {
             let mut gradient = vec![0.0; self.map.len()];
-            at.problem.gradient_of(profiles.clone(), &mut gradient);
+            at.gradient_of(profiles.clone(), &mut gradient);
             gradient
         });
         plus.iter().zip(minus).map(|(p, m)| (p - m) / (2.0 * h)).collect()
@@ -111,7 +96,7 @@ impl<'a> DisplacedModel<'a> {
 
     /// `D_x` of every bin, a column a coordinate.
     pub fn tangents(&self) -> DMatrix<f64> {
-        let mut tangents = DMatrix::zeros(self.here.depth.len(), self.profiles() + self.stellar.len());
+        let mut tangents = DMatrix::zeros(self.here.model().len(), self.profiles() + self.stellar.len());
         let velocity = first(&self.shifted, VELOCITY_STEP_KMS);
         for k in 0..self.profiles() {
             for j in self.bins(k) {
@@ -167,7 +152,7 @@ impl<'a> DisplacedModel<'a> {
     fn mixed(&self, (a, step_a): (Parameter, f64), (b, step_b): (Parameter, f64)) -> Vec<f64> {
         let at = |(sign_a, sign_b): (f64, f64)| {
             let values = moved(&self.reference.values, &[(a, sign_a * step_a), (b, sign_b * step_b)]);
-            displaced(self.imager, self.imager.response(&values.state()), &self.map).depth
+            displaced(self.imager, self.imager.response(&values.state()), &self.map).model().to_vec()
         };
         let corners = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
         let d: Vec<Vec<f64>> = corners.into_par_iter().map(at).collect();
@@ -176,7 +161,7 @@ impl<'a> DisplacedModel<'a> {
 
     fn weighted_residual(&self) -> Vec<f64> {
         let data = &self.imager.data;
-        let both = self.here.depth.iter().zip(&data.depth).zip(&data.inverse_variance);
+        let both = self.here.model().iter().zip(&data.depth).zip(&data.inverse_variance);
         both.map(|((model, observed), w)| (model - observed) * w).collect()
     }
 
@@ -185,10 +170,11 @@ impl<'a> DisplacedModel<'a> {
     }
 }
 
-fn displaced<'a>(imager: &'a Imager, response: Response, map: &[f64]) -> Displaced<'a> {
+/// The problem seen through `response`, linearised at the map.
+fn displaced<'a>(imager: &'a Imager, response: Response, map: &[f64]) -> ImagingProblem<'a> {
     let mut problem = imager.problem(response);
     problem.linearise(map);
-    Displaced { depth: problem.model().to_vec(), problem }
+    problem
 }
 
 /// The response with all profiles shifted by `h` (km/s).
@@ -204,12 +190,12 @@ fn moved(values: &ParameterValues, moves: &[(Parameter, f64)]) -> ParameterValue
 }
 
 /// Central first difference of the depths.
-fn first([plus, minus]: &[Displaced; 2], h: f64) -> Vec<f64> {
-    plus.depth.iter().zip(&minus.depth).map(|(p, m)| (p - m) / (2.0 * h)).collect()
+fn first([plus, minus]: &[ImagingProblem; 2], h: f64) -> Vec<f64> {
+    plus.model().iter().zip(minus.model()).map(|(p, m)| (p - m) / (2.0 * h)).collect()
 }
 
 /// Central second difference of the depths.
-fn second([plus, minus]: &[Displaced; 2], here: &Displaced, h: f64) -> Vec<f64> {
-    let all = plus.depth.iter().zip(&minus.depth).zip(&here.depth);
+fn second([plus, minus]: &[ImagingProblem; 2], here: &ImagingProblem, h: f64) -> Vec<f64> {
+    let all = plus.model().iter().zip(minus.model()).zip(here.model());
     all.map(|((p, m), d)| (p - 2.0 * d + m) / (h * h)).collect()
 }

@@ -123,7 +123,6 @@ mod tests {
                 gradient: gradient.column(0).into_owned(),
                 information,
                 noise: noise.clone(),
-                passes: 0,
             };
             let factor = expansion.spots_left(&[vsys]).unwrap();
             let honest = expansion.with_spots_left(factor).unwrap();

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Trial periods that share one matrix product.
-pub(super) const BLOCK: usize = 128;
+const BLOCK: usize = 128;
 
 /// Two velocities (a, b) are not told apart where the curvature along one is below this part of the whole information.
 const SINGULAR: f64 = 1e-9;
@@ -68,10 +68,7 @@ pub(super) fn design(cycles: &[f64], frequencies: &[f64]) -> DMatrix<f64> {
 }
 
 /// `X' M X` of each frequency of a design.
-pub(super) fn blocks<'a>(
-    x: &'a DMatrix<f64>,
-    mx: &'a DMatrix<f64>,
-) -> impl ExactSizeIterator<Item = Matrix2<f64>> + 'a {
+fn blocks<'a>(x: &'a DMatrix<f64>, mx: &'a DMatrix<f64>) -> impl ExactSizeIterator<Item = Matrix2<f64>> + 'a {
     (0..x.ncols() / 2).map(|j| {
         let entry = |r: usize, c: usize| x.column(2 * j + r).dot(&mx.column(2 * j + c));
         let off = 0.5 * (entry(0, 1) + entry(1, 0));

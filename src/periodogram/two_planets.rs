@@ -2,7 +2,7 @@
 //!
 //! At each period the 4 x 4 system in both (a, b) is solved by blocks: with the first orbit's pair eliminated, what is left is a
 //! quadratic in the velocities again, of gradient `Q g` and information `Q I`, `Q = 1 - I X A^-1 X'` (Schur complement). The
-//! periodogram of that is the gain, and gradients without a second planet scatter with `Q C Q'`.
+//! periodogram of that is the gain, and gradients without a second planet scatter with its own information.
 
 use super::frequencies::Frequencies;
 use super::orbits::{design, velocities};

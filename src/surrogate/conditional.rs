@@ -68,11 +68,8 @@ impl LinearModel {
             .collect();
         let mut columns = DMatrix::zeros(all, others.len());
         let mut offset = -&expansion.centre;
-        for (c, &i) in others.iter().enumerate() {
-            match expansion.stellar.iter().position(|&p| p == space.free()[i].parameter) {
-                Some(s) => columns[(n + s, c)] = 1.0,
-                None => columns.rows_mut(0, n).column_mut(c).fill(1.0),
-            }
+        for (mut column, &i) in columns.column_iter_mut().zip(&others) {
+            column.copy_from(&expansion.direction(space.free()[i].parameter));
         }
         if position(Parameter::Vsys).is_none() {
             offset.rows_mut(0, n).add_scalar_mut(fixed[Parameter::Vsys]);

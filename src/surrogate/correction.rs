@@ -66,12 +66,12 @@ impl Surrogate {
             .iter()
             .map(|(position, theta, log_prob)| log_prob + density.log_jacobian(theta) - self.log_density(position))
             .collect();
-        // from each draw to every other; what has no log-probability is never accepted, and neither is what cannot be drawn
         // a walk that never moves proposes nothing new
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let moves =
             |position: &Vec<f64>| self.place(position).is_some_and(|at| self.walk(at, &mut rng).position != *position);
         let moved = draws.iter().map(|draw| &draw.0).map(moves).filter(|moved| *moved).count() as f64 / TRIALS as f64;
+        // from each draw to every other; what has no log-probability is never accepted, and neither is what cannot be drawn
         let pairs = beyond.iter().flat_map(|from| beyond.iter().map(move |to| (from, to)));
         let accepted = |(from, to): (&f64, &f64)| if from.is_finite() { (to - from).exp().min(1.0) } else { 0.0 };
         moved * pairs.map(accepted).sum::<f64>() / (TRIALS as f64).powi(2)

@@ -1,7 +1,8 @@
 //! The independent reference numbers under `tests/data/oracle` (see the README there), in this crate's types.
 #![allow(dead_code)]
 
-use dimcmc::imaging::Data;
+use dimcmc::imaging::{Data, Imager};
+use dimcmc::maxent::entropy::Entropy;
 use dimcmc::objective::{Parameter, ParameterValues};
 use dimcmc::star::{LimbDarkening, LocalLine, Sampling, StarSettings, SurfaceGrid};
 use dimcmc::units::{instrumental_sigma_kms, planck_contrast};
@@ -57,6 +58,22 @@ pub fn oracle() -> Oracle {
     let data = Data { inverse_variance: vec![1.0 / (sigma * sigma); depth.len()], depth };
     let default_spot = number("default_spot");
     Oracle { json, star, grid, sampling, data, default_spot }
+}
+
+/// The oracle's data on these pixels.
+pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
+    Imager {
+        grid,
+        star: oracle.star.clone(),
+        sampling: oracle.sampling.clone(),
+        data: oracle.data.clone(),
+        entropy: Entropy::new(oracle.default_spot),
+    }
+}
+
+/// The injected values.
+pub fn truth(oracle: &Oracle) -> ParameterValues {
+    values(&oracle.json["results"]["fixed_lambda"][0]["theta"], oracle.star.rotation_period_d)
 }
 
 /// Parameter values of one of the oracle's `theta` objects.
