@@ -9,7 +9,7 @@ use crate::ensemble::{
 };
 use crate::io::atomic::WriteError;
 use crate::io::journal::{Journal, JournalError};
-use crate::log_density::{LogDensity, Threads};
+use crate::log_density::{Evaluation, LogDensity, Threads};
 use crate::manifest::{Manifest, kinds_and_goals};
 use crate::objective::Posterior;
 use crate::optimise::Optimum;
@@ -20,7 +20,7 @@ use crate::surrogate::{Surrogate, SurrogateMove};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 /// Name of the chain in a run's folder.
 pub const CHAIN: &str = "chain.jsonl";
@@ -58,6 +58,8 @@ pub struct Run {
     pub posterior: Posterior,
     /// The chain so far.
     pub chain: Chain,
+    /// Reconstructions before its first step: to fit and try the surrogate, and for the start.
+    pub preparation: usize,
     kinds: Vec<ParameterKind>,
     policy: StopPolicy,
     settings: ensemble::SamplerSettings,
@@ -108,14 +110,16 @@ impl Run {
     pub fn begin(scene: &Scene, folder: &Path, found: Found, from: StartFrom, replace: bool) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
         let needed = from == StartFrom::Optimum || scene.settings.sampler.moves.surrogate > 0.0;
-        let surrogate = Some(&found.posterior).filter(|_| needed).and_then(surrogate);
+        let counted = Counted::new(&found.posterior);
+        let surrogate = if needed { surrogate(&counted) } else { None };
         let start = match from {
             StartFrom::Optimum => {
-                let drawn = surrogate.as_ref().and_then(|(s, _)| from_surrogate(s, &found.posterior, scene));
+                let drawn = surrogate.as_ref().and_then(|(s, _)| from_surrogate(s, &counted, scene));
                 drawn.map_or_else(|| around_maxima(&found, scene), Ok)?
             }
-            StartFrom::Prior => over_prior(&found.posterior, scene)?,
+            StartFrom::Prior => over_prior(&counted, scene)?,
         };
+        let preparation = counted.evaluations.into_inner();
         let first = first_step(scene, &found.posterior, &start)?;
         let manifest = manifest(scene, &found, start);
         std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
@@ -130,7 +134,8 @@ impl Run {
         let mut chain = Chain::new(manifest.shape());
         journal.append(&first)?;
         chain.push_step(&first)?;
-        Ok(Run::new(scene, folder, manifest, found.posterior, surrogate, (journal, chain)))
+        let run = Run::new(scene, folder, manifest, found.posterior, surrogate, (journal, chain));
+        Ok(Run { preparation, ..run })
     }
 
     /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
@@ -151,8 +156,11 @@ impl Run {
         if manifest.update(&scene.settings, extend.map(|steps| last_step + steps)) {
             manifest.write(folder)?;
         }
-        let surrogate = Some(&posterior).filter(|_| scene.settings.sampler.moves.surrogate > 0.0).and_then(surrogate);
-        Ok(Run::new(scene, folder, manifest, posterior, surrogate, (journal, chain)))
+        let counted = Counted::new(&posterior);
+        let surrogate = if scene.settings.sampler.moves.surrogate > 0.0 { surrogate(&counted) } else { None };
+        let preparation = counted.evaluations.into_inner();
+        let run = Run::new(scene, folder, manifest, posterior, surrogate, (journal, chain));
+        Ok(Run { preparation, ..run })
     }
 
     /// The run with its chain so far.
@@ -171,7 +179,7 @@ impl Run {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        Run { folder: folder.into(), policy, manifest, posterior, chain, kinds, settings, surrogate, journal }
+        Run { folder: folder.into(), policy, manifest, posterior, chain, preparation: 0, kinds, settings, surrogate, journal }
     }
 
     /// The step at which the run ends if its goals are not reached before.
@@ -215,9 +223,45 @@ impl Run {
 
 /// The surrogate of the posterior, if there is one, and the share of its proposals accepted on trial: a function of the
 /// posterior alone, so that a resumed run has the same.
-fn surrogate(posterior: &Posterior) -> Option<(Surrogate, f64)> {
+fn surrogate(counted: &Counted) -> Option<(Surrogate, f64)> {
+    let posterior = counted.posterior;
     let expansion = Surrogate::new(posterior.imager(), posterior.space(), posterior.reference())?;
-    Some(expansion.fitted(posterior, &Threads(posterior)))
+    Some(expansion.fitted(counted, &Threads(counted)))
+}
+
+/// The posterior with a count of its evaluations.
+struct Counted<'a> {
+    posterior: &'a Posterior,
+    evaluations: AtomicUsize,
+}
+
+impl<'a> Counted<'a> {
+    fn new(posterior: &'a Posterior) -> Self {
+        Counted { posterior, evaluations: AtomicUsize::new(0) }
+    }
+}
+
+impl LogDensity for Counted<'_> {
+    fn names(&self) -> &[String] {
+        self.posterior.names()
+    }
+
+    fn evaluate(&self, theta: &[f64]) -> Evaluation {
+        self.evaluations.fetch_add(1, Relaxed);
+        self.posterior.evaluate(theta)
+    }
+
+    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
+        self.posterior.to_internal(theta)
+    }
+
+    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+        self.posterior.to_written(internal)
+    }
+
+    fn log_jacobian(&self, theta: &[f64]) -> f64 {
+        self.posterior.log_jacobian(theta)
+    }
 }
 
 fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
@@ -244,7 +288,7 @@ fn first_step(scene: &Scene, posterior: &Posterior, start: &Positions) -> Result
 
 /// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these deserve;
 /// `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.
-fn from_surrogate(surrogate: &Surrogate, posterior: &Posterior, scene: &Scene) -> Option<Positions> {
+fn from_surrogate(surrogate: &Surrogate, posterior: &Counted, scene: &Scene) -> Option<Positions> {
     let wide = surrogate.tempered(OVERDISPERSION.powi(2))?;
     let draw = |rng: &mut ChaCha8Rng| Some(posterior.to_written(&wide.draw(rng)?));
     reconstructed(posterior, scene, DRAW_TRIES, draw)
@@ -270,7 +314,7 @@ fn around_maxima(found: &Found, scene: &Scene) -> Result<Positions, RunError> {
     let around: Result<Vec<Positions>, _> = maxima.iter().enumerate().map(draw).collect();
     let around = match around {
         // data so weak that the curvature is wider than the prior
-        Err(EnsembleError::StartOutside { .. }) => return over_prior(&found.posterior, scene),
+        Err(EnsembleError::StartOutside { .. }) => return over_prior(&Counted::new(&found.posterior), scene),
         around => around?,
     };
     let choose = |e: usize, w: usize| if w.is_multiple_of(2) { e % maxima.len() } else { (w / 2) % maxima.len() };
@@ -279,14 +323,14 @@ fn around_maxima(found: &Found, scene: &Scene) -> Result<Positions, RunError> {
 }
 
 /// Draws from the prior at which the reconstruction succeeds.
-fn over_prior(posterior: &Posterior, scene: &Scene) -> Result<Positions, RunError> {
+fn over_prior(posterior: &Counted, scene: &Scene) -> Result<Positions, RunError> {
     let draw = |rng: &mut ChaCha8Rng| Some(scene.space.sample_prior(rng));
     reconstructed(posterior, scene, PRIOR_TRIES, draw).ok_or(RunError::PriorStart)
 }
 
 /// The first of so many draws, for each walker, at which the reconstruction succeeds; `None` if a walker finds none.
 fn reconstructed(
-    posterior: &Posterior,
+    posterior: &Counted,
     scene: &Scene,
     tries: usize,
     draw: impl Fn(&mut ChaCha8Rng) -> Option<Vec<f64>> + Sync,

@@ -23,6 +23,7 @@ const LAYERS: &[&[&str]] = &[
     &["manifest", "survey", "optimum"],
     &["run"],
     &["comparison"],
+    &["experiments"],
 ];
 
 /// Modules, and all that they may import. What is not listed here may import whatever lies lower.

@@ -105,6 +105,12 @@ impl Convergence {
         Ok(Convergence { discarded, kept, diagnostics, stuck: stuck(chain, discarded), ensembles })
     }
 
+    /// Length of what is kept in the longest of the autocorrelation times; 0 where one is unknown.
+    pub fn kept_times(&self) -> f64 {
+        let longest = worst(self.diagnostics.iter().map(|one| one.tau), f64::max);
+        longest.map_or(0.0, |tau| self.kept as f64 / tau)
+    }
+
     /// Whether every parameter has reached the goals and no walker is stuck. One ensemble alone never has: there is nothing
     /// independent to compare it with.
     pub fn reached(&self, goals: &Goals) -> bool {

@@ -13,6 +13,7 @@ mod output;
 mod periodogram;
 mod progress;
 mod report;
+mod reproduce;
 mod sample;
 mod search;
 mod signals;
@@ -56,6 +57,7 @@ enum Command {
     #[command(alias = "analyze")]
     Analyse(analyse::Args),
     Compare(compare::Args),
+    Reproduce(reproduce::Args),
 }
 
 /// Runs the command.
@@ -75,6 +77,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Sample(args) => sample::run(args, &cli.global),
         Command::Analyse(args) => analyse::run(args, &cli.global),
         Command::Compare(args) => compare::run(args, &cli.global),
+        Command::Reproduce(args) => reproduce::run(args, &cli.global),
     }
 }
 

@@ -14,11 +14,14 @@ pub struct StopPolicy {
     pub steps: usize,
     /// What every parameter must reach.
     pub goals: Goals,
-    /// The goals are looked at when the step is a multiple of this.
+    /// The goals are looked at when the step is a multiple of this; before twice as many steps, of a fifth of it.
     pub every: usize,
     /// Steps to make in any case: the goals end no chain before this step (for `--extend`).
     pub least: usize,
 }
+
+/// A chain ends early only if what is kept of it is so many autocorrelation times long.
+const EARLY_TIMES: f64 = 10.0;
 
 /// What is done with each step: the records, and the diagnostics when they were due.
 pub type OnStep<'a, E> = dyn FnMut(&[Record], Option<&Convergence>) -> Result<(), E> + 'a;
@@ -49,7 +52,7 @@ pub enum RunError<E> {
 }
 
 impl StopPolicy {
-    /// The policy of the settings, looking at the goals every 50 steps.
+    /// The policy of the settings, looking at the goals every 50 steps, and every 10 steps before step 100.
     pub fn new(settings: &SamplerSettings) -> Self {
         let goals = Goals { rhat: settings.rhat, ess: settings.ess };
         StopPolicy { steps: settings.steps, goals, every: 50, least: 0 }
@@ -66,11 +69,15 @@ impl StopPolicy {
     ) -> Result<(Option<StopReason>, Option<Convergence>), ChainError> {
         let Some(step) = chain.steps().checked_sub(1) else { return Ok((None, None)) };
         let due = step > 0 && (step.is_multiple_of(self.every.max(1)) || step >= self.steps);
-        // early on, whoever watches is told five times as often
+        // early on five times as often
         let early = step > 0 && step < 2 * self.every && step.is_multiple_of((self.every / 5).max(1));
         let convergence = if due || early { Some(Convergence::of(chain, kinds)?) } else { None };
         let reason = match &convergence {
-            Some(convergence) if due && step >= self.least && convergence.reached(&self.goals) => {
+            Some(convergence)
+                if (due || convergence.kept_times() >= EARLY_TIMES)
+                    && step >= self.least
+                    && convergence.reached(&self.goals) =>
+            {
                 Some(StopReason::Converged)
             }
             _ if step >= self.steps => Some(StopReason::StepLimit),

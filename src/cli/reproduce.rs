@@ -1,0 +1,105 @@
+//! `dimcmc reproduce`: the paper's experiments.
+
+use super::signals::Signals;
+use super::{Failure, Global, progress};
+use dimcmc::experiments::files::{Made, SUMMARY, TABLE};
+use dimcmc::experiments::{ExperimentError, Laboratory, ROWS, Row};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Repeat the experiments of Petit et al. (2015), and a few beyond them
+///
+/// Every row of experiments gets a folder with table.csv and summary.json. A row that is there already is left alone; one that
+/// was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an hour on two cores.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc reproduce R2 --quick --out runs/reproduced --work runs/reproduce_raw\n  \
+                        dimcmc reproduce R5 R6")]
+pub struct Args {
+    /// Rows: R1 to R12, co-rotation, coverage
+    #[arg(value_name = "ROW")]
+    rows: Vec<String>,
+    /// Folder of the results; `results`, or with --quick `runs/quick`, if not given
+    #[arg(long = "out", value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Folder of chains, landscapes and what is done of a row; `runs/reproduce` or `runs/reproduce_quick` if not given
+    #[arg(long, value_name = "DIR")]
+    work: Option<PathBuf>,
+    /// A reduced version of everything, in two minutes: fewer stars, pixels and draws
+    #[arg(long)]
+    quick: bool,
+    /// Do rows again that are there already
+    #[arg(long)]
+    force: bool,
+    /// List the rows and what the paper found
+    #[arg(long)]
+    list: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let rows = rows(&args.rows)?;
+    let mut stdout = std::io::stdout();
+    if args.list {
+        for row in rows {
+            let _ = writeln!(stdout, "{:<11}  {}", row.name, row.title);
+            if !row.paper.is_empty() {
+                let _ = writeln!(stdout, "{:<11}  paper: {}", "", row.paper);
+            }
+        }
+        return Ok(());
+    }
+    let or = |given: &Option<PathBuf>, full: &str, quick: &str| {
+        given.clone().unwrap_or_else(|| PathBuf::from(if args.quick { quick } else { full }))
+    };
+    let out = or(&args.out, "results", "runs/quick");
+    let work = or(&args.work, "runs/reproduce", "runs/reproduce_quick");
+    let signals = Signals::catch("reconstruction")?;
+    for row in rows {
+        let folder = out.join(row.name);
+        if folder.join(SUMMARY).exists() && !args.force {
+            let _ = writeln!(stdout, "{}: done before: {}; --force does it again", row.name, folder.display());
+            continue;
+        }
+        let spinner = progress::bar(global, None, "begins");
+        let report = |message: &str| spinner.set_message(message.to_owned());
+        signals.defer();
+        let laboratory = Laboratory { folder: work.clone(), quick: args.quick, stop: signals.flag(), report: &report };
+        let began = Instant::now();
+        let result = row.run(&laboratory);
+        spinner.finish_and_clear();
+        let result = result.map_err(|e| failure(row, e))?;
+        create(&folder)?;
+        let made = Made {
+            command: format!("dimcmc reproduce {}{}", row.name, if args.quick { " --quick" } else { "" }),
+            quick: args.quick,
+            seconds: began.elapsed().as_secs_f64().round(),
+            threads: rayon::current_num_threads(),
+        };
+        result.write(row, &made, &folder)?;
+        let paper = if row.paper.is_empty() { String::new() } else { format!("\n  paper: {}", row.paper) };
+        let _ = write!(stdout, "{}: {}{paper}\n{}", row.name, row.title, result.text());
+        let _ = writeln!(stdout, "  in {} s; written: {}: {TABLE}, {SUMMARY}", made.seconds, folder.display());
+    }
+    Ok(())
+}
+
+/// The rows of these names, all of them if there is none.
+fn rows(names: &[String]) -> Result<Vec<&'static Row>, Failure> {
+    if names.is_empty() {
+        return Ok(ROWS.iter().collect());
+    }
+    let row = |name: &String| {
+        let known = || ROWS.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
+        Row::from_name(name).ok_or_else(|| Failure::input(format!("no experiment is called {name}: there are {}", known())))
+    };
+    names.iter().map(row).collect()
+}
+
+fn create(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| Failure::failed(format!("{}: {e}", folder.display())))
+}
+
+fn failure(row: &Row, error: ExperimentError) -> Failure {
+    Failure::failed(format!("{}: {error}", row.name))
+}

@@ -1,0 +1,132 @@
+//! Whether intervals are what they say: the share of injected values inside the chain's 68 and 95 % intervals, over spot maps and
+//! noise seeds, for each way to judge a reconstruction.
+//!
+//! Orbits are drawn from the very prior that the chain has, so that an exact posterior covers just as often as it says. Left out:
+//! the periodogram's intervals (`examples/calibration.rs`).
+
+use super::case::Case;
+use super::laboratory::{ExperimentError, Laboratory};
+use super::outcome::{Estimate, Outcome};
+use super::report::Report;
+use super::star::{paper, with};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+/// What a reconstruction is judged by.
+const JUDGES: [&str; 2] = ["spottedness", "regularised-likelihood"];
+
+/// Parameters that are sampled.
+const ORBIT: [&str; 3] = ["k_kms", "porb_over_prot", "phi"];
+
+/// Prior of K (km/s), uniform.
+const K_KMS: (f64, f64) = (0.0, 0.2);
+
+/// Prior of Porb/Prot, log-uniform.
+const PERIODS: (f64, f64) = (0.5, 4.0);
+
+/// Periods within this share of the rotation period are near co-rotation.
+const NEAR: f64 = 0.15;
+
+/// Coverage over 20 spot maps, six noise seeds and orbits each.
+pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+    let (maps, seeds) = laboratory.full_or_quick((20u64, 6u64), (1, 2));
+    let stars: Vec<(u64, u64)> = (0..maps).flat_map(|map| (0..seeds).map(move |seed| (map, seed))).collect();
+    let mut columns: Vec<String> = ["map", "seed"].map(str::to_owned).to_vec();
+    columns.extend(ORBIT.map(|name| format!("true_{name}")));
+    let judged = JUDGES.iter().flat_map(|judge| ORBIT.map(|name| (judge, name)));
+    let ends = ["median", "low68", "high68", "low95", "high95"];
+    columns.extend(judged.flat_map(|(judge, name)| ends.map(|end| format!("{judge}_{name}_{end}"))));
+    let mut report = Report::new(columns);
+    let mut by_judge = Vec::new();
+    for judge in JUDGES {
+        let cases: Vec<Case> = stars.iter().map(|&(map, seed)| case(laboratory, judge, map, seed)).collect();
+        by_judge.push(laboratory.outcomes("coverage", &cases)?);
+    }
+    for (k, &(map, seed)) in stars.iter().enumerate() {
+        let mut row = vec![map as f64, seed as f64];
+        row.extend(ORBIT.map(|name| by_judge[0][k].truth[name]));
+        for outcome in by_judge.iter().map(|outcomes| &outcomes[k]) {
+            for name in ORBIT {
+                let one = estimate(outcome, name);
+                row.extend([one.value, one.ci68[0], one.ci68[1], one.ci95[0], one.ci95[1]]);
+            }
+        }
+        report.row(row);
+    }
+    for (judge, outcomes) in JUDGES.iter().zip(&by_judge) {
+        report.number(judge, shares(outcomes));
+    }
+    Ok(report)
+}
+
+fn estimate(outcome: &Outcome, name: &str) -> Estimate {
+    outcome.chain.as_ref().expect("every star has a chain").parameters[name]
+}
+
+/// Shares of the stars inside the intervals, with their binomial errors, for all periods, away from co-rotation and near it.
+fn shares(outcomes: &[Outcome]) -> Value {
+    let is_near = |outcome: &&Outcome| (outcome.truth["porb_over_prot"] - 1.0).abs() < NEAR;
+    let (near, away): (Vec<&Outcome>, Vec<&Outcome>) = outcomes.iter().partition(is_near);
+    let groups = [("all", outcomes.iter().collect()), ("away_from_co_rotation", away), ("near_co_rotation", near)];
+    let of_group = |(group, stars): (&str, Vec<&Outcome>)| {
+        let of_one = |name: &str| {
+            let shares = [("inside_68", 0), ("inside_95", 1)].map(|(level, k)| {
+                let inside = stars.iter().filter(|star| is_inside(star, name, k)).count();
+                (level.to_owned(), json!(share(inside, stars.len())))
+            });
+            (name.to_owned(), Value::Object(shares.into_iter().collect()))
+        };
+        let mut of_all: serde_json::Map<String, Value> = ORBIT.iter().map(|name| of_one(name)).collect();
+        of_all.insert("stars".into(), json!(stars.len()));
+        (group.to_owned(), Value::Object(of_all))
+    };
+    let mut all: serde_json::Map<String, Value> = groups.into_iter().map(of_group).collect();
+    let converged = outcomes.iter().filter(|o| o.chain.as_ref().is_some_and(|chain| chain.note.is_none())).count();
+    all.insert("converged".into(), json!(converged));
+    Value::Object(all)
+}
+
+/// Share and its binomial error.
+fn share(count: usize, of: usize) -> [f64; 2] {
+    let n = of.max(1) as f64;
+    let p = count as f64 / n;
+    [p, (p * (1.0 - p) / n).sqrt()].map(|x| (1000.0 * x).round() / 1000.0)
+}
+
+/// Whether the injected value is inside the interval of 68 (0) or 95 % (1); a phase in any turn.
+fn is_inside(outcome: &Outcome, name: &str, level: usize) -> bool {
+    let one = estimate(outcome, name);
+    let [low, high] = [one.ci68, one.ci95][level];
+    let truth = outcome.truth[name];
+    let turns: &[f64] = if name == "phi" { &[-1.0, 0.0, 1.0] } else { &[0.0] };
+    turns.iter().any(|turn| (low..=high).contains(&(truth + turn)))
+}
+
+/// A star with spots of its map, and orbit and noise of its seed.
+fn case(laboratory: &Laboratory, judge: &str, map: u64, seed: u64) -> Case {
+    let mut rng = ChaCha8Rng::seed_from_u64(map);
+    let mut spot = || {
+        let longitude = rng.random_range(0.0..360.0f64);
+        let latitude = rng.random_range(-0.3f64..1.0).asin().to_degrees();
+        json!([longitude, latitude, rng.random_range(5.0..17.0f64), rng.random_range(0.5..0.92f64)])
+    };
+    let spots: Vec<Value> = (0..12).map(|_| spot()).collect();
+    rng.set_stream(1 + seed);
+    let k_kms = rng.random_range(K_KMS.0..K_KMS.1);
+    let period = rng.random_range(PERIODS.0.ln()..PERIODS.1.ln()).exp();
+    let changes = [
+        ("/observations/simulate/spots", json!(spots)),
+        ("/observations/simulate/seed", json!(1000 * (map + 1) + seed)),
+        ("/planet", json!({ "k_kms": k_kms, "porb_over_prot": period, "phi": rng.random::<f64>() })),
+        ("/imaging/pixels", json!(laboratory.full_or_quick(2000, 800))),
+        ("/imaging/objective", json!(judge)),
+        ("/parameters/k_kms", json!({ "prior": "uniform", "min": K_KMS.0, "max": K_KMS.1 })),
+        ("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": PERIODS.0, "max": PERIODS.1 })),
+        ("/sampler/walkers", json!(10)),
+        ("/sampler/ess", json!(laboratory.full_or_quick(400, 100))),
+        ("/sampler/rhat", json!(laboratory.full_or_quick(1.02, 1.05))),
+    ];
+    let name = format!("{judge}_map_{map}_seed_{seed}");
+    Case { name, config: with(paper(), &changes), grid: None, chain: true, periodogram: None }
+}

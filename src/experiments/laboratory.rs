@@ -1,0 +1,151 @@
+//! Where experiments are run: with what effort, in which folder; and what is done already.
+//!
+//! Every case is a file of its own once it is done, with the config that it was run with. A laboratory that was stopped goes on
+//! with the first case that is not there, or was run with another config or version. Left out: what a case is (`case`).
+
+use super::{Case, Outcome};
+use crate::chain::ChainError;
+use crate::config::ConfigError;
+use crate::comparison::PairError;
+use crate::detection::DetectionError;
+use crate::io::atomic::{WriteError, write_json};
+use crate::objective::ReferenceError;
+use crate::periodogram::FrequencyError;
+use crate::run::RunError;
+use crate::scene::SceneError;
+use crate::search::SearchError;
+use crate::survey::SurveyError;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Runs experiments and keeps what they came to.
+pub struct Laboratory<'a> {
+    /// Folder of the raw results, in a folder for each row.
+    pub folder: PathBuf,
+    /// A reduced version of everything, to see that it works: fewer cases, pixels and draws.
+    pub quick: bool,
+    /// Set from outside to stop.
+    pub stop: &'a AtomicBool,
+    /// Told what is under way.
+    pub report: &'a (dyn Fn(&str) + Sync),
+}
+
+/// Why an experiment came to nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// It was stopped.
+    #[error("interrupted; the same command goes on where it was")]
+    Interrupted,
+    /// A config of an experiment does not resolve: a fault of the program.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Its observations cannot be made: a fault of the program.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// No reference.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    /// No image.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// No landscape.
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
+    /// No chain.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// No summary of it.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// No comparison of the two.
+    #[error(transparent)]
+    Pair(#[from] PairError),
+    /// No trial periods.
+    #[error(transparent)]
+    Frequency(#[from] FrequencyError),
+    /// No periodogram.
+    #[error(transparent)]
+    Detection(#[from] DetectionError),
+    /// A folder that cannot be made.
+    #[error("{}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file that cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// Name of the file of a case that is done.
+const OUTCOME: &str = "outcome.json";
+
+impl Laboratory<'_> {
+    /// What the cases of `row` come to, in order; those that are done are read.
+    ///
+    /// # Errors
+    /// [`ExperimentError`].
+    pub fn outcomes(&self, row: &str, cases: &[Case]) -> Result<Vec<Outcome>, ExperimentError> {
+        let outcome = |(k, case): (usize, &Case)| {
+            (self.report)(&format!("{row}, case {} of {}: {}", k + 1, cases.len(), case.name));
+            self.outcome(row, case)
+        };
+        cases.iter().enumerate().map(outcome).collect()
+    }
+
+    fn outcome(&self, row: &str, case: &Case) -> Result<Outcome, ExperimentError> {
+        let folder = self.folder(&format!("{row}/{}", case.name))?;
+        let path = folder.join(OUTCOME);
+        if let Some(done) = done(&path, case) {
+            return Ok(done);
+        }
+        self.go_on()?;
+        let outcome = case.run(&folder, self.stop)?;
+        write_json(&path, &outcome)?;
+        Ok(outcome)
+    }
+
+    /// A folder for raw results, made if need be.
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn folder(&self, name: &str) -> Result<PathBuf, ExperimentError> {
+        let path = self.folder.join(name);
+        std::fs::create_dir_all(&path).map_err(|source| ExperimentError::Folder { path: path.clone(), source })?;
+        Ok(path)
+    }
+
+    /// Whether to go on.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Interrupted`].
+    pub fn go_on(&self) -> Result<(), ExperimentError> {
+        if self.stop.load(Relaxed) { Err(ExperimentError::Interrupted) } else { Ok(()) }
+    }
+
+    /// The one or the other, as the effort is full or quick.
+    pub fn full_or_quick<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
+
+    /// A few of many cases where it has to be quick.
+    pub fn some<T>(&self, mut all: Vec<T>) -> Vec<T> {
+        if self.quick {
+            let last = all.len() - 1;
+            let mut k = 0;
+            all.retain(|_| {
+                k += 1;
+                k == 1 || k == last + 1
+            });
+        }
+        all
+    }
+}
+
+/// The outcome at `path`, if it is that of the case as it is now.
+fn done(path: &Path, case: &Case) -> Option<Outcome> {
+    let outcome: Outcome = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+    (outcome.config == case.config && outcome.version == env!("CARGO_PKG_VERSION")).then_some(outcome)
+}
