@@ -131,9 +131,9 @@ pub trait Evaluator {
 }
 
 /// Threads of this machine: one reconstruction is serial, a batch is spread over rayon's current pool.
-pub struct Threads<'a, D: LogDensity>(pub &'a D);
+pub struct Threads<'a, D: LogDensity + ?Sized>(pub &'a D);
 
-impl<D: LogDensity> Evaluator for Threads<'_, D> {
+impl<D: LogDensity + ?Sized> Evaluator for Threads<'_, D> {
     fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation> {
         batch.par_iter().with_max_len(1).map(|theta| self.0.evaluate(theta)).collect()
     }

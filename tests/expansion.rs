@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Oracle, imager, json, numbers, oracle, truth};
-use dimcmc::expansion::{Expansion, Nuisance, STELLAR};
+use dimcmc::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
 use dimcmc::imaging::Imager;
 use dimcmc::maxent::SolverSettings;
 use dimcmc::objective::{
@@ -210,4 +210,49 @@ fn co_rotation_hides_a_planet() {
     // photon noise alone scatters the gradient less than the information says
     let eigen = (&expansion.information - &expansion.noise).symmetric_eigenvalues();
     assert!(eigen.min() > -1e-2 * quadratic.information.diagonal().max());
+}
+
+/// Spots left over counted in the posterior: the same at the reference; near it the quadratic with their covariance, to a tenth
+/// of what they change; everywhere a fall, not faster than without them, and one that goes on where the quadratics would have
+/// turned the sum of exact ln L and their difference upwards.
+#[test]
+fn a_posterior_that_counts_spots_left_over() {
+    let oracle = oracle();
+    let imager = imager(&oracle, oracle.grid.clone());
+    let at = truth(&oracle);
+    let reference = Reference::build(&imager, at, 0.97).unwrap();
+    let free = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
+    let space = space(&imager, at, &free);
+    let posterior = Posterior::new(imager.clone(), space, ObjectiveKind::Spottedness, reference);
+    let counted = SpotsCounted::new(&posterior).unwrap();
+    let exact = |values: &ParameterValues| {
+        let theta = [values[Parameter::K], values[Parameter::PorbOverProt], values[Parameter::Phi]];
+        posterior.likelihood(&theta).likelihood.unwrap().log_likelihood
+    };
+    let here = exact(&at);
+    assert!((counted.log_likelihood(&at, here) - here).abs() < 1e-9);
+    let quadratic = |values: &ParameterValues| {
+        counted.expansion().log_likelihood_at(values) - counted.expansion().log_likelihood_at(&at)
+    };
+    let with_k = |k_kms: f64| {
+        let mut values = at;
+        values[Parameter::K] = k_kms;
+        values
+    };
+    for k_kms in [0.08, 0.09, 0.11, 0.12] {
+        let values = with_k(k_kms);
+        let (alone, with) = (exact(&values), counted.log_likelihood(&values, exact(&values)));
+        let (change, expected) = (with - alone, here + quadratic(&values) - alone);
+        assert!((change - expected).abs() < 0.1 * expected.abs().max(0.1), "K = {k_kms}: {change} for {expected}");
+    }
+    let mut last = (here, here);
+    for k_kms in [0.15, 0.25, 0.4, 0.8, 1.5, 3.0] {
+        let values = with_k(k_kms);
+        let alone = exact(&values);
+        let with = counted.log_likelihood(&values, alone);
+        println!("K = {k_kms}: {alone:.2}, spots counted {with:.2}");
+        assert!(with < last.1, "K = {k_kms}: {with} after {}", last.1);
+        assert!(with - here >= alone - here - 0.05 * alone.abs(), "K = {k_kms}: {with} below {alone}");
+        last = (alone, with);
+    }
 }

@@ -57,7 +57,7 @@ impl Failure {
             RunError::Origin(error) => Failure::origin(path, error),
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
-            RunError::PriorStart => Failure::input(format!("{}: {error}", path.display())),
+            RunError::PriorStart | RunError::SpotsLeft => Failure::input(format!("{}: {error}", path.display())),
             RunError::Journal(error) => error.into(),
         }
     }

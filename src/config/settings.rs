@@ -4,7 +4,7 @@ use super::raw_parts::EquivalentWidth;
 use super::{ConfigError, SamplerSettings};
 use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
-use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues};
+use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, SpotsLeft};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
@@ -67,11 +67,14 @@ pub struct ImagingSettings {
     pub chi2_target: f64,
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
+    /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
+    #[serde(skip_serializing_if = "SpotsLeft::is_default")]
+    pub spots_left: SpotsLeft,
 }
 
 impl Default for ImagingSettings {
     fn default() -> Self {
-        ImagingSettings { pixels: 2000, default_spot: 1e-4, chi2_target: 0.97, objective: ObjectiveKind::default() }
+        ImagingSettings { pixels: 2000, default_spot: 1e-4, chi2_target: 0.97, objective: ObjectiveKind::default(), spots_left: SpotsLeft::default() }
     }
 }
 

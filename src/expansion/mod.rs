@@ -5,6 +5,7 @@
 //! every profile: it holds where the map that fits best answers the change of a velocity linearly. Its gradient and
 //! curvature take one preconditioned solve a profile. Left out: orbits (`periodogram`), proposals (`surrogate`).
 
+mod counted;
 mod marginal;
 mod model;
 mod spots;
@@ -16,6 +17,7 @@ use model::DisplacedModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+pub use counted::SpotsCounted;
 pub use marginal::{Nuisance, nuisances};
 pub use spots::SPOTS_LEFT;
 

@@ -80,7 +80,7 @@ impl Case {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             truth: scene.truth.map(|values| by_name(&values)).unwrap_or_default(),
             chi2_target: scene.settings.imaging.chi2_target,
-            lambda_per_datum: reference.solution.image.lambda / data,
+            lambda_data: reference.solution.image.lambda * data,
             spottedness: reference.solution.spottedness,
             search_reconstructions: ends.map(|end| end.evaluations).sum::<usize>() + found.optimum.evaluations,
             search_seconds,

@@ -19,15 +19,16 @@ const AXES: [(&str, f64, f64); 3] = [("k_kms", 0.0, 0.2), ("porb_over_prot", 1.2
 pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let changes = [
         ("/imaging/pixels", json!(laboratory.full_or_quick(20_000, 1000))),
-        ("/sampler/walkers", json!(12)),
-        ("/sampler/ess", json!(laboratory.full_or_quick(1000, 200))),
-        ("/sampler/rhat", json!(laboratory.full_or_quick(1.01, 1.05))),
+        ("/sampler/walkers", json!(8)),
+        // a median is as good as the landscape's at 400 effective draws: to a twentieth of its error bar
+        ("/sampler/ess", json!(laboratory.full_or_quick(400, 200))),
+        ("/sampler/rhat", json!(laboratory.full_or_quick(1.02, 1.05))),
     ];
     let config = with(paper(), &changes);
     let folder = laboratory.folder("R3")?;
     (laboratory.report)("R3: search");
     let (scene, found) = case::search(&config, &folder.join("config.json"))?;
-    let [along, along_slice] = laboratory.full_or_quick([10, 50], [6, 9]);
+    let [along, along_slice] = laboratory.full_or_quick([15, 50], [6, 9]);
     let axis = |&(name, min, max): &(&str, f64, f64), nodes: usize| Axis {
         name: name.to_owned(),
         min,

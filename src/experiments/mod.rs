@@ -13,7 +13,7 @@ mod landscape;
 mod orbits;
 pub mod outcome;
 mod report;
-mod star;
+pub mod star;
 mod stellar;
 
 pub use case::{Case, Nodes};

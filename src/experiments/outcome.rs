@@ -40,8 +40,8 @@ pub struct Outcome {
     pub truth: BTreeMap<String, f64>,
     /// Target chi2 per datum; above the config's where that could not be reached.
     pub chi2_target: f64,
-    /// Multiplier of chi2 / 2 in the image at the best orbit, over the number of data.
-    pub lambda_per_datum: f64,
+    /// Multiplier of chi2 / 2 in the image at the best orbit, times the number of data.
+    pub lambda_data: f64,
     /// Spot coverage of that image.
     pub spottedness: f64,
     /// Reconstructions of the search for it, which grid and chain share.

@@ -1,4 +1,4 @@
-//! The three objectives by name (method section 3).
+//! The three objectives by name (method section 3), and what is known of the spots that a map leaves over.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,5 +25,24 @@ impl ObjectiveKind {
             ObjectiveKind::Entropy => "entropy",
             ObjectiveKind::RegularisedLikelihood => "regularised-likelihood",
         }
+    }
+}
+
+/// What is known of the spots that a map leaves over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpotsLeft {
+    /// As the entropy has them: small and independent. Intervals are too narrow where spots have edges, above all near
+    /// Porb = Prot.
+    #[default]
+    Entropy,
+    /// Their size is fitted to the data, as a jitter's would be, and the chain counts them as noise.
+    Fitted,
+}
+
+impl SpotsLeft {
+    /// Whether it is the default, which configs need not mention.
+    pub fn is_default(&self) -> bool {
+        *self == SpotsLeft::default()
     }
 }

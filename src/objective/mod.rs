@@ -11,7 +11,7 @@ pub mod reference;
 pub mod tradeoff;
 
 pub use coordinates::{FreeParameter, ParameterSpace};
-pub use kind::ObjectiveKind;
+pub use kind::{ObjectiveKind, SpotsLeft};
 pub use parameters::{Parameter, ParameterValues};
 pub use posterior::Posterior;
 pub use prior::Prior;

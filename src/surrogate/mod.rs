@@ -61,17 +61,20 @@ impl Surrogate {
     /// Around `reference`; `None` where the space is not one that it is made for (K or phi fixed), or the likelihood has no
     /// maximum to second order.
     pub fn new(imager: &Imager, space: &ParameterSpace, reference: &Reference) -> Option<Self> {
-        let is_free = |p: Parameter| space.free().iter().any(|f| f.parameter == p);
-        if !(is_free(Parameter::K) && is_free(Parameter::Phi)) {
+        if !is_orbit_free(space) {
             return None;
         }
-        let stellar: Vec<Parameter> = STELLAR.into_iter().filter(|&p| is_free(p)).collect();
+        let is_free = |p: &Parameter| space.free().iter().any(|f| f.parameter == *p);
+        let stellar: Vec<Parameter> = STELLAR.into_iter().filter(is_free).collect();
         Surrogate::of_expansion(&Expansion::of(imager, reference, &stellar), space, imager)
     }
 
-    /// Of an expansion whose stellar coordinates are those that `space` leaves free, as K and phi are; `None` where the
+    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where K or phi is fixed, or the
     /// likelihood has no maximum.
     pub fn of_expansion(expansion: &Expansion, space: &ParameterSpace, imager: &Imager) -> Option<Self> {
+        if !is_orbit_free(space) {
+            return None;
+        }
         let model = LinearModel::new(expansion, space, imager.mid_cycle());
         Surrogate::of(model, space.clone(), imager.time_base_cycles(), 1.0)
     }
@@ -161,4 +164,9 @@ impl Surrogate {
         };
         chosen.filter_map(peak).collect()
     }
+}
+
+/// Whether K and phi are free.
+fn is_orbit_free(space: &ParameterSpace) -> bool {
+    [Parameter::K, Parameter::Phi].iter().all(|p| space.free().iter().any(|f| f.parameter == *p))
 }

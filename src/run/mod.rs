@@ -1,26 +1,23 @@
 //! A sampling run: start, chain on disk; begun afresh or resumed to the same bytes.
 //!
-//! Left out: the search before it (`search`), how progress is shown, and the analysis of the chain (`chain`).
+//! `target` is what is sampled, `start` where the walkers begin. Left out: the search before it (`search`), how progress is shown, and the analysis of the chain (`chain`).
+
+mod start;
+mod target;
 
 use crate::chain::{Chain, Convergence, Goals, ParameterKind, Record};
-use crate::ensemble::{
-    self, EnsembleError, Positions, RunError as StepError, Sampler, StartDraw, StopPolicy, StopReason, draw_start,
-    start_numbers,
-};
+use crate::ensemble::{self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason};
 use crate::io::atomic::WriteError;
 use crate::io::journal::{Journal, JournalError};
-use crate::log_density::{Evaluation, LogDensity, Threads};
+use crate::log_density::Threads;
 use crate::manifest::{Manifest, kinds_and_goals};
-use crate::objective::Posterior;
-use crate::optimise::Optimum;
 use crate::origin::{Origin, OriginError};
 use crate::scene::Scene;
 use crate::search::Found;
 use crate::surrogate::{Surrogate, SurrogateMove};
-use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::AtomicBool;
+use target::Target;
 
 /// Name of the chain in a run's folder.
 pub const CHAIN: &str = "chain.jsonl";
@@ -39,27 +36,17 @@ pub enum StartFrom {
     Prior,
 }
 
-/// Starts are wider than the curvature by this factor, so that R-hat can tell whether the chain has forgotten them.
-const OVERDISPERSION: f64 = 1.5;
-
-/// Draws from the surrogate tried for one walker.
-const DRAW_TRIES: usize = 3;
-
-/// Draws from the prior tried for one walker.
-const PRIOR_TRIES: usize = 100;
-
 /// A run with its chain so far.
 pub struct Run {
     /// Where it is kept.
     pub folder: PathBuf,
     /// What it was begun with.
     pub manifest: Manifest,
-    /// The posterior that is sampled.
-    pub posterior: Posterior,
     /// The chain so far.
     pub chain: Chain,
     /// Reconstructions before its first step: to fit and try the surrogate, and for the start.
     pub preparation: usize,
+    target: Target,
     kinds: Vec<ParameterKind>,
     policy: StopPolicy,
     settings: ensemble::SamplerSettings,
@@ -76,9 +63,15 @@ pub enum RunError {
     Ensemble(#[from] EnsembleError),
     /// A walker found no place in the prior where a reconstruction succeeds.
     #[error(
-        "start from the prior: no reconstruction succeeds at {PRIOR_TRIES} draws; narrow the priors under `parameters`"
+        "start from the prior: no reconstruction succeeds at {} draws; narrow the priors under `parameters`",
+        start::PRIOR_TRIES
     )]
     PriorStart,
+    /// The spots left over have no size that fits.
+    #[error(
+        "imaging.spots_left: no size of the spots left over fits the data; \"entropy\" takes them as the entropy has them"
+    )]
+    SpotsLeft,
     /// What the run was begun with is missing, wrong, or not what is there now.
     #[error(transparent)]
     Origin(#[from] OriginError),
@@ -110,17 +103,17 @@ impl Run {
     pub fn begin(scene: &Scene, folder: &Path, found: Found, from: StartFrom, replace: bool) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
         let needed = from == StartFrom::Optimum || scene.settings.sampler.moves.surrogate > 0.0;
-        let counted = Counted::new(&found.posterior);
-        let surrogate = if needed { surrogate(&counted) } else { None };
+        let target = Target::new(found.posterior.clone(), scene.settings.imaging.spots_left)?;
+        let surrogate = if needed { target.surrogate() } else { None };
         let start = match from {
             StartFrom::Optimum => {
-                let drawn = surrogate.as_ref().and_then(|(s, _)| from_surrogate(s, &counted, scene));
-                drawn.map_or_else(|| around_maxima(&found, scene), Ok)?
+                let drawn = surrogate.as_ref().and_then(|(s, _)| start::from_surrogate(s, &target, scene));
+                drawn.map_or_else(|| start::around_maxima(&found, &target, scene), Ok)?
             }
-            StartFrom::Prior => over_prior(&counted, scene)?,
+            StartFrom::Prior => start::over_prior(&target, scene)?,
         };
-        let preparation = counted.evaluations.into_inner();
-        let first = first_step(scene, &found.posterior, &start)?;
+        let preparation = target.evaluations();
+        let first = first_step(scene, &target, &start)?;
         let manifest = manifest(scene, &found, start);
         std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
         // the chain first: whoever holds it may write the manifest
@@ -134,7 +127,7 @@ impl Run {
         let mut chain = Chain::new(manifest.shape());
         journal.append(&first)?;
         chain.push_step(&first)?;
-        let run = Run::new(scene, folder, manifest, found.posterior, surrogate, (journal, chain));
+        let run = Run::new(scene, folder, manifest, target, surrogate, (journal, chain));
         Ok(Run { preparation, ..run })
     }
 
@@ -147,8 +140,9 @@ impl Run {
         manifest.origin.check(scene, folder)?;
         let (mut journal, mut chain) = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
         let posterior = manifest.origin.posterior(scene, scene.space.clone(), folder)?;
+        let target = Target::new(posterior, scene.settings.imaging.spots_left)?;
         if chain.steps() == 0 {
-            let first = first_step(scene, &posterior, &manifest.start)?;
+            let first = first_step(scene, &target, &manifest.start)?;
             journal.append(&first)?;
             chain.push_step(&first)?;
         }
@@ -156,10 +150,9 @@ impl Run {
         if manifest.update(&scene.settings, extend.map(|steps| last_step + steps)) {
             manifest.write(folder)?;
         }
-        let counted = Counted::new(&posterior);
-        let surrogate = if scene.settings.sampler.moves.surrogate > 0.0 { surrogate(&counted) } else { None };
-        let preparation = counted.evaluations.into_inner();
-        let run = Run::new(scene, folder, manifest, posterior, surrogate, (journal, chain));
+        let surrogate = if scene.settings.sampler.moves.surrogate > 0.0 { target.surrogate() } else { None };
+        let preparation = target.evaluations();
+        let run = Run::new(scene, folder, manifest, target, surrogate, (journal, chain));
         Ok(Run { preparation, ..run })
     }
 
@@ -168,7 +161,7 @@ impl Run {
         scene: &Scene,
         folder: &Path,
         manifest: Manifest,
-        posterior: Posterior,
+        target: Target,
         surrogate: Option<(Surrogate, f64)>,
         (journal, chain): (Journal, Chain),
     ) -> Self {
@@ -179,7 +172,7 @@ impl Run {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        Run { folder: folder.into(), policy, manifest, posterior, chain, preparation: 0, kinds, settings, surrogate, journal }
+        Run { folder: folder.into(), policy, manifest, target, chain, preparation: 0, kinds, settings, surrogate, journal }
     }
 
     /// The step at which the run ends if its goals are not reached before.
@@ -201,9 +194,9 @@ impl Run {
         stop: &AtomicBool,
         mut on_step: impl FnMut(&[Record], Option<&Convergence>),
     ) -> Result<StopReason, RunError> {
-        let Run { posterior, chain, kinds, policy, settings, surrogate, journal, .. } = self;
-        let evaluator = Threads(&*posterior);
-        let mut sampler = Sampler::new(&*posterior, &evaluator, settings)?;
+        let Run { target, chain, kinds, policy, settings, surrogate, journal, .. } = self;
+        let evaluator = Threads(&*target);
+        let mut sampler = Sampler::new(&*target, &evaluator, settings)?;
         if let Some((surrogate, acceptance)) = surrogate {
             let weight = settings.moves.surrogate * acceptance.powi(2);
             sampler = sampler.with_move(weight, Box::new(SurrogateMove(surrogate.clone())));
@@ -218,49 +211,6 @@ impl Run {
             StepError::Chain(error) => error.into(),
             StepError::Callback(error) => error.into(),
         })
-    }
-}
-
-/// The surrogate of the posterior, if there is one, and the share of its proposals accepted on trial: a function of the
-/// posterior alone, so that a resumed run has the same.
-fn surrogate(counted: &Counted) -> Option<(Surrogate, f64)> {
-    let posterior = counted.posterior;
-    let expansion = Surrogate::new(posterior.imager(), posterior.space(), posterior.reference())?;
-    Some(expansion.fitted(counted, &Threads(counted)))
-}
-
-/// The posterior with a count of its evaluations.
-struct Counted<'a> {
-    posterior: &'a Posterior,
-    evaluations: AtomicUsize,
-}
-
-impl<'a> Counted<'a> {
-    fn new(posterior: &'a Posterior) -> Self {
-        Counted { posterior, evaluations: AtomicUsize::new(0) }
-    }
-}
-
-impl LogDensity for Counted<'_> {
-    fn names(&self) -> &[String] {
-        self.posterior.names()
-    }
-
-    fn evaluate(&self, theta: &[f64]) -> Evaluation {
-        self.evaluations.fetch_add(1, Relaxed);
-        self.posterior.evaluate(theta)
-    }
-
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
-        self.posterior.to_internal(theta)
-    }
-
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
-        self.posterior.to_written(internal)
-    }
-
-    fn log_jacobian(&self, theta: &[f64]) -> f64 {
-        self.posterior.log_jacobian(theta)
     }
 }
 
@@ -281,67 +231,7 @@ fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
 }
 
 /// The walkers at step 0, evaluated; refused here, before anything is written, if they are no start.
-fn first_step(scene: &Scene, posterior: &Posterior, start: &Positions) -> Result<Vec<Record>, RunError> {
-    let evaluator = Threads(posterior);
-    Ok(Sampler::new(posterior, &evaluator, &scene.settings.sampler)?.start(start)?.1)
-}
-
-/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these deserve;
-/// `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.
-fn from_surrogate(surrogate: &Surrogate, posterior: &Counted, scene: &Scene) -> Option<Positions> {
-    let wide = surrogate.tempered(OVERDISPERSION.powi(2))?;
-    let draw = |rng: &mut ChaCha8Rng| Some(posterior.to_written(&wide.draw(rng)?));
-    reconstructed(posterior, scene, DRAW_TRIES, draw)
-}
-
-/// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of them
-/// and half around all in turn, another one for each ensemble: that walkers can hop between them, and that R-hat tells if
-/// they do not.
-fn around_maxima(found: &Found, scene: &Scene) -> Result<Positions, RunError> {
-    let sampler = &scene.settings.sampler;
-    let maxima: Vec<&Optimum> = std::iter::once(&found.optimum).chain(found.rivals()).collect();
-    let draw = |(m, maximum): (usize, &&Optimum)| {
-        let draw = StartDraw {
-            centre: &maximum.theta,
-            covariance: &maximum.covariance,
-            scale: OVERDISPERSION,
-            ensembles: sampler.ensembles,
-            walkers: sampler.walkers,
-            seed: sampler.seed.wrapping_add(m as u64),
-        };
-        draw_start(&found.posterior, &draw, &|theta| scene.space.log_prior(theta).is_finite())
-    };
-    let around: Result<Vec<Positions>, _> = maxima.iter().enumerate().map(draw).collect();
-    let around = match around {
-        // data so weak that the curvature is wider than the prior
-        Err(EnsembleError::StartOutside { .. }) => return over_prior(&Counted::new(&found.posterior), scene),
-        around => around?,
-    };
-    let choose = |e: usize, w: usize| if w.is_multiple_of(2) { e % maxima.len() } else { (w / 2) % maxima.len() };
-    let walker = |e: usize, w: usize| around[choose(e, w)][e][w].clone();
-    Ok((0..sampler.ensembles).map(|e| (0..sampler.walkers).map(|w| walker(e, w)).collect()).collect())
-}
-
-/// Draws from the prior at which the reconstruction succeeds.
-fn over_prior(posterior: &Counted, scene: &Scene) -> Result<Positions, RunError> {
-    let draw = |rng: &mut ChaCha8Rng| Some(scene.space.sample_prior(rng));
-    reconstructed(posterior, scene, PRIOR_TRIES, draw).ok_or(RunError::PriorStart)
-}
-
-/// The first of so many draws, for each walker, at which the reconstruction succeeds; `None` if a walker finds none.
-fn reconstructed(
-    posterior: &Counted,
-    scene: &Scene,
-    tries: usize,
-    draw: impl Fn(&mut ChaCha8Rng) -> Option<Vec<f64>> + Sync,
-) -> Option<Positions> {
-    let sampler = &scene.settings.sampler;
-    let walker = |index: usize| {
-        let mut rng = start_numbers(sampler.seed, index / sampler.walkers, index % sampler.walkers);
-        let mut draws = (0..tries).filter_map(|_| draw(&mut rng));
-        draws.find(|theta| posterior.evaluate(theta).log_prob.is_finite())
-    };
-    let walkers = 0..sampler.ensembles * sampler.walkers;
-    let positions: Vec<Vec<f64>> = walkers.into_par_iter().with_max_len(1).map(walker).collect::<Option<_>>()?;
-    Some(positions.chunks(sampler.walkers).map(<[_]>::to_vec).collect())
+fn first_step(scene: &Scene, target: &Target, start: &Positions) -> Result<Vec<Record>, RunError> {
+    let evaluator = Threads(target);
+    Ok(Sampler::new(target, &evaluator, &scene.settings.sampler)?.start(start)?.1)
 }

@@ -1,0 +1,116 @@
+//! The experiments: what must come out whatever the paper says, each test named after the mistake that it would catch; and the
+//! command on a row of them.
+
+#[allow(dead_code)]
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::{dimcmc, text};
+use dimcmc::experiments::{Case, Nodes, Outcome, ROWS, star};
+use serde_json::{Value, json};
+use std::sync::atomic::AtomicBool;
+
+/// Injected orbit: no two numbers alike, phi far from its mirror image and from half a turn.
+const ORBIT: [(&str, f64); 3] = [("k_kms", 0.12), ("porb_over_prot", 1.6), ("phi", 0.2)];
+
+/// The paper's star with that orbit on few pixels; landscape and periodogram.
+fn outcome(changes: &[(&str, Value)]) -> Outcome {
+    let orbit = ORBIT.map(|(name, value)| (name, json!(value)));
+    let own = [
+        ("/planet", Value::Object(orbit.iter().map(|(name, value)| (name.to_string(), value.clone())).collect())),
+        ("/imaging/pixels", json!(1500)),
+        ("/parameters/porb_over_prot/min", json!(1.2)),
+        ("/parameters/porb_over_prot/max", json!(2.2)),
+    ];
+    let config = star::with(star::with(star::paper(), &own), changes);
+    let case = Case { name: "test".into(), config, grid: Some(Nodes::Around(5)), chain: false, periodogram: Some(1000) };
+    let folder = tempfile::tempdir().unwrap();
+    case.run(folder.path(), &AtomicBool::new(false)).unwrap()
+}
+
+/// Deviation of every route from the injected value, in its error bars.
+fn deviations(outcome: &Outcome, name: &str) -> Vec<(&'static str, f64)> {
+    let of_route = |(route, found): (&'static str, &dimcmc::experiments::Route)| {
+        let estimate = found.parameters.get(name).unwrap_or_else(|| panic!("{route}: {:?}", found.note));
+        (route, outcome.deviation(name, estimate).unwrap() / estimate.error())
+    };
+    outcome.routes().map(of_route).collect()
+}
+
+/// Three error bars: wrong by chance once in 400 times, and the seeds are fixed.
+fn assert_recovered(outcome: &Outcome, name: &str) {
+    for (route, deviation) in deviations(outcome, name) {
+        println!("{name} by {route}: {deviation:+.2} error bars");
+        assert!(deviation.abs() < 3.0, "{name} by {route} is {deviation:+.2} error bars off");
+    }
+}
+
+/// With the sign of K wrong phi would come out half a turn off: 12 error bars.
+#[test]
+fn k_has_the_right_sign_and_phi_the_right_zero_point() {
+    let outcome = outcome(&[]);
+    for (name, _) in ORBIT {
+        assert_recovered(&outcome, name);
+    }
+    let phi = outcome.grid.as_ref().unwrap().parameters["phi"];
+    assert!(phi.error() < 0.05, "too uncertain for the test: {}", phi.error());
+}
+
+/// A phase that were counted in rotations, or from mid-time, would move when the epoch does: here by 0.39 of a turn.
+#[test]
+fn phi_is_counted_in_orbital_cycles_from_the_epoch() {
+    let cycles: Vec<f64> = (0..50).map(|k| 5.0 + 0.06 * f64::from(k)).collect();
+    let outcome = outcome(&[("/observations/simulate/cycles", json!(cycles))]);
+    assert_recovered(&outcome, "phi");
+    assert_recovered(&outcome, "porb_over_prot");
+}
+
+/// The landscape's nodes are laid out as the table says: the best node is the injected orbit, not one with axes exchanged.
+#[test]
+fn axes_are_not_swapped() {
+    let config = star::with(star::paper(), &[("/imaging/pixels", json!(1500))]);
+    let at = Nodes::At([(0.06, 0.14, 3), (1.5, 1.9, 3), (0.4, 0.6, 3)]);
+    let case = Case { name: "axes".into(), config, grid: Some(at), chain: false, periodogram: None };
+    let folder = tempfile::tempdir().unwrap();
+    case.run(folder.path(), &AtomicBool::new(false)).unwrap();
+    let text = std::fs::read_to_string(folder.path().join("grid/landscape.jsonl")).unwrap();
+    let nodes: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let height = |node: &Value| node["log_likelihood"].as_f64().unwrap_or(f64::NEG_INFINITY);
+    let best = nodes.iter().max_by(|a, b| height(a).total_cmp(&height(b))).unwrap();
+    let place = ["k_kms", "porb_over_prot", "phi"].map(|name| best[name].as_f64().unwrap());
+    assert_eq!(place, [0.1, 1.7, 0.5]);
+}
+
+/// At half the signal-to-noise ratio the error bars are twice as wide, whatever the spots: a chi2 that were scaled, or counted
+/// twice, would show. To 15 %, because fewer spots are seen in more noise.
+#[test]
+fn chi2_has_its_scale() {
+    let error = |snr: f64| {
+        let outcome = outcome(&[("/observations/simulate/snr", json!(snr))]);
+        outcome.routes().map(|(_, route)| route.parameters["k_kms"].error()).collect::<Vec<f64>>()
+    };
+    for (good, poor) in error(1000.0).iter().zip(error(500.0)) {
+        println!("{good} {poor}");
+        assert!((poor / good - 2.0).abs() < 0.3, "{good} and {poor}");
+    }
+}
+
+#[test]
+fn a_row_is_done_once_and_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |more: &[&str]| dimcmc(&[&["reproduce", "r1", "--quick"], more].concat(), folder.path());
+    let first = run(&[]);
+    assert!(first.status.success(), "{}", text(&first.stderr));
+    let table = folder.path().join("runs/quick/R1/table.csv");
+    let written = std::fs::read_to_string(&table).unwrap();
+    assert_eq!(written.lines().count(), 51, "a line a profile");
+    let again = run(&[]);
+    assert!(text(&again.stdout).contains("done before"));
+    assert!(run(&["--force"]).status.success());
+    assert_eq!(std::fs::read_to_string(&table).unwrap(), written, "the same bytes");
+    let list = text(&dimcmc(&["reproduce", "--list"], folder.path()).stdout);
+    assert!(ROWS.iter().all(|row| list.contains(row.name)), "{list}");
+    let wrong = dimcmc(&["reproduce", "R99"], folder.path());
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("R99"));
+}
