@@ -9,6 +9,9 @@ use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::{Estimate, Outcome};
 use super::report::Report;
 use super::star::{paper, with};
+use crate::config;
+use crate::objective::Reference;
+use crate::scene::Scene;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -35,6 +38,9 @@ const K_KMS: (f64, f64) = (0.03, 0.2);
 /// Prior of Porb/Prot, log-uniform.
 const PERIODS: (f64, f64) = (0.5, 4.0);
 
+/// A chi2 per datum that no image comes down to.
+const OUT_OF_REACH: f64 = 0.5;
+
 /// Periods within this share of the rotation period are near co-rotation.
 const NEAR: f64 = 0.15;
 
@@ -49,8 +55,24 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
     columns.extend(judged.flat_map(|(judge, name)| ends.map(|end| format!("{}_{name}_{end}", judge.name))));
     let mut report = Report::new(columns);
     let mut by_judge = Vec::new();
+    (laboratory.report)("coverage: targets");
+    let configs = stars.iter().map(|&(map, seed)| star(laboratory, map, seed));
+    let configs: Vec<Value> = configs.collect::<Result<_, _>>()?;
     for judge in &JUDGES {
-        let cases: Vec<Case> = stars.iter().map(|&(map, seed)| case(laboratory, judge, map, seed)).collect();
+        let case = |((map, seed), config): (&(u64, u64), &Value)| Case {
+            name: format!("{}_map_{map}_seed_{seed}", judge.name),
+            config: with(
+                config.clone(),
+                &[
+                    ("/imaging/objective", json!(judge.objective)),
+                    ("/imaging/spots_left", json!(judge.spots_left)),
+                ],
+            ),
+            grid: None,
+            chain: true,
+            periodogram: None,
+        };
+        let cases: Vec<Case> = stars.iter().zip(&configs).map(case).collect();
         by_judge.push(laboratory.outcomes("coverage", &cases)?);
     }
     for (k, &(map, seed)) in stars.iter().enumerate() {
@@ -113,8 +135,10 @@ fn is_inside(outcome: &Outcome, name: &str, level: usize) -> bool {
     turns.iter().any(|turn| (low..=high).contains(&(truth + turn)))
 }
 
-/// A star with spots of its map, and orbit and noise of its seed.
-fn case(laboratory: &Laboratory, judge: &Judge, map: u64, seed: u64) -> Case {
+/// A star with spots of its map, and orbit and noise of its seed. Its target is the chi2 of the image at the weight of the
+/// entropy that the paper's star has at 0.97: how far down a noise realisation lets chi2 come is up to it, and a target near the
+/// floor would make noise of the spots.
+fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, ExperimentError> {
     let mut rng = ChaCha8Rng::seed_from_u64(map);
     let mut spot = || {
         let longitude = rng.random_range(0.0..360.0f64);
@@ -130,14 +154,16 @@ fn case(laboratory: &Laboratory, judge: &Judge, map: u64, seed: u64) -> Case {
         ("/observations/simulate/seed", json!(1000 * (map + 1) + seed)),
         ("/planet", json!({ "k_kms": k_kms, "porb_over_prot": period, "phi": rng.random::<f64>() })),
         ("/imaging/pixels", json!(laboratory.full_or_quick(2000, 800))),
-        ("/imaging/objective", json!(judge.objective)),
-        ("/imaging/spots_left", json!(judge.spots_left)),
         ("/parameters/k_kms", json!({ "prior": "uniform", "min": K_KMS.0, "max": K_KMS.1 })),
         ("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": PERIODS.0, "max": PERIODS.1 })),
         ("/sampler/walkers", json!(10)),
         ("/sampler/ess", json!(laboratory.full_or_quick(200, 100))),
         ("/sampler/rhat", json!(laboratory.full_or_quick(1.05, 1.1))),
     ];
-    let name = format!("{}_map_{map}_seed_{seed}", judge.name);
-    Case { name, config: with(paper(), &changes), grid: None, chain: true, periodogram: None }
+    let config = with(paper(), &changes);
+    let scene = Scene::new(config::from_json(config.to_string().as_bytes(), &laboratory.folder.join("config.json"))?)?;
+    // a target out of reach: the image ends at the largest weight of chi2 that a first image may have
+    let image = Reference::provisional(&scene.imager, scene.settings.values, OUT_OF_REACH)?;
+    let chi2 = image.solution.chi2 / scene.imager.data.depth.len() as f64;
+    Ok(with(config, &[("/imaging/chi2_target", json!((1e4 * chi2).round() / 1e4))]))
 }
