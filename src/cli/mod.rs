@@ -5,6 +5,7 @@
 
 mod analyse;
 mod compare;
+mod export;
 mod failure;
 mod grid;
 mod map;
@@ -56,6 +57,7 @@ enum Command {
     #[command(alias = "analyze")]
     Analyse(analyse::Args),
     Compare(compare::Args),
+    Export(export::Args),
 }
 
 /// Runs the command.
@@ -75,6 +77,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Sample(args) => sample::run(args, &cli.global),
         Command::Analyse(args) => analyse::run(args, &cli.global),
         Command::Compare(args) => compare::run(args, &cli.global),
+        Command::Export(args) => export::run(args, &cli.global),
     }
 }
 
