@@ -64,8 +64,8 @@ impl Contents {
         let path = run.join(CHAIN);
         let chain = journal::read(&path, &manifest.shape())?;
         let (kinds, goals) = kinds_and_goals(&settings);
-        let summary = summarise(&chain, &kinds, &goals)
-            .map_err(|source| ExportError::Chain { path: path.clone(), source })?;
+        let summary =
+            summarise(&chain, &kinds, &goals).map_err(|source| ExportError::Chain { path: path.clone(), source })?;
         let quantity = |(free, kind): (&FreeParameter, &crate::chain::ParameterKind)| {
             let name = free.parameter.name();
             let periodic = *kind == crate::chain::ParameterKind::Periodic;

@@ -20,8 +20,10 @@ pub fn write(contents: &Contents, file: &Path) -> Result<(), WriteError> {
     let mut table = Table::new(&columns);
     for record in contents.chain.records() {
         let warmup = record.step < contents.summary.discarded_steps;
-        let place = [record.ensemble.to_string(), record.step.to_string(), record.walker.to_string(), warmup.to_string()];
-        let values = record.theta.iter().chain([&record.log_prob, &record.spottedness, &record.chi2]).map(f64::to_string);
+        let place =
+            [record.ensemble.to_string(), record.step.to_string(), record.walker.to_string(), warmup.to_string()];
+        let values =
+            record.theta.iter().chain([&record.log_prob, &record.spottedness, &record.chi2]).map(f64::to_string);
         let outcome = [
             record.accepted.to_string(),
             word(&record.status),

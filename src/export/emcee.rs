@@ -24,17 +24,25 @@ const EMCEE: &str = "3.1.6";
 /// What the blobs are.
 const BLOBS: [&str; 2] = ["spottedness", "chi2"];
 
-/// Writes the file.
+/// Whether there is anything to write.
 ///
 /// # Errors
-/// A chain that is only its start, a file that cannot be written.
-pub fn write(contents: &Contents, file: &Path) -> Result<(), ExportError> {
-    if contents.chain.steps() < 2 {
-        return Err(ExportError::OnlyStart { path: contents.path.clone() });
+/// [`ExportError::OnlyStart`].
+pub fn check(contents: &Contents) -> Result<(), ExportError> {
+    match contents.chain.steps() {
+        0 | 1 => Err(ExportError::OnlyStart { path: contents.path.clone() }),
+        _ => Ok(()),
     }
+}
+
+/// Writes the file, of a chain of two steps or more.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(contents: &Contents, file: &Path) -> Result<(), WriteError> {
     let bytes = encode(contents)
         .map_err(|error| WriteError { path: file.into(), source: std::io::Error::other(error.to_string()) })?;
-    Ok(atomic::write(file, &bytes)?)
+    atomic::write(file, &bytes)
 }
 
 /// The bytes of the file.

@@ -41,19 +41,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// All of them.
-    pub const ALL: [Format; 4] = [Format::Zarr, Format::Emcee, Format::Getdist, Format::Csv];
-
-    /// The name that it is asked for by.
-    pub fn name(self) -> &'static str {
-        match self {
-            Format::Zarr => "zarr",
-            Format::Emcee => "emcee",
-            Format::Getdist => "getdist",
-            Format::Csv => "csv",
-        }
-    }
-
     /// Where an export goes if nothing else is said: into the run's folder, beside the chain.
     pub fn place(self, run: &Path) -> PathBuf {
         run.join(match self {
@@ -108,7 +95,7 @@ pub enum ExportError {
 /// # Errors
 /// [`ExportError`].
 pub fn write(contents: &Contents, format: Format, out: &Path, replace: bool) -> Result<Vec<PathBuf>, ExportError> {
-    check(format, contents.chain.shape().ensembles, out, replace)?;
+    check(contents, format, out, replace)?;
     place::create_parent(out)?;
     match format {
         Format::Zarr => zarr::write(contents, out)?,
@@ -119,11 +106,12 @@ pub fn write(contents: &Contents, format: Format, out: &Path, replace: bool) -> 
     Ok(targets(format, contents.chain.shape().ensembles, out))
 }
 
-/// Whether an export of so many ensembles may go to `out`.
-///
-/// # Errors
-/// [`ExportError::Place`].
-pub fn check(format: Format, ensembles: usize, out: &Path, replace: bool) -> Result<(), ExportError> {
+/// Whether the chain can be exported so, and the export may go to `out`.
+fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Result<(), ExportError> {
+    let ensembles = contents.chain.shape().ensembles;
+    if format == Format::Emcee {
+        emcee::check(contents)?;
+    }
     place::check_name(out)?;
     match format {
         Format::Zarr => place::check_folder(out, replace, &zarr::is_own),

@@ -66,7 +66,7 @@ fn attributes(contents: &Contents) -> Attributes {
         ("creation_library_language", json!("Rust")),
         ("walkers", json!(contents.chain.shape().walkers)),
         ("discarded_steps", json!(contents.summary.discarded_steps)),
-        ("converged", json!(contents.summary.converged.to_string())),
+        ("converged", json!(u8::from(contents.summary.converged))),
         ("seed", json!(contents.seed.to_string())),
         ("priors", json!(contents.priors())),
         ("data_sha256", json!(contents.data_sha256)),
@@ -164,10 +164,8 @@ fn group(contents: &Contents, draws: &Draws, mut arrays: Vec<Array>) -> Group {
     arrays.push(coordinate("draw", "draw", (0..length as i64).collect(), "draw of the ensemble"));
     arrays.push(coordinate("step", "draw", of_first(|record| record.step), "step of the draw"));
     arrays.push(coordinate("walker", "draw", of_first(|record| record.walker), "walker of the draw"));
-    let attributes = some_attributes([
-        (LIBRARY, json!(PROGRAM)),
-        ("inference_library_version", json!(contents.version)),
-    ]);
+    let attributes =
+        some_attributes([(LIBRARY, json!(PROGRAM)), ("inference_library_version", json!(contents.version))]);
     Group { attributes, groups: Vec::new(), arrays }
 }
 

@@ -136,9 +136,10 @@ fn write_members(folder: &Path, group: &Group, path: &str, nodes: &mut Nodes) ->
         write_node(&folder.join(name), &node)?;
         nodes.0.push((format!("{path}{name}"), json!(node)));
     }
-    group.groups.iter().try_for_each(|(name, inner)| {
-        write_members(&folder.join(name), inner, &format!("{path}{name}/"), nodes)
-    })
+    group
+        .groups
+        .iter()
+        .try_for_each(|(name, inner)| write_members(&folder.join(name), inner, &format!("{path}{name}/"), nodes))
 }
 
 fn write_array(folder: &Path, array: &Array) -> std::io::Result<Value> {
