@@ -234,6 +234,8 @@ fn the_same_bytes_again_and_nothing_overwritten() {
     let message = desk.refusal(&["export", "run", "--format", "zarr", "--out", CONFIG, "--force"]);
     says(&message, &["config.json: is there already, and no earlier export"]);
     for format in ["csv", "emcee"] {
+        let message = desk.refusal(&["export", "run", "--format", format, "--out", "run/chain.jsonl", "--force"]);
+        says(&message, &["run/chain.jsonl: is there already, and no earlier export"]);
         let message = desk.refusal(&["export", "run", "--format", format, "--out", "mine", "--force"]);
         says(&message, &["mine: is a folder"]);
         let message = desk.refusal(&["export", "run", "--format", format, "--out", "config.json/x", "--force"]);

@@ -4,19 +4,27 @@
 //! not unwrapped. `move` is empty at step 0.
 
 use super::Contents;
+use super::place::begins_with;
 use crate::io::atomic::{self, WriteError};
 use crate::io::csv::Table;
 use serde::Serialize;
 use std::path::Path;
+
+/// Columns before the parameters.
+const FIRST: [&str; 4] = ["ensemble", "step", "walker", "warmup"];
+
+/// Whether the file may be an earlier export: whether its columns begin so.
+pub fn is_own(file: &Path) -> bool {
+    begins_with(file, FIRST.join(",").as_bytes())
+}
 
 /// Writes the file.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write(contents: &Contents, file: &Path) -> Result<(), WriteError> {
-    let before = ["ensemble", "step", "walker", "warmup"];
     let after = ["log_prob", "spottedness", "chi2", "accepted", "status", "move", "proposed", "passes"];
-    let columns: Vec<&str> = before.into_iter().chain(contents.names()).chain(after).collect();
+    let columns: Vec<&str> = FIRST.into_iter().chain(contents.names()).chain(after).collect();
     let mut table = Table::new(&columns);
     for record in contents.chain.records() {
         let warmup = record.step < contents.summary.discarded_steps;

@@ -10,6 +10,7 @@
 //! Besides emcee's own attributes there are names, units, priors and injected values. Left out: `random_state_N`, for this
 //! program's random numbers have no state that emcee could go on with (its backend then gives None).
 
+use super::place::begins_with;
 use super::{Contents, ExportError};
 use crate::io::atomic::{self, WriteError};
 use hdf5_writer::{AttributeBuilder, DatasetBuilder, Hdf5Builder, WriteOptions};
@@ -33,6 +34,11 @@ pub fn check(contents: &Contents) -> Result<(), ExportError> {
         0 | 1 => Err(ExportError::OnlyStart { path: contents.path.clone() }),
         _ => Ok(()),
     }
+}
+
+/// Whether the file may be an earlier export: whether it is HDF5.
+pub fn is_own(file: &Path) -> bool {
+    begins_with(file, b"\x89HDF\r\n\x1a\n")
 }
 
 /// Writes the file, of a chain of two steps or more.

@@ -116,10 +116,12 @@ fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Resu
     match format {
         Format::Zarr => place::check_folder(out, replace, &zarr::is_own),
         Format::Getdist => {
-            place::check_files(&targets(format, ensembles, out), replace)?;
+            // by their names they can be nothing else
+            place::check_files(&targets(format, ensembles, out), replace, &|_| true)?;
             getdist::check_strangers(out, ensembles)
         }
-        Format::Emcee | Format::Csv => place::check_files(&targets(format, ensembles, out), replace),
+        Format::Emcee => place::check_files(&targets(format, ensembles, out), replace, &emcee::is_own),
+        Format::Csv => place::check_files(&targets(format, ensembles, out), replace, &csv::is_own),
     }
 }
 
