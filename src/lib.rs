@@ -22,7 +22,7 @@
 //!
 //! [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
 //! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
-//! what they were begun with.
+//! what they were begun with; [`export`] writes a chain for other programs.
 //! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
 //! of the star.
 //!
@@ -48,6 +48,7 @@ pub mod detection;
 pub mod ensemble;
 pub mod expansion;
 pub mod experiments;
+pub mod export;
 pub mod fit;
 pub mod imaging;
 pub mod io;

@@ -22,7 +22,7 @@ const LAYERS: &[&[&str]] = &[
     &["origin"],
     &["manifest", "survey", "optimum"],
     &["run"],
-    &["comparison"],
+    &["comparison", "export"],
     &["experiments"],
 ];
 
@@ -42,6 +42,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("periodogram", &["velocities"]),
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),
+    ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
 ];
 
 struct Source {

@@ -2,6 +2,7 @@
 
 use dimcmc::comparison::PairError;
 use dimcmc::config::ConfigError;
+use dimcmc::export::ExportError;
 use dimcmc::io::atomic::WriteError;
 use dimcmc::io::journal::JournalError;
 use dimcmc::io::lsd::LsdError;
@@ -119,6 +120,15 @@ impl From<WriteError> for Failure {
 impl From<JournalError> for Failure {
     fn from(error: JournalError) -> Self {
         Failure::input(error)
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        match error {
+            ExportError::Write(error) => error.into(),
+            error => Failure::input(error),
+        }
     }
 }
 

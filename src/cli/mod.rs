@@ -5,6 +5,7 @@
 
 mod analyse;
 mod compare;
+mod export;
 mod failure;
 mod grid;
 mod map;
@@ -58,6 +59,7 @@ enum Command {
     Analyse(analyse::Args),
     Compare(compare::Args),
     Reproduce(reproduce::Args),
+    Export(export::Args),
 }
 
 /// Runs the command.
@@ -78,6 +80,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Analyse(args) => analyse::run(args, &cli.global),
         Command::Compare(args) => compare::run(args, &cli.global),
         Command::Reproduce(args) => reproduce::run(args, &cli.global),
+        Command::Export(args) => export::run(args, &cli.global),
     }
 }
 

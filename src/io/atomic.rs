@@ -1,4 +1,4 @@
-//! Files that are either there whole or not at all: written beside their place, then renamed.
+//! Files and folders that are either there whole or not at all: written beside their place, then renamed.
 
 use serde::Serialize;
 use std::fs::File;
@@ -20,10 +20,7 @@ pub struct WriteError {
 /// # Errors
 /// A folder that is not there or cannot be written to, a full disc.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.tmp", std::process::id()));
-    let temporary = path.with_file_name(name);
+    let temporary = beside(path, "tmp");
     let written = File::create(&temporary)
         .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
         .and_then(|()| std::fs::rename(&temporary, path));
@@ -32,6 +29,35 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
         let _ = std::fs::remove_file(&temporary);
         WriteError { path: path.into(), source }
     })
+}
+
+/// Writes a folder: `fill` makes it, under the name it is given. A folder that is at `path` already is replaced, whatever is in
+/// it; between two renames it is missing.
+///
+/// # Errors
+/// Those of `fill`, and as [`write()`].
+pub fn write_folder(path: &Path, fill: &dyn Fn(&Path) -> std::io::Result<()>) -> Result<(), WriteError> {
+    let (temporary, old) = (beside(path, "tmp"), beside(path, "old"));
+    let replace = || match path.symlink_metadata() {
+        Ok(_) => {
+            std::fs::rename(path, &old)?;
+            std::fs::rename(&temporary, path).inspect_err(|_| drop(std::fs::rename(&old, path)))?;
+            std::fs::remove_dir_all(&old)
+        }
+        Err(_) => std::fs::rename(&temporary, path),
+    };
+    fill(&temporary).and_then(|()| replace()).map_err(|source| {
+        let _ = std::fs::remove_dir_all(&temporary);
+        WriteError { path: path.into(), source }
+    })
+}
+
+/// A hidden name beside `path` that no other process uses.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.{ending}", std::process::id()));
+    path.with_file_name(name)
 }
 
 /// Writes `value` as indented JSON; what is not a finite number becomes null.

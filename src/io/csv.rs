@@ -1,6 +1,6 @@
-//! Tables of numbers as comma-separated text. Floats are written so that they read back exactly.
+//! Tables as comma-separated text. Floats are written so that they read back exactly.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
 /// A table under construction.
 #[derive(Clone, Debug)]
@@ -17,12 +17,19 @@ impl Table {
 
     /// Adds a row; one number a column.
     pub fn row(&mut self, numbers: &[f64]) {
-        assert_eq!(numbers.len(), self.columns, "one number a column");
-        for (k, number) in numbers.iter().enumerate() {
-            let comma = if k == 0 { "" } else { "," };
+        self.cells(numbers.iter());
+    }
+
+    /// Adds a row of numbers and plain words, one cell a column; nothing in them is quoted.
+    pub fn cells<C: Display>(&mut self, cells: impl IntoIterator<Item = C>) {
+        let mut count = 0;
+        for cell in cells {
+            let comma = if count == 0 { "" } else { "," };
             // Writing to a String cannot fail.
-            let _ = write!(self.text, "{comma}{number}");
+            let _ = write!(self.text, "{comma}{cell}");
+            count += 1;
         }
+        assert_eq!(count, self.columns, "one cell a column");
         self.text.push('\n');
     }
 

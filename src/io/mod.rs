@@ -1,4 +1,4 @@
-//! Files in and out: LSD profiles, the journals of chains and landscapes, maps, exports. No decisions are taken here.
+//! Files in and out: LSD profiles, the journals of chains and landscapes, maps, tables, Zarr stores. No decisions are taken here.
 
 pub mod atomic;
 pub mod csv;
@@ -11,3 +11,4 @@ pub mod paraboloid;
 pub mod periodogram;
 pub mod provenance;
 pub mod truth;
+pub mod zarr;

@@ -53,6 +53,31 @@ impl Parameter {
         }
     }
 
+    /// Unit of its values; `1` for a ratio.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Parameter::K | Parameter::Vsini | Parameter::Vsys => "km/s",
+            Parameter::PorbOverProt => "1",
+            Parameter::Phi => "cycles",
+            Parameter::OmegaEq | Parameter::DOmega => "rad/d",
+            Parameter::Inclination => "deg",
+        }
+    }
+
+    /// Its symbol, in LaTeX without dollars.
+    pub fn latex(self) -> &'static str {
+        match self {
+            Parameter::K => "K",
+            Parameter::PorbOverProt => r"P_\mathrm{orb}/P_\mathrm{rot}",
+            Parameter::Phi => r"\phi",
+            Parameter::OmegaEq => r"\Omega_\mathrm{eq}",
+            Parameter::DOmega => r"\mathrm{d}\Omega",
+            Parameter::Inclination => "i",
+            Parameter::Vsini => r"v \sin i",
+            Parameter::Vsys => r"v_\mathrm{sys}",
+        }
+    }
+
     /// Whether it belongs to the planet's orbit.
     pub fn is_orbital(self) -> bool {
         matches!(self, Parameter::K | Parameter::PorbOverProt | Parameter::Phi)

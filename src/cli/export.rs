@@ -1,0 +1,58 @@
+//! `dimcmc export`: a run's chain for other programs.
+
+use super::{Failure, Global};
+use dimcmc::export::{self, Contents};
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Write a run's chain for other programs
+///
+/// Without --out it goes beside the chain in the run's folder: chain.zarr, chain.h5, chain.csv, or chain_1.txt,
+/// chain.paramnames, ... The warm-up is told apart as `analyse` does it. A run may be exported while it grows.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc export runs/demo --format zarr\n  \
+                        dimcmc export runs/demo --format getdist --out getdist/demo")]
+pub struct Args {
+    /// Folder of the run
+    run: PathBuf,
+    /// For which program
+    #[arg(long, value_enum)]
+    format: Format,
+    /// File (emcee, csv), folder (zarr) or beginning of the names of files (getdist)
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
+    /// Replace an earlier export
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Format {
+    /// xarray and ArviZ: a Zarr store, a chain an ensemble
+    Zarr,
+    /// emcee's HDF5 backend: all walkers side by side
+    Emcee,
+    /// GetDist: a text file an ensemble, names and ranges
+    Getdist,
+    /// pandas and others: a row a line of the chain
+    Csv,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let format = match args.format {
+        Format::Zarr => export::Format::Zarr,
+        Format::Emcee => export::Format::Emcee,
+        Format::Getdist => export::Format::Getdist,
+        Format::Csv => export::Format::Csv,
+    };
+    let out = args.out.clone().unwrap_or_else(|| format.place(&args.run));
+    let contents = Contents::read(&args.run)?;
+    let written = export::write(&contents, format, &out, args.force)?;
+    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    let _ = writeln!(std::io::stdout(), "written: {}", names.join(", "));
+    if !contents.summary.converged {
+        let _ = writeln!(std::io::stdout(), "note: the chain has not converged, `dimcmc analyse` says what to do");
+    }
+    Ok(())
+}
