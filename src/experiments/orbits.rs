@@ -3,7 +3,7 @@
 //! The orbit is looked for at periods within a factor of 1.4 of the injected one, as the paper's grids did (1.2 to 2.2 for 1.7);
 //! the periodogram searches all periods, and so do all routes where there is no planet. Left out: other parameters (`stellar`).
 
-use super::case::{Case, Nodes};
+use super::case::{Case, Nodes, search};
 use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::Outcome;
 use super::report::{Panel, Report, Series};
@@ -238,15 +238,26 @@ pub(super) fn targets(laboratory: &Laboratory) -> Result<Report, ExperimentError
     tabulated(laboratory, "R8", &["chi2_target", "seed"], all.map(star).collect())
 }
 
-/// R9.
+/// R9. Once with the projected velocity as it is, as a line's width gives it, and once with the equatorial velocity kept, so that
+/// vsini goes with the inclination.
 pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
-    let star = |&assumed: &f64| {
-        let changes =
-            [("/observations/simulate/truth/inclination_deg", json!(38.0)), ("/star/inclination_deg", json!(assumed))];
-        star(laboratory, &[("assumed_deg", assumed)], PLANET, &changes)
+    const TRUE_DEG: f64 = 38.0;
+    const VSINI_KMS: f64 = 40.0;
+    let star = |(assumed, equatorial): (f64, bool)| {
+        let ratio = assumed.to_radians().sin() / TRUE_DEG.to_radians().sin();
+        let mut changes =
+            vec![("/observations/simulate/truth/inclination_deg", json!(TRUE_DEG)), ("/star/inclination_deg", json!(assumed))];
+        if equatorial {
+            changes.push(("/observations/simulate/truth/vsini_kms", json!(VSINI_KMS)));
+            changes.push(("/star/vsini_kms", json!(VSINI_KMS * ratio)));
+        }
+        let varied = [("assumed_deg", assumed), ("equatorial_velocity_kept", f64::from(u8::from(equatorial)))];
+        star(laboratory, &varied, PLANET, &changes)
     };
-    let all = [33.0, 35.0, 37.0, 38.0, 39.0, 41.0, 43.0];
-    tabulated(laboratory, "R9", &["assumed_deg"], all.iter().map(star).collect())
+    let projected = [33.0, 35.0, 37.0, 38.0, 39.0, 41.0, 43.0].map(|assumed| (assumed, false));
+    let equatorial = [33.0, 36.0, 40.0, 43.0].map(|assumed| (assumed, true));
+    let names = ["assumed_deg", "equatorial_velocity_kept"];
+    tabulated(laboratory, "R9", &names, projected.into_iter().chain(equatorial).map(star).collect())
 }
 
 /// Shear of the star, and of the model.
@@ -263,10 +274,29 @@ pub(super) fn shear_modelled(laboratory: &Laboratory) -> Result<Report, Experime
     tabulated(laboratory, "R10", &["gamma"], stars.collect())
 }
 
-/// R11.
+/// R11. Once with the rotation of the equator, and once with the solid rotation that fits the profiles best, as an observer would
+/// take it who knows of no shear.
 pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
-    let stars = (0..=6).map(|k| f64::from(4 * k) / 1000.0).map(|gamma| sheared(laboratory, gamma, 0.0));
-    tabulated(laboratory, "R11", &["gamma"], stars.collect())
+    let mut stars = Vec::new();
+    for gamma in (0..=6).map(|k| f64::from(4 * k) / 1000.0) {
+        stars.push(Varied { values: vec![gamma, 0.0], ..sheared(laboratory, gamma, 0.0) });
+    }
+    let gammas = laboratory.full_or_quick(&[0.004, 0.008, 0.012, 0.016, 0.02][..], &[0.012]);
+    for &gamma in gammas {
+        laboratory.go_on()?;
+        (laboratory.report)(&format!("R11, gamma {gamma}: solid rotation that fits best"));
+        let mut star = sheared(laboratory, gamma, 0.0);
+        let prior = json!({ "prior": "uniform", "min": 2.0, "max": 2.2 });
+        let injected = ("/observations/simulate/truth/omega_eq_rad_d", json!(TAU / ROTATION_PERIOD_D));
+        let free = with(star.case.config.clone(), &[injected.clone(), ("/parameters/omega_eq_rad_d", prior)]);
+        let (scene, found) = search(&free, &laboratory.folder.join("config.json"))?;
+        let index = scene.space.names().iter().position(|name| name == "omega_eq_rad_d").expect("it is free");
+        let omega = rounded(found.optimum.theta[index], 7);
+        star.case.name += "_rotation_fitted";
+        star.case.config = with(star.case.config, &[injected, ("/star/omega_eq_rad_d", json!(omega))]);
+        stars.push(Varied { values: vec![gamma, 1.0], ..star });
+    }
+    tabulated(laboratory, "R11", &["gamma", "rotation_fitted"], stars)
 }
 
 /// K = 100 m/s at the rotation period, the same number of profiles over more and more rotations, for several noise seeds.
