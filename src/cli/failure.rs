@@ -5,8 +5,10 @@ use dimcmc::config::ConfigError;
 use dimcmc::io::atomic::WriteError;
 use dimcmc::io::journal::JournalError;
 use dimcmc::io::lsd::LsdError;
+use dimcmc::io::zdipy::ZdipyError;
 use dimcmc::objective::ReferenceError;
 use dimcmc::origin::OriginError;
+use dimcmc::proposal::ProposalError;
 use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
 use dimcmc::search::SearchError;
@@ -124,6 +126,18 @@ impl From<JournalError> for Failure {
 
 impl From<PairError> for Failure {
     fn from(error: PairError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<ProposalError> for Failure {
+    fn from(error: ProposalError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<ZdipyError> for Failure {
+    fn from(error: ZdipyError) -> Self {
         Failure::input(error)
     }
 }

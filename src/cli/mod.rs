@@ -7,6 +7,8 @@ mod analyse;
 mod compare;
 mod failure;
 mod grid;
+mod import;
+mod init;
 mod map;
 mod optimise;
 mod output;
@@ -46,6 +48,8 @@ pub struct Global {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::Args),
+    Import(import::Args),
     Simulate(simulate::Args),
     Map(map::Args),
     Periodogram(periodogram::Args),
@@ -67,6 +71,8 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
             .map_err(|e| Failure::failed(format!("--threads {threads}: {e}")))?;
     }
     match &cli.command {
+        Command::Init(args) => init::run(args, &cli.global),
+        Command::Import(args) => import::run(args, &cli.global),
         Command::Simulate(args) => simulate::run(args),
         Command::Map(args) => map::run(args, &cli.global),
         Command::Periodogram(args) => periodogram::run(args, &cli.global),

@@ -11,3 +11,4 @@ pub mod paraboloid;
 pub mod periodogram;
 pub mod provenance;
 pub mod truth;
+pub mod zdipy;
