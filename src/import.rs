@@ -28,7 +28,9 @@ pub struct Import {
 
 /// Why there is none.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{place}: profile {file}: the list of profiles cannot hold a path with a blank or a # in it: write the config elsewhere")]
+#[error(
+    "{place}: profile {file}: the list of profiles cannot hold a path with a blank or a # in it: write the config elsewhere"
+)]
 pub struct ImportError {
     place: String,
     file: String,
@@ -143,7 +145,9 @@ fn list(input: &Input, folder: &Path) -> Result<String, ImportError> {
 
 fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
     let mut row = |line: usize, what: String, why: &str| rows.push([place(&input.path, line), what, why.to_owned()]);
-    if let Some(Field { value: (mass, radius), line }) = input.mass_radius.filter(|f| f.value.0 > 0.0 && f.value.1 > 0.0) {
+    if let Some(Field { value: (mass, radius), line }) =
+        input.mass_radius.filter(|f| f.value.0 > 0.0 && f.value.1 > 0.0)
+    {
         row(line, format!("mass {mass}, radius {radius}"), "the star is a sphere here");
     }
     match input.target.value {
@@ -151,7 +155,11 @@ fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
             row(input.target.line, format!("target entropy {entropy}"), "a map goes to a target chi2 here");
         }
         Target::Chi2(target) if !input.brightness.value => {
-            row(input.target.line, format!("target chi^2 {target}"), "is for the magnetic field, the brightness is not fitted");
+            row(
+                input.target.line,
+                format!("target chi^2 {target}"),
+                "is for the magnetic field, the brightness is not fitted",
+            );
         }
         Target::Chi2(_) => {}
     }
@@ -176,7 +184,11 @@ fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
         }
     }
     if input.brightness.value && input.brightness_start.value {
-        row(input.brightness_start.line, "start from a brightness map".into(), "a map does not depend on where it starts here");
+        row(
+            input.brightness_start.line,
+            "start from a brightness map".into(),
+            "a map does not depend on where it starts here",
+        );
     }
 }
 
@@ -186,7 +198,10 @@ fn leave_out_of_line(line: &LocalLineFile, measured_strength: bool, rows: &mut V
         row(format!("line depth {}", line.depth), "the strength is measured on the profiles, as there");
     }
     if line.lorentz > 0.0 {
-        row(format!("Lorentzian width {}", line.lorentz), "the line is the Gaussian of the same width at half depth here");
+        row(
+            format!("Lorentzian width {}", line.lorentz),
+            "the line is the Gaussian of the same width at half depth here",
+        );
     }
     row(format!("Lande factor {}", line.lande), "Stokes V is not modelled here");
     if line.gravity_darkening != 0.0 {

@@ -11,15 +11,15 @@ const LAYERS: &[&[&str]] = &[
     &["units", "text", "vector", "velocities", "log_density"],
     &["observation"],
     &["star", "maxent", "chain", "landscape", "periodogram"],
-    &["imaging", "ensemble", "optimise"],
+    &["imaging", "ensemble", "optimise", "first_look"],
     &["objective"],
     &["expansion"],
     &["surrogate"],
     &["simulate", "fit", "detection"],
     &["io"],
     &["config"],
-    &["scene", "search"],
-    &["origin"],
+    &["scene", "search", "proposal"],
+    &["origin", "import"],
     &["manifest", "survey", "optimum"],
     &["run"],
     &["comparison"],
@@ -41,6 +41,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("periodogram", &["velocities"]),
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),
+    ("first_look", &["observation", "star"]),
 ];
 
 struct Source {

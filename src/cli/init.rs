@@ -14,7 +14,9 @@ use std::path::{Path, PathBuf};
 /// given by options or assumed; a list says which is which. The rotation period cannot be assumed: without it the config holds a
 /// null in its place, and no other command takes it. Then tries out whether a map can be made of it all.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out demo.json")]
+#[command(
+    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out demo.json"
+)]
 pub struct Args {
     /// List of the profiles: file, time in days, and perhaps the velocity (km/s) to be subtracted, a line
     observations: PathBuf,

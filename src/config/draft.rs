@@ -177,7 +177,8 @@ mod tests {
     #[test]
     fn what_fits_stands_on_one_line() {
         let long = "x".repeat(100);
-        let value = serde_json::json!({ "a": { "b": [1, 2], "c": "{" }, "d": [], "e": { "f": long, "g": { "h": null } } });
+        let value =
+            serde_json::json!({ "a": { "b": [1, 2], "c": "{" }, "d": [], "e": { "f": long, "g": { "h": null } } });
         let text = compact(&serde_json::to_string_pretty(&value).unwrap());
         let expected = format!(
             "{{\n  \"a\": {{ \"b\": [1, 2], \"c\": \"{{\" }},\n  \"d\": [],\n  \"e\": {{\n    \"f\": \"{long}\",\n    \

@@ -102,7 +102,8 @@ impl Proposal {
         let shown = |source: Source| self.entries.iter().filter(move |entry| entry.source == source);
         let mut ordered: Vec<&Entry> = Source::ALL.into_iter().flat_map(shown).collect();
         ordered.sort_by_key(|entry| (entry.source as usize, entry.section()));
-        let cells = |entry: &&Entry| vec![entry.key.into(), entry.value.clone(), entry.unit.into(), entry.remark.clone()];
+        let cells =
+            |entry: &&Entry| vec![entry.key.into(), entry.value.clone(), entry.unit.into(), entry.remark.clone()];
         let rows: Vec<Vec<String>> = ordered.iter().map(cells).collect();
         let table = columns(&rows, &[Align::Left, Align::Right, Align::Left, Align::Left]);
         let mut text = format!("{}\n", self.observed);

@@ -120,7 +120,8 @@ pub fn propose(place: &Place, known: &Known) -> Result<Proposal, ProposalError> 
     let mut ledger = Ledger::default();
     let look = |error| ProposalError::Look { list: place.list.into(), error };
     let values = Values::measure(&whole, known, &mut ledger).map_err(look)?;
-    let cut = read(&ReadOptions { velocity_range_kms: Some(values.velocity_range_kms), sigma_scale: 1.0 })?.observations;
+    let cut =
+        read(&ReadOptions { velocity_range_kms: Some(values.velocity_range_kms), sigma_scale: 1.0 })?.observations;
     let mut draft = values.draft(&cut, known, &mut ledger);
     draft.observations.clone_from(&place.list_in_config);
     draft.schema.clone_from(&place.schema);

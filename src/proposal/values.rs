@@ -5,7 +5,7 @@ use super::{Given, Known};
 use crate::config::{Draft, EquivalentWidth, ImagingSettings};
 use crate::first_look::{FirstLook, LineModel, LookError};
 use crate::observation::Observations;
-use crate::periodogram::{FrequencySettings, Frequencies};
+use crate::periodogram::{Frequencies, FrequencySettings};
 use crate::units::instrumental_sigma_kms;
 
 /// What is assumed where nobody says otherwise.
@@ -35,6 +35,10 @@ const VSYS_REACH: (f64, f64) = (6.0, 0.5);
 
 /// Given and measured vsini that differ by more than that many errors are worth a note.
 const DISAGREEMENT: f64 = 3.0;
+
+/// Differential rotation of the Sun (rad/d), and the angle (rad) between equator and pole from which a map shows it.
+const SOLAR_DOMEGA_RAD_D: f64 = 0.055;
+const SHEAR_RAD: f64 = 0.2;
 
 /// What is needed before the velocity range is cut.
 pub(super) struct Values {
@@ -179,7 +183,13 @@ impl Values {
         let (centre, reach) = (self.look.unspotted.centre_kms, (errors * self.look.centre_error_kms).max(least));
         let min = rounded(vsys_kms.min(centre) - reach, 1);
         let max = rounded(vsys_kms.max(centre) + reach, 1);
-        ledger.note("parameters.vsys_kms", format!("{min} to {max}"), "km/s", Source::Data, "uniform; around the centre");
+        ledger.note(
+            "parameters.vsys_kms",
+            format!("{min} to {max}"),
+            "km/s",
+            Source::Data,
+            "uniform; around the centre",
+        );
         (min, max)
     }
 
@@ -196,14 +206,24 @@ impl Values {
         )
     }
 
-    /// Given values that the profiles do not agree with.
+    /// Given values that the profiles do not agree with, and an assumed one that matters.
     pub fn notes(&self, known: &Known) -> Vec<String> {
         let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
         let disagrees = |given: &&Given<f64>| (given.value - measured).abs() > DISAGREEMENT * error;
         let vsini = known.vsini_kms.as_ref().filter(disagrees).map(|given| {
             format!("vsini is given as {} km/s, the mean profile looks like {measured:.1} +- {error:.1}", given.value)
         });
-        vsini.into_iter().collect()
+        let days = self.look.span_d.1 - self.look.span_d.0;
+        let shear = SOLAR_DOMEGA_RAD_D * days;
+        let rigid = known.domega_rad_d.is_none() && shear > SHEAR_RAD;
+        let domega = rigid.then(|| {
+            format!(
+                "in {days:.1} d the equator of a star like the Sun gains {:.0} degrees on its poles: give --domega, or a prior of \
+                 domega_rad_d",
+                shear.to_degrees()
+            )
+        });
+        vsini.into_iter().chain(domega).collect()
     }
 }
 
@@ -219,7 +239,9 @@ fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> E
     let value = known.equivalent_width.as_ref().map_or(EquivalentWidth::Auto, |given| given.value);
     let (source, by) = origin(&known.equivalent_width, "");
     let (shown, unit, remark) = match value {
-        EquivalentWidth::Auto => ("auto".to_owned(), "", [by, auto].join(if source == Source::Given { "; " } else { "" })),
+        EquivalentWidth::Auto => {
+            ("auto".to_owned(), "", [by, auto].join(if source == Source::Given { "; " } else { "" }))
+        }
         EquivalentWidth::Fixed(width) => (width.to_string(), "km/s", format!("{by}; the profiles have {auto}")),
     };
     ledger.note("star.line.equivalent_width_kms", shown, unit, source, remark);
@@ -264,7 +286,7 @@ fn rounded(value: f64, decimals: usize) -> f64 {
 /// Two digits of a positive number, the last by `round`.
 pub(super) fn significant(value: f64, round: impl Fn(f64) -> f64) -> f64 {
     let exponent = value.log10().floor() as i32 - 1;
-    let digits = round(value / 10f64.powi(exponent) * (1.0 + 1e-12 * (round(0.5) - 0.5).signum()) );
+    let digits = round(value / 10f64.powi(exponent) * (1.0 + 1e-12 * (round(0.5) - 0.5).signum()));
     format!("{digits}e{exponent}").parse().unwrap_or(value)
 }
 

@@ -134,7 +134,7 @@ impl Input {
     /// Reads the file at `path`.
     ///
     /// # Errors
-    /// A file that cannot be read or ends too early, or a line that makes no sense.
+    /// A file that cannot be read or ends too early, or a line that makes no sense or names a profile that is not there.
     pub fn read(path: &Path) -> Result<Self, ZdipyError> {
         let text = read_text(path)?;
         let mut rows = Rows::new(path, &text);
@@ -223,7 +223,12 @@ fn velocity_range(row: &Row) -> Result<Field<(f64, f64)>, ZdipyError> {
 
 fn profiles(mut rows: Rows, path: &Path) -> Result<Vec<ListedProfile>, ZdipyError> {
     let mut profiles = Vec::new();
+    let folder = path.parent().unwrap_or(Path::new(""));
     while let Some(row) = rows.another() {
+        let profile = folder.join(row.text(0, "file name")?);
+        if let Err(problem) = std::fs::File::open(&profile) {
+            return Err(row.fault(format!("cannot read profile {}: {problem}", profile.display())));
+        }
         profiles.push(ListedProfile {
             line: row.line,
             file: row.text(0, "file name")?.to_owned(),
