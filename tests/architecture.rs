@@ -18,9 +18,9 @@ const LAYERS: &[&[&str]] = &[
     &["simulate", "fit", "detection"],
     &["io"],
     &["config"],
-    &["scene", "search", "proposal"],
-    &["origin", "import"],
-    &["manifest", "survey", "optimum"],
+    &["scene", "search"],
+    &["origin", "proposal"],
+    &["manifest", "survey", "optimum", "import"],
     &["run"],
     &["comparison"],
 ];

@@ -51,11 +51,11 @@ pub struct Draft {
     pub sigma_scale: f64,
     /// The image.
     pub imaging: ImagingSettings,
-    /// Start of the orbital period, over the rotation period.
-    pub porb_over_prot: f64,
+    /// Starts of the orbit: semi-amplitude (km/s), 0 for no planet; period over the rotation period; phase.
+    pub orbit: (f64, f64, f64),
     /// Bounds of its prior, uniform in the logarithm.
     pub porb_over_prot_range: (f64, f64),
-    /// Upper bound of the prior of K (km/s), uniform from 0. The start is K = 0: no planet.
+    /// Upper bound of the prior of K (km/s), uniform from 0.
     pub k_max_kms: f64,
     /// Bounds of the prior of the systemic velocity (km/s), uniform.
     pub vsys_range_kms: (f64, f64),
@@ -88,7 +88,7 @@ impl Draft {
             schema: self.schema.clone(),
             star: self.star(),
             instrument: Instrument { resolving_power: Some(self.resolving_power) },
-            planet: Planet { k_kms: 0.0, porb_over_prot: self.porb_over_prot, phi: 0.0 },
+            planet: Planet { k_kms: self.orbit.0, porb_over_prot: self.orbit.1, phi: self.orbit.2 },
             observations: ObservationsSection {
                 path: Some(self.observations.clone()),
                 velocity_range_kms: Some(self.velocity_range_kms.into()),

@@ -47,7 +47,7 @@ pub struct Entry {
 impl Entry {
     /// Where its section stands in a config.
     fn section(&self) -> usize {
-        const SECTIONS: [&str; 5] = ["star", "instrument", "observations", "imaging", "parameters"];
+        const SECTIONS: [&str; 6] = ["star", "instrument", "planet", "observations", "imaging", "parameters"];
         let section = self.key.split('.').next();
         SECTIONS.iter().position(|name| section == Some(name)).unwrap_or(SECTIONS.len())
     }

@@ -16,7 +16,6 @@ use crate::first_look::LookError;
 use crate::io::lsd::{self, LsdError, ReadOptions};
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
-use trial::Outcome;
 use values::Values;
 
 /// A value with who gave it: an option, or a line of a file.
@@ -125,19 +124,20 @@ pub fn propose(place: &Place, known: &Known) -> Result<Proposal, ProposalError> 
     let mut draft = values.draft(&cut, known, &mut ledger);
     draft.observations.clone_from(&place.list_in_config);
     draft.schema.clone_from(&place.schema);
-    let outcome = trial::run(&mut draft, place.config, &cut, known.sigma_scale.is_some())?;
+    let trial = trial::run(&mut draft, place.config, &cut, known.sigma_scale.is_some())?;
     let mut notes = values.notes(known);
-    notes.extend(outcome.notes(values.look.noise.quoted, &draft));
-    if let Outcome::Scaled { .. } = outcome {
+    notes.extend(trial.notes(values.look.noise.quoted, &draft));
+    if trial.floor_scale.is_some() {
         let remark = "so that a map reaches the target chi2, see the note";
         ledger.replace("observations.sigma_scale", draft.sigma_scale, remark);
     }
+    values::note_orbit(&draft, trial.orbit && trial.is_complete(), &mut ledger);
     Ok(Proposal {
         json: to_json(&draft, place.config)?,
         observed: values.observed(&whole),
         entries: ledger.entries,
         notes,
-        complete: outcome.is_complete(),
+        complete: trial.is_complete(),
     })
 }
 

@@ -1,11 +1,13 @@
-//! Tries a draft out: whether a map reaches its target chi2, and by how much the errors promise too much if none does.
+//! Tries a draft out: whether a map reaches its target chi2, without a planet or with the best orbit that a search finds, and by
+//! how much the errors promise too much if none does.
 
-use super::values::significant;
+use super::values::{rounded, significant};
 use super::{ProposalError, to_json};
 use crate::config::{self, Draft};
-use crate::imaging::Imager;
-use crate::objective::{Reference, ReferenceError};
+use crate::objective::{Parameter, Reference, ReferenceError};
 use crate::observation::Observations;
+use crate::scene::Scene;
+use crate::search::{self, SearchError, SearchSettings};
 use std::path::Path;
 
 /// Stands in for a rotation period that is still to be given, so that everything else is checked (d).
@@ -17,9 +19,23 @@ const CLEARANCE: f64 = 1.2;
 /// Most rounds of scaling and trying again; it takes one or two.
 const ROUNDS: usize = 4;
 
+/// More of a star is hardly ever spotted in a maximum-entropy map.
+const MANY_SPOTS: f64 = 0.25;
+
 /// What became of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Outcome {
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Trial {
+    /// How it ended.
+    pub end: End,
+    /// Factor on the errors as quoted at which the best fit just reaches the target, if they had to be scaled for it.
+    pub floor_scale: Option<f64>,
+    /// Whether the start is an orbit, since there is no fit without one.
+    pub orbit: bool,
+}
+
+/// How it ended.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum End {
     /// It was not tried: there is no rotation period.
     Untried,
     /// A map reaches the target.
@@ -27,96 +43,115 @@ pub(super) enum Outcome {
         /// How much of the star is spotted then.
         spottedness: f64,
     },
-    /// One does with errors scaled anew.
-    Scaled {
-        /// How much of the star is spotted then.
-        spottedness: f64,
-        /// Factor on the errors as quoted at which the best fit just reaches the target.
-        floor_scale: f64,
-    },
-    /// None does, and none will.
-    Failed(ReferenceError),
+    /// None does, and none will: why.
+    Failed(String),
 }
 
-/// Tries `draft` on `cut`, the profiles within its velocity range with errors as quoted, and scales its errors where need be,
-/// unless they are the user's own.
+/// Tries `draft` on `cut`, the profiles within its velocity range with errors as quoted. Changes the draft's start where only an
+/// orbit makes a map fit, and scales its errors where nothing does, unless they are the user's own.
 pub(super) fn run(
     draft: &mut Draft,
     config: &Path,
     cut: &Observations,
     scale_is_given: bool,
-) -> Result<Outcome, ProposalError> {
+) -> Result<Trial, ProposalError> {
+    let mut trial = Trial { end: End::Untried, floor_scale: None, orbit: false };
     if draft.rotation_period_d.is_none() {
-        reference(&Draft { rotation_period_d: Some(STAND_IN_D), ..draft.clone() }, config, None)?;
-        return Ok(Outcome::Untried);
+        scene(&Draft { rotation_period_d: Some(STAND_IN_D), ..draft.clone() }, config, cut)?;
+        return Ok(trial);
     }
-    let (mut last, mut floor_scale) = (Outcome::Untried, None);
+    let without_planet = draft.clone();
     for _ in 0..ROUNDS {
-        last = match reference(draft, config, Some(cut))? {
-            None => Outcome::Untried,
-            Some(Ok(reference)) => {
-                let spottedness = reference.solution.spottedness;
-                return Ok(match floor_scale {
-                    None => Outcome::Reached { spottedness },
-                    Some(floor_scale) => Outcome::Scaled { spottedness, floor_scale },
-                });
+        *draft = Draft { sigma_scale: draft.sigma_scale, ..without_planet.clone() };
+        let mut reached = reach(draft, config, cut)?;
+        trial.orbit = matches!(reached, Err(ReferenceError::TargetBelowFloor { .. }));
+        if trial.orbit {
+            reached = match search(draft, config, cut)? {
+                Ok(()) => reach(draft, config, cut)?,
+                Err(SearchError::Reference(error)) => Err(error),
+                // what matters is that there is no map
+                Err(SearchError::Optimise(_)) => reached,
+            };
+        }
+        match reached {
+            Ok(spottedness) => {
+                trial.end = End::Reached { spottedness };
+                return Ok(trial);
             }
-            Some(Err(error)) => Outcome::Failed(error),
-        };
-        match last {
-            Outcome::Failed(ReferenceError::TargetBelowFloor { target, floor }) if !scale_is_given => {
+            Err(ReferenceError::TargetBelowFloor { target, floor }) if !scale_is_given => {
                 let least = draft.sigma_scale * (floor / target).sqrt();
-                floor_scale = Some(least);
+                trial.floor_scale = Some(least);
                 draft.sigma_scale = significant(CLEARANCE * least, f64::ceil);
             }
-            _ => break,
+            Err(error) => {
+                trial.end = End::Failed(error.to_string());
+                break;
+            }
         }
     }
-    Ok(last)
+    *draft = Draft { sigma_scale: draft.sigma_scale, ..without_planet };
+    Ok(trial)
 }
 
-/// Resolves the draft, and makes the reference image of it on the profiles `cut`, if any.
-fn reference(
-    draft: &Draft,
-    config: &Path,
-    cut: Option<&Observations>,
-) -> Result<Option<Result<Reference, ReferenceError>>, ProposalError> {
+/// The draft as commands see it, with the profiles `cut`, their errors scaled.
+fn scene(draft: &Draft, config: &Path, cut: &Observations) -> Result<Scene, ProposalError> {
     let settings = config::from_json(to_json(draft, config)?.as_bytes(), config)?;
-    let Some(cut) = cut else { return Ok(None) };
     let mut observations = cut.clone();
     for profile in &mut observations.profiles {
         profile.sigma.iter_mut().for_each(|sigma| *sigma *= draft.sigma_scale);
     }
-    settings.check_velocity_grid(&settings.values, observations.step_kms)?;
-    let star = settings.star_for(&observations)?;
-    let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
-    Ok(Some(Reference::build(&imager, settings.values, settings.imaging.chi2_target)))
+    Ok(Scene::of(settings, observations)?)
 }
 
-impl Outcome {
+/// Spottedness of the map at the draft's values.
+fn reach(draft: &Draft, config: &Path, cut: &Observations) -> Result<Result<f64, ReferenceError>, ProposalError> {
+    let Scene { settings, imager, .. } = scene(draft, config, cut)?;
+    let reference = Reference::build(&imager, settings.values, settings.imaging.chi2_target);
+    Ok(reference.map(|reference| reference.solution.spottedness))
+}
+
+/// Puts the best orbit and systemic velocity into the draft, if there are any.
+fn search(draft: &mut Draft, config: &Path, cut: &Observations) -> Result<Result<(), SearchError>, ProposalError> {
+    let Scene { settings, imager, space, .. } = scene(draft, config, cut)?;
+    Ok(search::find(&imager, &space, SearchSettings::new(&settings), &|_| ()).map(|found| {
+        let best = space.values_at(&found.optimum.theta);
+        // bounds of priors have fewer digits than this
+        let [k, period, phi] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi].map(|p| rounded(best[p], 4));
+        draft.orbit = (k, period, phi.rem_euclid(1.0));
+        draft.vsys_kms = rounded(best[Parameter::Vsys], 4);
+    }))
+}
+
+impl Trial {
     /// Whether a map can be made of the config as it is.
     pub fn is_complete(&self) -> bool {
-        matches!(self, Outcome::Reached { .. } | Outcome::Scaled { .. })
+        matches!(self.end, End::Reached { .. })
     }
 
     /// It in words; `quoted` is the error of a bin as its file has it.
     pub fn notes(&self, quoted: f64, draft: &Draft) -> Vec<String> {
-        let fits = |spottedness: f64| {
-            format!("tried out: spots on {:.1} % of the star fit the profiles to the target chi2", 100.0 * spottedness)
+        let scaled = self.floor_scale.map(|floor_scale| {
+            format!(
+                "no map fits better than errors of {:.1e} a bin allow, so they are scaled to {:.1e}; better values for vsini, line \
+                 or velocity range may allow less (see the README)",
+                quoted * floor_scale,
+                quoted * draft.sigma_scale
+            )
+        });
+        let end = match &self.end {
+            End::Untried => "without a rotation period no command takes the config".into(),
+            End::Reached { spottedness } => {
+                let orbit =
+                    if self.orbit { ", but only with an orbit; `periodogram` says what it is worth" } else { "" };
+                let many = if *spottedness > MANY_SPOTS {
+                    "; that is a lot: are vsini, inclination and line right?"
+                } else {
+                    ""
+                };
+                format!("tried out: spots on {:.1} % of the star fit the profiles{orbit}{many}", 100.0 * spottedness)
+            }
+            End::Failed(error) => format!("no command takes the config as it is: {error}"),
         };
-        match self {
-            Outcome::Untried => vec!["without a rotation period no command takes the config".into()],
-            Outcome::Reached { spottedness } => vec![fits(*spottedness)],
-            Outcome::Scaled { spottedness, floor_scale } => vec![
-                format!(
-                    "no map fits better than errors of {:.1e} a bin allow, so they are scaled to {:.1e}; better values for vsini, \
-                     line or velocity range may allow less (see the README)",
-                    quoted * floor_scale,
-                    quoted * draft.sigma_scale
-                ),
-                fits(*spottedness),
-            ],
-            Outcome::Failed(error) => vec![format!("no command takes the config as it is: {error}")],
-        }
+        scaled.into_iter().chain([end]).collect()
     }
 }

@@ -124,7 +124,7 @@ impl Values {
             velocity_range_kms: self.velocity_range_kms,
             sigma_scale: self.sigma_scale(known, ledger),
             imaging: imaging(known, ledger),
-            porb_over_prot,
+            orbit: (0.0, porb_over_prot, 0.0),
             porb_over_prot_range,
             k_max_kms: k_max(cut, ledger),
             vsys_range_kms: self.vsys_range(vsys_kms, ledger),
@@ -277,8 +277,27 @@ fn k_max(cut: &Observations, ledger: &mut Ledger) -> f64 {
     max
 }
 
+/// The orbit that the config starts from, and the systemic velocity that comes with it.
+pub(super) fn note_orbit(draft: &Draft, found: bool, ledger: &mut Ledger) {
+    let (k, period, phi) = draft.orbit;
+    match found {
+        true => {
+            let shown = format!("{k}, {period}, {phi}");
+            ledger.note(
+                "planet.k_kms, ...",
+                shown,
+                "",
+                Source::Data,
+                "start: K (km/s), Porb/Prot, phi of the best orbit",
+            );
+            ledger.replace("star.vsys_kms", draft.vsys_kms, "start: with the best orbit");
+        }
+        false => ledger.note("planet.k_kms", k, "km/s", Source::Assumed, "start: no planet"),
+    }
+}
+
 /// Rounded to so many decimals.
-fn rounded(value: f64, decimals: usize) -> f64 {
+pub(super) fn rounded(value: f64, decimals: usize) -> f64 {
     // what is formatted as a number is one
     format!("{value:.decimals$}").parse().unwrap_or(value)
 }
