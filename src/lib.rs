@@ -20,7 +20,8 @@
 //!
 //! # Around them
 //!
-//! [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
+//! [`first_look`] measures what profiles say by themselves, [`proposal`] makes a first config of it, also of another program's
+//! files ([`import`]). [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
 //! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
 //! what they were begun with.
 //! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing

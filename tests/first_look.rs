@@ -16,7 +16,7 @@ const VSYS_KMS: f64 = 1.3;
 fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) -> Observations {
     let mut spots: Vec<Spot> = (0..8)
         .map(|_| Spot {
-            longitude: rng.random_range(0.0..6.28),
+            longitude: rng.random_range(-3.0..3.0),
             latitude: rng.random_range(-0.5..1.2),
             radius: rng.random_range(0.09..0.3),
             filling: 0.8,

@@ -209,16 +209,29 @@ fn what_cannot_be_is_refused_in_a_line() {
     refused(&["--out", "data"], &["--out data: is a folder"]);
     refused(&["--out", "absent/star.json"], &["--out absent/star.json: absent is not a folder"]);
     refused(&["--out", "star.json/x.json"], &["star.json is not a folder"]);
-    let bad: [(&[&str], &str); 5] = [
+    let bad: [(&[&str], &str); 4] = [
         (&["--vsini", "0"], "star.vsini_kms: 0 must be above 0"),
         (&["--spot", "6000"], "star.spot_k: 6000 must be below photosphere_k"),
         (&["--limb-darkening", "1.5"], "star.limb_darkening.coefficients: 1.5"),
         (&["--line-sigma", "0"], "star.line.sigma_kms: 0 must be above 0"),
-        (&["--resolving-power", "-1"], "instrument.resolving_power: -1 must be above 0"),
     ];
     for (options, problem) in bad {
         let options = options.join("=");
         refused(&["--out", "a.json", &options], &["a.json: ", problem]);
+    }
+    for options in [
+        ["--line-sigma=1e9", "--resolving-power=1"],
+        ["--line-sigma=0", "--resolving-power=1e12"],
+        ["--line-sigma=2.5", "--resolving-power=-1"],
+    ] {
+        refused(
+            &["--out", "a.json", options[0], options[1]],
+            &["data/observations.txt: a local line of a standard deviation"],
+        );
+    }
+    for option in ["--limb-darkening=nan", "--resolving-power=nan", "--line-sigma=inf", "--epoch=nan", "--vsini=1e308"]
+    {
+        refused(&["--out", "a.json", option], &[": "]);
     }
     for period in ["0", "-3", "inf"] {
         let args = ["init", "data/observations.txt", "--out", "a.json", &format!("--rotation-period={period}")];

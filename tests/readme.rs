@@ -58,6 +58,17 @@ fn shipped_configs_resolve() {
     }
 }
 
+/// The citation is of this version, and of the paper whose method it is.
+#[test]
+fn the_citation_is_up_to_date() {
+    let citation = std::fs::read_to_string(root().join("CITATION.cff")).unwrap();
+    let version = concat!("\nversion: ", env!("CARGO_PKG_VERSION"), "\n");
+    for part in ["cff-version: 1.2.0\n", version, "doi: 10.1051/0004-6361/201525993\n", "volume: 584\n", "start: A84\n"]
+    {
+        assert!(citation.contains(part), "{part:?}");
+    }
+}
+
 /// Every dependency is there for a reason, and the reason is written down.
 #[test]
 fn dependencies_are_listed() {

@@ -1,7 +1,7 @@
 //! `dimcmc import`: a config from another program's input files.
 
 use super::init::{KnownArgs, next_commands};
-use super::output::ConfigFile;
+use super::output::{ConfigFile, folder_of};
 use super::{Failure, Global, progress};
 use dimcmc::import::Import;
 use dimcmc::io::atomic;
@@ -69,8 +69,4 @@ fn list_beside(config: &Path) -> PathBuf {
     let mut name = config.file_stem().unwrap_or_default().to_owned();
     name.push("_observations.txt");
     config.with_file_name(name)
-}
-
-fn folder_of(file: &Path) -> &Path {
-    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

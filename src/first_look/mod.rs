@@ -79,6 +79,21 @@ pub enum LookError {
         /// Bins above half depth.
         bins: usize,
     },
+    /// The line that is assumed is out of all proportion to the data.
+    #[error(
+        "a local line of a standard deviation of {sigma_kms} km/s (with the instrument) is too narrow or too broad for bins of \
+         {step_kms:.3} km/s from {from_kms:.1} to {to_kms:.1}"
+    )]
+    LineModel {
+        /// Standard deviation (km/s), instrumental broadening included.
+        sigma_kms: f64,
+        /// Width of a bin (km/s).
+        step_kms: f64,
+        /// First velocity that all profiles have (km/s).
+        from_kms: f64,
+        /// Last one.
+        to_kms: f64,
+    },
     /// The fit ran away.
     #[error("the mean profile is not like that of a rotating star: the fit for vsini does not converge")]
     NoRotation,
@@ -91,6 +106,7 @@ impl FirstLook {
     /// [`LookError`].
     pub fn at(observations: &Observations, line: LineModel) -> Result<Self, LookError> {
         let mean = MeanProfile::of(observations)?;
+        line.check(&mean)?;
         let half_depth = mean.half_depth()?;
         let fit = |line| Unspotted::fit(&mean, half_depth, line);
         let unspotted = fit(line)?;
@@ -115,6 +131,16 @@ impl FirstLook {
 }
 
 impl LineModel {
+    /// Whether the line can be seen in the bins of a profile, and fits into it.
+    fn check(self, mean: &MeanProfile) -> Result<(), LookError> {
+        const NARROWEST: f64 = 0.02;
+        let (sigma_kms, step_kms, (from_kms, to_kms)) = (self.sigma_kms, mean.step_kms, mean.range_kms());
+        match (NARROWEST * step_kms..=to_kms - from_kms).contains(&sigma_kms) {
+            true => Ok(()),
+            false => Err(LookError::LineModel { sigma_kms, step_kms, from_kms, to_kms }),
+        }
+    }
+
     fn law(self) -> LimbDarkening {
         LimbDarkening::Linear(self.limb_darkening)
     }

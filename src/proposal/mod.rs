@@ -5,6 +5,7 @@
 //! model can keep are scaled up until a map reaches the target chi2. Left out: who gives values (`import`, the command line),
 //! and writing it down.
 
+mod digits;
 mod ledger;
 mod trial;
 mod values;

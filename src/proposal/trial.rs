@@ -1,7 +1,7 @@
 //! Tries a draft out: whether a map reaches its target chi2, without a planet or with the best orbit that a search finds, and by
 //! how much the errors promise too much if none does.
 
-use super::values::{rounded, significant};
+use super::digits::{rounded, significant};
 use super::{ProposalError, to_json};
 use crate::config::{self, Draft};
 use crate::objective::{Parameter, Reference, ReferenceError};

@@ -1,5 +1,6 @@
 //! The values of a proposal: measured, given, or assumed.
 
+use super::digits::{rounded, significant};
 use super::ledger::{Ledger, Source};
 use super::{Given, Known};
 use crate::config::{Draft, EquivalentWidth, ImagingSettings};
@@ -293,33 +294,5 @@ pub(super) fn note_orbit(draft: &Draft, found: bool, ledger: &mut Ledger) {
             ledger.replace("star.vsys_kms", draft.vsys_kms, "start: with the best orbit");
         }
         false => ledger.note("planet.k_kms", k, "km/s", Source::Assumed, "start: no planet"),
-    }
-}
-
-/// Rounded to so many decimals.
-pub(super) fn rounded(value: f64, decimals: usize) -> f64 {
-    // what is formatted as a number is one
-    format!("{value:.decimals$}").parse().unwrap_or(value)
-}
-
-/// Two digits of a positive number, the last by `round`.
-pub(super) fn significant(value: f64, round: impl Fn(f64) -> f64) -> f64 {
-    let exponent = value.log10().floor() as i32 - 1;
-    let digits = round(value / 10f64.powi(exponent) * (1.0 + 1e-12 * (round(0.5) - 0.5).signum()));
-    format!("{digits}e{exponent}").parse().unwrap_or(value)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{rounded, significant};
-
-    #[test]
-    fn numbers_are_short() {
-        assert_eq!(significant(4.512, f64::ceil), 4.6);
-        assert_eq!(significant(0.03, f64::ceil), 0.03);
-        assert_eq!(significant(35.95, f64::floor), 35.0);
-        assert_eq!(significant(0.2049, f64::round), 0.2);
-        assert_eq!(rounded(2456894.0001, 3), 2456894.0);
-        assert_eq!(rounded(-0.318, 2), -0.32);
     }
 }
