@@ -115,10 +115,12 @@ fn search(draft: &mut Draft, config: &Path, cut: &Observations) -> Result<Result
     let Scene { settings, imager, space, .. } = scene(draft, config, cut)?;
     Ok(search::find(&imager, &space, SearchSettings::new(&settings), &|_| ()).map(|found| {
         let best = space.values_at(&found.optimum.theta);
-        // bounds of priors have fewer digits than this
-        let [k, period, phi] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi].map(|p| rounded(best[p], 4));
-        draft.orbit = (k, period, phi.rem_euclid(1.0));
-        draft.vsys_kms = rounded(best[Parameter::Vsys], 4);
+        // rounding does not lead out of the priors
+        let within = |parameter, (min, max): (f64, f64)| rounded(best[parameter], 4).clamp(min, max);
+        let k = within(Parameter::K, (0.0, draft.k_max_kms));
+        let period = within(Parameter::PorbOverProt, draft.porb_over_prot_range);
+        draft.orbit = (k, period, rounded(best[Parameter::Phi], 4).rem_euclid(1.0));
+        draft.vsys_kms = within(Parameter::Vsys, draft.vsys_range_kms);
     }))
 }
 
