@@ -20,7 +20,8 @@
 //!
 //! # Around them
 //!
-//! [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
+//! [`first_look`] measures what profiles say by themselves, [`proposal`] makes a first config of it, also of another program's
+//! files ([`import`]). [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
 //! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
 //! what they were begun with; [`export`] writes a chain for other programs.
 //! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
@@ -49,8 +50,10 @@ pub mod ensemble;
 pub mod expansion;
 pub mod experiments;
 pub mod export;
+pub mod first_look;
 pub mod fit;
 pub mod imaging;
+pub mod import;
 pub mod io;
 pub mod landscape;
 pub mod log_density;
@@ -62,6 +65,7 @@ pub mod optimise;
 pub mod optimum;
 pub mod origin;
 pub mod periodogram;
+pub mod proposal;
 pub mod run;
 pub mod scene;
 pub mod search;

@@ -68,11 +68,20 @@ impl Scene {
                 (observations, sha256, Some(simulation.truth))
             }
         };
+        Ok(Scene { data_sha256, truth, ..Scene::of(settings, observations)? })
+    }
+
+    /// The scene of observations at hand, whatever `settings` say of where they come from.
+    ///
+    /// # Errors
+    /// Settings that make no sense with these observations.
+    pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
         settings.check_velocity_grid(&settings.values, observations.step_kms)?;
         let star = settings.star_for(&observations)?;
         let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
         let space = space(&settings.free, &settings, &imager);
-        Ok(Scene { settings, observations, data_sha256, truth, imager, space })
+        let data_sha256 = fingerprint(&observations);
+        Ok(Scene { settings, observations, data_sha256, truth: None, imager, space })
     }
 
     /// The space of the parameters in `free`, starting at the config's values, all others fixed there.

@@ -11,7 +11,7 @@ const LAYERS: &[&[&str]] = &[
     &["units", "text", "vector", "velocities", "log_density"],
     &["observation"],
     &["star", "maxent", "chain", "landscape", "periodogram"],
-    &["imaging", "ensemble", "optimise"],
+    &["imaging", "ensemble", "optimise", "first_look"],
     &["objective"],
     &["expansion"],
     &["surrogate"],
@@ -19,8 +19,8 @@ const LAYERS: &[&[&str]] = &[
     &["io"],
     &["config"],
     &["scene", "search"],
-    &["origin"],
-    &["manifest", "survey", "optimum"],
+    &["origin", "proposal"],
+    &["manifest", "survey", "optimum", "import"],
     &["run"],
     &["comparison", "export"],
     &["experiments"],
@@ -43,6 +43,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),
     ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
+    ("first_look", &["observation", "star"]),
 ];
 
 struct Source {

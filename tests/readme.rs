@@ -24,7 +24,23 @@ fn the_config_of_the_readme_resolves() {
 
 #[test]
 fn the_commands_of_the_readme_exist() {
-    let known = ["simulate", "map", "periodogram", "optimise", "sample", "analyse", "grid", "compare", "export"];
+    let known = [
+        "init",
+        "import",
+        "schema",
+        "completions",
+        "man",
+        "simulate",
+        "map",
+        "periodogram",
+        "optimise",
+        "sample",
+        "analyse",
+        "grid",
+        "compare",
+        "export",
+        "reproduce",
+    ];
     let lines: Vec<String> = blocks("sh").iter().flat_map(|block| block.lines()).map(str::to_owned).collect();
     let commands = lines.iter().filter_map(|line| {
         let rest = line.strip_prefix("dimcmc ").or_else(|| line.strip_prefix("cargo run --release -- "))?;
@@ -41,6 +57,17 @@ fn shipped_configs_resolve() {
         if !path.to_str().unwrap().ends_with("schema.json") {
             config::load(&path).unwrap().require_free().unwrap();
         }
+    }
+}
+
+/// The citation is of this version, and of the paper whose method it is.
+#[test]
+fn the_citation_is_up_to_date() {
+    let citation = std::fs::read_to_string(root().join("CITATION.cff")).unwrap();
+    let version = concat!("\nversion: ", env!("CARGO_PKG_VERSION"), "\n");
+    for part in ["cff-version: 1.2.0\n", version, "doi: 10.1051/0004-6361/201525993\n", "volume: 584\n", "start: A84\n"]
+    {
+        assert!(citation.contains(part), "{part:?}");
     }
 }
 

@@ -23,7 +23,8 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
         ("/parameters/porb_over_prot/max", json!(2.2)),
     ];
     let config = star::with(star::with(star::paper(), &own), changes);
-    let case = Case { name: "test".into(), config, grid: Some(Nodes::Around(5)), chain: false, periodogram: Some(1000) };
+    let case =
+        Case { name: "test".into(), config, grid: Some(Nodes::Around(5)), chain: false, periodogram: Some(1000) };
     let folder = tempfile::tempdir().unwrap();
     case.run(folder.path(), &AtomicBool::new(false)).unwrap()
 }

@@ -6,8 +6,10 @@ use dimcmc::export::ExportError;
 use dimcmc::io::atomic::WriteError;
 use dimcmc::io::journal::JournalError;
 use dimcmc::io::lsd::LsdError;
+use dimcmc::io::zdipy::ZdipyError;
 use dimcmc::objective::ReferenceError;
 use dimcmc::origin::OriginError;
+use dimcmc::proposal::ProposalError;
 use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
 use dimcmc::search::SearchError;
@@ -134,6 +136,18 @@ impl From<ExportError> for Failure {
 
 impl From<PairError> for Failure {
     fn from(error: PairError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<ProposalError> for Failure {
+    fn from(error: ProposalError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<ZdipyError> for Failure {
+    fn from(error: ZdipyError) -> Self {
         Failure::input(error)
     }
 }

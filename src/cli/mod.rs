@@ -1,13 +1,18 @@
 //! The commands, one file each: what is asked, which parts of the library answer, what is printed. No formulas.
 //!
-//! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`, and one
-//! line each in [`Command`] and [`run`]. Both spellings of a name: `#[command(alias = "analyze")]`.
+//! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`, one line
+//! each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias = "analyze")]`.
 
 mod analyse;
 mod compare;
+mod completions;
 mod export;
 mod failure;
 mod grid;
+mod groups;
+mod import;
+mod init;
+mod man;
 mod map;
 mod optimise;
 mod output;
@@ -16,18 +21,22 @@ mod progress;
 mod report;
 mod reproduce;
 mod sample;
+mod schema;
 mod search;
 mod signals;
 mod simulate;
 
 pub use failure::Failure;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use std::num::NonZeroUsize;
+
+/// The version, with the commit that it was built from where that is known.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"));
 
 /// Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
 #[derive(Debug, Parser)]
-#[command(name = "dimcmc", version, arg_required_else_help = true)]
+#[command(name = "dimcmc", version = VERSION, arg_required_else_help = true)]
 pub struct Cli {
     #[command(flatten)]
     global: Global,
@@ -48,6 +57,8 @@ pub struct Global {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Init(init::Args),
+    Import(import::Args),
     Simulate(simulate::Args),
     Map(map::Args),
     Periodogram(periodogram::Args),
@@ -60,6 +71,19 @@ enum Command {
     Compare(compare::Args),
     Reproduce(reproduce::Args),
     Export(export::Args),
+    Schema(schema::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// The whole command line, for help, manual and completions.
+fn command() -> clap::Command {
+    groups::grouped(Cli::command())
+}
+
+/// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to do.
+pub fn parse() -> Cli {
+    Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|e| e.exit())
 }
 
 /// Runs the command.
@@ -71,6 +95,8 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
             .map_err(|e| Failure::failed(format!("--threads {threads}: {e}")))?;
     }
     match &cli.command {
+        Command::Init(args) => init::run(args, &cli.global),
+        Command::Import(args) => import::run(args, &cli.global),
         Command::Simulate(args) => simulate::run(args),
         Command::Map(args) => map::run(args, &cli.global),
         Command::Periodogram(args) => periodogram::run(args, &cli.global),
@@ -81,12 +107,14 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Compare(args) => compare::run(args, &cli.global),
         Command::Reproduce(args) => reproduce::run(args, &cli.global),
         Command::Export(args) => export::run(args, &cli.global),
+        Command::Schema(args) => schema::run(args),
+        Command::Completions(args) => completions::run(args),
+        Command::Man(args) => man::run(args),
     }
 }
 
 /// Clap's own consistency checks.
 #[test]
 fn the_command_line_is_consistent() {
-    use clap::CommandFactory as _;
-    Cli::command().debug_assert();
+    command().debug_assert();
 }

@@ -56,6 +56,69 @@ impl Output {
     }
 }
 
+/// Options of every command that writes a config.
+#[derive(Debug, clap::Args)]
+pub struct ConfigFile {
+    /// Config to write
+    #[arg(long = "out", value_name = "FILE", default_value = "star.json")]
+    path: PathBuf,
+    /// Replace the file if it is there
+    #[arg(long)]
+    force: bool,
+}
+
+impl ConfigFile {
+    /// The file as given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether the config, and another file that comes with it, may be written.
+    pub fn check(&self, other: Option<&Path>) -> Result<(), Failure> {
+        let out = self.path.display();
+        let wrong = |problem: String| Err(Failure::input(format!("--out {out}: {problem}")));
+        let folder = folder_of(&self.path);
+        if self.path.file_name().is_none() || self.path.is_dir() {
+            return wrong("is a folder; give the name of a file".into());
+        }
+        if !folder.is_dir() {
+            return wrong(format!("{} is not a folder", folder.display()));
+        }
+        match [Some(self.path.as_path()), other].into_iter().flatten().find(|path| path.exists()) {
+            Some(path) if !self.force => {
+                wrong(format!("{} exists; give another name, or --force to replace it", path.display()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// `file` as a config at this place names it: relative to its folder, or from the root where the two share none.
+    pub fn relative(&self, file: &Path) -> Result<PathBuf, Failure> {
+        let whole = |path: &Path| {
+            path.canonicalize().map_err(|e| Failure::input(format!("{}: cannot read: {e}", path.display())))
+        };
+        let (folder, file) = (whole(folder_of(&self.path))?, whole(file)?);
+        let shared = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+        // on Windows, two drives
+        if shared == 0 {
+            return Ok(file);
+        }
+        let up = folder.components().skip(shared).map(|_| "..");
+        Ok(up.map(PathBuf::from).chain(file.components().skip(shared).map(|c| PathBuf::from(c.as_os_str()))).collect())
+    }
+
+    /// The JSON Schema, if it lies beside the config under the name it ships with.
+    pub fn schema(&self) -> Option<String> {
+        const NAME: &str = "dimcmc.schema.json";
+        folder_of(&self.path).join(NAME).is_file().then(|| NAME.to_owned())
+    }
+}
+
+/// The folder that a file is in.
+pub fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// What exists of the path, if that is no folder.
 fn obstacle(folder: &Path) -> Option<&Path> {
     folder.ancestors().find(|parent| parent.exists()).filter(|parent| !parent.is_dir())

@@ -14,7 +14,7 @@ use std::time::Instant;
 /// was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an hour on two cores.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc reproduce R2 --quick --out runs/reproduced --work runs/reproduce_raw\n  \
-                        dimcmc reproduce R5 R6")]
+                        dimcmc reproduce --list")]
 pub struct Args {
     /// Rows: R1 to R12, co-rotation, coverage
     #[arg(value_name = "ROW")]
@@ -91,7 +91,8 @@ fn rows(names: &[String]) -> Result<Vec<&'static Row>, Failure> {
     }
     let row = |name: &String| {
         let known = || ROWS.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
-        Row::from_name(name).ok_or_else(|| Failure::input(format!("no experiment is called {name}: there are {}", known())))
+        Row::from_name(name)
+            .ok_or_else(|| Failure::input(format!("no experiment is called {name}: there are {}", known())))
     };
     names.iter().map(row).collect()
 }

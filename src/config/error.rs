@@ -125,7 +125,10 @@ fn in_the_users_words(message: &str) -> String {
         e if e.starts_with("struct ") => "an object in braces".to_string(),
         e => e.replace("a tuple of size", "an array of length"),
     };
-    format!("expected {expected}, found {found}")
+    match found.as_str() {
+        "null" => format!("null stands for a value still to be given: put {expected} in its place"),
+        _ => format!("expected {expected}, found {found}"),
+    }
 }
 
 fn without_position(error: &serde_json::Error) -> String {

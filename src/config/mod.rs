@@ -4,6 +4,7 @@
 //! error names the file and the key. Left out: reading the observations (`io::lsd`), and anything done with the settings.
 
 mod domain;
+mod draft;
 mod error;
 mod identity;
 mod raw;
@@ -16,6 +17,7 @@ mod settings;
 mod suggest;
 
 pub use crate::ensemble::SamplerSettings;
+pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, model_difference, section_difference};
 pub use raw_parts::EquivalentWidth;

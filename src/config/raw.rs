@@ -110,7 +110,7 @@ pub(super) enum LineShape {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LimbDarkeningSection {
-    /// Law.
+    /// Law, in the cosine `mu` of the angle to the line of sight.
     pub law: LimbLaw,
     /// One coefficient for the linear law, two for the quadratic one.
     pub coefficients: Vec<f64>,

@@ -251,6 +251,9 @@ impl JsonSchema for EquivalentWidth {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "const": "auto" }] })
+        json_schema!({
+            "description": "A number (km/s), above 0, or \"auto\": the mean area of the observed profiles.",
+            "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "const": "auto" }]
+        })
     }
 }

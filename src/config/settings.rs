@@ -74,7 +74,13 @@ pub struct ImagingSettings {
 
 impl Default for ImagingSettings {
     fn default() -> Self {
-        ImagingSettings { pixels: 2000, default_spot: 1e-4, chi2_target: 0.97, objective: ObjectiveKind::default(), spots_left: SpotsLeft::default() }
+        ImagingSettings {
+            pixels: 2000,
+            default_spot: 1e-4,
+            chi2_target: 0.97,
+            objective: ObjectiveKind::default(),
+            spots_left: SpotsLeft::default(),
+        }
     }
 }
 

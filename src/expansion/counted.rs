@@ -24,8 +24,7 @@ impl SpotsCounted {
     /// Of `posterior`, spots left over as large as they are at its reference; `None` where there is no such size.
     pub fn new(posterior: &Posterior) -> Option<Self> {
         let free = posterior.space().free();
-        let stellar: Vec<Parameter> =
-            STELLAR.into_iter().filter(|&p| free.iter().any(|f| f.parameter == p)).collect();
+        let stellar: Vec<Parameter> = STELLAR.into_iter().filter(|&p| free.iter().any(|f| f.parameter == p)).collect();
         let reference = posterior.reference();
         let entropy = Expansion::of(posterior.imager(), reference, &stellar);
         let fitted = entropy.with_spots_left(entropy.spots_left(&nuisances(free))?)?;

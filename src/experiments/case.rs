@@ -183,9 +183,8 @@ pub fn landscape(
 }
 
 fn vertex(fitted: &Paraboloid) -> std::collections::BTreeMap<String, Estimate> {
-    let estimate = |(name, one): (&String, &crate::landscape::Estimate)| {
-        (name.clone(), Estimate::gaussian(one.vertex, one.error))
-    };
+    let estimate =
+        |(name, one): (&String, &crate::landscape::Estimate)| (name.clone(), Estimate::gaussian(one.vertex, one.error));
     fitted.parameters.iter().map(estimate).collect()
 }
 
@@ -204,11 +203,8 @@ pub fn chain(
     }
     let (kinds, goals) = kinds_and_goals(&scene.settings);
     let summary = summarise(&run.chain, &kinds, &goals)?;
-    let estimate = |one: &crate::chain::summary::ParameterSummary| Estimate {
-        value: one.median,
-        ci68: one.ci68,
-        ci95: one.ci95,
-    };
+    let estimate =
+        |one: &crate::chain::summary::ParameterSummary| Estimate { value: one.median, ci68: one.ci68, ci95: one.ci95 };
     let route = Route {
         parameters: summary.parameters.iter().map(|(name, one)| (name.clone(), estimate(one))).collect(),
         reconstructions: run.preparation + summary.evaluations,
@@ -222,8 +218,7 @@ pub fn chain(
 fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentError> {
     let began = Instant::now();
     let imager = &scene.imager;
-    let frequencies =
-        Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
+    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
         chi2_target: scene.settings.imaging.chi2_target,
         nuisances: Vec::new(),

@@ -63,10 +63,7 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
             name: format!("{}_map_{map}_seed_{seed}", judge.name),
             config: with(
                 config.clone(),
-                &[
-                    ("/imaging/objective", json!(judge.objective)),
-                    ("/imaging/spots_left", json!(judge.spots_left)),
-                ],
+                &[("/imaging/objective", json!(judge.objective)), ("/imaging/spots_left", json!(judge.spots_left))],
             ),
             grid: None,
             chain: true,

@@ -63,12 +63,17 @@ pub(super) fn profiles(laboratory: &Laboratory) -> Result<Report, ExperimentErro
     report.number("rv_peak_to_peak_kms", peak_to_peak(&noisy_rv));
     report.number("noise_rms_kms", scatter(&noise));
     report.number("rv_rms_without_spots_kms", scatter(&photon));
-    report.number("spottedness_true", noisy.true_spot_filling().map(|s| {
-        s.iter().zip(&noisy.imager.grid.area).map(|(s, a)| s * a).sum::<f64>()
-    }));
+    report.number(
+        "spottedness_true",
+        noisy.true_spot_filling().map(|s| s.iter().zip(&noisy.imager.grid.area).map(|(s, a)| s * a).sum::<f64>()),
+    );
     report.figure = vec![panel(
         "first moment (km/s)",
-        &[("spots and noise", "rv_kms"), ("spots alone", "rv_without_noise_kms"), ("noise alone", "rv_without_spots_kms")],
+        &[
+            ("spots and noise", "rv_kms"),
+            ("spots alone", "rv_without_noise_kms"),
+            ("noise alone", "rv_without_spots_kms"),
+        ],
         true,
     )];
     Ok(report)

@@ -5,8 +5,8 @@
 
 use super::{Case, Outcome};
 use crate::chain::ChainError;
-use crate::config::ConfigError;
 use crate::comparison::PairError;
+use crate::config::ConfigError;
 use crate::detection::DetectionError;
 use crate::io::atomic::{WriteError, write_json};
 use crate::objective::ReferenceError;

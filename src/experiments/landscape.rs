@@ -54,7 +54,8 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         let settings = SearchSettings::new(&scene.settings);
         let found = search::find(&scene.imager, &scene.space_of(&free), settings, &|_| ())?;
         let grid = Grid { axes: others.collect() };
-        let (route, survey) = case::landscape(&scene, found, grid, &folder.join(format!("slice_{fixed}")), laboratory.stop)?;
+        let (route, survey) =
+            case::landscape(&scene, found, grid, &folder.join(format!("slice_{fixed}")), laboratory.stop)?;
         slices += route.reconstructions;
         let lowest = survey.landscape.nodes().iter().filter_map(|node| Some((node, node.reconstruction.likelihood?)));
         let lowest = lowest.min_by(|a, b| a.1.spottedness.total_cmp(&b.1.spottedness));

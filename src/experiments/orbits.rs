@@ -105,7 +105,8 @@ fn columns(names: &[&str]) -> Vec<String> {
 
 /// The numbers of all columns but those of what is varied.
 fn numbers(outcome: &Outcome) -> Vec<f64> {
-    let mut numbers: Vec<f64> = ORBIT.iter().map(|name| outcome.truth.get(*name).copied().unwrap_or(f64::NAN)).collect();
+    let mut numbers: Vec<f64> =
+        ORBIT.iter().map(|name| outcome.truth.get(*name).copied().unwrap_or(f64::NAN)).collect();
     for name in ROUTES {
         let route = outcome.routes().find(|(route, _)| *route == name).map(|(_, route)| route);
         for parameter in ORBIT {
@@ -160,7 +161,8 @@ fn sum_up(report: &mut Report, outcomes: &[Outcome]) {
             });
             numbers.insert(parameter.to_owned(), value);
         }
-        let total = |f: &dyn Fn(&crate::experiments::Route) -> f64| routes.iter().map(|(_, route)| f(route)).sum::<f64>();
+        let total =
+            |f: &dyn Fn(&crate::experiments::Route) -> f64| routes.iter().map(|(_, route)| f(route)).sum::<f64>();
         let each = routes.len().max(1) as f64;
         numbers.insert("reconstructions_each".into(), json!(rounded(total(&|r| r.reconstructions as f64) / each, 4)));
         numbers.insert("seconds_each".into(), json!(rounded(total(&|r| r.seconds) / each, 3)));
@@ -190,8 +192,11 @@ const SEED: &str = "/observations/simulate/seed";
 /// R4.
 pub(super) fn no_planet(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let star = |seed: u32| {
-        let anywhere =
-            [("/parameters/porb_over_prot/min", json!(0.5)), ("/parameters/porb_over_prot/max", json!(4.0)), (SEED, json!(seed))];
+        let anywhere = [
+            ("/parameters/porb_over_prot/min", json!(0.5)),
+            ("/parameters/porb_over_prot/max", json!(4.0)),
+            (SEED, json!(seed)),
+        ];
         let mut star = star(laboratory, &[("seed", f64::from(seed))], [0.0, 1.7, 0.5], &anywhere);
         let [k, period, phi] = laboratory.full_or_quick([11, 15, 12], [5, 5, 5]);
         star.case.grid = Some(Nodes::At([(0.0, 0.2, k), (0.5, 4.0, period), (0.0, 1.0, phi)]));
@@ -245,8 +250,10 @@ pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, Experiment
     const VSINI_KMS: f64 = 40.0;
     let star = |(assumed, equatorial): (f64, bool)| {
         let ratio = assumed.to_radians().sin() / TRUE_DEG.to_radians().sin();
-        let mut changes =
-            vec![("/observations/simulate/truth/inclination_deg", json!(TRUE_DEG)), ("/star/inclination_deg", json!(assumed))];
+        let mut changes = vec![
+            ("/observations/simulate/truth/inclination_deg", json!(TRUE_DEG)),
+            ("/star/inclination_deg", json!(assumed)),
+        ];
         if equatorial {
             changes.push(("/observations/simulate/truth/vsini_kms", json!(VSINI_KMS)));
             changes.push(("/star/vsini_kms", json!(VSINI_KMS * ratio)));
@@ -263,8 +270,7 @@ pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, Experiment
 /// Shear of the star, and of the model.
 fn sheared(laboratory: &Laboratory, gamma: f64, assumed: f64) -> Varied {
     let shear = |gamma: f64| json!(gamma * TAU / ROTATION_PERIOD_D);
-    let changes =
-        [("/observations/simulate/truth/domega_rad_d", shear(gamma)), ("/star/domega_rad_d", shear(assumed))];
+    let changes = [("/observations/simulate/truth/domega_rad_d", shear(gamma)), ("/star/domega_rad_d", shear(assumed))];
     star(laboratory, &[("gamma", gamma)], PLANET, &changes)
 }
 

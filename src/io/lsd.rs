@@ -53,10 +53,18 @@ struct Entry {
 /// A file that cannot be read, a line that makes no sense, profiles on different velocity axes, or a velocity range that
 /// leaves fewer than five bins of a profile.
 pub fn read(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
-    let mut hash = Sha256::new();
     let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
-    hash.update(&bytes);
-    let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
+    read_listed(list, &bytes, options)
+}
+
+/// Reads all profiles that a list of the content `bytes` names, which is or will be at `list`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<DataSet, LsdError> {
+    let mut hash = Sha256::new();
+    hash.update(bytes);
+    let entries = parse_list(list, &String::from_utf8_lossy(bytes))?;
     let mut first: Option<(&Path, Axis)> = None;
     let mut profiles = Vec::with_capacity(entries.len());
     for entry in &entries {

@@ -12,3 +12,4 @@ pub mod periodogram;
 pub mod provenance;
 pub mod truth;
 pub mod zarr;
+pub mod zdipy;

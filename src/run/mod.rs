@@ -172,7 +172,18 @@ impl Run {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        Run { folder: folder.into(), policy, manifest, target, chain, preparation: 0, kinds, settings, surrogate, journal }
+        Run {
+            folder: folder.into(),
+            policy,
+            manifest,
+            target,
+            chain,
+            preparation: 0,
+            kinds,
+            settings,
+            surrogate,
+            journal,
+        }
     }
 
     /// The step at which the run ends if its goals are not reached before.

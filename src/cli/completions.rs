@@ -1,0 +1,24 @@
+//! `dimcmc completions`: what a shell needs to complete commands and options.
+
+use super::Failure;
+use clap_complete::Shell;
+use std::io::Write as _;
+
+/// Print a shell's completions of commands and options
+///
+/// For bash, put them where bash-completion looks (~/.local/share/bash-completion/completions/dimcmc); for zsh, as _dimcmc in a
+/// folder of $fpath; for fish, in ~/.config/fish/completions/dimcmc.fish.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc completions bash > dimcmc.bash")]
+pub struct Args {
+    /// The shell
+    shell: Shell,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut super::command(), "dimcmc", &mut script);
+    let _ = std::io::stdout().write_all(&script);
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! `dimcmc import`: a config from another program's input files.
+
+use super::init::{KnownArgs, next_commands};
+use super::output::{ConfigFile, folder_of};
+use super::{Failure, Global, progress};
+use dimcmc::import::Import;
+use dimcmc::io::atomic;
+use dimcmc::io::zdipy::{Input, LINE_FILE, LocalLineFile};
+use dimcmc::proposal::{Place, propose};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Write a config from ZDIpy's input files
+///
+/// Reads inzdi.dat, model-voigt-line.dat beside it, and the profiles that it lists. Writes the config and the list of profiles
+/// beside it (star.json, star_observations.txt). Epoch, angles, signs and units are the same in both programs. What has no
+/// counterpart is listed; what ZDIpy does not know, the priors among it, is found as by `init`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc import inzdi.dat --out star.json")]
+pub struct Args {
+    /// ZDIpy's inzdi.dat
+    input: PathBuf,
+    /// ZDIpy's model of the local line; model-voigt-line.dat beside the input if it is there
+    #[arg(long, value_name = "FILE")]
+    line: Option<PathBuf>,
+    #[command(flatten)]
+    output: ConfigFile,
+    #[command(flatten)]
+    known: KnownArgs,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let config = args.output.path();
+    let list = list_beside(config);
+    args.output.check(Some(&list))?;
+    let input = Input::read(&args.input)?;
+    let line = line_file(args).map(|path| LocalLineFile::read(&path)).transpose()?;
+    let folder = args.output.relative(folder_of(&args.input))?;
+    let import = Import::zdipy(&input, line.as_ref(), &folder).map_err(Failure::input)?;
+    let place = Place {
+        config,
+        list: &list,
+        list_bytes: import.list.as_bytes(),
+        list_in_config: PathBuf::from(list.file_name().unwrap_or_default()),
+        schema: args.output.schema(),
+    };
+    let spinner = progress::bar(global, None, "a first look, and a map to try it out");
+    let proposal = propose(&place, &args.known.over(import.known.clone()));
+    spinner.finish_and_clear();
+    let proposal = proposal?;
+    args.output.check(Some(&list))?;
+    // the list first, so that where the config is its observations are
+    atomic::write(&list, import.list.as_bytes())?;
+    atomic::write(config, proposal.json.as_bytes())?;
+    let (table, left_out) = (proposal.table(), import.table());
+    let written = format!("written: {}, {}", config.display(), list.display());
+    let _ = write!(std::io::stdout(), "{table}\n{left_out}{}{written}\n", if left_out.is_empty() { "" } else { "\n" });
+    next_commands(&proposal, config);
+    Ok(())
+}
+
+fn line_file(args: &Args) -> Option<PathBuf> {
+    let beside = folder_of(&args.input).join(LINE_FILE);
+    args.line.clone().or(beside.is_file().then_some(beside))
+}
+
+fn list_beside(config: &Path) -> PathBuf {
+    let mut name = config.file_stem().unwrap_or_default().to_owned();
+    name.push("_observations.txt");
+    config.with_file_name(name)
+}

@@ -1,0 +1,127 @@
+//! `dimcmc init`: a first config for observed profiles.
+
+use super::output::ConfigFile;
+use super::{Failure, Global, progress};
+use dimcmc::io::atomic;
+use dimcmc::io::lsd::LsdError;
+use dimcmc::proposal::{Given, Known, Place, Proposal, propose};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Write a first config for observed profiles
+///
+/// Takes from the profiles what they say: velocity range, vsini, systemic velocity, noise, and priors of the orbit. The rest is
+/// given by options or assumed; a list says which is which. The rotation period cannot be assumed: without it the config holds a
+/// null in its place, and no other command takes it. Then tries out whether a map can be made of it all.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out demo.json"
+)]
+pub struct Args {
+    /// List of the profiles: file, time in days, and perhaps the velocity (km/s) to be subtracted, a line
+    observations: PathBuf,
+    #[command(flatten)]
+    output: ConfigFile,
+    #[command(flatten)]
+    known: KnownArgs,
+}
+
+/// What the profiles do not say, or not as well.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "The star and the spectrograph")]
+pub struct KnownArgs {
+    /// Rotation period (d)
+    #[arg(long, value_name = "DAYS")]
+    rotation_period: Option<f64>,
+    /// Time of rotation cycle 0 (d); the middle of the observations if not given
+    #[arg(long, value_name = "DAYS")]
+    epoch: Option<f64>,
+    /// Inclination of the rotation axis to the line of sight (degrees)
+    #[arg(long, value_name = "DEG")]
+    inclination: Option<f64>,
+    /// Projected rotation velocity (km/s), instead of the measured one
+    #[arg(long, value_name = "KMS")]
+    vsini: Option<f64>,
+    /// Differential rotation: equator minus pole (rad/d)
+    #[arg(long, value_name = "RAD/D", allow_negative_numbers = true)]
+    domega: Option<f64>,
+    /// Coefficient of linear limb darkening
+    #[arg(long, value_name = "U")]
+    limb_darkening: Option<f64>,
+    /// Temperature of the photosphere (K)
+    #[arg(long, value_name = "K")]
+    photosphere: Option<f64>,
+    /// Temperature of the spots (K)
+    #[arg(long, value_name = "K")]
+    spot: Option<f64>,
+    /// Wavelength of the profiles (nm)
+    #[arg(long, value_name = "NM")]
+    wavelength: Option<f64>,
+    /// Standard deviation of the local line (km/s), without the spectrograph
+    #[arg(long, value_name = "KMS")]
+    line_sigma: Option<f64>,
+    /// Resolving power of the spectrograph
+    #[arg(long, value_name = "R")]
+    resolving_power: Option<f64>,
+}
+
+impl KnownArgs {
+    /// The options that are there replace what is `known` otherwise.
+    pub fn over(&self, mut known: Known) -> Known {
+        let options = [
+            ("--rotation-period", self.rotation_period, &mut known.rotation_period_d),
+            ("--epoch", self.epoch, &mut known.epoch_d),
+            ("--inclination", self.inclination, &mut known.inclination_deg),
+            ("--vsini", self.vsini, &mut known.vsini_kms),
+            ("--domega", self.domega, &mut known.domega_rad_d),
+            ("--limb-darkening", self.limb_darkening, &mut known.limb_darkening),
+            ("--photosphere", self.photosphere, &mut known.photosphere_k),
+            ("--spot", self.spot, &mut known.spot_k),
+            ("--wavelength", self.wavelength, &mut known.wavelength_nm),
+            ("--line-sigma", self.line_sigma, &mut known.line_sigma_kms),
+            ("--resolving-power", self.resolving_power, &mut known.resolving_power),
+        ];
+        for (name, value, slot) in options {
+            if let Some(value) = value {
+                *slot = Some(Given { value, by: name.to_owned() });
+            }
+        }
+        known
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    args.output.check(None)?;
+    let list = &args.observations;
+    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.clone(), source })?;
+    let place = Place {
+        config: args.output.path(),
+        list,
+        list_bytes: &bytes,
+        list_in_config: args.output.relative(list)?,
+        schema: args.output.schema(),
+    };
+    let spinner = progress::bar(global, None, "a first look, and a map to try it out");
+    let proposal = propose(&place, &args.known.over(Known::default()));
+    spinner.finish_and_clear();
+    let proposal = proposal?;
+    args.output.check(None)?;
+    atomic::write(args.output.path(), proposal.json.as_bytes())?;
+    let _ = write!(std::io::stdout(), "{}\nwritten: {}\n", proposal.table(), args.output.path().display());
+    next_commands(&proposal, args.output.path());
+    Ok(())
+}
+
+/// What to do with the config at `path`.
+pub fn next_commands(proposal: &Proposal, path: &Path) {
+    let config = path.display();
+    let next = match proposal.complete {
+        true => format!(
+            "next:\n  dimcmc map {config} --out map               does the model fit? is the map plausible?\n  dimcmc periodogram \
+             {config} --out search    is there a planet at all?\n  dimcmc sample {config} --out run            the posterior\n"
+        ),
+        false => format!("next: put right what the notes say in {config}, then\n  dimcmc map {config} --out map\n"),
+    };
+    let _ = write!(std::io::stdout(), "{next}");
+}

@@ -1,0 +1,19 @@
+//! `dimcmc schema`: the JSON Schema of the config.
+
+use super::Failure;
+use dimcmc::config;
+use std::io::Write as _;
+
+/// Print the JSON Schema of the config
+///
+/// It explains every key. An editor that finds it by the config's "$schema" completes keys and marks mistakes; `init` names it
+/// there if it lies beside the config as dimcmc.schema.json.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc schema > dimcmc.schema.json")]
+pub struct Args {}
+
+/// Runs the command.
+pub fn run(_args: &Args) -> Result<(), Failure> {
+    let _ = std::io::stdout().write_all(config::schema().as_bytes());
+    Ok(())
+}

@@ -1,0 +1,99 @@
+//! Rows of ZDIpy's input files: what is no comment, with line numbers, taken one by one.
+
+use super::{Field, ZdipyError};
+use std::path::Path;
+
+/// The rows that are left.
+pub(super) struct Rows<'a> {
+    path: &'a Path,
+    lines: std::iter::Enumerate<std::str::Lines<'a>>,
+}
+
+/// A line that is no comment.
+pub(super) struct Row<'a> {
+    path: &'a Path,
+    /// Its number (from 1).
+    pub line: usize,
+    fields: Vec<&'a str>,
+}
+
+impl<'a> Rows<'a> {
+    pub fn new(path: &'a Path, text: &'a str) -> Self {
+        Rows { path, lines: text.lines().enumerate() }
+    }
+
+    /// The next row, if there is one.
+    pub fn another(&mut self) -> Option<Row<'a>> {
+        let path = self.path;
+        self.lines.find_map(|(k, text)| {
+            let fields: Vec<&str> = text.split_whitespace().take_while(|f| !f.starts_with('#')).collect();
+            (!fields.is_empty()).then_some(Row { path, line: k + 1, fields })
+        })
+    }
+
+    /// The next row, which holds `what`.
+    pub fn next(&mut self, what: &'static str) -> Result<Row<'a>, ZdipyError> {
+        self.another().ok_or(ZdipyError::Short { path: self.path.into(), what })
+    }
+}
+
+impl<'a> Row<'a> {
+    /// How many values there are.
+    pub fn columns(&self) -> usize {
+        self.fields.len()
+    }
+
+    /// A value of this line.
+    pub fn field<T>(&self, value: T) -> Field<T> {
+        Field { value, line: self.line }
+    }
+
+    pub fn fault(&self, problem: String) -> ZdipyError {
+        ZdipyError::Line { path: self.path.into(), line: self.line, problem }
+    }
+
+    /// The text in a column (from 0), which holds `name`.
+    pub fn text(&self, column: usize, name: &str) -> Result<&'a str, ZdipyError> {
+        let missing = || self.fault(format!("{} columns, the {name} is due in column {}", self.columns(), column + 1));
+        self.fields.get(column).copied().ok_or_else(missing)
+    }
+
+    pub fn number(&self, column: usize, name: &str) -> Result<f64, ZdipyError> {
+        let text = self.text(column, name)?;
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(self.fault(format!("the {name} is {}, not a number", shown(text)))),
+        }
+    }
+
+    pub fn positive(&self, column: usize, name: &str) -> Result<f64, ZdipyError> {
+        self.within(column, name, 0.0, f64::INFINITY)
+    }
+
+    /// A number above `min` and up to `max`.
+    pub fn within(&self, column: usize, name: &str, min: f64, max: f64) -> Result<f64, ZdipyError> {
+        let value = self.number(column, name)?;
+        match (value > min && value <= max, max.is_finite()) {
+            (true, _) => Ok(value),
+            (false, true) => Err(self.fault(format!("the {name} is {value}, it must be above {min} and up to {max}"))),
+            (false, false) => Err(self.fault(format!("the {name} is {value}, it must be above {min}"))),
+        }
+    }
+
+    /// A whole number above 0.
+    pub fn count(&self, column: usize, name: &str) -> Result<usize, ZdipyError> {
+        let text = self.text(column, name)?;
+        match text.parse() {
+            Ok(value) if (1..=MOST).contains(&value) => Ok(value),
+            _ => Err(self.fault(format!("the {name} is {}, not a whole number from 1 to {MOST}", shown(text)))),
+        }
+    }
+}
+
+/// No count is larger.
+const MOST: usize = 10_000;
+
+/// A piece of the user's text, quoted and cut to a length that keeps a message on one line.
+fn shown(text: &str) -> String {
+    format!("{:?}", text.chars().take(40).collect::<String>())
+}

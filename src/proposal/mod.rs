@@ -1,0 +1,147 @@
+//! A first config for observed profiles: what they say themselves, what is given, and what has to be assumed; each value with
+//! where it came from.
+//!
+//! It is a config that `map`, `periodogram` and `sample` take as it is, and that is tried out: errors that promise more than the
+//! model can keep are scaled up until a map reaches the target chi2. Left out: who gives values (`import`, the command line),
+//! and writing it down.
+
+mod digits;
+mod ledger;
+mod trial;
+mod values;
+
+pub use ledger::{Entry, Source};
+
+use crate::config::{ConfigError, Draft, EquivalentWidth};
+use crate::first_look::LookError;
+use crate::io::lsd::{self, LsdError, ReadOptions};
+use ledger::Ledger;
+use std::path::{Path, PathBuf};
+use values::Values;
+
+/// A value with who gave it: an option, or a line of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Given<T> {
+    /// The value.
+    pub value: T,
+    /// Who gave it, for the table.
+    pub by: String,
+}
+
+/// What is known of the star without its profiles; all of it may be absent. Names and units are those of the config.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Known {
+    pub rotation_period_d: Option<Given<f64>>,
+    pub epoch_d: Option<Given<f64>>,
+    pub inclination_deg: Option<Given<f64>>,
+    pub vsini_kms: Option<Given<f64>>,
+    pub vsys_kms: Option<Given<f64>>,
+    pub domega_rad_d: Option<Given<f64>>,
+    /// Coefficient of the linear law.
+    pub limb_darkening: Option<Given<f64>>,
+    pub photosphere_k: Option<Given<f64>>,
+    pub spot_k: Option<Given<f64>>,
+    pub wavelength_nm: Option<Given<f64>>,
+    /// Standard deviation of the local line.
+    pub line_sigma_kms: Option<Given<f64>>,
+    pub equivalent_width: Option<Given<EquivalentWidth>>,
+    pub resolving_power: Option<Given<f64>>,
+    pub velocity_range_kms: Option<Given<(f64, f64)>>,
+    pub sigma_scale: Option<Given<f64>>,
+    pub pixels: Option<Given<usize>>,
+    pub chi2_target: Option<Given<f64>>,
+}
+
+/// Where things are or will be.
+#[derive(Clone, Debug)]
+pub struct Place<'a> {
+    /// The config that will be written.
+    pub config: &'a Path,
+    /// The list of profiles.
+    pub list: &'a Path,
+    /// Its content, which need not have been written.
+    pub list_bytes: &'a [u8],
+    /// The list as the config names it, relative to the config's folder.
+    pub list_in_config: PathBuf,
+    /// The JSON Schema as the config names it.
+    pub schema: Option<String>,
+}
+
+/// A config and where its values came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// The config, as text.
+    pub json: String,
+    /// What was observed, in a line.
+    pub observed: String,
+    /// Every value that is worth a look, with its source.
+    pub entries: Vec<Entry>,
+    /// What became of the trial, and what looks wrong.
+    pub notes: Vec<String>,
+    /// Whether a map can be made of the config as it is.
+    pub complete: bool,
+}
+
+/// Why there is no proposal: one line that names the file at fault.
+#[derive(Debug, thiserror::Error)]
+pub enum ProposalError {
+    /// The list or a profile.
+    #[error(transparent)]
+    Observations(#[from] LsdError),
+    /// The profiles show no star.
+    #[error("{}: {error}", .list.display())]
+    Look {
+        /// The list of profiles.
+        list: PathBuf,
+        /// What is wrong with them.
+        error: LookError,
+    },
+    /// A given value makes no sense.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A path that JSON cannot hold.
+    #[error("{}: the path of the observations cannot be written in JSON: {problem}", .config.display())]
+    Path {
+        /// The config.
+        config: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// The proposal for the profiles of a list, of a star of which something is known.
+///
+/// # Errors
+/// Profiles that cannot be read or show no line, given values that make no sense.
+pub fn propose(place: &Place, known: &Known) -> Result<Proposal, ProposalError> {
+    let read = |options: &ReadOptions| lsd::read_listed(place.list, place.list_bytes, options);
+    let whole = read(&ReadOptions::default())?.observations;
+    let mut ledger = Ledger::default();
+    let look = |error| ProposalError::Look { list: place.list.into(), error };
+    let values = Values::measure(&whole, known, &mut ledger).map_err(look)?;
+    let cut =
+        read(&ReadOptions { velocity_range_kms: Some(values.velocity_range_kms), sigma_scale: 1.0 })?.observations;
+    let mut draft = values.draft(&cut, known, &mut ledger);
+    draft.observations.clone_from(&place.list_in_config);
+    draft.schema.clone_from(&place.schema);
+    let trial = trial::run(&mut draft, place.config, &cut, known.sigma_scale.is_some())?;
+    let mut notes = values.notes(known);
+    notes.extend(trial.notes(values.look.noise.quoted, &draft));
+    if trial.floor_scale.is_some() {
+        let remark = "so that a map reaches the target chi2, see the note";
+        ledger.replace("observations.sigma_scale", draft.sigma_scale, remark);
+    }
+    values::note_orbit(&draft, trial.orbit && trial.is_complete(), &mut ledger);
+    Ok(Proposal {
+        json: to_json(&draft, place.config)?,
+        observed: values.observed(&whole),
+        entries: ledger.entries,
+        notes,
+        complete: trial.is_complete(),
+    })
+}
+
+fn to_json(draft: &Draft, config: &Path) -> Result<String, ProposalError> {
+    draft.to_json().map_err(|e| ProposalError::Path { config: config.into(), problem: e.to_string() })
+}

@@ -1,0 +1,156 @@
+//! The first look at simulated stars: vsini and centre within the errors that it gives, lines found where they are, and every
+//! reason to see nothing.
+
+use dimcmc::first_look::{FirstLook, LineModel, LookError, MeanProfile};
+use dimcmc::objective::{Parameter, ParameterValues};
+use dimcmc::observation::{Observations, Profile};
+use dimcmc::simulate::Simulation;
+use dimcmc::star::{LimbDarkening, LocalLine, Spot, StarSettings};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const LINE: LineModel = LineModel { limb_darkening: 0.65, sigma_kms: 3.18 };
+const VSYS_KMS: f64 = 1.3;
+
+/// Profiles of a star with eight spots somewhere and perhaps a polar cap, reaching `beyond_kms` farther than vsini.
+fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) -> Observations {
+    let mut spots: Vec<Spot> = (0..8)
+        .map(|_| Spot {
+            longitude: rng.random_range(-3.0..3.0),
+            latitude: rng.random_range(-0.5..1.2),
+            radius: rng.random_range(0.09..0.3),
+            filling: 0.8,
+        })
+        .collect();
+    if cap_deg > 0.0 {
+        spots.push(Spot { longitude: 0.5, latitude: 1.48, radius: cap_deg.to_radians(), filling: 0.9 });
+    }
+    let star = StarSettings {
+        rotation_period_d: 3.0,
+        epoch_d: 0.0,
+        limb_darkening: LimbDarkening::Linear(0.65),
+        contrast: 0.08,
+        line: LocalLine { sigma_kms: LINE.sigma_kms, equivalent_width_kms: 5.8 },
+    };
+    let mut truth = ParameterValues([0.0; 8]);
+    truth[Parameter::PorbOverProt] = 2.0;
+    truth[Parameter::OmegaEq] = std::f64::consts::TAU / 3.0;
+    truth[Parameter::Inclination] = rng.random_range(25.0..85.0);
+    truth[Parameter::Vsini] = vsini_kms;
+    truth[Parameter::Vsys] = VSYS_KMS;
+    let reach = vsini_kms + beyond_kms;
+    let simulation = Simulation {
+        spots,
+        truth,
+        times_d: (0..20).map(|_| rng.random_range(0.0..12.0)).collect(),
+        first_velocity_kms: -reach,
+        step_kms: 1.8,
+        bins: (2.0 * reach / 1.8) as usize,
+        snr: Some(700.0),
+        seed: 1,
+        pixels: 3000,
+    };
+    simulation.observe(&star)
+}
+
+#[test]
+fn vsini_and_centre_are_within_their_errors() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let (mut vsini_pulls, mut centre_pulls) = (Vec::new(), Vec::new());
+    for vsini in [6.0, 12.0, 25.0, 40.0, 70.0, 120.0] {
+        for cap in [0.0, 20.0, 40.0] {
+            for _ in 0..3 {
+                let look = FirstLook::at(&observe(vsini, cap, 0.3 * vsini + 20.0, &mut rng), LINE).unwrap();
+                // line and limb darkening are known here: what is left is what spots are said to do
+                let by_spots = 0.01 * vsini + 0.3;
+                vsini_pulls.push((look.unspotted.vsini_kms - vsini) / by_spots);
+                centre_pulls.push((look.unspotted.centre_kms - VSYS_KMS) / look.centre_error_kms);
+                // where the line is as narrow as the star is slow, its width decides; a fifth of 3.2 km/s is 1.6 km/s of vsini
+                let error = look.vsini_error_kms;
+                let largest = if vsini > 20.0 { 0.02 * vsini + 0.8 } else { 2.0 };
+                assert!((by_spots..largest).contains(&error), "{vsini}: {error}");
+            }
+        }
+    }
+    for (name, pulls) in [("vsini", vsini_pulls), ("centre", centre_pulls)] {
+        let within = |n: f64| pulls.iter().filter(|p| p.abs() < n).count() as f64 / pulls.len() as f64;
+        let worst = pulls.iter().fold(0.0f64, |a, p| a.max(p.abs()));
+        println!("{name}: {:.2} within 1, {:.2} within 2, worst {worst:.2}", within(1.0), within(2.0));
+        // 54 stars: 0.68 expected of a standard error, its own scatter is 0.06
+        assert!(within(1.0) > 0.55 && within(2.0) > 0.9 && worst < 4.0, "{name}: {pulls:.2?}");
+    }
+}
+
+#[test]
+fn a_range_without_continuum_will_do() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    for vsini in [25.0, 60.0] {
+        // the line alone: it is 0.1 % deep at 9.5 km/s beyond vsini
+        let look = FirstLook::at(&observe(vsini, 20.0, 9.5, &mut rng), LINE).unwrap();
+        let pull = (look.unspotted.vsini_kms - vsini) / look.vsini_error_kms;
+        assert!(pull.abs() < 2.0, "{vsini}: {pull}");
+        assert!((look.reach_kms - vsini - 3.0 * LINE.sigma_kms).abs() < 2.0);
+        assert_eq!((look.noise.scatter, look.noise.ratio()), (None, None));
+    }
+}
+
+#[test]
+fn the_continuum_tells_wrong_errors() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut observations = observe(30.0, 0.0, 60.0, &mut rng);
+    for factor in [1.0, 5.0] {
+        observations.profiles.iter_mut().for_each(|p| p.sigma.iter_mut().for_each(|s| *s *= factor));
+        let noise = FirstLook::at(&observations, LINE).unwrap().noise;
+        assert!((noise.quoted / (factor / 700.0) - 1.0).abs() < 1e-9);
+        // some 40 bins of 20 profiles: good to 1 / sqrt(2 x 800) = 2.5 %
+        assert!((noise.ratio().unwrap() * factor - 1.0).abs() < 0.1, "{noise:?}");
+    }
+}
+
+#[test]
+fn profiles_on_different_axes_have_a_mean() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let together = observe(40.0, 0.0, 30.0, &mut rng);
+    let mean = MeanProfile::of(&together).unwrap();
+    assert_eq!(mean.depth.len(), together.profiles[0].intensity.len());
+    let first: f64 = together.profiles.iter().map(|p| 1.0 - p.intensity[3]).sum::<f64>() / 20.0;
+    assert!((mean.depth[3] - first).abs() < 1e-15);
+    // as if half of them had a VRAD larger by 0.7 bins: the line is smeared, its centre moves by half of that
+    let mut apart = together.clone();
+    apart.profiles.iter_mut().step_by(2).for_each(|p| p.first_velocity_kms += 0.7 * 1.8);
+    let look = |observations: &Observations| FirstLook::at(observations, LINE).unwrap().unspotted;
+    let (here, there) = (look(&together), look(&apart));
+    assert!((there.centre_kms - here.centre_kms - 0.35 * 1.8).abs() < 0.1, "{here:?} {there:?}");
+    assert!((there.vsini_kms - here.vsini_kms).abs() < 0.3, "{here:?} {there:?}");
+}
+
+/// Two equal profiles of the given depths.
+fn made(depth: impl Fn(f64) -> f64) -> Observations {
+    let velocities = (0..101).map(|j| -50.0 + f64::from(j));
+    let profile = Profile {
+        time_d: 0.0,
+        first_velocity_kms: -50.0,
+        intensity: velocities.map(|v| 1.0 - depth(v)).collect(),
+        sigma: vec![1e-3; 101],
+    };
+    Observations { step_kms: 1.0, profiles: vec![profile.clone(), profile] }
+}
+
+#[test]
+fn where_there_is_no_star_it_says_so() {
+    let look = |observations: &Observations| FirstLook::at(observations, LINE).unwrap_err();
+    assert!(matches!(look(&made(|_| 0.0)), LookError::NoLine { .. }));
+    assert!(matches!(look(&made(|v| 1e-3 * (v * v).sin())), LookError::NoLine { .. }));
+    assert!(matches!(look(&made(|v| -0.3 * (-v * v / 100.0).exp())), LookError::NoLine { .. }), "emission");
+    assert!(matches!(look(&made(|v| 0.3 * (-(v - 50.0).powi(2) / 400.0).exp())), LookError::LineCut { .. }));
+    assert!(matches!(look(&made(|v| if v == 3.0 { 0.5 } else { 0.0 })), LookError::LineTooNarrow { bins: 1 }));
+    let mut apart = made(|v| 0.3 * (-v * v / 100.0).exp());
+    apart.profiles[1].first_velocity_kms = 48.0;
+    assert_eq!(look(&apart), LookError::NothingInCommon);
+    // whatever it is given, it comes to an end without a panic
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for _ in 0..200 {
+        let depth: Vec<f64> = (0..101).map(|_| rng.random_range(-1.0..1.0f64).powi(5) * 1e3).collect();
+        let _ = FirstLook::at(&made(|v| depth[(v + 50.0) as usize]), LINE);
+    }
+}

@@ -1,0 +1,217 @@
+//! `dimcmc import`: ZDIpy's star in this program's terms, what has no counterpart, and every way in which its files can be wrong.
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::{Desk, says, with_line};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+fn data(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/zdipy").join(name)
+}
+
+/// ZDIpy's files in `zdi`, with profiles of the star that they describe: 17 of the demo's times, in ZDIpy's Julian dates.
+fn desk() -> Desk {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json");
+    let mut demo: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    let cycles: Vec<f64> = (0..17).map(|k| 0.18 * f64::from(k)).collect();
+    demo["observations"]["simulate"]["cycles"] = json!(cycles);
+    demo["observations"]["simulate"]["snr"] = json!(300);
+    demo["star"]["domega_rad_d"] = json!(0.02);
+    let desk = Desk::new(demo);
+    desk.succeed(&["simulate", "config.json", "--out", "zdi/LSDprof"]);
+    for file in ["inzdi.dat", "model-voigt-line.dat"] {
+        std::fs::copy(data(file), desk.path("zdi").join(file)).unwrap();
+    }
+    desk
+}
+
+#[test]
+fn values_and_conventions_are_taken_over() {
+    let desk = desk();
+    let table = desk.succeed(&["import", "zdi/inzdi.dat"]);
+    println!("{table}");
+    let config = desk.json("star.json");
+    let star = &config["star"];
+    for (key, value) in [
+        ("rotation_period_d", 3.0),
+        ("epoch_d", 0.0),
+        ("inclination_deg", 38.0),
+        ("vsini_kms", 40.0),
+        ("vsys_kms", 0.0),
+        ("domega_rad_d", 0.02),
+        ("wavelength_nm", 550.0),
+    ] {
+        assert_eq!(star[key], value, "{key}");
+    }
+    assert_eq!(star["limb_darkening"], json!({ "law": "linear", "coefficients": [0.65] }));
+    assert_eq!(star["line"]["equivalent_width_kms"], "auto");
+    // Gauss: 3.2 / sqrt 2 = 2.263 km/s, full width 5.328; Lorentz 2 x 0.25 x 3.2 = 1.6 km/s; together 6.2355 (Olivero & Longbothum)
+    assert!((star["line"]["sigma_kms"].as_f64().unwrap() - 6.2355 / 2.354_82).abs() < 2e-4, "{star}");
+    assert_eq!(config["instrument"]["resolving_power"], 65000.0);
+    assert_eq!(config["observations"]["path"], "star_observations.txt");
+    assert_eq!(config["observations"]["velocity_range_kms"], json!([-50.0, 50.0]));
+    assert_eq!((&config["observations"]["sigma_scale"], &config["imaging"]["chi2_target"]), (&json!(1.0), &json!(1.0)));
+    // 20 rings: 4 / pi x 400
+    assert_eq!(config["imaging"]["pixels"], 509);
+    let list = desk.read("star_observations.txt");
+    let expected = "# file  time_d  vrad_kms\nzdi/LSDprof/p000.prof  0  0\nzdi/LSDprof/p001.prof  0.54  0\n";
+    assert!(list.starts_with(expected) && list.lines().count() == 18, "{list}");
+    says(
+        &table,
+        &[
+            "not taken over\n",
+            "inzdi.dat:5             mass 0.9, radius 1.1",
+            "inzdi.dat:20            default and limiting brightness",
+            "model-voigt-line.dat:2  line depth 0.7",
+            "model-voigt-line.dat:2  Lorentzian width 0.25",
+            "model-voigt-line.dat:2  Lande factor 1.2",
+            "model-voigt-line.dat:2  gravity darkening 0.5",
+            "written: star.json, star_observations.txt\n",
+        ],
+    );
+    // the star is the one that was simulated: with another sign of a velocity or sense of rotation no map would fit
+    desk.edit("star.json", |text| text.replace("\"pixels\": 509", "\"pixels\": 2000"));
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+    let spottedness = desk.json("map/fit.json")["spottedness"].as_f64().unwrap();
+    let truth = desk.json("zdi/LSDprof/truth.json")["spottedness"].as_f64().unwrap();
+    assert!(spottedness < 1.5 * truth, "{spottedness} {truth}");
+}
+
+/// The velocity of each profile is subtracted, as ZDIpy does.
+#[test]
+fn velocities_have_the_same_sign() {
+    let desk = desk();
+    desk.succeed(&["import", "zdi/inzdi.dat", "--out", "a.json"]);
+    for k in 0..17 {
+        let moved = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
+            [v, i, s] => format!("{:.6} {i} {s}\n", v.parse::<f64>().unwrap() - 19.8),
+            _ => format!("{line}\n"),
+        };
+        desk.edit(&format!("zdi/LSDprof/p{k:03}.prof"), |text| {
+            text.lines().enumerate().map(|(n, l)| if n < 2 { format!("{l}\n") } else { moved(l) }).collect()
+        });
+    }
+    let here = |line: &str| line.starts_with("LSDprof");
+    desk.edit("zdi/inzdi.dat", |text| {
+        text.lines().map(|l| if here(l) { l.replace("    0.0", "  -19.8") + "\n" } else { format!("{l}\n") }).collect()
+    });
+    desk.succeed(&["import", "zdi/inzdi.dat", "--out", "b.json"]);
+    assert!(desk.read("b_observations.txt").contains("p016.prof  8.64  -19.8\n"));
+    assert_eq!(desk.read("a.json").replace("a_obs", "b_obs"), desk.read("b.json"));
+}
+
+#[test]
+fn targets_become_errors_and_flags_decide() {
+    // (line of inzdi.dat, its new text, chi2_target, sigma_scale, what the table says)
+    type Case<'a> = (usize, &'a str, f64, Option<f64>, &'a str);
+    let cases: [Case; 6] = [
+        (9, "C 1.44 20", 1.0, Some(1.2), "chi^2 of 1.44 with errors as quoted"),
+        (9, "C 1.05 20", 1.05, Some(1.0), "inzdi.dat:9"),
+        (9, "E -28828. 20", 0.97, None, "inzdi.dat:9             target entropy -28828"),
+        (18, "0 1.0 1.0", 0.97, None, "inzdi.dat:9             target chi^2 1"),
+        (18, "1 0.64 1.0", 1.0, Some(1.25), "imaging.chi2_target"),
+        (13, "1 15 100.0 Full", 1.0, Some(1.0), "inzdi.dat:13            magnetic field"),
+    ];
+    let desk = desk();
+    let good = desk.read("zdi/inzdi.dat");
+    for (line, text, target, scale, said) in cases {
+        desk.write("zdi/inzdi.dat", &with_line(&good, line, text));
+        let table = desk.succeed(&["import", "zdi/inzdi.dat", "--force"]);
+        says(&table, &[said]);
+        let config = desk.json("star.json");
+        assert_eq!(config["imaging"]["chi2_target"], target, "{text}");
+        if let Some(scale) = scale {
+            assert_eq!(config["observations"]["sigma_scale"], scale, "{text}");
+        }
+    }
+}
+
+#[test]
+fn other_layouts_and_no_line_file() {
+    let desk = desk();
+    // older ZDIpy has no mass and radius
+    let without: String =
+        desk.read("zdi/inzdi.dat").lines().filter(|l| !l.starts_with("0.9 ")).map(|l| format!("{l}\n")).collect();
+    desk.write("zdi/old.dat", &without);
+    let table = desk.succeed(&["import", "zdi/old.dat", "--out", "old.json"]);
+    assert!(!table.contains("mass"));
+    desk.succeed(&["import", "zdi/inzdi.dat", "--out", "new.json"]);
+    assert_eq!(desk.read("old.json").replace("old_obs", "new_obs"), desk.read("new.json"));
+    // strength by the file: depth x sqrt(pi) x Gaussian width
+    desk.write("zdi/old.dat", &with_line(&without, 23, "0"));
+    desk.succeed(&["import", "zdi/old.dat", "--out", "old.json", "--force", "--line", "zdi/model-voigt-line.dat"]);
+    let width = desk.json("old.json")["star"]["line"]["equivalent_width_kms"].as_f64().unwrap();
+    assert!((width - 0.7 * std::f64::consts::PI.sqrt() * 3.2).abs() < 1e-4, "{width}");
+    // without it the line is assumed, and said to be; options replace what files say
+    std::fs::remove_file(desk.path("zdi/model-voigt-line.dat")).unwrap();
+    let table =
+        desk.succeed(&["import", "zdi/inzdi.dat", "--out", "bare.json", "--inclination", "41", "--spot", "3800"]);
+    says(&table, &["--line-sigma", "--wavelength", "--limb-darkening"]);
+    let star = &desk.json("bare.json")["star"];
+    assert_eq!((&star["inclination_deg"], &star["spot_k"]), (&json!(41.0), &json!(3800.0)));
+}
+
+#[test]
+fn broken_files_are_refused_by_file_and_line() {
+    let desk = desk();
+    let cases: [(usize, &str, &[&str]); 17] = [
+        (3, "38.0 40.0 3.0", &["inzdi.dat:3: 3 columns, the dOmega is due in column 4"]),
+        (3, "98.0 40.0 3.0 0.02", &["inzdi.dat:3: the inclination is 98, it must be above 0 and up to 90"]),
+        (3, "38.0 forty 3.0 0.02", &["inzdi.dat:3: the vsini is \"forty\", not a number"]),
+        (3, "38.0 40.0 -3.0 0.02", &["inzdi.dat:3: the period is -3, it must be above 0"]),
+        (3, "38.0 40.0 3.0 nan", &["inzdi.dat:3: the dOmega is \"nan\", not a number"]),
+        (5, "0.9 heavy", &["inzdi.dat:5: the radius is \"heavy\""]),
+        (7, "20.5", &["inzdi.dat:7: the number of rings is \"20.5\", not a whole number"]),
+        (7, "0", &["inzdi.dat:7: the number of rings is \"0\""]),
+        (9, "X 1.0 20", &["inzdi.dat:9: the target is \"X\", it must be C (chi^2) or E (entropy)"]),
+        (9, "C 0.0 20", &["inzdi.dat:9: the target chi^2 is 0"]),
+        (13, "yes 15 100.0 Full", &["inzdi.dat:13: fit magnetic is \"yes\", it must be 0 or 1"]),
+        (18, "1", &["inzdi.dat:18: 1 columns, the chi^2 scaling is due in column 2"]),
+        (20, "3 1.0 1.01", &["inzdi.dat:20: the brightness entropy is \"3\""]),
+        (26, "0", &["inzdi.dat:26: the resolution is 0"]),
+        (28, "50.0 -50.0", &["inzdi.dat:28: vel_start 50 must be below vel_end, which is -50"]),
+        (34, "LSDprof/p002.prof 1.08", &["inzdi.dat:34: 2 columns, the centre velocity is due in column 3"]),
+        (35, "LSDprof/q003.prof 1.62 0.0", &["inzdi.dat:35: cannot read profile", "q003.prof"]),
+    ];
+    let good = desk.read("zdi/inzdi.dat");
+    for (line, text, parts) in cases {
+        desk.write("zdi/inzdi.dat", &with_line(&good, line, text));
+        let message = desk.refusal(&["import", "zdi/inzdi.dat"]);
+        says(&message, parts);
+        assert!(message.starts_with("zdi/inzdi.dat:"), "{message}");
+    }
+    // cut off anywhere, it names what is missing, or is whole
+    let lines: Vec<&str> = good.lines().collect();
+    for end in 0..32 {
+        desk.write("zdi/inzdi.dat", &lines[..end].join("\n"));
+        says(&desk.refusal(&["import", "zdi/inzdi.dat"]), &["zdi/inzdi.dat: ends before "]);
+    }
+    desk.write("zdi/inzdi.dat", &good);
+    let line = desk.read("zdi/model-voigt-line.dat");
+    for (text, part) in [
+        ("550.0 0.7 3.2 0.25 1.2", "5 columns, the limb darkening is due in column 6"),
+        ("550.0 0.7 3.2 0.25 1.2 1.65", "the limb darkening is 1.65, it must be from 0 to 1"),
+        ("550.0 0.7 3.2 -0.25 1.2 0.65", "the Lorentzian width is -0.25, it must be 0 or more"),
+        ("550.0 0.7 wide 0.25 1.2 0.65", "the Gaussian width is \"wide\", not a number"),
+    ] {
+        desk.write("zdi/model-voigt-line.dat", &with_line(&line, 2, text));
+        says(&desk.refusal(&["import", "zdi/inzdi.dat"]), &["zdi/model-voigt-line.dat:2: ", part]);
+    }
+    desk.write("zdi/model-voigt-line.dat", "# nothing\n");
+    says(&desk.refusal(&["import", "zdi/inzdi.dat"]), &["model-voigt-line.dat: ends before the model of the line"]);
+    says(&desk.refusal(&["import", "zdi/absent.dat"]), &["zdi/absent.dat: cannot read"]);
+}
+
+#[test]
+fn nothing_is_overwritten_and_no_list_is_broken() {
+    let desk = desk();
+    desk.write("star_observations.txt", "precious");
+    says(&desk.refusal(&["import", "zdi/inzdi.dat"]), &["--out star.json: star_observations.txt exists", "--force"]);
+    std::fs::rename(desk.path("zdi"), desk.path("my data")).unwrap();
+    let message = desk.refusal(&["import", "my data/inzdi.dat", "--out", "b.json"]);
+    says(&message, &["my data/inzdi.dat:32: profile my data/LSDprof/p000.prof: ", "a path with a blank"]);
+    desk.succeed(&["import", "my data/inzdi.dat", "--out", "my data/star.json"]);
+    desk.succeed(&["map", "my data/star.json", "--out", "map"]);
+}

@@ -1,0 +1,284 @@
+//! `dimcmc init`: the config that it writes is taken by the other commands as it is, its values are those of the star, and
+//! nothing that is not known is passed over in silence.
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::{Desk, dimcmc, says, text};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// A small star with a planet of 0.3 km/s, with continuum beside the line.
+fn simulated() -> Value {
+    json!({
+        "star": {
+            "rotation_period_d": 3.0, "epoch_d": 100.0, "inclination_deg": 50.0, "vsini_kms": 25.0, "vsys_kms": 1.7,
+            "photosphere_k": 5000.0, "spot_k": 3500.0,
+            "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }
+        },
+        "instrument": { "resolving_power": 65000.0 },
+        "planet": { "k_kms": 0.3, "porb_over_prot": 1.7, "phi": 0.5 },
+        "observations": { "simulate": {
+            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
+            "cycles": [0.0, 0.11, 0.23, 0.37, 0.52, 0.66, 0.79, 0.91, 1.05, 1.18, 1.33, 1.46, 1.61, 1.77, 1.9, 2.04],
+            "velocity_kms": { "min": -75.6, "max": 75.6, "step": 1.8 },
+            "snr": 300, "seed": 7, "pixels": 3000
+        } }
+    })
+}
+
+fn desk() -> Desk {
+    let desk = Desk::new(simulated());
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    desk
+}
+
+const INIT: [&str; 6] = ["init", "data/observations.txt", "--rotation-period", "3", "--inclination", "50"];
+
+fn number(config: &Value, pointer: &str) -> f64 {
+    config.pointer(pointer).unwrap_or_else(|| panic!("{pointer}")).as_f64().unwrap_or_else(|| panic!("{pointer}"))
+}
+
+#[test]
+fn the_config_is_taken_as_it_is() {
+    let desk = desk();
+    let table = desk.succeed(&INIT);
+    println!("{table}");
+    says(
+        &table,
+        &[
+            "16 profiles of 85 bins of 1.800 km/s, from 100.000 to 106.120 (6.120 d); S/N 300 a bin",
+            "from the profiles\n",
+            "given\n",
+            "--rotation-period",
+            "assumed, please check\n",
+            "--resolving-power",
+            "note: tried out: spots on ",
+            "written: star.json\n",
+            "  dimcmc map star.json --out map ",
+        ],
+    );
+    assert!(!table.contains("still to be given"));
+    let config = desk.json("star.json");
+    assert!((number(&config, "/star/vsini_kms") - 25.0).abs() < 0.6, "its error says 0.6");
+    assert!((number(&config, "/star/vsys_kms") - 1.7).abs() < 0.3, "three errors of 0.1");
+    assert_eq!(number(&config, "/star/epoch_d"), 103.06);
+    assert_eq!(config["star"]["line"]["equivalent_width_kms"], "auto");
+    let range = &config["observations"]["velocity_range_kms"];
+    // vsini and three sigmas of a line of 3.2 km/s (R = 65000 included) around vsys
+    assert!((range[0].as_f64().unwrap() - (1.7 - 34.6)).abs() < 1.0 && (range[1].as_f64().unwrap() - 36.3).abs() < 1.0);
+    assert_eq!(config["observations"]["sigma_scale"], 1.0);
+    let orbits = &config["parameters"]["porb_over_prot"];
+    assert!(orbits["min"].as_f64().unwrap() < 0.5 && orbits["max"] == 2.0, "one orbit in 2.04 rotations: {orbits}");
+    assert!(number(&config, "/parameters/k_kms/max") > 0.6);
+
+    // fewer pixels alone are asked for; the defaults take as long as is worth it for a real star
+    desk.edit("star.json", |text| text.replace("\"pixels\": 2000", "\"pixels\": 800"));
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+    desk.succeed(&["periodogram", "star.json", "--out", "search"]);
+    let found = desk.json("search/periodogram.json");
+    println!("{}", found["best"]);
+    let short = json!({ "ensembles": 2, "walkers": 10, "steps": 10 });
+    let mut config = desk.json("star.json");
+    config["sampler"] = short;
+    desk.write("star.json", &config.to_string());
+    desk.succeed(&["sample", "star.json", "--out", "run"]);
+    let summary = desk.json("run/summary.json");
+    let k = summary["parameters"]["k_kms"]["median"].as_f64().unwrap();
+    assert!((k - 0.3).abs() < 0.15, "{k}");
+}
+
+/// What is written does not depend on threads or on when and how often it is asked for.
+#[test]
+fn the_same_observations_give_the_same_config() {
+    let desk = desk();
+    let first = desk.succeed(&[&INIT[..], &["--out", "a.json"]].concat());
+    let second = desk.succeed(&[&INIT[..], &["--out", "b.json", "--threads", "1", "--quiet"]].concat());
+    assert_eq!(desk.read("a.json"), desk.read("b.json"));
+    assert_eq!(first.replace("a.json", "b.json"), second);
+}
+
+#[test]
+fn what_nobody_knows_is_marked_and_refused_later() {
+    let desk = desk();
+    let table = desk.succeed(&["init", "data/observations.txt", "--out", "a.json"]);
+    says(
+        &table,
+        &["still to be given\n", "star.rotation_period_d", "null", "note: without a rotation period no command"],
+    );
+    assert_eq!(desk.json("a.json")["star"]["rotation_period_d"], Value::Null);
+    for command in ["map", "periodogram", "optimise", "sample"] {
+        let message = desk.refusal(&[command, "a.json", "--out", "out"]);
+        says(&message, &["a.json: star.rotation_period_d: null stands for a value still to be given: put a number"]);
+    }
+    desk.edit("a.json", |text| text.replace("null", "3.0"));
+    desk.succeed(&["map", "a.json", "--out", "out"]);
+}
+
+#[test]
+fn options_replace_what_is_measured() {
+    let desk = desk();
+    let options = [
+        ("--epoch", "/star/epoch_d", 101.5),
+        ("--vsini", "/star/vsini_kms", 30.5),
+        ("--domega", "/star/domega_rad_d", -0.01),
+        ("--limb-darkening", "/star/limb_darkening/coefficients/0", 0.5),
+        ("--photosphere", "/star/photosphere_k", 4400.0),
+        ("--spot", "/star/spot_k", 3600.0),
+        ("--wavelength", "/star/wavelength_nm", 650.0),
+        ("--line-sigma", "/star/line/sigma_kms", 3.5),
+        ("--resolving-power", "/instrument/resolving_power", 100_000.0),
+    ];
+    let texts: Vec<String> =
+        options.iter().flat_map(|(name, _, value)| [name.to_string(), value.to_string()]).collect();
+    let args: Vec<&str> = INIT.into_iter().chain(texts.iter().map(String::as_str)).collect();
+    let table = desk.succeed(&args);
+    let config = desk.json("star.json");
+    for (name, pointer, value) in options {
+        assert_eq!(number(&config, pointer), value, "{name}");
+        assert!(table.contains(name), "{name}");
+    }
+    says(&table, &["note: vsini is given as 30.5 km/s, the mean profile looks like 2"]);
+}
+
+/// Errors five times too large, and five times too small: the continuum says so.
+#[test]
+fn wrong_errors_are_scaled() {
+    for (scale, expected) in [(5.0, 0.2), (0.2, 5.0)] {
+        let desk = desk();
+        for k in 0..16 {
+            let scaled = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
+                [v, i, s] => format!("{v} {i} {:e}\n", s.parse::<f64>().unwrap() * scale),
+                _ => format!("{line}\n"),
+            };
+            // two lines of header
+            desk.edit(&format!("data/p{k:03}.prof"), |text| {
+                text.lines().enumerate().map(|(n, l)| if n < 2 { format!("{l}\n") } else { scaled(l) }).collect()
+            });
+        }
+        let table = desk.succeed(&INIT);
+        says(&table, &["observations.sigma_scale", "the continuum scatters by 3.", "note: tried out: spots on "]);
+        let found = number(&desk.json("star.json"), "/observations/sigma_scale");
+        // the scatter of 480 bins is good to 3 %, and two digits of it are written
+        assert!((found / expected - 1.0).abs() < 0.12, "{found}");
+        desk.succeed(&["map", "star.json", "--out", "map"]);
+    }
+}
+
+/// A star that is not modelled as well as its errors promise: the config's target is reached all the same.
+#[test]
+fn errors_that_the_model_cannot_keep_are_scaled() {
+    let desk = desk();
+    let table = desk.succeed(&[&INIT[..], &["--vsini", "20"]].concat());
+    says(&table, &["note: no map fits better than errors of ", "so that a map reaches the target chi2"]);
+    assert!(number(&desk.json("star.json"), "/observations/sigma_scale") > 1.2);
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+}
+
+#[test]
+fn the_observations_are_found_from_wherever_the_config_is() {
+    let desk = desk();
+    for folder in ["configs", "configs/deep", "data/inside"] {
+        std::fs::create_dir_all(desk.path(folder)).unwrap();
+    }
+    let cases = [
+        ("configs/deep/star.json", "../../data/observations.txt"),
+        ("data/star.json", "observations.txt"),
+        ("data/inside/star.json", "../observations.txt"),
+    ];
+    for (out, expected) in cases {
+        desk.succeed(&[&INIT[..], &["--out", out]].concat());
+        let config = desk.json(out);
+        assert_eq!(Path::new(config["observations"]["path"].as_str().unwrap()), Path::new(expected));
+        assert!(config.get("$schema").is_none());
+        desk.succeed(&["map", out, "--out", "map", "--force"]);
+    }
+    // the schema is named where it lies beside the config
+    let schema = text(&dimcmc(&["schema"], &desk.path("")).stdout);
+    desk.write("configs/dimcmc.schema.json", &schema);
+    desk.succeed(&[&INIT[..], &["--out", "configs/star.json"]].concat());
+    assert_eq!(desk.json("configs/star.json")["$schema"], "dimcmc.schema.json");
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_a_line() {
+    let desk = desk();
+    desk.write("star.json", "precious");
+    let refused = |more: &[&str], parts: &[&str]| says(&desk.refusal(&[&INIT[..], more].concat()), parts);
+    refused(&[], &["--out star.json: star.json exists", "--force"]);
+    refused(&["--out", "data"], &["--out data: is a folder"]);
+    refused(&["--out", "absent/star.json"], &["--out absent/star.json: absent is not a folder"]);
+    refused(&["--out", "star.json/x.json"], &["star.json is not a folder"]);
+    let bad: [(&[&str], &str); 4] = [
+        (&["--vsini", "0"], "star.vsini_kms: 0 must be above 0"),
+        (&["--spot", "6000"], "star.spot_k: 6000 must be below photosphere_k"),
+        (&["--limb-darkening", "1.5"], "star.limb_darkening.coefficients: 1.5"),
+        (&["--line-sigma", "0"], "star.line.sigma_kms: 0 must be above 0"),
+    ];
+    for (options, problem) in bad {
+        let options = options.join("=");
+        refused(&["--out", "a.json", &options], &["a.json: ", problem]);
+    }
+    for options in [
+        ["--line-sigma=1e9", "--resolving-power=1"],
+        ["--line-sigma=0", "--resolving-power=1e12"],
+        ["--line-sigma=2.5", "--resolving-power=-1"],
+    ] {
+        refused(
+            &["--out", "a.json", options[0], options[1]],
+            &["data/observations.txt: a local line of a standard deviation"],
+        );
+    }
+    for option in ["--limb-darkening=nan", "--resolving-power=nan", "--line-sigma=inf", "--epoch=nan", "--vsini=1e308"]
+    {
+        refused(&["--out", "a.json", option], &[": "]);
+    }
+    for period in ["0", "-3", "inf"] {
+        let args = ["init", "data/observations.txt", "--out", "a.json", &format!("--rotation-period={period}")];
+        says(&desk.refusal(&args), &["star.rotation_period_d: "]);
+    }
+    says(&desk.refusal(&["init", "absent.txt", "--out", "a.json"]), &["absent.txt: cannot read"]);
+    desk.write("empty.txt", "# nothing\n");
+    says(&desk.refusal(&["init", "empty.txt", "--out", "a.json"]), &["empty.txt: lists no profile"]);
+    let flat: String = (0..40).map(|j| format!("{} 1.0 0.001\n", -39 + 2 * j)).collect();
+    desk.write("flat.prof", &flat);
+    desk.write("flat.txt", "flat.prof 0\n");
+    says(
+        &desk.refusal(&["init", "flat.txt", "--out", "a.json"]),
+        &["flat.txt: no absorption line in the mean profile"],
+    );
+    assert_eq!(desk.read("star.json"), "precious");
+    desk.succeed(&[&INIT[..], &["--force"]].concat());
+    assert_ne!(desk.read("star.json"), "precious");
+}
+
+/// A single profile, or two at the same time, say nothing of periods; the rest is there.
+#[test]
+fn one_profile_is_enough_for_a_start() {
+    let desk = desk();
+    desk.write("data/one.txt", "p003.prof 101.1\n");
+    let table = desk.succeed(&["init", "data/one.txt", "--rotation-period", "3"]);
+    says(&table, &["1 profiles of", "0.5 to 5", "log-uniform; give what the times can show"]);
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+}
+
+#[test]
+fn lo_peg_has_a_config() {
+    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
+    if !data.exists() {
+        println!("skipped: {} is not there", data.display());
+        return;
+    }
+    let desk = Desk::new(json!(null));
+    let list = data.to_str().unwrap();
+    let table = desk.succeed(&["init", list, "--rotation-period", "0.4232", "--inclination", "45", "--domega", "0.03"]);
+    println!("{table}");
+    let config = desk.json("star.json");
+    // published: 67.7 km/s and -19.8 km/s, which VRAD subtracts
+    assert!((number(&config, "/star/vsini_kms") - 67.7).abs() < 1.2);
+    assert!(number(&config, "/star/vsys_kms").abs() < 0.6);
+    // the errors are several times too large
+    assert!((0.2..0.6).contains(&number(&config, "/observations/sigma_scale")));
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+    desk.succeed(&["periodogram", "star.json", "--out", "search"]);
+}
