@@ -313,7 +313,10 @@ pub(super) fn co_rotation(laboratory: &Laboratory) -> Result<Report, ExperimentE
         let cycles: Vec<f64> = (0..PROFILES).map(cycle).collect();
         let changes = [("/observations/simulate/cycles", json!(cycles)), (SEED, json!(seed))];
         let varied = [("rotations", f64::from(rotations)), ("seed", f64::from(seed))];
-        star(laboratory, &varied, [0.1, 1.0, 0.5], &changes)
+        let mut star = star(laboratory, &varied, [0.1, 1.0, 0.5], &changes);
+        // that it agrees with the chain is seen in the other rows
+        star.case.grid = None;
+        star
     };
     let all = [1, 2, 3, 4, 6, 8].into_iter().flat_map(|rotations| (1..=2).map(move |seed| (rotations, seed)));
     tabulated(laboratory, "co-rotation", &["rotations", "seed"], all.map(star).collect())
