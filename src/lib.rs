@@ -47,6 +47,7 @@ pub mod config;
 pub mod detection;
 pub mod ensemble;
 pub mod expansion;
+pub mod figure;
 pub mod fit;
 pub mod imaging;
 pub mod io;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
 const LAYERS: &[&[&str]] = &[
-    &["units", "text", "vector", "velocities", "log_density"],
+    &["units", "text", "vector", "velocities", "log_density", "figure"],
     &["observation"],
     &["star", "maxent", "chain", "landscape", "periodogram"],
     &["imaging", "ensemble", "optimise"],
@@ -31,6 +31,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("vector", &[]),
     ("velocities", &[]),
+    ("figure", &[]),
     ("log_density", &[]),
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
