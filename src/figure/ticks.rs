@@ -88,8 +88,8 @@ pub fn range_of(values: impl Iterator<Item = f64>, scale: Scale, share: f64) -> 
     let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
     let [low, high] = match high - low {
         extent if extent > 0.0 => [low - share * extent, high + share * extent],
-        extent if extent == 0.0 && log => [low - 1.0, high + 1.0],
-        extent if extent == 0.0 => {
+        0.0 if log => [low - 1.0, high + 1.0],
+        0.0 => {
             let margin = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
             [low - margin, high + margin]
         }
