@@ -61,6 +61,7 @@ pub mod optimise;
 pub mod optimum;
 pub mod origin;
 pub mod periodogram;
+pub mod plot;
 pub mod run;
 pub mod scene;
 pub mod search;

@@ -23,6 +23,7 @@ const LAYERS: &[&[&str]] = &[
     &["manifest", "survey", "optimum"],
     &["run"],
     &["comparison"],
+    &["plot"],
 ];
 
 /// Modules, and all that they may import. What is not listed here may import whatever lies lower.
@@ -42,6 +43,24 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("periodogram", &["velocities"]),
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),
+    // from saved files alone: nothing that reconstructs, samples or searches
+    (
+        "plot",
+        &[
+            "chain",
+            "comparison",
+            "figure",
+            "io",
+            "landscape",
+            "manifest",
+            "objective",
+            "observation",
+            "origin",
+            "run",
+            "star",
+            "survey",
+        ],
+    ),
 ];
 
 struct Source {

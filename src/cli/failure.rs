@@ -7,6 +7,7 @@ use dimcmc::io::journal::JournalError;
 use dimcmc::io::lsd::LsdError;
 use dimcmc::objective::ReferenceError;
 use dimcmc::origin::OriginError;
+use dimcmc::plot::PlotError;
 use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
 use dimcmc::search::SearchError;
@@ -124,6 +125,12 @@ impl From<JournalError> for Failure {
 
 impl From<PairError> for Failure {
     fn from(error: PairError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<PlotError> for Failure {
+    fn from(error: PlotError) -> Self {
         Failure::input(error)
     }
 }

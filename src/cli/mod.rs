@@ -11,8 +11,9 @@ mod map;
 mod optimise;
 mod output;
 mod periodogram;
+mod plot;
 mod progress;
-mod report;
+mod report_lines;
 mod sample;
 mod search;
 mod signals;
@@ -56,6 +57,7 @@ enum Command {
     #[command(alias = "analyze")]
     Analyse(analyse::Args),
     Compare(compare::Args),
+    Plot(plot::Args),
 }
 
 /// Runs the command.
@@ -75,6 +77,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Sample(args) => sample::run(args, &cli.global),
         Command::Analyse(args) => analyse::run(args, &cli.global),
         Command::Compare(args) => compare::run(args, &cli.global),
+        Command::Plot(args) => plot::run(args, &cli.global),
     }
 }
 

@@ -38,8 +38,19 @@ fn y_ticks(frame: Rect, axis: &Axis) -> Ticks {
 
 /// The frame of a panel.
 pub(super) fn draw(panel: &Panel, figure: &mut Figure, sides: Sides) {
+    let y = y_ticks(panel.frame, &panel.y);
+    draw_with(panel, figure, sides, &y);
+}
+
+/// The frame of a panel without ticks on its sides.
+pub(super) fn draw_without_y(panel: &Panel, figure: &mut Figure, sides: Sides) {
+    let none = Ticks { major: Vec::new(), minor: Vec::new() };
+    draw_with(panel, figure, sides, &none);
+}
+
+fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks) {
     let frame = panel.frame;
-    let (x, y) = (x_ticks(frame, &panel.x), y_ticks(frame, &panel.y));
+    let x = x_ticks(frame, &panel.x);
     let mut path = Vec::new();
     let mut tick = |from: [f64; 2], by: [f64; 2]| {
         path.extend([Segment::Move(from), Segment::Line([from[0] + by[0], from[1] + by[1]])]);
@@ -51,7 +62,7 @@ pub(super) fn draw(panel: &Panel, figure: &mut Figure, sides: Sides) {
             tick([at, frame.top], [0.0, length]);
         }
     }
-    for (length, values) in lengths(&y) {
+    for (length, values) in lengths(y) {
         for value in values {
             let at = frame.bottom() - panel.y.share(value) * frame.height;
             tick([frame.left, at], [length, 0.0]);
@@ -64,7 +75,7 @@ pub(super) fn draw(panel: &Panel, figure: &mut Figure, sides: Sides) {
         numbers_below(figure, frame, &panel.x, &x);
     }
     if sides.left {
-        numbers_left(figure, frame, &panel.y, &y);
+        numbers_left(figure, frame, &panel.y, y);
     }
 }
 

@@ -45,6 +45,7 @@ pub use legend::{Key, Legend};
 pub use panel::{Axis, Marker, Panel, Scale};
 pub use scatter::{Errors, Reference, ScatterPanel, Series, scatter};
 pub use text::{Align, Font, plain, width_pt};
+pub use ticks::range_of;
 
 /// Width of a column (mm).
 pub const COLUMN_MM: f64 = 88.0;

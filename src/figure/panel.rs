@@ -228,6 +228,16 @@ impl Panel {
         super::frame::draw(self, figure, sides);
     }
 
+    /// The same without ticks on its sides, where heights are only relative.
+    pub fn bare_y_frame(&self, figure: &mut Figure) {
+        super::frame::draw_without_y(self, figure, Sides::BOTH);
+    }
+
+    /// The same without numbers.
+    pub fn bare_frame(&self, figure: &mut Figure) {
+        super::frame::draw_without_y(self, figure, Sides { below: false, left: false });
+    }
+
     /// A text within the panel, at shares of its width (from the left) and height (from above).
     pub fn note(&self, figure: &mut Figure, text: &str, at: Point, align: super::Align) {
         let place = [self.frame.left + at[0] * self.frame.width, self.frame.top + at[1] * self.frame.height];

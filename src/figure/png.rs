@@ -19,7 +19,7 @@ pub(super) fn write(figure: &Figure, dpi: f64) -> Vec<u8> {
     for item in &figure.items {
         match item {
             Item::Path { segments, paint, clip, .. } => {
-                draw(&mut page, segments, paint, to_page, clip.map(|k| &masks[k]));
+                draw(&mut page, segments, paint, FillRule::EvenOdd, to_page, clip.map(|k| &masks[k]));
             }
             Item::Text { glyphs, colour, .. } => {
                 for glyph in glyphs {
@@ -28,7 +28,14 @@ pub(super) fn write(figure: &Figure, dpi: f64) -> Vec<u8> {
                         .pre_translate(glyph.at[0] as f32, glyph.at[1] as f32)
                         .pre_concat(Transform::from_rotate(-glyph.turn as f32))
                         .pre_scale(unit, -unit);
-                    draw(&mut page, &text::outline(glyph.shape), &Paint::fill(*colour), placed, None);
+                    draw(
+                        &mut page,
+                        &text::outline(glyph.shape),
+                        &Paint::fill(*colour),
+                        FillRule::Winding,
+                        placed,
+                        None,
+                    );
                 }
             }
         }
@@ -44,10 +51,18 @@ fn mask(width: u32, height: u32, clip: &[Segment], to_page: Transform) -> Mask {
     mask
 }
 
-fn draw(page: &mut Pixmap, segments: &[Segment], paint: &Paint, to_page: Transform, mask: Option<&Mask>) {
+/// Draws a path; holes of areas go by `rule`.
+fn draw(
+    page: &mut Pixmap,
+    segments: &[Segment],
+    paint: &Paint,
+    rule: FillRule,
+    to_page: Transform,
+    mask: Option<&Mask>,
+) {
     let Some(path) = path(segments) else { return };
     if let Some(colour) = paint.fill {
-        page.fill_path(&path, &pen(colour, paint.sharp), FillRule::Winding, to_page, mask);
+        page.fill_path(&path, &pen(colour, paint.sharp), rule, to_page, mask);
     }
     if let Some(stroke) = paint.stroke {
         let dash: Vec<f32> = stroke.dash.iter().map(|x| *x as f32).collect();

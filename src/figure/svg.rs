@@ -70,7 +70,8 @@ fn glyph_id(name: &str, shape: Shape) -> String {
 
 fn attributes(paint: &Paint) -> String {
     let mut text = match paint.fill {
-        Some(colour) => fill(colour),
+        // an area within an area is a hole
+        Some(colour) => fill(colour) + " fill-rule=\"evenodd\"",
         None => " fill=\"none\"".to_owned(),
     };
     if let Some(stroke) = paint.stroke {
