@@ -37,6 +37,11 @@ impl Legend {
         }
     }
 
+    /// Whether it has no line.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Where it goes in a corner of `frame`: 0, 0.5 or 1 from the left and from above.
     fn place(&self, frame: Rect, corner: Point) -> Rect {
         let widest = self.entries.iter().map(|(_, text)| width_pt(text, SMALL_PT)).fold(0.0, f64::max);

@@ -145,7 +145,7 @@ pub struct Paint {
     pub fill: Option<Colour>,
     /// Pen of its outline.
     pub stroke: Option<Stroke>,
-    /// Without smoothed edges, for areas that touch each other.
+    /// Without smoothed edges, for areas that touch or overlap each other. Elsewhere an area within an area is a hole.
     pub sharp: bool,
 }
 

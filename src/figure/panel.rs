@@ -1,7 +1,8 @@
 //! A panel: a rectangle of the page with two axes, and data drawn in it. Nothing that is drawn by its axes leaves it.
 
 use super::colour::{BLACK, Colour, ColourMap, WHITE};
-use super::{Figure, Paint, Point, Rect, Segment, Stroke, closed, ellipse, open, rectangle};
+use super::{Figure, Paint, Point, Rect, Segment, Stroke, closed, open, rectangle};
+use std::collections::BTreeMap;
 
 /// How values become lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -188,37 +189,18 @@ impl Panel {
         self.line(figure, class, &[[self.x.range[0], y], [self.x.range[1], y]], stroke);
     }
 
-    /// An ellipse around `centre` by its 2 x 2 covariance, `radius` standard deviations away; on linear axes.
-    pub fn gaussian(
-        &self,
-        figure: &mut Figure,
-        class: &'static str,
-        centre: [f64; 2],
-        covariance: [[f64; 2]; 2],
-        radius: f64,
-        stroke: Stroke,
-    ) {
-        self.line(figure, class, &gaussian_contour(centre, covariance, radius), stroke);
-    }
-
-    /// Cells of a table of numbers between `edges`, from `low` to `high` of the colour map; what is not finite stays white.
-    /// Neighbours of one colour in a row are drawn as one.
-    pub fn cells(&self, figure: &mut Figure, edges: [&[f64]; 2], values: impl Fn(usize, usize) -> f64, shade: Shade) {
-        let [x, y] = edges;
+    /// Tiles from x0 to x1 and y0 to y1 in the colours of numbers; what is not finite stays white.
+    pub fn tiles(&self, figure: &mut Figure, tiles: impl Iterator<Item = Tile>, shade: Shade) {
+        let mut of_colour: BTreeMap<[u8; 4], Vec<Segment>> = BTreeMap::new();
+        for Tile { x: [x0, x1], y: [y0, y1], value } in tiles {
+            if let Some(Colour(colour)) = shade.colour(value) {
+                let corners = self.places(&[[x0, y0], [x1, y0], [x1, y1], [x0, y1]]);
+                of_colour.entry(colour).or_default().extend(closed(&corners));
+            }
+        }
         self.clipped(figure, |figure| {
-            for j in 0..y.len().saturating_sub(1) {
-                let colour = |i: usize| shade.colour(values(i, j));
-                let mut first = 0;
-                for i in 1..x.len() {
-                    if i + 1 < x.len() && colour(i) == colour(first) {
-                        continue;
-                    }
-                    if let Some(colour) = colour(first) {
-                        let corners = [[x[first], y[j]], [x[i], y[j]], [x[i], y[j + 1]], [x[first], y[j + 1]]];
-                        figure.polygon("cell", &self.places(&corners), Paint::cell(colour));
-                    }
-                    first = i;
-                }
+            for (colour, path) in of_colour {
+                figure.path("tiles", path, Paint::cell(Colour(colour)));
             }
         });
     }
@@ -247,6 +229,17 @@ impl Panel {
     pub(super) fn places(&self, points: &[[f64; 2]]) -> Vec<Point> {
         points.iter().map(|[x, y]| self.place(*x, *y)).collect()
     }
+}
+
+/// A rectangle with a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tile {
+    /// From where to where along x.
+    pub x: [f64; 2],
+    /// The same along y.
+    pub y: [f64; 2],
+    /// The number.
+    pub value: f64,
 }
 
 /// Colours of numbers.
@@ -306,9 +299,4 @@ pub fn gaussian_contour(centre: [f64; 2], covariance: [[f64; 2]; 2], radius: f64
         [centre[0] + radius * a * cos, centre[1] + radius * (b * cos + c * sin)]
     };
     (0..=96).map(at).collect()
-}
-
-/// A disc's outline, for clipping.
-pub fn disc(centre: Point, radius: f64) -> Vec<Segment> {
-    ellipse(centre, [radius, radius])
 }

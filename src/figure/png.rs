@@ -19,7 +19,8 @@ pub(super) fn write(figure: &Figure, dpi: f64) -> Vec<u8> {
     for item in &figure.items {
         match item {
             Item::Path { segments, paint, clip, .. } => {
-                draw(&mut page, segments, paint, FillRule::EvenOdd, to_page, clip.map(|k| &masks[k]));
+                let rule = if paint.sharp { FillRule::Winding } else { FillRule::EvenOdd };
+                draw(&mut page, segments, paint, rule, to_page, clip.map(|k| &masks[k]));
             }
             Item::Text { glyphs, colour, .. } => {
                 for glyph in glyphs {

@@ -70,6 +70,7 @@ fn glyph_id(name: &str, shape: Shape) -> String {
 
 fn attributes(paint: &Paint) -> String {
     let mut text = match paint.fill {
+        Some(colour) if paint.sharp => fill(colour),
         // an area within an area is a hole
         Some(colour) => fill(colour) + " fill-rule=\"evenodd\"",
         None => " fill=\"none\"".to_owned(),
@@ -104,6 +105,8 @@ fn css(Colour([r, g, b, a]): Colour) -> (String, Option<String>) {
 
 fn path(segments: &[Segment]) -> String {
     let mut text = String::new();
+    // where the pen is, as it was written
+    let mut pen = [String::new(), String::new()];
     for segment in segments {
         let (letter, points): (char, &[Point]) = match segment {
             Segment::Move(a) => ('M', &[*a]),
@@ -112,9 +115,20 @@ fn path(segments: &[Segment]) -> String {
             Segment::Cubic(a, b, c) => ('C', &[*a, *b, *c]),
             Segment::Close => ('Z', &[]),
         };
-        text.push(letter);
-        let points: Vec<String> = points.iter().map(|p| format!("{} {}", number(p[0]), number(p[1]))).collect();
-        text += &points.join(" ");
+        let written: Vec<[String; 2]> = points.iter().map(|p| p.map(number)).collect();
+        match (letter, written.last()) {
+            // lines along the axes have short forms
+            ('L', Some([x, y])) if *y == pen[1] => text += &format!("H{x}"),
+            ('L', Some([x, y])) if *x == pen[0] => text += &format!("V{y}"),
+            _ => {
+                text.push(letter);
+                let pairs: Vec<String> = written.iter().map(|[x, y]| format!("{x} {y}")).collect();
+                text += &pairs.join(" ");
+            }
+        }
+        if let Some(last) = written.last() {
+            pen.clone_from(last);
+        }
     }
     text
 }

@@ -3,7 +3,6 @@
 use super::PlotError;
 use super::symbols::{label, nearest_turn};
 use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, VERMILION};
-use crate::figure::panel::Sides;
 use crate::figure::{Align, Axis, Colour, Figure, Font, Marker, PAGE_MM, Panel, Rect, Scale, Stroke, range_of};
 use crate::origin;
 use serde::Deserialize;
@@ -94,5 +93,4 @@ fn panel(figure: &mut Figure, frame: Rect, name: &str, entries: &[Entry], first:
         }
     }
     panel.bare_y_frame(figure);
-    let _ = Sides::BOTH;
 }

@@ -1,7 +1,7 @@
 //! The density of draws in two dimensions, and the contours that hold given shares of it.
 //!
-//! A histogram under a Gaussian of the draws' own covariance, narrowed by the number of effective draws (0.6 of Scott's rule, so
-//! that contours grow by a per cent or two), and divided by the part of the kernel that is inside: a posterior that ends at the
+//! A histogram under a Gaussian of the draws' own covariance, narrowed by the number of effective draws (0.9 of Scott's rule, so
+//! that contours of some thousand draws grow by two or three per cent), and divided by the part of the kernel that is inside: a posterior that ends at the
 //! edge of a prior keeps its height there.
 
 use crate::figure::contour::{Line, contour};
@@ -10,7 +10,7 @@ use crate::figure::contour::{Line, contour};
 const CELLS: usize = 96;
 
 /// Bandwidth over that of Scott's rule.
-const NARROWED: f64 = 0.6;
+const NARROWED: f64 = 0.9;
 
 /// A density on a grid.
 #[derive(Clone, Debug, PartialEq)]

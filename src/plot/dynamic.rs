@@ -2,7 +2,7 @@
 
 use super::profiles::{Line, extent};
 use crate::figure::colour::ColourMap;
-use crate::figure::panel::{Shade, Sides};
+use crate::figure::panel::{Shade, Sides, Tile};
 use crate::figure::{Align, Axis, Figure, Font, PAGE_MM, Panel, Rect};
 
 /// Half the phase that a profile fills, at most.
@@ -45,12 +45,18 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         let frame = Rect { left, top: 16.0, width, height: figure.height - 46.0 };
         let y = Axis::linear(if k == 0 { "rotation phase" } else { "" }, [0.0, 1.0]);
         let panel = Panel { frame, x: Axis::linear("velocity (km/s)", velocities), y };
-        for (line, rows) in lines.iter().zip(rows(lines)) {
-            for row in rows {
-                let edges = edges(&line.velocity_kms);
-                panel.cells(&mut figure, [&edges, &row], |k, _| value(line, k), shade);
-            }
-        }
+        let tiles = lines.iter().zip(rows(lines)).flat_map(|(line, rows)| {
+            let edges = edges(&line.velocity_kms);
+            rows.into_iter().flat_map(move |y| {
+                let edges = edges.clone();
+                (0..line.velocity_kms.len()).map(move |k| Tile {
+                    x: [edges[k], edges[k + 1]],
+                    y,
+                    value: value(line, k),
+                })
+            })
+        });
+        panel.tiles(&mut figure, tiles, shade);
         panel.frame(&mut figure, Sides { below: true, left: k == 0 });
         figure.text(title, [frame.centre()[0], 10.0], Font::LABEL, Align::Centre, 0.0);
         match k {

@@ -7,7 +7,7 @@ use super::trace::Sampled;
 use super::{PlotError, corner::SHARES};
 use crate::figure::colour::{BLACK, BLUE, ColourMap, VERMILION, WHITE};
 use crate::figure::contour::contour;
-use crate::figure::panel::{Shade, Sides, gaussian_contour};
+use crate::figure::panel::{Shade, Sides, Tile, gaussian_contour};
 use crate::figure::{Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke};
 use crate::io::landscape;
 use crate::landscape::{Axis as GridAxis, Grid, Landscape};
@@ -18,8 +18,8 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Largest difference of chi2 that has a colour of its own.
-const DARKEST: f64 = 25.0;
+/// Root of the largest difference of chi2 that has a colour of its own.
+const DARKEST: f64 = 10.0;
 
 /// Differences of chi2 of contours: 68 and 95 % of two Gaussian parameters.
 const LEVELS: [f64; 2] = [2.30, 5.99];
@@ -130,7 +130,7 @@ impl Scene {
         figure.caption = "Landscape: chi2 at the nodes (points) minus the lowest, with the paraboloid (line).".into();
         let frame = Rect { left: 38.0, top: 8.0, width: figure.width - 46.0, height: figure.height - 36.0 };
         let points: Vec<[f64; 2]> = self.nodes[0].iter().enumerate().map(|(k, x)| [*x, self.at(&[k])]).collect();
-        let highest = points.iter().map(|p| p[1]).filter(|y| y.is_finite()).fold(1.0, f64::max).min(4.0 * DARKEST);
+        let highest = points.iter().map(|p| p[1]).filter(|y| y.is_finite()).fold(1.0, f64::max).min(DARKEST * DARKEST);
         let panel = Panel { frame, x: self.axis(0), y: Axis::linear("Δ*χ*^{2}", [-0.05 * highest, highest]) };
         if let Some(paraboloid) = &self.paraboloid {
             let [low, high] = panel.x.range;
@@ -173,7 +173,7 @@ impl Scene {
                 let text = self.title([i, j], row == 1);
                 figure.text(&text, [frame.centre()[0], frame.top - 4.0], Font::SMALL, Align::Centre, 0.0);
                 if column + 1 == pairs.len() {
-                    shade.upright_bar(&mut figure, frame, "Δ*χ*^{2}");
+                    shade.upright_bar(&mut figure, frame, "√Δ*χ*^{2}");
                 }
             }
         }
@@ -186,14 +186,27 @@ impl Scene {
         let Some(other) = (0..self.grid.axes.len()).find(|k| !shown.contains(k)) else { return String::new() };
         let (symbol, _) = symbol(&self.grid.axes[other].name);
         let value = self.nodes[other][self.lowest[other]];
-        if lowest { format!("lowest over {symbol}") } else { format!("slice at {symbol} = {value:.4}") }
+        if lowest {
+            format!("lowest over {symbol}")
+        } else {
+            {
+                let digits = super::symbols::decimals(self.grid.axes[other].spacing());
+                format!("slice at {symbol} = {value:.digits$}")
+            }
+        }
     }
 
     fn plane(&self, figure: &mut Figure, panel: &Panel, shown: [usize; 2], lowest: bool, shade: Shade) {
         let [i, j] = shown;
         let value = |a: usize, b: usize| self.value(shown, [a, b], lowest);
         let (x, y) = (&self.nodes[i], &self.nodes[j]);
-        panel.cells(figure, [&edges(x), &edges(y)], value, shade);
+        let (x_edges, y_edges) = (edges(x), edges(y));
+        let tile = |(a, b): (usize, usize)| Tile {
+            x: [x_edges[a], x_edges[a + 1]],
+            y: [y_edges[b], y_edges[b + 1]],
+            value: value(a, b).sqrt(),
+        };
+        panel.tiles(figure, (0..x.len()).flat_map(|a| (0..y.len()).map(move |b| (a, b))).map(tile), shade);
         for level in LEVELS {
             for line in contour(x, y, value, level) {
                 panel.line(figure, "contour", &line, Stroke::new(BLACK, 0.7));
@@ -268,8 +281,8 @@ impl Scene {
         };
         let chain = if self.chain.is_some() { " Dashed: contours of the chain." } else { "" };
         format!(
-            "Landscape of chi2 = -2 ln L minus its lowest value, {DARKEST} and more in the darkest colour, nodes without a \
-             reconstruction white. {rows}{chain}"
+            "Landscape: the root of chi2 = -2 ln L minus its lowest value, {DARKEST} and more in the darkest colour, nodes \
+             without a reconstruction white. {rows}{chain}"
         )
     }
 }

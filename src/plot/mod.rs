@@ -14,12 +14,13 @@ mod profiles;
 mod projection;
 mod star_map;
 mod surface;
-mod symbols;
+pub mod symbols;
 mod trace;
 mod velocities;
 
 pub use density::Density;
 pub use projection::Projection;
+pub use trace::Sampled;
 
 use crate::figure::Figure;
 use crate::io::atomic::{self, WriteError};

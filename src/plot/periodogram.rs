@@ -2,9 +2,9 @@
 //! alone do, and how well K is known.
 
 use super::{PlotError, velocities};
-use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, VERMILION};
+use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, VERMILION, WHITE};
 use crate::figure::panel::Sides;
-use crate::figure::{Align, Axis, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Scale, Stroke, range_of};
+use crate::figure::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
 use crate::io::csv::Columns;
 use crate::origin;
 use crate::star::Orbit;
@@ -77,7 +77,7 @@ fn figure(name: &str, table: &Columns, file: Option<&SearchFile>) -> Result<Figu
     let ratio = table.column("porb_over_prot")?;
     let mut figure = Figure::new(name, PAGE_MM, 128.0);
     figure.caption = CAPTION.into();
-    let (left, right, top, gap, bottom) = (40.0, 50.0, 30.0, 5.0, 28.0);
+    let (left, right, top, gap, bottom) = (40.0, 58.0, 24.0, 5.0, 28.0);
     let width = figure.width - left - right;
     let room = figure.height - top - bottom - 2.0 * gap;
     let range = range_of(period.iter().copied(), Scale::Log, 0.0);
@@ -94,16 +94,7 @@ fn figure(name: &str, table: &Columns, file: Option<&SearchFile>) -> Result<Figu
     let x = Axis::log("period (d)", range);
     let above = Panel { frame: frames[0], x: x.clone(), y: Axis::linear("Δ ln *L*", [0.0, 1.15 * highest]) };
     let rotation = period.first().zip(ratio.first()).map(|(p, r)| p / r).unwrap_or(f64::NAN);
-    for level in levels {
-        above.horizontal(&mut figure, "false-alarm", level.delta_ln_l, Stroke::new(GREY, 0.7).dashed());
-        let at = above.place(range[1], level.delta_ln_l);
-        let text = format!("{} %", 100.0 * level.false_alarm_probability);
-        figure.text(&text, [at[0] + 4.0, at[1] + 2.5], Font::SMALL, Align::Left, 0.0);
-    }
-    if let Some(level) = levels.first() {
-        let at = above.place(range[1], level.delta_ln_l);
-        figure.text("false alarms", [at[0] + 4.0, at[1] + 13.0], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
-    }
+    false_alarms(&mut figure, &above, levels);
     above.line(&mut figure, "delta-ln-l", &likelihood, Stroke::new(BLACK, 0.9));
 
     let window = Panel { frame: frames[1], x: x.clone(), y: Axis::linear("window", [0.0, 1.05]) };
@@ -126,10 +117,27 @@ fn figure(name: &str, table: &Columns, file: Option<&SearchFile>) -> Result<Figu
     let mut legend = Legend::default();
     legend.add(Key::Line(fitted_pen), "best *K*");
     legend.add(Key::Line(sigma_pen), "*σ*_{K}");
-    legend.add(Key::Line(upper_pen), "*K* < , 95 %");
+    legend.add(Key::Line(upper_pen), "95 % limit");
     let beside = Rect { left: frames[2].right() - 2.0, width: right, ..frames[2] };
     legend.draw(&mut figure, beside, [0.0, 0.0]);
     Ok(figure)
+}
+
+/// Lines that chance exceeds once in so many times, with their shares beside the panel, none over another.
+fn false_alarms(figure: &mut Figure, panel: &Panel, levels: &[Level]) {
+    let right = panel.frame.right() + 4.0;
+    let mut lowest = f64::NEG_INFINITY;
+    let mut falling: Vec<&Level> = levels.iter().collect();
+    falling.sort_by(|a, b| b.delta_ln_l.total_cmp(&a.delta_ln_l));
+    for level in falling {
+        panel.horizontal(figure, "false-alarm", level.delta_ln_l, Stroke::new(GREY, 0.7).dashed());
+        lowest = (panel.place(1.0, level.delta_ln_l)[1] + 2.5).max(lowest + 8.0);
+        let text = format!("{} %", 100.0 * level.false_alarm_probability);
+        figure.text(&text, [right, lowest], Font::SMALL, Align::Left, 0.0);
+    }
+    if !levels.is_empty() {
+        figure.text("false alarms", [right, lowest + 8.5], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
+    }
 }
 
 /// Rotation period and its fractions, the peaks, and the injected period.
@@ -151,10 +159,16 @@ fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, file: Option<&
     }
     let Some(file) = file else { return };
     if let Some(best) = file.peaks.first() {
-        let at = above.place(best.period_d, best.delta_ln_l);
-        Marker::Triangle.draw(figure, "best", [at[0], at[1] - 5.0], 0.1, BLACK);
-        let text = format!("{:.3} d", file.best.period_d);
-        figure.text(&text, [at[0], at[1] - 4.0], Font::SMALL.coloured(BLUE), Align::Centre, 0.0);
+        let [x, y] = above.place(best.period_d, best.delta_ln_l);
+        // beside the peak, where the panel has room
+        let (side, align) = if x > above.frame.centre()[0] { (-1.0, Align::Right) } else { (1.0, Align::Left) };
+        figure.polyline("best", &[[x + 3.0 * side, y - 6.0], [x + 13.0 * side, y - 6.0]], Stroke::new(BLUE, 0.8));
+        let text = format!("best: {:.3} d", file.best.period_d);
+        let width = crate::figure::width_pt(&text, Font::SMALL.size);
+        let left = if side < 0.0 { x - 16.0 - width } else { x + 14.0 };
+        let ground = Rect { left, top: y - 10.5, width: width + 2.0, height: 9.0 };
+        figure.rect("label-ground", ground, Paint::fill(WHITE));
+        figure.text(&text, [x + 15.0 * side, y - 3.5], Font::SMALL.coloured(BLUE), align, 0.0);
     }
     let truth = file.truth.as_ref().filter(|truth| truth.get("k_kms").is_some_and(|k| *k > 0.0));
     if let Some(truth) = truth.and_then(|truth| truth.get("porb_over_prot")).filter(|p| inside(**p * rotation)) {

@@ -83,6 +83,9 @@ pub(super) fn extent(lines: &[Line], numbers: impl Fn(&Line) -> &[f64]) -> [f64;
     all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(*x), high.max(*x)])
 }
 
+/// Room for the cycles beside the profiles (pt).
+const LABELS: f64 = 42.0;
+
 /// Profiles of a column.
 const PER_COLUMN: usize = 17;
 
@@ -102,17 +105,21 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     );
     let [low, high] = extent(lines, |line| &line.observed);
     let spacing = 0.5 * (high - low);
-    let (margin, top, bottom) = (12.0, 20.0, 30.0);
-    let cell = (figure.width - margin) / columns as f64;
+    let (margin, top, bottom) = (6.0, 20.0, 30.0);
+    let cell = figure.width / columns as f64;
     let legend_middle = figure.width / 2.0;
     let velocities = extent(lines, |line| &line.velocity_kms);
     for (column, lines) in lines.chunks(rows).enumerate() {
-        let frame =
-            Rect { left: margin + cell * column as f64, top, width: cell - 12.0, height: figure.height - top - bottom };
+        let frame = Rect {
+            left: margin + cell * column as f64,
+            top,
+            width: cell - margin - LABELS,
+            height: figure.height - top - bottom,
+        };
         // all columns share one scale
         let range = [low - spacing * (rows as f64 - 0.7), high + 0.5 * spacing];
         let room = velocities[1] - velocities[0];
-        let x = Axis::linear("velocity (km/s)", [velocities[0] - 0.04 * room, velocities[1] + 0.3 * room]);
+        let x = Axis::linear("velocity (km/s)", [velocities[0] - 0.04 * room, velocities[1] + 0.04 * room]);
         let panel = Panel { frame, x, y: Axis::linear("", range) };
         for (row, line) in lines.iter().enumerate() {
             one(&mut figure, &panel, line, spacing * row as f64);
@@ -131,23 +138,24 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     figure
 }
 
-const OBSERVED: Stroke = Stroke::new(BLACK, 0.9);
-const MODEL: Stroke = Stroke::new(VERMILION, 0.7);
+const OBSERVED: Stroke = Stroke::new(BLACK, 1.2);
+const MODEL: Stroke = Stroke::new(VERMILION, 0.6);
 
 /// One profile, lowered by `down`.
 fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     let points = |y: &[f64]| line.velocity_kms.iter().zip(y).map(|(v, i)| [*v, i - down]).collect::<Vec<_>>();
     panel.line(figure, "observed", &points(&line.observed), OBSERVED);
     panel.line(figure, "model", &points(&line.model), MODEL);
-    let last = line.velocity_kms.last().copied().unwrap_or(0.0);
     let turns = line.cycle - line.phase();
-    let at = panel.place(last, 1.0 - down);
-    let bar = at[0] + 4.0;
+    let (last, level) =
+        (line.velocity_kms.last().copied().unwrap_or(0.0), line.observed.last().copied().unwrap_or(1.0));
+    let middle = panel.place(last, level - down)[1];
+    let bar = panel.frame.right() + 3.5;
     let sigma = line.sigma.iter().sum::<f64>() / line.sigma.len().max(1) as f64;
-    let (up, low) = (panel.place(last, 1.0 - down + sigma)[1], panel.place(last, 1.0 - down - sigma)[1]);
-    figure.polyline("sigma", &[[bar, up], [bar, low]], Stroke::new(BLACK, 0.8));
+    let half = 0.5 * (panel.place(last, 0.0)[1] - panel.place(last, 2.0 * sigma)[1]);
+    figure.polyline("sigma", &[[bar, middle - half], [bar, middle + half]], Stroke::new(BLACK, 1.0));
     let text = format!("{turns:.0} + {:.3}", line.phase());
-    figure.text(&text, [at[0] + 8.0, at[1] + 2.3], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
+    figure.text(&text, [bar + 3.0, middle + 2.3], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
 }
 
 /// A bar that shows how much of the continuum a length upwards is.

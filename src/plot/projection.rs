@@ -60,10 +60,11 @@ impl Projection {
         let up = steps(north - south, 4.0);
         let lon = |t: f64| longitude[0] + t * (longitude[1] - longitude[0]);
         let lat = |t: f64| south + t * (north - south);
-        let below = along.iter().map(|t| self.place(lon(*t), south));
-        let right = up.iter().map(|t| self.place(longitude[1], lat(*t)));
-        let above = along.iter().rev().map(|t| self.place(lon(*t), north));
-        let left = up.iter().rev().map(|t| self.place(longitude[0], lat(*t)));
+        // every side without its end, where the next one begins
+        let below = along.iter().map(|t| self.place(lon(*t), south)).take(along.len() - 1);
+        let right = up.iter().map(|t| self.place(longitude[1], lat(*t))).take(up.len() - 1);
+        let above = along.iter().rev().map(|t| self.place(lon(*t), north)).take(along.len() - 1);
+        let left = up.iter().rev().map(|t| self.place(longitude[0], lat(*t))).take(up.len() - 1);
         below.chain(right).chain(above).chain(left).collect()
     }
 }

@@ -14,15 +14,23 @@ use crate::run::CHAIN;
 use std::path::Path;
 
 /// A chain with its summary.
-pub(super) struct Sampled {
+#[derive(Debug)]
+pub struct Sampled {
+    /// What the run was begun with.
     pub manifest: Manifest,
+    /// All its steps.
     pub chain: Chain,
+    /// What sort of number each parameter is.
     pub kinds: Vec<ParameterKind>,
+    /// What the chain says.
     pub summary: Summary,
 }
 
 impl Sampled {
     /// Reads the run in `folder`.
+    ///
+    /// # Errors
+    /// [`PlotError`]: no run there, or one that cannot be read.
     pub fn read(folder: &Path) -> Result<Self, PlotError> {
         let manifest = Manifest::read(folder)?;
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
@@ -33,7 +41,7 @@ impl Sampled {
     }
 
     /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
-    pub fn draws(&self, i: usize) -> Vec<f64> {
+    pub(super) fn draws(&self, i: usize) -> Vec<f64> {
         let series = self.chain.series(i, self.summary.discarded_steps);
         let mut draws: Vec<f64> = series.into_iter().flatten().flatten().collect();
         if let Some(mode) = self.mode(i) {
@@ -57,19 +65,19 @@ impl Sampled {
     }
 
     /// The injected value, in the turn of the draws.
-    pub fn truth(&self, i: usize) -> Option<f64> {
+    pub(super) fn truth(&self, i: usize) -> Option<f64> {
         let truth = *self.manifest.origin.truth.as_ref()?.get(&self.summary.names[i])?;
         Some(self.mode(i).map_or(truth, |mode| nearest_turn(truth, mode)))
     }
 
     /// Effective draws of the parameter that has fewest.
-    pub fn effective(&self) -> f64 {
+    pub(super) fn effective(&self) -> f64 {
         let least = self.summary.parameters.values().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 100.0 }
     }
 
     /// From where to where the prior of a parameter reaches.
-    pub fn bounds(&self, i: usize) -> [f64; 2] {
+    pub(super) fn bounds(&self, i: usize) -> [f64; 2] {
         let prior = self.manifest.priors.get(&self.summary.names[i]);
         let bound = |key: &str, none: f64| {
             prior.and_then(|prior| prior.get(key)).and_then(serde_json::Value::as_f64).unwrap_or(none)
@@ -82,7 +90,7 @@ impl Sampled {
 }
 
 /// Walkers of each ensemble that are drawn.
-const WALKERS: usize = 8;
+const WALKERS: usize = 4;
 /// Steps that are drawn, about.
 const STEPS: usize = 500;
 
@@ -144,8 +152,8 @@ pub(super) const TRUTH: Stroke = Stroke::new(VERMILION, 1.0).dashed();
 pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
     let mut figure = Figure::new("autocorrelation", PAGE_MM, 70.0);
     figure.caption = "Left: autocorrelation of the walkers around the mean of their ensemble, after the burn-in. Right: the \
-                      integrated autocorrelation time as the chain grows; it can be believed where the chain is more than 50 \
-                      times as long (left of the dashed line it is not)."
+                      integrated autocorrelation time as the chain grows; above the dashed line it is a rough estimate, from \
+                      less than 50 times its length."
         .into();
     let names = &sampled.summary.names;
     let discarded = sampled.summary.discarded_steps;

@@ -112,7 +112,8 @@ impl Curves<'_> {
         let folds = self.orbit.k_kms > 0.0 && self.orbit.porb_over_prot > 0.0;
         let rows = self.panels.len() as f64;
         let mut figure = Figure::new("rv", if folds { PAGE_MM } else { COLUMN_MM }, 24.0 + 26.0 * rows);
-        let (left, top, gap) = (38.0, 8.0, 5.0);
+        let legend = legend(&self.panels[0].1);
+        let (left, top, gap) = (38.0, if legend.is_empty() { 8.0 } else { 16.0 }, 5.0);
         let width = if folds { 0.56 * figure.width - left } else { figure.width - left - 8.0 };
         let height = (figure.height - top - 28.0 - gap * (rows - 1.0)) / rows;
         let span = range_of(self.cycle.iter().copied(), crate::figure::Scale::Linear, 0.03);
@@ -134,8 +135,9 @@ impl Curves<'_> {
             series.iter().for_each(|one| one.draw(&mut figure, &panel, self.cycle));
             let below = k + 1 == self.panels.len();
             panel.frame(&mut figure, Sides { below, left: true });
-            legend(series).draw(&mut figure, frame, [1.0, 0.0]);
         }
+        let middle = left + 0.5 * width;
+        legend.row(&mut figure, [middle, 8.0]);
         if folds {
             let frame = Rect {
                 left: left + width + 48.0,
