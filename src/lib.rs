@@ -62,6 +62,7 @@ pub mod optimum;
 pub mod origin;
 pub mod periodogram;
 pub mod plot;
+pub mod report;
 pub mod run;
 pub mod scene;
 pub mod search;

@@ -24,6 +24,7 @@ const LAYERS: &[&[&str]] = &[
     &["run"],
     &["comparison"],
     &["plot"],
+    &["report"],
 ];
 
 /// Modules, and all that they may import. What is not listed here may import whatever lies lower.
@@ -61,6 +62,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
             "survey",
         ],
     ),
+    ("report", &["chain", "figure", "manifest", "objective", "origin", "plot", "survey"]),
 ];
 
 struct Source {

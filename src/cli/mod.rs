@@ -13,6 +13,7 @@ mod output;
 mod periodogram;
 mod plot;
 mod progress;
+mod report;
 mod report_lines;
 mod sample;
 mod search;
@@ -58,6 +59,7 @@ enum Command {
     Analyse(analyse::Args),
     Compare(compare::Args),
     Plot(plot::Args),
+    Report(report::Args),
 }
 
 /// Runs the command.
@@ -78,6 +80,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Analyse(args) => analyse::run(args, &cli.global),
         Command::Compare(args) => compare::run(args, &cli.global),
         Command::Plot(args) => plot::run(args, &cli.global),
+        Command::Report(args) => report::run(args, &cli.global),
     }
 }
 

@@ -1,0 +1,42 @@
+//! `dimcmc report`: one page of whatever a folder holds.
+
+use super::report_lines::Report;
+use super::{Failure, Global};
+use dimcmc::io::atomic;
+use dimcmc::report;
+use std::path::PathBuf;
+
+/// Write one HTML page of whatever a folder holds
+///
+/// Tables, the verdict in plain words, notes, figures, the config and how to cite, in a single file that needs nothing else and can be
+/// sent to others.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc report runs/demo\n  dimcmc report runs/demo --out demo.html")]
+pub struct Args {
+    /// Folder that another command wrote
+    folder: PathBuf,
+    /// The file; `report.html` in FOLDER if not given
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace the file if it is there
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let file = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
+    if file.is_dir() {
+        return Err(Failure::input(format!("--out {}: is a folder, give the name of a file", file.display())));
+    }
+    if file.exists() && !args.force {
+        return Err(Failure::input(format!(
+            "--out {}: is there already; give another name, or --force",
+            file.display()
+        )));
+    }
+    let page = report::report(&args.folder)?;
+    atomic::write(&file, page.as_bytes())?;
+    Report::default().line("written", file.display()).print();
+    Ok(())
+}
