@@ -22,7 +22,8 @@
 //!
 //! [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
 //! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
-//! what they were begun with.
+//! what they were begun with. [`plot`] draws what a folder holds, with the means of [`mod@figure`], and [`mod@report`] makes a page
+//! of it.
 //! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
 //! of the star.
 //!

@@ -25,15 +25,18 @@ fn x_ticks(frame: Rect, axis: &Axis) -> Ticks {
     // numbers may not touch: fewer of them where they are long
     let fits = |found: &Ticks| {
         let widest = found.major.iter().map(|(_, text)| width_pt(text, SMALL_PT)).fold(0.0, f64::max);
-        widest + 5.0 < frame.width / (found.major.len() as f64 - 0.5).max(1.0)
+        widest + 7.0 < frame.width / (found.major.len() as f64 - 0.5).max(1.0)
     };
-    let first = most(frame.width, 24.0);
-    let tried = (2..=first).rev().map(|n| ticks(axis.range, axis.scale, n));
+    let tried = (2..=most(frame.width, 14.0)).rev().map(|n| ticks(axis.range, axis.scale, n));
     tried.into_iter().find(fits).unwrap_or_else(|| ticks(axis.range, axis.scale, 1))
 }
 
 fn y_ticks(frame: Rect, axis: &Axis) -> Ticks {
-    ticks(axis.range, axis.scale, most(frame.height, 16.0))
+    let first = most(frame.height, 16.0);
+    // one number alone gives no scale: closer together then, as long as there is room
+    let closest = ((frame.height / 9.0) as usize).max(first);
+    let tried = (first..=closest).map(|n| ticks(axis.range, axis.scale, n)).find(|found| found.major.len() >= 3);
+    tried.unwrap_or_else(|| ticks(axis.range, axis.scale, first))
 }
 
 /// The frame of a panel.

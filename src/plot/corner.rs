@@ -2,9 +2,8 @@
 //! draws; a periodic parameter is unwrapped around its mode.
 
 use super::density::Density;
-use super::symbols::{decimals, label, symbol};
+use super::symbols::{decimals, label, short_label, value_lines};
 use super::trace::{Sampled, TRUTH, shown_range};
-use crate::chain::ParameterSummary;
 use crate::figure::colour::{BLACK, BLUE, WHITE};
 use crate::figure::panel::Sides;
 use crate::figure::{
@@ -46,7 +45,8 @@ impl Corner<'_> {
         let top = 8.0 + 9.0 * self.titles.iter().map(Vec::len).max().unwrap_or(1) as f64;
         let side = (figure.width - MARGIN[0] - 6.0 - gap * (n as f64 - 1.0)) / n as f64;
         let height = (figure.height - top - MARGIN[1] - gap * (n as f64 - 1.0)) / n as f64;
-        let axis = |i: usize| Axis::linear(&label(&self.names[i]), self.ranges[i]);
+        let named = if n > 5 { short_label } else { label };
+        let axis = |i: usize| Axis::linear(&named(&self.names[i]), self.ranges[i]);
         for row in 0..n {
             for column in 0..=row {
                 let frame = Rect {
@@ -119,12 +119,17 @@ pub(super) fn area_colours() -> [crate::figure::Colour; 2] {
 pub(super) fn figure(sampled: &Sampled) -> Figure {
     let names = &sampled.summary.names;
     let draws: Vec<Vec<f64>> = (0..names.len()).map(|i| sampled.draws(i)).collect();
-    let range = |i: usize| shown_range(&draws[i], sampled.bounds(i), None);
+    let range = |i: usize| shown_range(&draws[i], sampled.bounds(i), sampled.near_truth(i));
+    let title = |name: &String| {
+        let one = &sampled.summary.parameters[name];
+        let errors = [one.median - one.ci68[0], one.ci68[1] - one.median];
+        value_lines(name, one.median, errors, decimals(one.sd), names.len())
+    };
     let corner = Corner {
         names,
         ranges: (0..names.len()).map(range).collect(),
         truth: (0..names.len()).map(|i| sampled.truth(i)).collect(),
-        titles: names.iter().map(|name| title(name, &sampled.summary.parameters[name], names.len())).collect(),
+        titles: names.iter().map(title).collect(),
     };
     let mut legend = Legend::default();
     legend.add(Key::Area(area_colours()[1]), "68 % of the posterior");
@@ -147,19 +152,6 @@ pub(super) fn figure(sampled: &Sampled) -> Figure {
          68 % interval; contours hold 68 and 95 % of the draws{injected}."
     );
     figure
-}
-
-/// Median and 68 % interval, in one line where there is room.
-fn title(name: &str, one: &ParameterSummary, count: usize) -> Vec<String> {
-    let (down, up) = (one.median - one.ci68[0], one.ci68[1] - one.median);
-    // a median near the wrap may be in another turn than the interval
-    let digits = decimals(one.sd);
-    let (down, up) = (format!("{down:.digits$}"), format!("{up:.digits$}"));
-    let errors = if down == up { format!("± {up}") } else { format!("+{up} -{down}") };
-    let (symbol, unit) = symbol(name);
-    let unit = if unit == "orbital cycles" { "" } else { unit };
-    let value = format!("{:.digits$} {errors} {unit}", one.median);
-    if count > 3 { vec![symbol.to_owned(), value] } else { vec![format!("{symbol} = {value}")] }
 }
 
 /// Bins of a histogram.

@@ -2,20 +2,18 @@
 //! where a run is given, the contours of its chain.
 
 use super::density::Density;
+use super::paraboloid::{self, Paraboloid, ParaboloidFile};
 use super::symbols::{label, nearest_turn, symbol};
 use super::trace::Sampled;
 use super::{PlotError, corner::SHARES};
 use crate::figure::colour::{BLACK, BLUE, ColourMap, VERMILION, WHITE};
 use crate::figure::contour::contour;
-use crate::figure::panel::{Shade, Sides, Tile, gaussian_contour};
+use crate::figure::panel::{Shade, Sides, Tile};
 use crate::figure::{Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke};
 use crate::io::landscape;
 use crate::landscape::{Axis as GridAxis, Grid, Landscape};
 use crate::origin;
 use crate::survey::{HEADER, Header, NODES, PARABOLOID};
-use nalgebra::DMatrix;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Root of the largest difference of chi2 that has a colour of its own.
@@ -23,26 +21,6 @@ const DARKEST: f64 = 10.0;
 
 /// Differences of chi2 of contours: 68 and 95 % of two Gaussian parameters.
 const LEVELS: [f64; 2] = [2.30, 5.99];
-
-/// What is used of `paraboloid.json`.
-#[derive(Deserialize)]
-struct ParaboloidFile {
-    parameters: Option<BTreeMap<String, Vertex>>,
-    covariance: Option<Vec<Vec<f64>>>,
-}
-
-#[derive(Deserialize)]
-struct Vertex {
-    vertex: f64,
-    error: f64,
-}
-
-/// A paraboloid, in the order of the axes and in their turns.
-struct Paraboloid {
-    vertex: Vec<f64>,
-    error: Vec<f64>,
-    covariance: DMatrix<f64>,
-}
 
 /// All that is drawn.
 struct Scene {
@@ -137,7 +115,7 @@ impl Scene {
             let at = |x: f64| ((x - paraboloid.vertex[0]) / paraboloid.error[0]).powi(2);
             let curve: Vec<[f64; 2]> =
                 (0..=200).map(|k| low + (high - low) * f64::from(k) / 200.0).map(|x| [x, at(x)]).collect();
-            panel.line(&mut figure, "paraboloid", &curve, PARABOLOID_PEN);
+            panel.line(&mut figure, "paraboloid", &curve, paraboloid::PEN);
         }
         if let Some(truth) = self.truth[0] {
             panel.vertical(&mut figure, "truth", truth, super::trace::TRUTH);
@@ -260,7 +238,7 @@ impl Scene {
         let mut legend = Legend::default();
         legend.add(Key::Line(Stroke::new(BLACK, 0.7)), "Δ*χ*^{2} = 2.30, 5.99");
         if self.paraboloid.is_some() {
-            legend.add(Key::Line(PARABOLOID_PEN), "paraboloid, Δ*χ*^{2} = 1");
+            legend.add(Key::Line(paraboloid::PEN), "paraboloid, Δ*χ*^{2} = 1");
         }
         if self.chain.is_some() {
             legend.add(Key::Line(CHAIN_PEN), "chain, 68 and 95 %");
@@ -287,51 +265,7 @@ impl Scene {
     }
 }
 
-const PARABOLOID_PEN: Stroke = Stroke::new(VERMILION, 1.2);
 const CHAIN_PEN: Stroke = Stroke::new(BLUE, 1.1).dashed();
-
-impl Paraboloid {
-    fn of(file: ParaboloidFile, grid: &Grid, nodes: &[Vec<f64>]) -> Option<Self> {
-        let (parameters, rows) = (file.parameters?, file.covariance?);
-        let n = grid.axes.len();
-        if rows.len() != n || rows.iter().any(|row| row.len() != n) {
-            return None;
-        }
-        let one = |k: usize| parameters.get(&grid.axes[k].name);
-        let vertex = (0..n).map(|k| one(k).map(|v| turned(&grid.axes[k], &nodes[k], v.vertex)));
-        Some(Paraboloid {
-            vertex: vertex.collect::<Option<_>>()?,
-            error: (0..n).map(|k| one(k).map(|v| v.error)).collect::<Option<_>>()?,
-            covariance: DMatrix::from_fn(n, n, |i, j| rows[i][j]),
-        })
-    }
-
-    /// The ellipse one above the minimum: projected onto the plane, with error bars, or cut by it.
-    fn draw(&self, figure: &mut Figure, panel: &Panel, [i, j]: [usize; 2], projected: bool) {
-        let centre = [self.vertex[i], self.vertex[j]];
-        let square = |m: &DMatrix<f64>| [[m[(i, i)], m[(i, j)]], [m[(j, i)], m[(j, j)]]];
-        let ellipse = match projected {
-            true => Some(square(&self.covariance)),
-            false => self.covariance.clone().try_inverse().and_then(|inverse| invert(square(&inverse))),
-        };
-        if let Some(covariance) = ellipse {
-            let line = gaussian_contour(centre, covariance, 1.0);
-            panel.line(figure, "paraboloid-ground", &line, Stroke::new(WHITE, 2.2));
-            panel.line(figure, "paraboloid", &line, PARABOLOID_PEN);
-        }
-        if projected {
-            let [x, y] = centre;
-            let pen = Stroke::new(VERMILION, 0.8);
-            panel.bar(figure, "vertex", [[x - self.error[i], y], [x + self.error[i], y]], 0.0, pen);
-            panel.bar(figure, "vertex", [[x, y - self.error[j]], [x, y + self.error[j]]], 0.0, pen);
-        }
-    }
-}
-
-fn invert([[a, b], [c, d]]: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
-    let determinant = a * d - b * c;
-    (determinant > 0.0).then(|| [[d / determinant, -b / determinant], [-c / determinant, a / determinant]])
-}
 
 /// Values of the nodes of an axis, rising: a periodic one leaves [0, 1) rather than wrap.
 fn nodes(axis: &GridAxis) -> Vec<f64> {
@@ -345,6 +279,6 @@ fn edges(nodes: &[f64]) -> Vec<f64> {
 }
 
 /// A value in the turn of the axis.
-fn turned(axis: &GridAxis, nodes: &[f64], x: f64) -> f64 {
+pub(super) fn turned(axis: &GridAxis, nodes: &[f64], x: f64) -> f64 {
     if axis.periodic { nearest_turn(x, 0.5 * (nodes[0] + nodes[nodes.len() - 1])) } else { x }
 }

@@ -9,6 +9,7 @@ mod density;
 mod dynamic;
 mod landscape;
 mod optimum;
+mod paraboloid;
 mod periodogram;
 mod profiles;
 mod projection;

@@ -2,7 +2,7 @@
 
 use super::PlotError;
 use super::corner::Corner;
-use super::symbols::{decimals, nearest_turn, symbol};
+use super::symbols::{decimals, nearest_turn, value_lines};
 use super::trace::TRUTH;
 use crate::figure::colour::BLUE;
 use crate::figure::{Axis, Figure, Key, Legend, Paint, Panel, Rect, Stroke, panel::gaussian_contour};
@@ -53,13 +53,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         let periodic = Parameter::from_name(&file.names[i]) == Some(Parameter::Phi);
         Some(if periodic { nearest_turn(truth, best[i]) } else { truth })
     };
-    let title = |i: usize| {
-        let digits = decimals(sd[i]);
-        let (symbol, unit) = symbol(&file.names[i]);
-        let unit = if unit == "orbital cycles" { "" } else { unit };
-        let value = format!("{:.digits$} ± {:.digits$} {unit}", best[i], sd[i]);
-        if n > 3 { vec![symbol.to_owned(), value] } else { vec![format!("{symbol} = {value}")] }
-    };
+    let title = |i: usize| value_lines(&file.names[i], best[i], [sd[i]; 2], decimals(sd[i]), n);
     let corner = Corner {
         names: &file.names,
         ranges: (0..n).map(|i| [best[i] - 3.6 * sd[i], best[i] + 3.6 * sd[i]]).collect(),

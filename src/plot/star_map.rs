@@ -37,6 +37,13 @@ struct TruthFile {
     config: Value,
 }
 
+/// What was injected.
+struct Injected {
+    spots: Vec<Spot>,
+    /// Share of the surface, where the file says so.
+    spottedness: Option<f64>,
+}
+
 /// One star on the page.
 struct Star {
     title: String,
@@ -61,7 +68,7 @@ pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
     };
     let title = title("reconstructed", Some(map.spottedness));
     let mut stars = vec![Star { title, pixels: Some(pixels), spots: Vec::new() }];
-    if let Some((spots, spottedness)) = known {
+    if let Some(Injected { spots, spottedness }) = known {
         stars[0].spots.clone_from(&spots);
         stars.push(Star { title: self::title("injected", spottedness.or(map.true_spottedness)), pixels: None, spots });
     }
@@ -92,16 +99,18 @@ const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above th
 
 /// The injected spots and their share of the surface, where the folder knows them: of `truth.json`, or of the config that made
 /// the map.
-fn known_spots(folder: &Path) -> Result<Option<(Vec<Spot>, Option<f64>)>, PlotError> {
+fn known_spots(folder: &Path) -> Result<Option<Injected>, PlotError> {
     if folder.join(TRUTH).is_file() {
         let truth: TruthFile = origin::read(folder, TRUTH)?;
-        return Ok(Some((spots(&truth.spots), Some(truth.spottedness))));
+        return Ok(Some(Injected { spots: spots(&truth.spots), spottedness: Some(truth.spottedness) }));
     }
     if !folder.join(velocities::FIT).is_file() {
         return Ok(None);
     }
     let fit: Value = origin::read(folder, velocities::FIT)?;
-    Ok(fit.pointer("/config/observations/simulate/spots").map(|written| (spots(written), None)))
+    Ok(fit
+        .pointer("/config/observations/simulate/spots")
+        .map(|written| Injected { spots: spots(written), spottedness: None }))
 }
 
 /// Spots as they are written, `[longitude, latitude, radius, filling]` in degrees; others are left out.

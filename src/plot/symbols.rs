@@ -25,6 +25,30 @@ pub fn label(name: &str) -> String {
     }
 }
 
+/// Short label of an axis, for narrow panels.
+pub fn short_label(name: &str) -> String {
+    label(name).replace("orbital cycles", "cycles")
+}
+
+/// A value with its error bars, downwards and upwards, as lines above a panel: one where there are few
+/// panels in a row, three where there are many.
+pub fn value_lines(name: &str, value: f64, [down, up]: [f64; 2], digits: usize, panels: usize) -> Vec<String> {
+    let (down, up) = (format!("{down:.digits$}"), format!("{up:.digits$}"));
+    let errors = if down == up { format!("± {up}") } else { format!("+{up} -{down}") };
+    let (symbol, unit) = symbol(name);
+    let unit = match unit {
+        // those of a phase go without saying
+        "" | "orbital cycles" => String::new(),
+        "°" => "°".to_owned(),
+        unit => format!(" {unit}"),
+    };
+    match panels {
+        0..=3 => vec![format!("{symbol} = {value:.digits$} {errors}{unit}")],
+        4..=5 => vec![symbol.to_owned(), format!("{value:.digits$} {errors}{unit}")],
+        _ => vec![symbol.to_owned(), format!("{value:.digits$}"), errors],
+    }
+}
+
 /// `x` by the whole number of turns that brings it nearest to `centre`, for a periodic parameter (period 1).
 pub fn nearest_turn(x: f64, centre: f64) -> f64 {
     x - (x - centre).round()

@@ -70,6 +70,13 @@ impl Sampled {
         Some(self.mode(i).map_or(truth, |mode| nearest_turn(truth, mode)))
     }
 
+    /// The same where it is not so far from the draws that these would shrink beside it.
+    pub(super) fn near_truth(&self, i: usize) -> Option<f64> {
+        let one = &self.summary.parameters[&self.summary.names[i]];
+        let median = self.mode(i).map_or(one.median, |mode| nearest_turn(one.median, mode));
+        self.truth(i).filter(|truth| (truth - median).abs() < NEAR * one.sd)
+    }
+
     /// Effective draws of the parameter that has fewest.
     pub(super) fn effective(&self) -> f64 {
         let least = self.summary.parameters.values().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
@@ -88,6 +95,9 @@ impl Sampled {
         }
     }
 }
+
+/// Standard deviations from the median within which an injected value widens an axis.
+const NEAR: f64 = 8.0;
 
 /// Walkers of each ensemble that are drawn.
 const WALKERS: usize = 4;
@@ -109,7 +119,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         let frame = Rect { left, top: top + i as f64 * (height + gap), width: figure.width - left - 8.0, height };
         let series = sampled.series(i, 0);
         let shown = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
-        let values: Vec<f64> = shown.flatten().copied().chain(sampled.truth(i)).collect();
+        let values: Vec<f64> = shown.flatten().copied().chain(sampled.near_truth(i)).collect();
         let y = Axis::linear(&label(name), range_of(values.into_iter(), Scale::Linear, 0.05));
         let panel = Panel { frame, x: Axis::linear("step", [0.0, (steps - 1).max(1) as f64]), y };
         let kept = sampled.summary.discarded_steps as f64;
@@ -130,8 +140,8 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         panel.frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
     }
     let mut legend = Legend::default();
-    for e in 0..shape.ensembles.min(SERIES.len()) {
-        legend.add(Key::Line(Stroke::new(SERIES[e], 1.0)), &format!("ensemble {}", e + 1));
+    for (e, colour) in SERIES.into_iter().enumerate().take(shape.ensembles) {
+        legend.add(Key::Line(Stroke::new(colour, 1.0)), &format!("ensemble {}", e + 1));
     }
     legend.add(Key::Area(GREY.opacity(0.2)), "burn-in");
     if sampled.manifest.origin.truth.is_some() {
