@@ -120,6 +120,15 @@ fn what_cannot_be_drawn_is_refused() {
     says(&desk.refusal(&["plot", "map", "--out", "out"]), &["--out out", "not empty", "--force"]);
     desk.succeed(&["plot", "map", "--out", "out", "--force"]);
     assert_eq!(desk.read("out/mine.txt"), "precious");
+    // a run that has only begun has figures all the same
+    desk.succeed(&["sample", CONFIG, "--out", "run"]);
+    let lines: Vec<String> = desk.read("run/chain.jsonl").lines().map(|line| format!("{line}\n")).collect();
+    for steps in [1, 2, 5] {
+        desk.write("run/chain.jsonl", &lines[..32 * steps].concat());
+        desk.succeed(&["plot", "run", "--out", "begun", "--force"]);
+    }
+    desk.write("run/chain.jsonl", "");
+    says(&desk.refusal(&["plot", "run", "--out", "new"]), &["run/chain.jsonl", "no complete step"]);
     // files that are wrong, by name and line
     let profiles = desk.read("map/profiles.csv");
     desk.write("map/profiles.csv", &desk::with_line(&profiles, 5, "0,1,2"));

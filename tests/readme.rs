@@ -24,7 +24,8 @@ fn the_config_of_the_readme_resolves() {
 
 #[test]
 fn the_commands_of_the_readme_exist() {
-    let known = ["simulate", "map", "periodogram", "optimise", "sample", "analyse", "grid", "compare"];
+    let known =
+        ["simulate", "map", "periodogram", "optimise", "sample", "analyse", "grid", "compare", "plot", "report"];
     let lines: Vec<String> = blocks("sh").iter().flat_map(|block| block.lines()).map(str::to_owned).collect();
     let commands = lines.iter().filter_map(|line| {
         let rest = line.strip_prefix("dimcmc ").or_else(|| line.strip_prefix("cargo run --release -- "))?;

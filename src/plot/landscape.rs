@@ -122,6 +122,11 @@ impl Scene {
         }
         panel.points(&mut figure, "node", &points, (Marker::Disc, 3.6, BLACK));
         panel.frame(&mut figure, Sides::BOTH);
+        let mut legend = Legend::default();
+        legend.add(Key::Point(Marker::Disc, BLACK), "nodes");
+        legend.add(Key::Line(paraboloid::PEN), if self.paraboloid.is_some() { "paraboloid" } else { "" });
+        legend.add(Key::Line(super::trace::TRUTH), if self.truth[0].is_some() { "injected" } else { "" });
+        legend.draw(&mut figure, frame, [0.5, 0.0]);
         figure
     }
 

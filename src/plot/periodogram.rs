@@ -23,6 +23,24 @@ struct SearchFile {
     false_alarm: FalseAlarm,
     peaks: Vec<OrbitFile>,
     offset: Option<Offset>,
+    second: Option<Second>,
+}
+
+/// A search for a second planet, the first one's period kept.
+#[derive(Deserialize)]
+struct Second {
+    false_alarm: FalseAlarm,
+    peaks: Vec<OrbitFile>,
+}
+
+/// What is marked in a periodogram.
+struct Marks<'a> {
+    levels: &'a [Level],
+    peak: Option<&'a OrbitFile>,
+    /// The period that is written at the peak (d).
+    period_d: f64,
+    /// Injected period over rotation period.
+    truth: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -57,11 +75,21 @@ const TABLES: [(&str, &str); 2] = [("periodogram.csv", "periodogram"), ("periodo
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let file: SearchFile = origin::read(folder, FILE)?;
     let mut figures = Vec::new();
-    for (k, (table, name)) in TABLES.into_iter().enumerate() {
-        let path = folder.join(table);
-        if k == 0 || path.is_file() {
-            figures.push(figure(name, &Columns::read(&path)?, (k == 0).then_some(&file))?);
-        }
+    let injected = file.truth.as_ref().filter(|truth| truth.get("k_kms").is_some_and(|k| *k > 0.0));
+    let first = Marks {
+        levels: &file.false_alarm.levels,
+        peak: file.peaks.first(),
+        period_d: file.best.period_d,
+        truth: injected.and_then(|truth| truth.get("porb_over_prot")).copied(),
+    };
+    figures.push(figure(TABLES[0].1, &Columns::read(&folder.join(TABLES[0].0))?, &first)?);
+    if let Some(second) = &file.second {
+        let peak = second.peaks.first();
+        let period_d = peak.map_or(f64::NAN, |peak| peak.period_d);
+        let marks = Marks { levels: &second.false_alarm.levels, peak, period_d, truth: None };
+        let mut beside = figure(TABLES[1].1, &Columns::read(&folder.join(TABLES[1].0))?, &marks)?;
+        beside.caption.insert_str(0, "A second planet beside the best orbit. ");
+        figures.push(beside);
     }
     if folder.join(velocities::FILE).is_file() {
         let OrbitFile { k_kms, porb_over_prot, phi, .. } = file.best;
@@ -71,8 +99,8 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(figures)
 }
 
-/// A figure of one table; of a second planet without false alarms and peaks, which are those of the first.
-fn figure(name: &str, table: &Columns, file: Option<&SearchFile>) -> Result<Figure, PlotError> {
+/// The figure of a table.
+fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotError> {
     let period = table.column("period_d")?;
     let ratio = table.column("porb_over_prot")?;
     let mut figure = Figure::new(name, PAGE_MM, 128.0);
@@ -89,7 +117,7 @@ fn figure(name: &str, table: &Columns, file: Option<&SearchFile>) -> Result<Figu
     };
 
     let likelihood = curve("delta_ln_l")?;
-    let levels = file.map_or(&[][..], |file| &file.false_alarm.levels);
+    let levels = found.levels;
     let highest = likelihood.iter().map(|p| p[1]).chain(levels.iter().map(|l| l.delta_ln_l)).fold(1.0, f64::max);
     let x = Axis::log("period (d)", range);
     let above = Panel { frame: frames[0], x: x.clone(), y: Axis::linear("Δ ln *L*", [0.0, 1.15 * highest]) };
@@ -110,7 +138,7 @@ fn figure(name: &str, table: &Columns, file: Option<&SearchFile>) -> Result<Figu
     amplitude.line(&mut figure, "k-upper", &upper, upper_pen);
 
     let panels = [&above, &window, &amplitude];
-    marks(&mut figure, panels, rotation, file);
+    marks(&mut figure, panels, rotation, found);
     for (k, panel) in panels.into_iter().enumerate() {
         panel.frame(&mut figure, Sides { below: k == 2, left: true });
     }
@@ -141,7 +169,7 @@ fn false_alarms(figure: &mut Figure, panel: &Panel, levels: &[Level]) {
 }
 
 /// Rotation period and its fractions, the peaks, and the injected period.
-fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, file: Option<&SearchFile>) {
+fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, found: &Marks) {
     let above = panels[0];
     let inside = |period: f64| {
         let share = above.x.share(period);
@@ -157,21 +185,19 @@ fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, file: Option<&
             figure.text(text, at, Font::SMALL, Align::Centre, 0.0);
         }
     }
-    let Some(file) = file else { return };
-    if let Some(best) = file.peaks.first() {
+    if let Some(best) = found.peak {
         let [x, y] = above.place(best.period_d, best.delta_ln_l);
         // beside the peak, where the panel has room
         let (side, align) = if x > above.frame.centre()[0] { (-1.0, Align::Right) } else { (1.0, Align::Left) };
         figure.polyline("best", &[[x + 3.0 * side, y - 6.0], [x + 13.0 * side, y - 6.0]], Stroke::new(BLUE, 0.8));
-        let text = format!("best: {:.3} d", file.best.period_d);
+        let text = format!("best: {:.3} d", found.period_d);
         let width = crate::figure::width_pt(&text, Font::SMALL.size);
         let left = if side < 0.0 { x - 16.0 - width } else { x + 14.0 };
         let ground = Rect { left, top: y - 10.5, width: width + 2.0, height: 9.0 };
         figure.rect("label-ground", ground, Paint::fill(WHITE));
         figure.text(&text, [x + 15.0 * side, y - 3.5], Font::SMALL.coloured(BLUE), align, 0.0);
     }
-    let truth = file.truth.as_ref().filter(|truth| truth.get("k_kms").is_some_and(|k| *k > 0.0));
-    if let Some(truth) = truth.and_then(|truth| truth.get("porb_over_prot")).filter(|p| inside(**p * rotation)) {
+    if let Some(truth) = found.truth.filter(|truth| inside(truth * rotation)) {
         for panel in panels {
             panel.vertical(figure, "truth", truth * rotation, Stroke::new(VERMILION, 0.8).dashed());
         }

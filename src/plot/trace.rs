@@ -171,7 +171,7 @@ pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
     let all: Vec<Series> = (0..names.len()).map(|i| sampled.series(i, discarded)).collect();
     let time = |series: &Series| autocorrelation_time(series).map(|time| time.tau);
     let longest = all.iter().filter_map(time).fold(1.0, f64::max);
-    let lags = ((8.0 * longest).ceil() as usize).clamp(10, (kept / 2).max(1));
+    let lags = ((8.0 * longest).ceil() as usize).max(10).min((kept / 2).max(1));
     let (top, left, gap) = (20.0, 40.0, 52.0);
     let width = 0.5 * (figure.width - left - gap - 8.0);
     let frame = |k: f64| Rect { left: left + k * (width + gap), top, width, height: figure.height - top - 28.0 };
