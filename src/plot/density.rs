@@ -1,8 +1,8 @@
 //! The density of draws in two dimensions, and the contours that hold given shares of it.
 //!
 //! A histogram under a Gaussian of the draws' own covariance, narrowed by the number of effective draws (0.9 of Scott's rule, so
-//! that contours of some thousand draws grow by two or three per cent), and divided by the part of the kernel that is inside: a posterior that ends at the
-//! edge of a prior keeps its height there.
+//! that contours of some thousand draws grow by two or three per cent), and divided by the part of the kernel that is inside: a
+//! posterior that ends at the edge of a prior keeps its height there.
 
 use crate::figure::contour::{Line, contour};
 
