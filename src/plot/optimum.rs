@@ -82,8 +82,9 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         legend.add(Key::Line(TRUTH), "injected");
     }
     let mut figure = corner.draw("optimum", diagonal, pair, &legend);
-    figure.caption = "The best parameters with the Gaussian of the curvature of the log-probability around them: ellipses of 68 \
+    figure.caption =
+        "The best parameters with the Gaussian of the curvature of the log-probability around them: ellipses of 68 \
                       and 95 %, values with one standard deviation."
-        .into();
+            .into();
     Ok(vec![figure])
 }

@@ -96,11 +96,12 @@ pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<
         orbital: 1,
     };
     let mut figure = curves.draw();
-    figure.caption = "Radial velocities. Above: first moments of the profiles. Below: with the spots marginalised out, and the \
+    figure.caption =
+        "Radial velocities. Above: first moments of the profiles. Below: with the spots marginalised out, and the \
                       best orbit; their errors are correlated, bars are the diagonal of the covariance \
                       (covariance.csv). To the right: the same folded with the orbital period; phase 0 is the largest \
                       velocity."
-        .into();
+            .into();
     Ok(figure)
 }
 
