@@ -23,7 +23,8 @@
 //! [`first_look`] measures what profiles say by themselves, [`proposal`] makes a first config of it, also of another program's
 //! files ([`import`]). [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
 //! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
-//! what they were begun with; [`export`] writes a chain for other programs.
+//! what they were begun with; [`export`] writes a chain for other programs. [`plot`] draws what a folder holds, with the means of [`mod@figure`], and [`mod@report`] makes a page
+//! of it.
 //! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
 //! of the star.
 //!
@@ -51,6 +52,7 @@ pub mod expansion;
 pub mod experiments;
 pub mod export;
 pub mod first_look;
+pub mod figure;
 pub mod fit;
 pub mod imaging;
 pub mod import;
@@ -66,6 +68,8 @@ pub mod optimum;
 pub mod origin;
 pub mod periodogram;
 pub mod proposal;
+pub mod plot;
+pub mod report;
 pub mod run;
 pub mod scene;
 pub mod search;

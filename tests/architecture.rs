@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
 const LAYERS: &[&[&str]] = &[
-    &["units", "text", "vector", "velocities", "log_density"],
+    &["units", "text", "vector", "velocities", "log_density", "figure"],
     &["observation"],
     &["star", "maxent", "chain", "landscape", "periodogram"],
     &["imaging", "ensemble", "optimise", "first_look"],
@@ -24,6 +24,8 @@ const LAYERS: &[&[&str]] = &[
     &["run"],
     &["comparison", "export"],
     &["experiments"],
+    &["plot"],
+    &["report"],
 ];
 
 /// Modules, and all that they may import. What is not listed here may import whatever lies lower.
@@ -32,6 +34,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("vector", &[]),
     ("velocities", &[]),
+    ("figure", &[]),
     ("log_density", &[]),
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
@@ -44,6 +47,26 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("optimise", &["log_density"]),
     ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
     ("first_look", &["observation", "star"]),
+    // from saved files alone: nothing that reconstructs, samples or searches
+    (
+        "plot",
+        &[
+            "chain",
+            "comparison",
+            "experiments",
+            "figure",
+            "io",
+            "landscape",
+            "manifest",
+            "objective",
+            "observation",
+            "origin",
+            "run",
+            "star",
+            "survey",
+        ],
+    ),
+    ("report", &["chain", "figure", "manifest", "objective", "origin", "plot", "survey"]),
 ];
 
 struct Source {

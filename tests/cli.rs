@@ -126,6 +126,10 @@ fn help_shows_an_example() {
     says(&text(&output.stdout), &["Example:", "dimcmc compare runs/demo runs/demo_grid --out"]);
     let output = dimcmc(&["export", "--help"], here);
     says(&text(&output.stdout), &["Example:", "dimcmc export runs/demo --format zarr"]);
+    for (command, example) in [("plot", "dimcmc plot runs/demo"), ("report", "dimcmc report runs/demo")] {
+        let output = dimcmc(&[command, "--help"], here);
+        says(&text(&output.stdout), &["Example:", example]);
+    }
     for (args, part) in [(&["map"][..], "CONFIG"), (&["mapp"], "map"), (&["map", "x", "--threads", "0"], "threads")] {
         let output = dimcmc(args, here);
         assert_eq!(output.status.code(), Some(2), "{args:?}");

@@ -40,6 +40,8 @@ fn the_commands_of_the_readme_exist() {
         "compare",
         "export",
         "reproduce",
+        "plot",
+        "report",
     ];
     let lines: Vec<String> = blocks("sh").iter().flat_map(|block| block.lines()).map(str::to_owned).collect();
     let commands = lines.iter().filter_map(|line| {

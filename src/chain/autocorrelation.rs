@@ -26,14 +26,27 @@ pub struct IntegratedTime {
 ///
 /// `None` when there are fewer than 4 steps or the quantity does not vary.
 pub fn autocorrelation_time(series: &Series) -> Option<IntegratedTime> {
-    let centred: Vec<Vec<f64>> = series
-        .iter()
-        .flat_map(|walkers| {
-            let centre = mean(walkers.iter().flatten());
-            walkers.iter().map(move |walker| walker.iter().map(|x| x - centre).collect())
-        })
-        .collect();
-    integrated_time(&centred)
+    integrated_time(&centred(series))
+}
+
+/// Every walker around the mean of its ensemble.
+fn centred(series: &Series) -> Vec<Vec<f64>> {
+    let around = |walkers: &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+        let centre = mean(walkers.iter().flatten());
+        walkers.iter().map(|walker| walker.iter().map(|x| x - centre).collect()).collect()
+    };
+    series.iter().flat_map(around).collect()
+}
+
+/// Autocorrelation of a quantity over all walkers at lags from 0 to `lags`, around the mean of each ensemble; 1 at lag 0, empty
+/// when the quantity does not vary.
+pub fn autocorrelation_function(series: &Series, lags: usize) -> Vec<f64> {
+    let centred = centred(series);
+    let steps = centred.first().map_or(0, Vec::len);
+    let covariance = |lag: usize| centred.iter().map(|x| dot(&x[lag..], &x[..steps - lag])).sum::<f64>();
+    let variance = covariance(0);
+    let lags = if variance > 0.0 { 0..(lags + 1).min(steps) } else { 0..0 };
+    lags.map(|lag| covariance(lag) / variance).collect()
 }
 
 /// Integrated autocorrelation time of series from which the mean is already subtracted, averaging the autocovariances.
@@ -113,6 +126,16 @@ pub(crate) mod tests {
             assert!((found.tau / truth - 1.0).abs() < 0.06, "r = {coefficient}: tau {} against {truth}", found.tau);
             assert!(found.closed && (found.variance - 1.0).abs() < 0.1);
         }
+    }
+
+    #[test]
+    fn ar1_falls_by_its_coefficient() {
+        let found = autocorrelation_function(&ar1(0.8, [2, 16, 4000], 3), 10);
+        for (lag, r) in found.iter().enumerate() {
+            // noise of the mean over 128,000 values, of which one in nine is independent
+            assert!((r - 0.8f64.powi(lag as i32)).abs() < 0.03, "lag {lag}: {r}");
+        }
+        assert!(autocorrelation_function(&vec![vec![vec![1.0; 100]; 4]; 2], 5).is_empty());
     }
 
     #[test]

@@ -10,6 +10,7 @@ use dimcmc::io::zdipy::ZdipyError;
 use dimcmc::objective::ReferenceError;
 use dimcmc::origin::OriginError;
 use dimcmc::proposal::ProposalError;
+use dimcmc::plot::PlotError;
 use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
 use dimcmc::search::SearchError;
@@ -148,6 +149,12 @@ impl From<ProposalError> for Failure {
 
 impl From<ZdipyError> for Failure {
     fn from(error: ZdipyError) -> Self {
+        Failure::input(error)
+    }
+}
+
+impl From<PlotError> for Failure {
+    fn from(error: PlotError) -> Self {
         Failure::input(error)
     }
 }

@@ -1,7 +1,7 @@
 //! `dimcmc map`: one reconstruction at the config's parameter values.
 
 use super::output::Output;
-use super::report::Report;
+use super::report_lines::Report;
 use super::{Failure, Global, progress};
 use dimcmc::fit::{Fit, FitSummary};
 use dimcmc::io::map::{FILES, MapResult};

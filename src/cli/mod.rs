@@ -17,8 +17,10 @@ mod map;
 mod optimise;
 mod output;
 mod periodogram;
+mod plot;
 mod progress;
 mod report;
+mod report_lines;
 mod reproduce;
 mod sample;
 mod schema;
@@ -74,6 +76,8 @@ enum Command {
     Schema(schema::Args),
     Completions(completions::Args),
     Man(man::Args),
+    Plot(plot::Args),
+    Report(report::Args),
 }
 
 /// The whole command line, for help, manual and completions.
@@ -110,6 +114,8 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Schema(args) => schema::run(args),
         Command::Completions(args) => completions::run(args),
         Command::Man(args) => man::run(args),
+        Command::Plot(args) => plot::run(args, &cli.global),
+        Command::Report(args) => report::run(args, &cli.global),
     }
 }
 

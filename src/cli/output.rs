@@ -18,6 +18,11 @@ pub struct Output {
 }
 
 impl Output {
+    /// That of a command with a folder of its own where none is given.
+    pub fn to(folder: PathBuf, force: bool) -> Self {
+        Output { folder, force }
+    }
+
     /// Whether results may go there.
     pub fn check(&self) -> Result<(), Failure> {
         let folder = self.folder.display();

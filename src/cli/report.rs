@@ -1,33 +1,42 @@
-//! Short results on stdout, a label and a value a line.
+//! `dimcmc report`: one page of whatever a folder holds.
 
-use std::fmt::Display;
-use std::io::Write as _;
-use std::path::Path;
+use super::report_lines::Report;
+use super::{Failure, Global};
+use dimcmc::io::atomic;
+use dimcmc::report;
+use std::path::PathBuf;
 
-/// Lines of label and value.
-#[derive(Default)]
-pub struct Report {
-    lines: Vec<(&'static str, String)>,
+/// Write one HTML page of whatever a folder holds
+///
+/// Tables, the verdict in plain words, notes, figures, the config and how to cite, in a single file that needs nothing else and
+/// can be sent to others.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc report runs/demo\n  dimcmc report runs/demo --out demo.html")]
+pub struct Args {
+    /// Folder that another command wrote
+    folder: PathBuf,
+    /// The file; `report.html` in FOLDER if not given
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace the file if it is there
+    #[arg(long)]
+    force: bool,
 }
 
-impl Report {
-    /// Adds a line.
-    pub fn line(mut self, label: &'static str, value: impl Display) -> Self {
-        self.lines.push((label, value.to_string()));
-        self
+/// Runs the command.
+pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let file = args.out.clone().unwrap_or_else(|| args.folder.join("report.html"));
+    if file.is_dir() {
+        return Err(Failure::input(format!("--out {}: is a folder, give the name of a file", file.display())));
     }
-
-    /// Adds a line that names what was written.
-    pub fn written(self, folder: &Path, files: impl Display) -> Self {
-        self.line("written", format!("{}: {files}", folder.display()))
+    if file.exists() && !args.force {
+        return Err(Failure::input(format!(
+            "--out {}: is there already; give another name, or --force",
+            file.display()
+        )));
     }
-
-    /// Prints the lines, values aligned. Whoever reads may stop reading.
-    pub fn print(self) {
-        let width = self.lines.iter().map(|(label, _)| label.len()).max().unwrap_or(0);
-        let mut stdout = std::io::stdout().lock();
-        for (label, value) in &self.lines {
-            let _ = writeln!(stdout, "{label:width$}  {value}");
-        }
-    }
+    let page = report::report(&args.folder)?;
+    atomic::write(&file, page.as_bytes())?;
+    Report::default().line("written", file.display()).print();
+    Ok(())
 }

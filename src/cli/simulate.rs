@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::output::Output;
-use super::report::Report;
+use super::report_lines::Report;
 use dimcmc::io::{lsd, truth};
 use dimcmc::scene::Scene;
 use dimcmc::{config, config::ObservationSource};

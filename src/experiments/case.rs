@@ -166,7 +166,11 @@ pub fn landscape(
     let free = scene.settings.free.iter().filter(|f| names.iter().any(|name| name == f.parameter.name()));
     let plan = GridSettings { free: free.copied().collect(), grid };
     std::fs::create_dir_all(folder).map_err(|source| ExperimentError::Folder { path: folder.into(), source })?;
-    let mut survey = Survey::begin(scene, &plan, found, folder, true)?;
+    // one that was stopped goes on
+    let mut survey = match Survey::resume(scene, &plan, folder) {
+        Ok(survey) => survey,
+        Err(_) => Survey::begin(scene, &plan, found, folder, true)?,
+    };
     if !survey.go(stop, |_| ())? {
         return Err(ExperimentError::Interrupted);
     }

@@ -1,6 +1,82 @@
 //! Tables as comma-separated text. Floats are written so that they read back exactly.
 
 use std::fmt::{Display, Write as _};
+use std::path::{Path, PathBuf};
+
+/// What is wrong with a table: one line that names the file, and the line or column.
+#[derive(Debug, thiserror::Error)]
+pub enum CsvError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A line is not as many numbers as there are columns.
+    #[error("{}:{line}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// There is no such column.
+    #[error("{}: no column {name}", path.display())]
+    Column {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        name: String,
+    },
+}
+
+/// A table that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    path: PathBuf,
+    names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+}
+
+impl Columns {
+    /// Reads a table with the names of its columns in the first line.
+    ///
+    /// # Errors
+    /// [`CsvError`]: a file that cannot be read, a line of another length, something that is no number.
+    pub fn read(path: &Path) -> Result<Self, CsvError> {
+        let text = std::fs::read_to_string(path).map_err(|source| CsvError::Read { path: path.into(), source })?;
+        let mut lines = text.lines();
+        let names: Vec<String> =
+            lines.next().unwrap_or_default().split(',').map(|name| name.trim().to_owned()).collect();
+        let mut columns = vec![Vec::new(); names.len()];
+        for (k, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+            let wrong = |problem: String| CsvError::Line { path: path.into(), line: k + 2, problem };
+            let cells: Vec<&str> = line.split(',').collect();
+            if cells.len() != names.len() {
+                return Err(wrong(format!("{} columns instead of {}", cells.len(), names.len())));
+            }
+            for (column, cell) in columns.iter_mut().zip(cells) {
+                let cell = cell.trim();
+                column.push(cell.parse().map_err(|_| wrong(format!("{cell:?} is not a number")))?);
+            }
+        }
+        Ok(Columns { path: path.into(), names, columns })
+    }
+
+    /// The numbers of a column.
+    ///
+    /// # Errors
+    /// [`CsvError::Column`] if there is none of that name.
+    pub fn column(&self, name: &str) -> Result<&[f64], CsvError> {
+        let k = self.names.iter().position(|one| one == name);
+        let missing = || CsvError::Column { path: self.path.clone(), name: name.into() };
+        k.map(|k| self.columns[k].as_slice()).ok_or_else(missing)
+    }
+}
 
 /// A table under construction.
 #[derive(Clone, Debug)]

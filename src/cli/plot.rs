@@ -1,0 +1,56 @@
+//! `dimcmc plot`: figures of whatever a folder holds.
+
+use super::output::Output;
+use super::report_lines::Report;
+use super::{Failure, Global};
+use dimcmc::plot::{self, DPI};
+use std::path::PathBuf;
+
+/// Draw whatever a folder holds, as SVG and PNG
+///
+/// From saved files alone, nothing is computed anew: the map in flattened polar and Mollweide projection, profiles, residuals and
+/// radial velocities of `map`; periodogram and velocities of `periodogram`; corner plot, traces and autocorrelation of a run;
+/// slices of a landscape, with the contours of a run over them where one is given; the ellipses of `optimise`; the estimates of
+/// `compare`; the injected map of `simulate`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  dimcmc plot runs/demo\n  dimcmc plot runs/demo_grid --with runs/demo --out figures"
+)]
+pub struct Args {
+    /// Folder that another command wrote
+    folder: PathBuf,
+    /// Folder for the figures; `figures` in FOLDER if not given. Created if need be, must be empty
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write into the folder even if it is not empty; files of the same names are replaced
+    #[arg(long)]
+    force: bool,
+    /// Over a landscape: the contours of the run in this folder
+    #[arg(long = "with", value_name = "RUN")]
+    run: Option<PathBuf>,
+    /// Pixels of the PNG files to the inch; figures are 88 to 180 mm wide
+    #[arg(long, value_name = "N", default_value_t = DPI, value_parser = dpi)]
+    dpi: f64,
+}
+
+fn dpi(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(dpi) if (30.0..=1200.0).contains(&dpi) => Ok(dpi),
+        _ => Err("a number from 30 to 1200".into()),
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    let folder = args.out.clone().unwrap_or_else(|| args.folder.join("figures"));
+    let output = Output::to(folder, args.force);
+    output.check()?;
+    let figures = plot::figures(&args.folder, args.run.as_deref())?;
+    let folder = output.create()?;
+    let mut files = Vec::new();
+    for figure in &figures {
+        files.extend(plot::write(figure, folder, args.dpi)?);
+    }
+    Report::default().written(folder, files.join(", ")).print();
+    Ok(())
+}

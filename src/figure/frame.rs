@@ -1,0 +1,140 @@
+//! Frames of panels: ticks on all sides, numbers and labels below and to the left.
+
+use super::colour::BLACK;
+use super::panel::{Panel, Sides};
+use super::ticks::{Ticks, ticks};
+use super::{Align, Axis, Figure, Font, LABEL_PT, Paint, Rect, SMALL_PT, Segment, Stroke, width_pt};
+
+/// Length of a tick with a number (pt).
+const MAJOR: f64 = 3.0;
+/// Length of one without.
+const MINOR: f64 = 1.6;
+/// The pen of frames.
+const PEN: Stroke = Stroke::new(BLACK, 0.6);
+/// Gap between a frame and its numbers (pt).
+const GAP: f64 = 3.0;
+/// Height of a capital over its size.
+const CAPITAL: f64 = 0.71;
+
+/// How many numbers fit along a side.
+fn most(length: f64, apart: f64) -> usize {
+    ((length / apart) as usize).clamp(2, 8)
+}
+
+fn x_ticks(frame: Rect, axis: &Axis) -> Ticks {
+    // numbers may not touch: fewer of them where they are long
+    let fits = |found: &Ticks| {
+        let widest = found.major.iter().map(|(_, text)| width_pt(text, SMALL_PT)).fold(0.0, f64::max);
+        widest + 7.0 < frame.width / (found.major.len() as f64 - 0.5).max(1.0)
+    };
+    let tried = (2..=most(frame.width, 14.0)).rev().map(|n| ticks(axis.range, axis.scale, n));
+    tried.into_iter().find(fits).unwrap_or_else(|| ticks(axis.range, axis.scale, 1))
+}
+
+fn y_ticks(frame: Rect, axis: &Axis) -> Ticks {
+    let first = most(frame.height, 16.0);
+    // one number alone gives no scale: closer together then, as long as there is room
+    let closest = ((frame.height / 9.0) as usize).max(first);
+    let tried = (first..=closest).map(|n| ticks(axis.range, axis.scale, n)).find(|found| found.major.len() >= 3);
+    tried.unwrap_or_else(|| ticks(axis.range, axis.scale, first))
+}
+
+/// The frame of a panel.
+pub(super) fn draw(panel: &Panel, figure: &mut Figure, sides: Sides) {
+    let y = y_ticks(panel.frame, &panel.y);
+    draw_with(panel, figure, sides, &y);
+}
+
+/// The frame of a panel without ticks on its sides.
+pub(super) fn draw_without_y(panel: &Panel, figure: &mut Figure, sides: Sides) {
+    let none = Ticks { major: Vec::new(), minor: Vec::new() };
+    draw_with(panel, figure, sides, &none);
+}
+
+fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks) {
+    let frame = panel.frame;
+    let x = x_ticks(frame, &panel.x);
+    let mut path = Vec::new();
+    let mut tick = |from: [f64; 2], by: [f64; 2]| {
+        path.extend([Segment::Move(from), Segment::Line([from[0] + by[0], from[1] + by[1]])]);
+    };
+    for (length, values) in lengths(&x) {
+        for value in values {
+            let at = frame.left + panel.x.share(value) * frame.width;
+            tick([at, frame.bottom()], [0.0, -length]);
+            tick([at, frame.top], [0.0, length]);
+        }
+    }
+    for (length, values) in lengths(y) {
+        for value in values {
+            let at = frame.bottom() - panel.y.share(value) * frame.height;
+            tick([frame.left, at], [length, 0.0]);
+            tick([frame.right(), at], [-length, 0.0]);
+        }
+    }
+    figure.path("ticks", path, Paint::stroke(PEN));
+    figure.rect("frame", frame, Paint::stroke(PEN));
+    if sides.below {
+        numbers_below(figure, frame, &panel.x, &x);
+    }
+    if sides.left {
+        numbers_left(figure, frame, &panel.y, y);
+    }
+}
+
+/// Lengths of ticks, each with the values where they are.
+fn lengths(ticks: &Ticks) -> [(f64, Vec<f64>); 2] {
+    [(MAJOR, ticks.major.iter().map(|(value, _)| *value).collect()), (MINOR, ticks.minor.clone())]
+}
+
+fn numbers_below(figure: &mut Figure, frame: Rect, axis: &Axis, ticks: &Ticks) {
+    let baseline = frame.bottom() + GAP + CAPITAL * SMALL_PT;
+    for (value, text) in &ticks.major {
+        let at = frame.left + axis.share(*value) * frame.width;
+        figure.text(text, [at, baseline], Font::SMALL, Align::Centre, 0.0);
+    }
+    let at = [frame.centre()[0], baseline + GAP + LABEL_PT];
+    figure.text(&axis.label, at, Font::LABEL, Align::Centre, 0.0);
+}
+
+fn numbers_left(figure: &mut Figure, frame: Rect, axis: &Axis, ticks: &Ticks) {
+    for (value, text) in &ticks.major {
+        let at = frame.bottom() - axis.share(*value) * frame.height + 0.5 * CAPITAL * SMALL_PT;
+        figure.text(text, [frame.left - GAP, at], Font::SMALL, Align::Right, 0.0);
+    }
+    // labels of panels above each other stand in one line: room for the numbers is the same everywhere
+    let at = [frame.left - LEFT_LABEL, frame.centre()[1]];
+    figure.text(&axis.label, at, Font::LABEL, Align::Centre, 90.0);
+}
+
+/// Distance of the baseline of a label from the left side of its panel (pt): numbers of five characters have room.
+const LEFT_LABEL: f64 = 27.0;
+
+/// Ticks, numbers and label below a bar.
+pub(super) fn draw_below(figure: &mut Figure, frame: Rect, axis: &Axis) {
+    let ticks = x_ticks(frame, axis);
+    let mut path = Vec::new();
+    for (value, _) in &ticks.major {
+        let at = frame.left + axis.share(*value) * frame.width;
+        path.extend([Segment::Move([at, frame.bottom()]), Segment::Line([at, frame.bottom() - 0.6 * MAJOR])]);
+    }
+    figure.path("ticks", path, Paint::stroke(PEN));
+    numbers_below(figure, frame, axis, &ticks);
+}
+
+/// Ticks, numbers and label to the right of a bar.
+pub(super) fn draw_right(figure: &mut Figure, frame: Rect, axis: &Axis) {
+    let ticks = y_ticks(frame, axis);
+    let mut path = Vec::new();
+    let mut widest: f64 = 0.0;
+    for (value, text) in &ticks.major {
+        let at = frame.bottom() - axis.share(*value) * frame.height;
+        path.extend([Segment::Move([frame.right(), at]), Segment::Line([frame.right() - 0.6 * MAJOR, at])]);
+        let baseline = at + 0.5 * CAPITAL * SMALL_PT;
+        figure.text(text, [frame.right() + GAP, baseline], Font::SMALL, Align::Left, 0.0);
+        widest = widest.max(width_pt(text, SMALL_PT));
+    }
+    figure.path("ticks", path, Paint::stroke(PEN));
+    let at = [frame.right() + GAP + widest + GAP + LABEL_PT, frame.centre()[1]];
+    figure.text(&axis.label, at, Font::LABEL, Align::Centre, 90.0);
+}

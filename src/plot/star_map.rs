@@ -1,0 +1,242 @@
+//! The map of the star: flattened polar projection and Mollweide's, beside it the injected map where it is known.
+
+use super::projection::Projection;
+use super::surface::{PixelMap, graticule, outline_spots, paint_spots, photosphere};
+use super::{PlotError, velocities};
+use crate::figure::colour::{BLACK, BLUE, ColourMap, WHITE};
+use crate::figure::panel::Shade;
+use crate::figure::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, Stroke, open, width_pt};
+use crate::io::csv::Columns;
+use crate::origin;
+use crate::star::Spot;
+use serde::Deserialize;
+use serde_json::Value;
+use std::path::Path;
+
+/// The file of a map.
+pub(super) const FILE: &str = "map.json";
+
+/// The file of a simulation.
+pub(super) const TRUTH: &str = "truth.json";
+
+/// What is used of `map.json`.
+#[derive(Deserialize)]
+struct MapFile {
+    ring_pixels: Vec<usize>,
+    spot_filling: Vec<f64>,
+    spottedness: f64,
+    true_spottedness: Option<f64>,
+}
+
+/// What is used of `truth.json`.
+#[derive(Deserialize)]
+struct TruthFile {
+    spots: Value,
+    spottedness: f64,
+    times_d: Vec<f64>,
+    config: Value,
+}
+
+/// What was injected.
+struct Injected {
+    spots: Vec<Spot>,
+    /// Share of the surface, where the file says so.
+    spottedness: Option<f64>,
+}
+
+/// One star on the page.
+struct Star {
+    title: String,
+    /// Its pixels; `None` if it is the list of spots itself.
+    pixels: Option<PixelMap>,
+    /// Injected spots: drawn as they are, or their rims over the pixels.
+    spots: Vec<Spot>,
+}
+
+/// The map in `folder`.
+pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
+    let map: MapFile = origin::read(folder, FILE)?;
+    let pixels = PixelMap { ring_pixels: map.ring_pixels, spot_filling: map.spot_filling };
+    if !pixels.is_whole() {
+        let problem = "ring_pixels and spot_filling do not belong together".to_owned();
+        return Err(PlotError::Content { path: folder.join(FILE), problem });
+    }
+    let known = known_spots(folder)?;
+    let cycles = match folder.join(velocities::FILE) {
+        table if table.is_file() => Columns::read(&table)?.column("cycle")?.to_vec(),
+        _ => Vec::new(),
+    };
+    let title = title("reconstructed", Some(map.spottedness));
+    let mut stars = vec![Star { title, pixels: Some(pixels), spots: Vec::new() }];
+    if let Some(Injected { spots, spottedness }) = known {
+        stars[0].spots.clone_from(&spots);
+        stars.push(Star { title: self::title("injected", spottedness.or(map.true_spottedness)), pixels: None, spots });
+    }
+    let compared = if stars.len() > 1 { "; rims of injected spots are outlined" } else { "" };
+    let caption = format!("Map of the spots at cycle 0{compared}. {HOW_TO_READ}");
+    Ok(draw(&stars, &cycles, caption))
+}
+
+/// The injected map of the simulation in `folder`.
+pub(super) fn injected(folder: &Path) -> Result<Figure, PlotError> {
+    let truth: TruthFile = origin::read(folder, TRUTH)?;
+    let number = |key: &str| truth.config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
+    let (period, epoch) = (number("rotation_period_d").unwrap_or(f64::NAN), number("epoch_d").unwrap_or(0.0));
+    let cycles: Vec<f64> = truth.times_d.iter().map(|t| (t - epoch) / period).filter(|c| c.is_finite()).collect();
+    let star = Star { title: title("injected", Some(truth.spottedness)), pixels: None, spots: spots(&truth.spots) };
+    Ok(draw(&[star], &cycles, format!("Map of the injected spots at cycle 0. {HOW_TO_READ}")))
+}
+
+fn title(what: &str, spottedness: Option<f64>) -> String {
+    spottedness.map_or_else(|| what.to_owned(), |s| format!("{what}: {:.1} % spotted", 100.0 * s))
+}
+
+/// How phases and longitudes are to be read.
+const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above the visible pole: parallels at +60, +30, 0 \
+                           (bold) and -30 degrees, the star turns anticlockwise, numbers outside are the rotation phases at which \
+                           a meridian faces the observer, ticks the observed phases. Ellipses: Mollweide projection; \
+                           longitude = 360 (1 - phase) degrees.";
+
+/// The injected spots and their share of the surface, where the folder knows them: of `truth.json`, or of the config that made
+/// the map.
+fn known_spots(folder: &Path) -> Result<Option<Injected>, PlotError> {
+    if folder.join(TRUTH).is_file() {
+        let truth: TruthFile = origin::read(folder, TRUTH)?;
+        return Ok(Some(Injected { spots: spots(&truth.spots), spottedness: Some(truth.spottedness) }));
+    }
+    if !folder.join(velocities::FIT).is_file() {
+        return Ok(None);
+    }
+    let fit: Value = origin::read(folder, velocities::FIT)?;
+    Ok(fit
+        .pointer("/config/observations/simulate/spots")
+        .map(|written| Injected { spots: spots(written), spottedness: None }))
+}
+
+/// Spots as they are written, `[longitude, latitude, radius, filling]` in degrees; others are left out.
+fn spots(written: &Value) -> Vec<Spot> {
+    let spot = |value: &Value| {
+        let number = |k: usize| value.get(k).and_then(Value::as_f64);
+        let [longitude, latitude, radius] = [number(0)?, number(1)?, number(2)?].map(f64::to_radians);
+        Some(Spot { longitude, latitude, radius, filling: number(3)? })
+    };
+    written.as_array().map(|spots| spots.iter().filter_map(spot).collect()).unwrap_or_default()
+}
+
+/// Radius of the polar projection (pt).
+const RADIUS: f64 = 84.0;
+/// Half the height of Mollweide's.
+const HALF_HEIGHT: f64 = 56.0;
+
+impl Star {
+    fn highest(&self) -> f64 {
+        let pixels = self.pixels.iter().flat_map(|map| map.spot_filling.iter().copied());
+        pixels.chain(self.spots.iter().map(|spot| spot.filling)).fold(0.0, f64::max)
+    }
+
+    fn paint(&self, figure: &mut Figure, projection: Projection, shade: Shade) {
+        photosphere(figure, projection, shade);
+        match &self.pixels {
+            Some(pixels) => pixels.paint(figure, projection, shade),
+            None => paint_spots(figure, projection, &self.spots, shade),
+        }
+        graticule(figure, projection);
+        if self.pixels.is_some() {
+            outline_spots(figure, projection, &self.spots, Stroke::new(BLUE, 0.6));
+        }
+    }
+}
+
+/// One star: the projections side by side; two stars: a column each.
+fn draw(stars: &[Star], cycles: &[f64], caption: String) -> Figure {
+    let two = stars.len() > 1;
+    let mut figure = Figure::new("map", PAGE_MM, if two { 136.0 } else { 92.0 });
+    figure.caption = caption;
+    let highest = stars.iter().map(Star::highest).fold(0.0, f64::max);
+    // a map of faint spots has a scale of its own
+    let high = if highest > 0.5 { 1.0 } else { ((10.0 * highest).ceil() / 10.0).max(0.1) };
+    let shade = Shade { map: ColourMap::Spots, low: 0.0, high };
+    let half = 0.5 * figure.width;
+    let middle = 28.0 + RADIUS + 8.0;
+    for (k, star) in stars.iter().enumerate() {
+        let x = half * (0.5 + k as f64);
+        let mollweide =
+            if two { [x + 6.0, middle + RADIUS + 26.0 + HALF_HEIGHT] } else { [1.5 * half - 4.0, middle - 8.0] };
+        polar(&mut figure, star, [x, middle], cycles, shade);
+        flat(&mut figure, star, mollweide, HALF_HEIGHT, shade);
+        figure.text(&star.title, [if two { x } else { half }, 10.0], Font::LABEL, Align::Centre, 0.0);
+    }
+    let bar = Rect { left: half - 70.0, top: figure.height - 30.0, width: 140.0, height: 6.0 };
+    shade.lying_bar(&mut figure, bar, "spot filling factor");
+    figure
+}
+
+const TINY: Font = Font { size: 6.0, colour: BLACK };
+
+fn polar(figure: &mut Figure, star: &Star, centre: Point, cycles: &[f64], shade: Shade) {
+    let projection = Projection::Polar { centre, radius: RADIUS };
+    star.paint(figure, projection, shade);
+    // the meridian that faces the observer at a phase
+    let toward = |phase: f64, distance: f64| {
+        let (sin, cos) = (-360.0 * phase).to_radians().sin_cos();
+        [centre[0] + distance * sin, centre[1] + distance * cos]
+    };
+    for cycle in cycles {
+        let tick = [toward(*cycle, RADIUS + 1.5), toward(*cycle, RADIUS + 7.0)];
+        figure.path("observed-phase", open(&tick), Paint::stroke(Stroke::new(BLACK, 0.6)));
+    }
+    for (phase, text, align, down) in [
+        (0.0, "phase 0", Align::Centre, 6.5),
+        (0.25, "0.25", Align::Right, 2.5),
+        (0.5, "0.5", Align::Centre, -1.5),
+        (0.75, "0.75", Align::Left, 2.5),
+    ] {
+        let at = toward(phase, RADIUS + 9.5);
+        figure.text(text, [at[0], at[1] + down], Font::SMALL, align, 0.0);
+    }
+    for latitude in [60.0, 30.0, 0.0] {
+        let [x, y] = projection.place(207.0, latitude);
+        let text = degrees(latitude);
+        let width = width_pt(&text, TINY.size);
+        let ground = Rect { left: x - 0.5 * width - 1.0, top: y - 3.2, width: width + 2.0, height: 6.4 };
+        figure.rect("label-ground", ground, Paint::fill(WHITE.opacity(0.75)));
+        figure.text(&text, [x, y + 2.1], TINY, Align::Centre, 0.0);
+    }
+    rotation_arrow(figure, [centre[0] + RADIUS + 2.0, centre[1] + RADIUS - 6.0]);
+}
+
+/// A latitude with its sign.
+fn degrees(latitude: f64) -> String {
+    if latitude == 0.0 { "0°".to_owned() } else { format!("{latitude:+}°") }
+}
+
+/// An arrow on an arc with the way the star turns: anticlockwise.
+fn rotation_arrow(figure: &mut Figure, at: Point) {
+    let radius = 7.0;
+    let on = |degrees: f64, radius: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        [at[0] + radius * cos, at[1] - radius * sin]
+    };
+    let arc: Vec<Point> = (0..=30).map(|k| on(-60.0 + 8.6 * f64::from(k), radius)).collect();
+    figure.polyline("rotation", &arc, Stroke::new(BLACK, 0.9));
+    let head = [on(232.0, radius), on(190.0, radius - 3.0), on(190.0, radius + 3.0)];
+    figure.polygon("rotation", &head, Paint::fill(BLACK));
+    figure.text("rotation", [at[0], at[1] + radius + 8.0], TINY, Align::Centre, 0.0);
+}
+
+fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, shade: Shade) {
+    let projection = Projection::Mollweide { centre, radius };
+    star.paint(figure, projection, shade);
+    for latitude in [-60.0, -30.0, 0.0, 30.0, 60.0_f64] {
+        let at = projection.place(0.0, latitude);
+        // clear of the edge, which leans where it is far from the equator
+        let text = [at[0] - 3.0 - latitude.abs() / 14.0, at[1] + 2.5];
+        figure.text(&degrees(latitude), text, Font::SMALL, Align::Right, 0.0);
+    }
+    let below = centre[1] + radius + 9.0;
+    for longitude in [0.0, 60.0, 120.0, 180.0, 240.0, 300.0, 360.0] {
+        let at = projection.place(longitude, 0.0);
+        figure.text(&format!("{longitude}°"), [at[0], below], Font::SMALL, Align::Centre, 0.0);
+    }
+    figure.text("longitude", [centre[0], below + 10.0], Font::LABEL, Align::Centre, 0.0);
+}

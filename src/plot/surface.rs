@@ -1,0 +1,158 @@
+//! What is on the star and how it is painted: a map of pixels, or a list of spots.
+
+use super::projection::{Projection, SOUTHERNMOST_DEG};
+use crate::figure::colour::{BLACK, GREY};
+use crate::figure::panel::Shade;
+use crate::figure::{Colour, Figure, Paint, Point, Segment, Stroke, closed, ellipse, open};
+use crate::star::Spot;
+use std::collections::BTreeMap;
+
+/// Spot filling factors of pixels of equal area in rings of constant latitude, south to north.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PixelMap {
+    pub ring_pixels: Vec<usize>,
+    pub spot_filling: Vec<f64>,
+}
+
+/// Latitude (degrees) by which rings overlap on the page, lest the ground shows between them.
+const OVERLAP_DEG: f64 = 0.15;
+
+impl PixelMap {
+    /// Whether the rings hold all pixels.
+    pub fn is_whole(&self) -> bool {
+        !self.spot_filling.is_empty() && self.ring_pixels.iter().sum::<usize>() == self.spot_filling.len()
+    }
+
+    /// Paints the map; neighbours of one colour are one patch, and the colour of the photosphere is the ground.
+    pub fn paint(&self, figure: &mut Figure, projection: Projection, shade: Shade) {
+        let photosphere = shade.map.at(0.0);
+        let total = self.spot_filling.len() as f64;
+        let latitude = |below: usize| (2.0 * below as f64 / total - 1.0).clamp(-1.0, 1.0).asin().to_degrees();
+        let mut of_colour: BTreeMap<[u8; 4], Vec<Segment>> = BTreeMap::new();
+        let mut below = 0;
+        for &count in &self.ring_pixels {
+            let latitudes = [latitude(below), (latitude(below + count) + OVERLAP_DEG).min(90.0)];
+            let ring = &self.spot_filling[below..below + count];
+            below += count;
+            if !projection.shows(latitudes[1]) {
+                continue;
+            }
+            let colour = |j: usize| shade.colour(ring[j]).unwrap_or(photosphere);
+            let mut first = 0;
+            for j in 1..=count {
+                if j < count && colour(j) == colour(first) {
+                    continue;
+                }
+                if colour(first) != photosphere {
+                    let longitudes = [first, j].map(|k| 360.0 * k as f64 / count as f64);
+                    let patch = closed(&projection.patch(longitudes, latitudes));
+                    of_colour.entry(colour(first).0).or_default().extend(patch);
+                }
+                first = j;
+            }
+        }
+        for (colour, path) in of_colour {
+            figure.path("pixels", path, Paint::cell(Colour(colour)));
+        }
+    }
+}
+
+/// Paints spots; where they overlap, the larger filling factor counts.
+pub(super) fn paint_spots(figure: &mut Figure, projection: Projection, spots: &[Spot], shade: Shade) {
+    let mut rising: Vec<&Spot> = spots.iter().collect();
+    rising.sort_by(|a, b| a.filling.total_cmp(&b.filling));
+    for spot in rising {
+        let paint = Paint::fill(shade.map.at((spot.filling - shade.low) / (shade.high - shade.low)));
+        rims(figure, "spot", projection, spot, paint);
+    }
+}
+
+/// Draws the rims of spots.
+pub(super) fn outline_spots(figure: &mut Figure, projection: Projection, spots: &[Spot], stroke: Stroke) {
+    for spot in spots {
+        rims(figure, "injected-spot", projection, spot, Paint::stroke(stroke));
+    }
+}
+
+/// A spot as closed lines: in Mollweide's projection once more to either side, for what goes around behind the star.
+fn rims(figure: &mut Figure, class: &'static str, projection: Projection, spot: &Spot, paint: Paint) {
+    let around: Vec<[f64; 2]> = (0..=120).map(|k| rim(spot, 3.0 * f64::from(k))).collect();
+    let places = |turn: f64, around: &[[f64; 2]]| -> Vec<Point> {
+        around.iter().map(|[longitude, latitude]| projection.place(longitude + turn, *latitude)).collect()
+    };
+    match projection {
+        Projection::Polar { .. } => {
+            figure.clipped(outline(projection), |figure| figure.polygon(class, &places(0.0, &around), paint));
+        }
+        Projection::Mollweide { .. } => {
+            let mut whole = unrolled(&around);
+            let turned = whole[whole.len() - 1][0] - whole[0][0];
+            if turned.abs() > 180.0 {
+                // around a pole: the area reaches up to it
+                let pole = 90.0_f64.copysign(spot.latitude);
+                whole.extend([[whole[whole.len() - 1][0], pole], [whole[0][0], pole]]);
+            }
+            figure.clipped(outline(projection), |figure| {
+                for turn in [-360.0, 0.0, 360.0] {
+                    figure.polygon(class, &places(turn, &whole), paint);
+                }
+            });
+        }
+    }
+}
+
+/// Longitudes without jumps.
+fn unrolled(around: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut whole: Vec<[f64; 2]> = Vec::with_capacity(around.len());
+    for [longitude, latitude] in around {
+        let before = whole.last().map_or(*longitude, |last| last[0]);
+        whole.push([longitude - 360.0 * ((longitude - before) / 360.0).round(), *latitude]);
+    }
+    whole
+}
+
+/// The point of a spot's rim in a direction from its centre: longitude and latitude (degrees).
+fn rim(spot: &Spot, direction_deg: f64) -> [f64; 2] {
+    let (sin_d, cos_d) = direction_deg.to_radians().sin_cos();
+    let (sin_r, cos_r) = spot.radius.sin_cos();
+    let (sin_b, cos_b) = spot.latitude.sin_cos();
+    let sin_latitude = (sin_b * cos_r + cos_b * sin_r * cos_d).clamp(-1.0, 1.0);
+    let turn = (sin_d * sin_r * cos_b).atan2(cos_r - sin_b * sin_latitude);
+    [(spot.longitude + turn).to_degrees().rem_euclid(360.0), sin_latitude.asin().to_degrees()]
+}
+
+/// The edge of the picture.
+fn outline(projection: Projection) -> Vec<Segment> {
+    match projection {
+        Projection::Polar { centre, radius } => ellipse(centre, [radius, radius]),
+        Projection::Mollweide { centre, radius } => ellipse(centre, [2.0 * radius, radius]),
+    }
+}
+
+/// A star without spots.
+pub(super) fn photosphere(figure: &mut Figure, projection: Projection, shade: Shade) {
+    figure.path("star", outline(projection), Paint::fill(shade.map.at(0.0)));
+}
+
+/// Meridians, parallels and the edge: the equator bold, others dashed.
+pub(super) fn graticule(figure: &mut Figure, projection: Projection) {
+    let thin = Paint::stroke(Stroke { dash: &[2.0, 2.0], ..Stroke::new(GREY, 0.4) });
+    let line = |points: Vec<[f64; 2]>| points.iter().map(|p| projection.place(p[0], p[1])).collect::<Vec<_>>();
+    let parallel = |latitude: f64| line((0..=180).map(|k| [2.0 * f64::from(k), latitude]).collect());
+    let flat = matches!(projection, Projection::Mollweide { .. });
+    let (latitudes, longitudes): (&[f64], &[f64]) = match flat {
+        false => (&[30.0, 60.0], &[0.0, 90.0, 180.0, 270.0]),
+        true => (&[-60.0, -30.0, 30.0, 60.0], &[60.0, 120.0, 180.0, 240.0, 300.0]),
+    };
+    let southernmost = if flat { -90.0 } else { SOUTHERNMOST_DEG };
+    for latitude in latitudes {
+        figure.path("parallel", open(&parallel(*latitude)), thin);
+    }
+    for longitude in longitudes {
+        let latitude = |k: i32| southernmost + (90.0 - southernmost) * f64::from(k) / 60.0;
+        figure.path("meridian", open(&line((0..=60).map(|k| [*longitude, latitude(k)]).collect())), thin);
+    }
+    let equator = if flat { open(&parallel(0.0)) } else { closed(&parallel(0.0)) };
+    figure.path("equator", equator, Paint::stroke(Stroke::new(BLACK, 0.9)));
+    figure.path("edge", outline(projection), Paint::stroke(Stroke::new(BLACK, 0.6)));
+}

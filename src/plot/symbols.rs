@@ -1,0 +1,60 @@
+//! The symbols of astronomers for parameters.
+
+use crate::objective::Parameter;
+
+/// Symbol and unit of a parameter by its name in files; the name itself if it is another one.
+pub fn symbol(name: &str) -> (&str, &'static str) {
+    match Parameter::from_name(name) {
+        Some(Parameter::K) => ("*K*", "km/s"),
+        Some(Parameter::PorbOverProt) => ("*P*_{orb}/*P*_{rot}", ""),
+        Some(Parameter::Phi) => ("*φ*", "orbital cycles"),
+        Some(Parameter::OmegaEq) => ("*Ω*_{eq}", "rad/d"),
+        Some(Parameter::DOmega) => ("d*Ω*", "rad/d"),
+        Some(Parameter::Inclination) => ("*i*", "°"),
+        Some(Parameter::Vsini) => ("*v* sin *i*", "km/s"),
+        Some(Parameter::Vsys) => ("*v*_{sys}", "km/s"),
+        None => (name, ""),
+    }
+}
+
+/// Label of an axis: symbol and unit.
+pub fn label(name: &str) -> String {
+    match symbol(name) {
+        (symbol, "") => symbol.to_owned(),
+        (symbol, unit) => format!("{symbol} ({unit})"),
+    }
+}
+
+/// Short label of an axis, for narrow panels.
+pub fn short_label(name: &str) -> String {
+    label(name).replace("orbital cycles", "cycles")
+}
+
+/// A value with its error bars, downwards and upwards, as lines above a panel: one where there are few
+/// panels in a row, three where there are many.
+pub fn value_lines(name: &str, value: f64, [down, up]: [f64; 2], digits: usize, panels: usize) -> Vec<String> {
+    let (down, up) = (format!("{down:.digits$}"), format!("{up:.digits$}"));
+    let errors = if down == up { format!("± {up}") } else { format!("+{up} -{down}") };
+    let (symbol, unit) = symbol(name);
+    let unit = match unit {
+        // those of a phase go without saying
+        "" | "orbital cycles" => String::new(),
+        "°" => "°".to_owned(),
+        unit => format!(" {unit}"),
+    };
+    match panels {
+        0..=3 => vec![format!("{symbol} = {value:.digits$} {errors}{unit}")],
+        4..=5 => vec![symbol.to_owned(), format!("{value:.digits$} {errors}{unit}")],
+        _ => vec![symbol.to_owned(), format!("{value:.digits$}"), errors],
+    }
+}
+
+/// `x` by the whole number of turns that brings it nearest to `centre`, for a periodic parameter (period 1).
+pub fn nearest_turn(x: f64, centre: f64) -> f64 {
+    x - (x - centre).round()
+}
+
+/// Decimals that show two digits of `error`.
+pub fn decimals(error: f64) -> usize {
+    if error > 0.0 && error.is_finite() { (1.0 - error.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 }
+}

@@ -1,0 +1,232 @@
+//! A chain: what was sampled as figures need it, its walkers over the steps, and how long it remembers.
+
+use super::PlotError;
+use super::symbols::{label, nearest_turn, symbol};
+use crate::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
+use crate::chain::statistics::{quantile, unwrap_around};
+use crate::chain::{Chain, ParameterKind, Series, Summary, summarise};
+use crate::figure::colour::{BLACK, GREY, SERIES, VERMILION};
+use crate::figure::panel::Sides;
+use crate::figure::{Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
+use crate::io::journal;
+use crate::manifest::{Manifest, kinds_and_goals};
+use crate::run::CHAIN;
+use std::path::Path;
+
+/// A chain with its summary.
+#[derive(Debug)]
+pub struct Sampled {
+    /// What the run was begun with.
+    pub manifest: Manifest,
+    /// All its steps.
+    pub chain: Chain,
+    /// What sort of number each parameter is.
+    pub kinds: Vec<ParameterKind>,
+    /// What the chain says.
+    pub summary: Summary,
+}
+
+impl Sampled {
+    /// Reads the run in `folder`.
+    ///
+    /// # Errors
+    /// [`PlotError`]: no run there, or one that cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, PlotError> {
+        let manifest = Manifest::read(folder)?;
+        let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
+        let (kinds, goals) = kinds_and_goals(&manifest.settings(folder)?);
+        let wrong = |problem: String| PlotError::Content { path: folder.join(CHAIN), problem };
+        let summary = summarise(&chain, &kinds, &goals).map_err(|e| wrong(e.to_string()))?;
+        Ok(Sampled { manifest, chain, kinds, summary })
+    }
+
+    /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
+    pub(super) fn draws(&self, i: usize) -> Vec<f64> {
+        let series = self.chain.series(i, self.summary.discarded_steps);
+        let mut draws: Vec<f64> = series.into_iter().flatten().flatten().collect();
+        if let Some(mode) = self.mode(i) {
+            unwrap_around(&mut draws, mode);
+        }
+        draws
+    }
+
+    /// Mode of a periodic parameter.
+    fn mode(&self, i: usize) -> Option<f64> {
+        (self.kinds[i] == ParameterKind::Periodic).then(|| self.summary.parameters[&self.summary.names[i]].mode)
+    }
+
+    /// Series of all steps, unwrapped like the draws.
+    fn series(&self, i: usize, discard: usize) -> Series {
+        let mut series = self.chain.series(i, discard);
+        if let Some(mode) = self.mode(i) {
+            series.iter_mut().flatten().for_each(|walker| unwrap_around(walker, mode));
+        }
+        series
+    }
+
+    /// The injected value, in the turn of the draws.
+    pub(super) fn truth(&self, i: usize) -> Option<f64> {
+        let truth = *self.manifest.origin.truth.as_ref()?.get(&self.summary.names[i])?;
+        Some(self.mode(i).map_or(truth, |mode| nearest_turn(truth, mode)))
+    }
+
+    /// The same where it is not so far from the draws that these would shrink beside it.
+    pub(super) fn near_truth(&self, i: usize) -> Option<f64> {
+        let one = &self.summary.parameters[&self.summary.names[i]];
+        let median = self.mode(i).map_or(one.median, |mode| nearest_turn(one.median, mode));
+        self.truth(i).filter(|truth| (truth - median).abs() < NEAR * one.sd)
+    }
+
+    /// Effective draws of the parameter that has fewest.
+    pub(super) fn effective(&self) -> f64 {
+        let least = self.summary.parameters.values().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
+        if least.is_finite() { least } else { 100.0 }
+    }
+
+    /// From where to where the prior of a parameter reaches.
+    pub(super) fn bounds(&self, i: usize) -> [f64; 2] {
+        let prior = self.manifest.priors.get(&self.summary.names[i]);
+        let bound = |key: &str, none: f64| {
+            prior.and_then(|prior| prior.get(key)).and_then(serde_json::Value::as_f64).unwrap_or(none)
+        };
+        match self.mode(i) {
+            Some(mode) => [mode - 0.5, mode + 0.5],
+            None => [bound("min", f64::NEG_INFINITY), bound("max", f64::INFINITY)],
+        }
+    }
+}
+
+/// Standard deviations from the median within which an injected value widens an axis.
+const NEAR: f64 = 8.0;
+
+/// Walkers of each ensemble that are drawn.
+const WALKERS: usize = 4;
+/// Steps that are drawn, about.
+const STEPS: usize = 500;
+
+/// The walkers over the steps.
+pub(super) fn traces(sampled: &Sampled) -> Figure {
+    let names = &sampled.summary.names;
+    let rows = names.len() as f64;
+    let row_mm = if names.len() > 4 { 22.0 } else { 28.0 };
+    let mut figure = Figure::new("traces", PAGE_MM, 22.0 + row_mm * rows);
+    let (left, top, gap) = (46.0, 20.0, 4.0);
+    let height = (figure.height - top - 28.0 - gap * (rows - 1.0)) / rows;
+    let steps = sampled.chain.steps();
+    let stride = steps.div_ceil(STEPS).max(1);
+    let shape = sampled.chain.shape();
+    for (i, name) in names.iter().enumerate() {
+        let frame = Rect { left, top: top + i as f64 * (height + gap), width: figure.width - left - 8.0, height };
+        let series = sampled.series(i, 0);
+        let shown = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
+        let values: Vec<f64> = shown.flatten().copied().chain(sampled.near_truth(i)).collect();
+        let y = Axis::linear(&label(name), range_of(values.into_iter(), Scale::Linear, 0.05));
+        let panel = Panel { frame, x: Axis::linear("step", [0.0, (steps - 1).max(1) as f64]), y };
+        let kept = sampled.summary.discarded_steps as f64;
+        let [low, high] = panel.y.range;
+        let burn_in = [[0.0, low], [kept, low], [kept, high], [0.0, high]];
+        panel.area(&mut figure, "burn-in", &burn_in, Paint::fill(GREY.opacity(0.2)));
+        for (e, ensemble) in series.iter().enumerate() {
+            let pen = Stroke::new(SERIES[e % SERIES.len()].opacity(0.55), 0.45);
+            for walker in ensemble.iter().take(WALKERS) {
+                let points: Vec<[f64; 2]> =
+                    walker.iter().enumerate().step_by(stride).map(|(step, x)| [step as f64, *x]).collect();
+                panel.line(&mut figure, "walker", &points, pen);
+            }
+        }
+        if let Some(truth) = sampled.truth(i) {
+            panel.horizontal(&mut figure, "truth", truth, TRUTH);
+        }
+        panel.frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
+    }
+    let mut legend = Legend::default();
+    for (e, colour) in SERIES.into_iter().enumerate().take(shape.ensembles) {
+        legend.add(Key::Line(Stroke::new(colour, 1.0)), &format!("ensemble {}", e + 1));
+    }
+    legend.add(Key::Area(GREY.opacity(0.2)), "burn-in");
+    if sampled.manifest.origin.truth.is_some() {
+        legend.add(Key::Line(TRUTH), "injected");
+    }
+    let middle = 0.5 * (left + figure.width);
+    legend.row(&mut figure, [middle, 9.0]);
+    let drawn = if shape.walkers > WALKERS { format!("{WALKERS} of the {}", shape.walkers) } else { "the".to_owned() };
+    let every = if stride > 1 { format!(", every {stride} steps") } else { String::new() };
+    figure.caption =
+        format!("Traces of {drawn} walkers of each ensemble{every}; the grey steps are left out as burn-in.");
+    figure
+}
+
+pub(super) const TRUTH: Stroke = Stroke::new(VERMILION, 1.0).dashed();
+
+/// Autocorrelation functions, and autocorrelation times over the length of the chain.
+pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
+    let mut figure = Figure::new("autocorrelation", PAGE_MM, 70.0);
+    figure.caption = "Left: autocorrelation of the walkers around the mean of their ensemble, after the burn-in. Right: the \
+                      integrated autocorrelation time as the chain grows; above the dashed line it is a rough estimate, from \
+                      less than 50 times its length."
+        .into();
+    let names = &sampled.summary.names;
+    let discarded = sampled.summary.discarded_steps;
+    let kept = sampled.chain.steps() - discarded;
+    let all: Vec<Series> = (0..names.len()).map(|i| sampled.series(i, discarded)).collect();
+    let time = |series: &Series| autocorrelation_time(series).map(|time| time.tau);
+    let longest = all.iter().filter_map(time).fold(1.0, f64::max);
+    let lags = ((8.0 * longest).ceil() as usize).max(10).min((kept / 2).max(1));
+    let (top, left, gap) = (20.0, 40.0, 52.0);
+    let width = 0.5 * (figure.width - left - gap - 8.0);
+    let frame = |k: f64| Rect { left: left + k * (width + gap), top, width, height: figure.height - top - 28.0 };
+    let function = Panel {
+        frame: frame(0.0),
+        x: Axis::linear("lag (steps)", [0.0, lags as f64]),
+        y: Axis::linear("autocorrelation", [-0.25, 1.05]),
+    };
+    let growth: Vec<Vec<[f64; 2]>> = all.iter().map(|series| growth(series, kept)).collect();
+    let largest = growth.iter().flatten().map(|p| p[1]).fold(1.0, f64::max);
+    let time = Panel {
+        frame: frame(1.0),
+        x: Axis::log("steps after the burn-in", [10.0, (kept as f64).max(20.0)]),
+        y: Axis::log("autocorrelation time *τ* (steps)", [0.7, 2.0 * largest]),
+    };
+    function.horizontal(&mut figure, "zero", 0.0, Stroke::new(GREY, 0.6));
+    time.line(&mut figure, "limit", &[[10.0, 0.2], [1e6, 2e4]], Stroke::new(BLACK, 0.7).dashed());
+    let mut legend = Legend::default();
+    for (i, series) in all.iter().enumerate() {
+        let pen = Stroke { dash: DASHES[i / SERIES.len() % 2], ..Stroke::new(SERIES[i % SERIES.len()], 1.0) };
+        let points: Vec<[f64; 2]> =
+            autocorrelation_function(series, lags).into_iter().enumerate().map(|(lag, r)| [lag as f64, r]).collect();
+        function.line(&mut figure, "autocorrelation", &points, pen);
+        time.line(&mut figure, "time", &growth[i], pen);
+        legend.add(Key::Line(pen), symbol(&names[i]).0);
+    }
+    legend.add(Key::Line(Stroke::new(BLACK, 0.7).dashed()), "steps/50");
+    function.frame(&mut figure, Sides::BOTH);
+    time.frame(&mut figure, Sides::BOTH);
+    let middle = 0.5 * figure.width;
+    legend.row(&mut figure, [middle, 9.0]);
+    figure
+}
+
+const DASHES: [&[f64]; 2] = [&[], &[1.0, 1.6]];
+
+/// The autocorrelation time of the first steps, for ever more of them.
+fn growth(series: &Series, kept: usize) -> Vec<[f64; 2]> {
+    let count = 12;
+    let lengths = (0..=count).map(|k| (10.0 * (kept as f64 / 10.0).powf(k as f64 / count as f64)).round() as usize);
+    let first = |steps: usize| -> Series {
+        series.iter().map(|e| e.iter().map(|walker| walker[..steps.min(walker.len())].to_vec()).collect()).collect()
+    };
+    lengths
+        .filter(|steps| (4..=kept).contains(steps))
+        .filter_map(|steps| Some([steps as f64, autocorrelation_time(&first(steps))?.tau]))
+        .collect()
+}
+
+/// Range of draws that shows all but a thousandth to either side, with some room, within the bounds of the prior.
+pub(super) fn shown_range(draws: &[f64], bounds: [f64; 2], also: Option<f64>) -> [f64; 2] {
+    let mut sorted = draws.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let ends = [quantile(&sorted, 0.001), quantile(&sorted, 0.999)];
+    let [low, high] = range_of(ends.into_iter().chain(also), Scale::Linear, 0.08);
+    let (low, high) = (low.max(bounds[0]), high.min(bounds[1]));
+    if high > low { [low, high] } else { [ends[0] - 1.0, ends[1] + 1.0] }
+}

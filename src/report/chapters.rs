@@ -1,0 +1,256 @@
+//! What is said of each kind of result, from its file.
+
+use super::{Chapter, Table, run};
+use crate::manifest;
+use crate::objective::Parameter;
+use crate::origin;
+use crate::plot::PlotError;
+use crate::plot::symbols::{decimals, label};
+use crate::survey::PARABOLOID;
+use serde_json::Value;
+use std::path::Path;
+
+/// The chapter of the result that is known by `file`, and the file that has its config.
+pub(super) fn of(folder: &Path, file: &'static str) -> Result<(Chapter, Value), PlotError> {
+    let whole: Value = origin::read(folder, file)?;
+    Ok(match file {
+        manifest::FILE => (run::chapter(folder)?, whole),
+        "map.json" => {
+            let fit = if folder.join("fit.json").is_file() { origin::read(folder, "fit.json")? } else { whole };
+            (map(&fit), fit)
+        }
+        "periodogram.json" => (periodogram(&whole), whole),
+        "landscape.json" => {
+            let present = folder.join(PARABOLOID).is_file();
+            let paraboloid = if present { origin::read(folder, PARABOLOID)? } else { Value::Null };
+            (landscape(&whole, &paraboloid), whole)
+        }
+        "optimum.json" => (optimum(&whole), whole),
+        "comparison.json" => (comparison(&whole), whole),
+        _ => (simulation(&whole), whole),
+    })
+}
+
+/// A number of a file with so many decimals; a dash where there is none.
+fn number(file: &Value, pointer: &str, digits: usize) -> String {
+    file.pointer(pointer).and_then(Value::as_f64).map_or_else(|| "–".into(), |x| format!("{x:.digits$}"))
+}
+
+fn texts(file: &Value, key: &str) -> Vec<String> {
+    let list = file.get(key).and_then(Value::as_array);
+    list.into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
+}
+
+fn pairs(rows: &[(&str, String)]) -> Table {
+    Table { head: Vec::new(), rows: rows.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
+}
+
+fn table(head: &[&str], rows: Vec<Vec<String>>) -> Table {
+    Table { head: head.iter().map(|text| (*text).to_owned()).collect(), rows }
+}
+
+fn map(fit: &Value) -> Chapter {
+    let converged = fit.get("status").and_then(Value::as_str) == Some("converged");
+    let sentence = match converged {
+        true => "The map reaches the target chi2 and is the one of greatest entropy that does.",
+        false => "The reconstruction did not converge: this map is not the one of greatest entropy at the target chi2.",
+    };
+    let rows = [
+        ("chi2 per datum", number(fit, "/chi2_per_datum", 4)),
+        ("data in profiles", format!("{} in {}", number(fit, "/data", 0), number(fit, "/profiles", 0))),
+        ("spot coverage", number(fit, "/spottedness", 4)),
+        ("entropy", number(fit, "/entropy", 4)),
+        ("scatter of the radial velocities (km/s)", number(fit, "/observed_rv_rms_kms", 4)),
+        ("the same with the model taken out (km/s)", number(fit, "/filtered_rv_rms_kms", 4)),
+        ("photon noise of a radial velocity (km/s)", number(fit, "/photon_rv_error_kms", 4)),
+        ("residuals, rms", number(fit, "/residual_rms", 6)),
+        ("pixels", number(fit, "/pixels", 0)),
+    ];
+    Chapter {
+        heading: "Map".into(),
+        verdict: Some((converged, sentence.into())),
+        tables: vec![("The fit.".into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters(fit))],
+        notes: Vec::new(),
+    }
+}
+
+/// The parameters of a file, and the injected ones where it has them.
+fn parameters(file: &Value) -> Table {
+    let Some(all) = file.get("parameters").and_then(Value::as_object) else { return Table::default() };
+    let truth = file.get("truth").filter(|truth| truth.is_object());
+    let row = |name: &String| {
+        let mut row = vec![label(name), number(file, &format!("/parameters/{name}"), 4)];
+        row.extend(truth.map(|truth| number(truth, &format!("/{name}"), 4)));
+        row
+    };
+    let head: &[&str] = if truth.is_some() { &["parameter", "value", "injected"] } else { &["parameter", "value"] };
+    let known = Parameter::ALL.map(Parameter::name).map(str::to_owned);
+    table(head, known.iter().filter(|name| all.contains_key(*name)).map(row).collect())
+}
+
+fn simulation(truth: &Value) -> Chapter {
+    let snr = truth.get("snr").and_then(Value::as_f64).map_or_else(|| "no noise".into(), |snr| format!("{snr}"));
+    let rows = [("spot coverage", number(truth, "/spottedness", 4)), ("signal-to-noise ratio of a bin", snr)];
+    Chapter {
+        heading: "Simulation".into(),
+        tables: vec![("Simulated data.".into(), pairs(&rows)), ("Injected parameters.".into(), parameters(truth))],
+        ..Chapter::default()
+    }
+}
+
+fn periodogram(file: &Value) -> Chapter {
+    let probability = file.pointer("/false_alarm/false_alarm_probability").and_then(Value::as_f64);
+    let peaks = file.get("peaks").and_then(Value::as_array).cloned().unwrap_or_default();
+    let share = |peak: &Value| peak.get("false_alarm_probability").and_then(Value::as_f64);
+    let first = peaks.first().and_then(share).or(probability);
+    let verdict = first.map(|p| match p {
+        p if p < 1e-2 => {
+            let sure = if p < 1e-3 { "A significant signal" } else { "A signal, though not a sure one" };
+            let shown = if p < 1e-3 { format!("{p:.1e}") } else { format!("{p:.4}") };
+            (
+                p < 1e-3,
+                format!(
+                    "{sure}: the probability that chance gives such a peak is {shown}. The notes say what else may."
+                ),
+            )
+        }
+        p => (false, format!("No significant signal: the probability that chance gives such a peak is {p:.2}.")),
+    });
+    let best = |key: &str, sigma: &str| {
+        let digits = file.pointer(&format!("/best/{sigma}")).and_then(Value::as_f64).map_or(3, decimals);
+        vec![
+            number(file, &format!("/best/{key}"), digits),
+            number(file, &format!("/best/{sigma}"), digits),
+            number(file, &format!("/truth/{key}"), digits),
+        ]
+    };
+    let rows = [("k_kms", "sigma_k_kms"), ("porb_over_prot", "sigma_porb_over_prot"), ("phi", "sigma_phi")];
+    let mut orbit: Vec<Vec<String>> =
+        rows.into_iter().map(|(key, sigma)| [vec![label(key)], best(key, sigma)].concat()).collect();
+    orbit.insert(1, [vec!["*P*_{orb} (d)".into()], best("period_d", "sigma_period_d")].concat());
+    let peak = |peak: &Value| {
+        let probability = share(peak).map_or_else(|| "–".into(), |p| format!("{p:.1e}"));
+        vec![
+            number(peak, "/period_d", 4),
+            number(peak, "/k_kms", 3),
+            number(peak, "/sigma_k_kms", 3),
+            number(peak, "/delta_ln_l", 2),
+            probability,
+        ]
+    };
+    let mut notes = texts(file, "warnings");
+    notes.extend(file.pointer("/co_rotation/statement").and_then(Value::as_str).map(str::to_owned));
+    let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm"];
+    Chapter {
+        heading: "Search for a planet".into(),
+        verdict,
+        tables: vec![
+            ("The best orbit.".into(), table(&["parameter", "best", "error", "injected"], orbit)),
+            ("Peaks of the periodogram.".into(), table(&head, peaks.iter().map(peak).collect())),
+        ],
+        notes,
+    }
+}
+
+fn landscape(header: &Value, paraboloid: &Value) -> Chapter {
+    let axes = header.pointer("/grid/axes").and_then(Value::as_array).cloned().unwrap_or_default();
+    let name = |axis: &Value| axis.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
+    let row = |axis: &Value| {
+        let name = name(axis);
+        let error = paraboloid.pointer(&format!("/parameters/{name}/error")).and_then(Value::as_f64);
+        let digits = error.map_or(4, decimals);
+        let range = format!("{} to {}", number(axis, "/min", 4), number(axis, "/max", 4));
+        let vertex = number(paraboloid, &format!("/parameters/{name}/vertex"), digits);
+        let truth = number(header, &format!("/truth/{name}"), digits);
+        let error = number(paraboloid, &format!("/parameters/{name}/error"), digits);
+        vec![label(&name), range, number(axis, "/nodes", 0), vertex, error, truth]
+    };
+    let refused = paraboloid.get("refused").and_then(Value::as_str);
+    let verdict = match (paraboloid, refused) {
+        (Value::Null, _) => Some((false, "The landscape is not finished, or has no paraboloid.".to_owned())),
+        (_, Some(why)) => Some((false, format!("There is no paraboloid: {why}."))),
+        _ => Some((true, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned())),
+    };
+    let head = ["parameter", "axis", "nodes", "vertex", "error", "injected"];
+    Chapter {
+        heading: "Landscape".into(),
+        verdict,
+        tables: vec![("Axes and paraboloid.".into(), table(&head, axes.iter().map(row).collect()))],
+        notes: Vec::new(),
+    }
+}
+
+fn optimum(file: &Value) -> Chapter {
+    let names = texts(file, "names");
+    let row = |name: &String| {
+        let digits = file.pointer(&format!("/sd/{name}")).and_then(Value::as_f64).map_or(4, decimals);
+        let value = |section: &str| number(file, &format!("/{section}/{name}"), digits);
+        vec![label(name), value("parameters"), value("sd"), value("truth")]
+    };
+    let is = |key: &str| file.get(key).and_then(Value::as_bool).unwrap_or(false);
+    let (defined, converged) = (is("well_defined"), is("converged"));
+    let sentence = match (defined, converged) {
+        (true, true) => "A well-defined maximum.",
+        (true, false) => "The search ran out of steps; the values may be improved from there.",
+        (false, _) => "No well-defined maximum: on the edge of a prior, or the data leave some direction open.",
+    };
+    Chapter {
+        heading: "Optimum".into(),
+        verdict: Some((defined && converged, sentence.into())),
+        tables: vec![(
+            "The best parameters, with errors from the curvature.".into(),
+            table(&["parameter", "best", "error", "injected"], names.iter().map(row).collect()),
+        )],
+        notes: Vec::new(),
+    }
+}
+
+fn comparison(file: &Value) -> Chapter {
+    let mut rows = Vec::new();
+    for name in texts(file, "names") {
+        let at = |rest: &str| format!("/parameters/{name}/{rest}");
+        let get = |rest: &str| file.pointer(&at(rest)).and_then(Value::as_f64);
+        let half = get("chain/ci68/1").zip(get("chain/ci68/0")).map(|(high, low)| 0.5 * (high - low));
+        let digits = half.map_or(4, decimals);
+        for by in ["chain", "paraboloid", "landscape"] {
+            if get(&format!("{by}/value")).is_some() {
+                let value = |rest: &str, digits| number(file, &at(&format!("{by}/{rest}")), digits);
+                let interval = format!("{} to {}", value("ci68/0", digits), value("ci68/1", digits));
+                rows.push(vec![
+                    label(&name),
+                    by.into(),
+                    value("value", digits),
+                    interval,
+                    value("difference", 2),
+                    value("width_ratio", 2),
+                ]);
+            }
+        }
+        if get("truth").is_some() {
+            let dash = || "–".to_owned();
+            rows.push(vec![
+                label(&name),
+                "injected".into(),
+                number(file, &at("truth"), digits),
+                dash(),
+                dash(),
+                dash(),
+            ]);
+        }
+    }
+    let converged = file.get("converged").and_then(Value::as_bool).unwrap_or(false);
+    let sentence = if converged {
+        "The chain has converged."
+    } else {
+        "The chain has not converged: the comparison is of its draws so far."
+    };
+    Chapter {
+        heading: "Chain against landscape".into(),
+        verdict: Some((converged, sentence.into())),
+        tables: vec![(
+            "Estimates; differences and widths in error bars of the chain.".into(),
+            table(&["parameter", "by", "value", "68 % interval", "difference", "width"], rows),
+        )],
+        notes: texts(file, "notes"),
+    }
+}

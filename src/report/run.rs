@@ -1,0 +1,94 @@
+//! What is said of a run.
+
+use super::{Chapter, Table};
+use crate::chain::{ParameterSummary, Summary};
+use crate::plot::symbols::{decimals, label};
+use crate::plot::{PlotError, Sampled};
+use std::path::Path;
+
+/// The chapter of the run in `folder`.
+pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
+    let sampled = Sampled::read(folder)?;
+    let (manifest, summary) = (&sampled.manifest, &sampled.summary);
+    let mut notes = manifest.warnings();
+    notes.extend(manifest.co_rotation(summary));
+    notes.extend(upper_limits(summary));
+    let truth = manifest.origin.truth.as_ref();
+    let mut head = ["parameter", "median", "68 % interval", "95 % interval", "95 % HDI", "R-hat", "ESS", "τ (steps)"]
+        .map(String::from)
+        .to_vec();
+    if truth.is_some() {
+        head.insert(1, "injected".into());
+    }
+    let row = |name: &String| {
+        let one = &summary.parameters[name];
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let digits = decimals(one.sd);
+            row.insert(1, truth.get(name).map_or_else(|| "–".into(), |value| format!("{value:.digits$}")));
+        }
+        row
+    };
+    let parameters = Table { head, rows: summary.names.iter().map(row).collect() };
+    let chain = Table {
+        head: ["steps", "burn-in", "ensembles × walkers", "evaluations", "failed", "accepted"]
+            .map(String::from)
+            .to_vec(),
+        rows: vec![vec![
+            summary.steps.to_string(),
+            summary.discarded_steps.to_string(),
+            format!("{} × {}", manifest.ensembles, manifest.walkers),
+            summary.evaluations.to_string(),
+            summary.failures.to_string(),
+            format!("{:.0} %", 100.0 * summary.acceptance_fraction),
+        ]],
+    };
+    Ok(Chapter {
+        heading: "Posterior".into(),
+        verdict: Some((summary.converged, verdict(summary))),
+        tables: vec![("The sampled parameters.".into(), parameters), ("The chain.".into(), chain)],
+        notes,
+    })
+}
+
+fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
+    let digits = decimals(one.sd);
+    let interval = |[low, high]: [f64; 2]| format!("{low:.digits$} to {high:.digits$}");
+    let optional = |x: Option<f64>, digits: usize| x.map_or_else(|| "–".into(), |x| format!("{x:.digits$}"));
+    vec![
+        label(name),
+        format!("{:.digits$}", one.median),
+        interval(one.ci68),
+        interval(one.ci95),
+        interval(one.hdi95),
+        optional(one.rhat, 3),
+        optional(one.ess, 0),
+        optional(one.tau, 1),
+    ]
+}
+
+/// Whether the chain has converged, and what that means.
+fn verdict(summary: &Summary) -> String {
+    if !summary.converged {
+        return format!(
+            "The chain has not converged, its intervals are not to be quoted: {}.",
+            summary.advice.join("; ")
+        );
+    }
+    let all = || summary.parameters.values();
+    let worst = all().filter_map(|one| one.rhat).fold(1.0, f64::max);
+    let least = all().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
+    let remark = if summary.advice.is_empty() { String::new() } else { format!(" But {}.", summary.advice.join("; ")) };
+    format!(
+        "The chain has converged: independent ensembles agree on every parameter (R-hat at most {worst:.3}), and its draws are \
+         worth {least:.0} independent ones or more.{remark}"
+    )
+}
+
+fn upper_limits(summary: &Summary) -> Vec<String> {
+    let limit = |(name, one): (&String, &ParameterSummary)| {
+        let digits = decimals(one.sd);
+        Some(format!("{} is compatible with zero: below {:.digits$} at 95 %.", label(name), one.upper95?))
+    };
+    summary.parameters.iter().filter_map(limit).collect()
+}

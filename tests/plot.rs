@@ -1,0 +1,230 @@
+//! `plot` as users run it: every folder gives its figures, and what is injected is drawn where it is.
+
+#[path = "common/desk.rs"]
+mod desk;
+#[path = "common/svg.rs"]
+mod svg;
+
+use desk::{Desk, says, star};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use serde_json::{Value, json};
+use svg::{extent, middle, paths, texts};
+
+const CONFIG: &str = "config.json";
+
+/// A small star that takes seconds.
+fn config() -> Value {
+    json!({
+        "star": star(),
+        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.0 },
+        "observations": { "simulate": {
+            "spots": [[30, 40, 25, 0.8], [250, 10, 15, 0.9]],
+            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
+            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
+            "snr": 1000, "seed": 7, "pixels": 2000
+        } },
+        "imaging": { "pixels": 200, "chi2_target": 1.05 },
+        "parameters": {
+            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
+            "phi": { "prior": "periodic" }
+        },
+        "sampler": { "ensembles": 4, "walkers": 8, "steps": 30, "ess": 100, "rhat": 1.1 },
+        "grid": { "axes": { "k_kms": [0.15, 0.25, 5], "phi": [-0.05, 0.04, 5] } }
+    })
+}
+
+/// What every command writes, in a folder of its name.
+fn all() -> Desk {
+    let desk = Desk::new(config());
+    for command in ["simulate", "map", "optimise", "grid", "sample"] {
+        desk.succeed(&[command, CONFIG, "--out", command]);
+    }
+    desk.succeed(&["periodogram", CONFIG, "--out", "periodogram", "--draws", "1000"]);
+    desk.succeed(&["compare", "sample", "grid", "--out", "compare"]);
+    desk
+}
+
+const FIGURES: [(&str, &[&str]); 7] = [
+    ("simulate", &["map", "profiles"]),
+    ("map", &["map", "profiles", "residuals", "rv"]),
+    ("periodogram", &["periodogram", "rv"]),
+    ("optimise", &["optimum"]),
+    ("grid", &["landscape"]),
+    ("sample", &["corner", "traces", "autocorrelation"]),
+    ("compare", &["comparison"]),
+];
+
+#[test]
+fn every_folder_has_its_figures() {
+    let desk = all();
+    for (folder, figures) in FIGURES {
+        let said = desk.succeed(&["plot", folder]);
+        let files: Vec<String> = figures.iter().flat_map(|f| [format!("{f}.svg"), format!("{f}.png")]).collect();
+        says(&said, &[&format!("written  {folder}/figures: {}", files.join(", "))]);
+        // the same bytes again, whatever the number of threads
+        desk.succeed(&["plot", folder, "--out", "again", "--threads", "1", "--force"]);
+        for file in &files {
+            let read = |folder: &str| std::fs::read(desk.path(&format!("{folder}/{file}"))).unwrap();
+            let bytes = read(&format!("{folder}/figures"));
+            assert!(bytes == read("again"), "{folder}: {file}");
+            let starts = if file.ends_with("png") { &b"\x89PNG"[..] } else { b"<svg" };
+            assert!(bytes.starts_with(starts), "{folder}: {file}");
+        }
+        // every figure says what it shows, in names that a reader knows
+        for figure in figures {
+            let svg = desk.read(&format!("{folder}/figures/{figure}.svg"));
+            assert!(svg.contains("<title>") && !svg.contains("NaN") && !svg.contains("_kms"), "{folder}: {figure}");
+        }
+    }
+    for (file, labels) in [
+        ("sample/figures/corner.svg", &["K (km/s)", "φ (orbital cycles)", "injected"][..]),
+        ("sample/figures/traces.svg", &["step", "ensemble 4", "burn-in"]),
+        ("map/figures/rv.svg", &["RV (km/s)", "rotation cycle", "orbital phase", "model"]),
+        ("map/figures/residuals.svg", &["velocity (km/s)", "rotation phase", "standard errors"]),
+        ("map/figures/map.svg", &["phase 0", "rotation", "longitude", "+60°", "spot filling factor"]),
+        ("periodogram/figures/periodogram.svg", &["period (d)", "Δ ln L", "window", "0.1 %", "Prot/2", "injected"]),
+        ("grid/figures/landscape.svg", &["√Δχ2", "paraboloid, Δχ2 = 1"]),
+        ("compare/figures/comparison.svg", &["chain", "paraboloid", "landscape", "injected"]),
+    ] {
+        let svg = desk.read(file);
+        for label in labels {
+            assert!(texts(&svg).contains(label), "{file}: {label} is not among {:?}", texts(&svg));
+        }
+    }
+
+    // over the landscape, the chain
+    desk.succeed(&["plot", "grid", "--with", "sample", "--out", "with"]);
+    let (with, without) = (desk.read("with/landscape.svg"), desk.read("grid/figures/landscape.svg"));
+    assert!(paths(&without, "chain").is_empty() && paths(&with, "chain").len() >= 2);
+    // one above the minimum: as wide as the error bars of the vertex
+    let (ellipse, bars) = (extent(&paths(&with, "paraboloid")[0]), paths(&with, "vertex"));
+    for (k, bar) in bars.iter().enumerate() {
+        let (ellipse, bar) = (ellipse[k], extent(bar)[k]);
+        assert!((ellipse[0] - bar[0]).abs() < 0.15 && (ellipse[1] - bar[1]).abs() < 0.15, "{ellipse:?} {bar:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let desk = Desk::new(config());
+    says(&desk.refusal(&["plot", "absent"]), &["absent", "no such folder"]);
+    std::fs::create_dir(desk.path("empty")).unwrap();
+    says(&desk.refusal(&["plot", "empty"]), &["empty", "nothing to draw", "map.json", "manifest.json"]);
+    desk.succeed(&["map", CONFIG, "--out", "map"]);
+    desk.write("map/figures", "mine");
+    says(&desk.refusal(&["plot", "map"]), &["map/figures", "not a folder"]);
+    desk.succeed(&["plot", "map", "--out", "out"]);
+    desk.write("out/mine.txt", "precious");
+    says(&desk.refusal(&["plot", "map", "--out", "out"]), &["--out out", "not empty", "--force"]);
+    desk.succeed(&["plot", "map", "--out", "out", "--force"]);
+    assert_eq!(desk.read("out/mine.txt"), "precious");
+    // a run that has only begun has figures all the same
+    desk.succeed(&["sample", CONFIG, "--out", "run"]);
+    let lines: Vec<String> = desk.read("run/chain.jsonl").lines().map(|line| format!("{line}\n")).collect();
+    for steps in [1, 2, 5] {
+        desk.write("run/chain.jsonl", &lines[..32 * steps].concat());
+        desk.succeed(&["plot", "run", "--out", "begun", "--force"]);
+    }
+    desk.write("run/chain.jsonl", "");
+    says(&desk.refusal(&["plot", "run", "--out", "new"]), &["run/chain.jsonl", "no complete step"]);
+    // files that are wrong, by name and line
+    let profiles = desk.read("map/profiles.csv");
+    desk.write("map/profiles.csv", &desk::with_line(&profiles, 5, "0,1,2"));
+    says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/profiles.csv:5:", "3 columns instead of 8"]);
+    desk.write("map/profiles.csv", &profiles.replacen("sigma", "error", 1));
+    says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/profiles.csv", "no column sigma"]);
+    desk.write("map/map.json", "{}");
+    says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/map.json", "ring_pixels"]);
+}
+
+#[test]
+fn a_spot_is_drawn_at_its_longitude() {
+    let desk = Desk::new(config());
+    desk.succeed(&["map", CONFIG, "--out", "map"]);
+    let map = desk.json("map/map.json");
+    let numbers =
+        |key: &str| -> Vec<f64> { map[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect() };
+    let (longitude, latitude) = (numbers("longitude_deg"), numbers("latitude_deg"));
+    for (at, east) in [(90.0, [1.0, 0.0]), (180.0, [0.0, -1.0]), (270.0, [-1.0, 0.0])] {
+        // one pixel of a mid-latitude
+        let distance = |k: &usize| (longitude[*k] - at).abs() + (latitude[*k] - 30.0).abs();
+        let dark = (0..longitude.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+        let mut map = map.clone();
+        map["spot_filling"] = (0..longitude.len()).map(|k| if k == dark { 1.0 } else { 0.0 }).collect();
+        desk.write("map/map.json", &map.to_string());
+        desk.succeed(&["plot", "map", "--out", "out", "--force"]);
+        let svg = desk.read("out/map.svg");
+        // the first star is the reconstructed one, in polar projection
+        let star = extent(&paths(&svg, "star")[0]);
+        let (pole, radius) = (star.map(|[low, high]| 0.5 * (low + high)), 0.5 * (star[0][1] - star[0][0]));
+        let spot = middle(&paths(&svg, "pixels")[0]);
+        // latitude -30 is at the edge
+        let r = radius * (90.0 - latitude[dark]) / 120.0;
+        let (sin, cos) = longitude[dark].to_radians().sin_cos();
+        let found = [spot[0] - pole[0], spot[1] - pole[1]];
+        // the middle of a pixel's outline is not quite its centre, which is 8 degrees wide
+        assert!((found[0] - r * sin).hypot(found[1] - r * cos) < 0.02 * radius, "{at}: {found:?}");
+        // 90 degrees are to the right, where the star recedes from an observer below
+        assert!(found[0] * east[0] + found[1] * east[1] > 0.9 * r, "{at}: {found:?}");
+    }
+    // the injected spot at longitude 30 and latitude 40
+    let svg = desk.read("out/map.svg");
+    let star = middle(&paths(&svg, "star")[0]);
+    let rim = middle(&paths(&svg, "injected-spot")[0]);
+    let angle = (rim[0] - star[0]).atan2(rim[1] - star[1]).to_degrees();
+    assert!((angle - 30.0).abs() < 2.0, "{angle}");
+}
+
+/// A run whose chain is a Gaussian of known centre and spread, correlated by 0.6; the phase is wrapped to [0, 1).
+fn gaussian_run(desk: &Desk, centre: [f64; 2], sd: [f64; 2]) {
+    desk.succeed(&["sample", CONFIG, "--out", "run", "--force"]);
+    let mut manifest = desk.json("run/manifest.json");
+    manifest["truth"]["k_kms"] = json!(centre[0]);
+    manifest["truth"]["phi"] = json!(centre[1].rem_euclid(1.0));
+    desk.write("run/manifest.json", &manifest.to_string());
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut text = String::new();
+    for step in 0..400 {
+        for (ensemble, walker) in (0..4).flat_map(|e| (0..8).map(move |w| (e, w))) {
+            let [u, v]: [f64; 2] = [rng.sample(StandardNormal), rng.sample(StandardNormal)];
+            let (k, phi) = (centre[0] + sd[0] * u, centre[1] + sd[1] * (0.6 * u + 0.8 * v));
+            let line = json!({
+                "ensemble": ensemble, "step": step, "walker": walker, "accepted": true, "log_prob": -0.5 * (u * u + v * v),
+                "k_kms": k, "phi": phi.rem_euclid(1.0), "spottedness": 0.05, "chi2": 1.0, "status": "converged",
+                "proposed": "converged", "passes": 10
+            });
+            text += &format!("{line}\n");
+        }
+    }
+    desk.write("run/chain.jsonl", &text);
+}
+
+#[test]
+fn a_known_gaussian_has_its_contours_and_a_phase_wraps() {
+    let desk = Desk::new(config());
+    for centre in [[0.3, 0.5], [0.3, 0.99]] {
+        gaussian_run(&desk, centre, [0.02, 0.03]);
+        desk.succeed(&["plot", "run", "--out", "out", "--force"]);
+        let svg = desk.read("out/corner.svg");
+        let (inner, outer) = (paths(&svg, "area68"), paths(&svg, "area95"));
+        assert_eq!((inner.len(), outer.len()), (1, 1), "one pair of parameters");
+        // the injected values are those of the centre: 12,800 independent draws place it to a hundredth of its width, their
+        // noise on a contour is some hundredths
+        let truth = middle(&paths(&svg, "truth-point")[0]);
+        let (found, [x, y]) = (middle(&inner[0]), extent(&inner[0]));
+        assert!((found[0] - truth[0]).abs() < 0.06 * (x[1] - x[0]), "{centre:?}: {found:?} {truth:?}");
+        assert!((found[1] - truth[1]).abs() < 0.06 * (y[1] - y[0]), "{centre:?}: {found:?} {truth:?}");
+        // 68 % of two Gaussian parameters reach to 1.510 standard deviations, 95 % to 2.448, the interval of one to 1 (0.994)
+        let interval = extent(&paths(&svg, "interval68")[0])[0];
+        let width = |[low, high]: [f64; 2]| high - low;
+        let (one, inner, outer) = (width(interval), width(x), width(extent(&outer[0])[0]));
+        assert!((inner / one / (1.510 / 0.994) - 1.0).abs() < 0.08, "{centre:?}: {}", inner / one);
+        assert!((outer / inner / (2.448 / 1.510) - 1.0).abs() < 0.08, "{centre:?}: {}", outer / inner);
+    }
+    // around 0.99 the axis runs on beyond 1, or below 0, in one piece
+    let svg = desk.read("out/corner.svg");
+    assert!(texts(&svg).iter().any(|text| ["1.00", "1.0"].contains(text)), "{:?}", texts(&svg));
+    assert!(texts(&svg).iter().any(|text| text.starts_with("1.0") && *text > "1.00"), "{:?}", texts(&svg));
+}
