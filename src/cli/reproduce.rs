@@ -3,14 +3,15 @@
 use super::signals::Signals;
 use super::{Failure, Global, progress};
 use dimcmc::experiments::files::{Made, SUMMARY, TABLE};
-use dimcmc::experiments::{ExperimentError, Laboratory, ROWS, Row};
+use dimcmc::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
+use dimcmc::plot::{self, DPI};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Repeat the experiments of Petit et al. (2015), and a few beyond them
 ///
-/// Every row of experiments gets a folder with table.csv and summary.json. A row that is there already is left alone; one that
+/// Every row of experiments gets a folder with table.csv, summary.json and figures. A row that is there already is left alone; one that
 /// was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an hour on two cores.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc reproduce R2 --quick --out runs/reproduced --work runs/reproduce_raw\n  \
@@ -77,11 +78,32 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             threads: rayon::current_num_threads(),
         };
         result.write(row, &made, &folder)?;
+        let figures = figures(&result, &folder)?;
         let paper = if row.paper.is_empty() { String::new() } else { format!("\n  paper: {}", row.paper) };
         let _ = write!(stdout, "{}: {}{paper}\n{}", row.name, row.title, result.text());
-        let _ = writeln!(stdout, "  in {} s; written: {}: {TABLE}, {SUMMARY}", made.seconds, folder.display());
+        let _ = writeln!(stdout, "  in {} s; written: {}: {TABLE}, {SUMMARY}{figures}", made.seconds, folder.display());
     }
     Ok(())
+}
+
+/// Draws the figures of a row into `folder`; their names, each after a comma.
+fn figures(report: &Report, folder: &Path) -> Result<String, Failure> {
+    let mut figures = if report.figure.is_empty() { Vec::new() } else { plot::figures(folder, None)? };
+    for drawn in &report.drawn {
+        for mut figure in plot::figures(&drawn.folder, drawn.chain.as_deref())? {
+            // traces and autocorrelations are for whoever has the chain
+            if figure.name == "corner" || figure.name == "landscape" {
+                figure.name = format!("{}_{}", drawn.name, figure.name);
+                figures.push(figure);
+            }
+        }
+    }
+    let mut names = String::new();
+    for figure in &figures {
+        let name = plot::write_png(figure, folder, DPI)?;
+        names.push_str(&format!(", {name}"));
+    }
+    Ok(names)
 }
 
 /// The rows of these names, all of them if there is none.

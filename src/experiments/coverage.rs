@@ -7,7 +7,7 @@
 use super::case::Case;
 use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::{Estimate, Outcome};
-use super::report::Report;
+use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
 use crate::config;
 use crate::objective::Reference;
@@ -83,6 +83,18 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         }
         report.row(row);
     }
+    let panel = |judge: &Judge| Panel {
+        x: "true_k_kms".into(),
+        label: "k_kms".into(),
+        series: vec![Series {
+            name: judge.name.replace('_', " "),
+            y: format!("{}_k_kms_median", judge.name),
+            interval: Some(["low68", "high68"].map(|end| format!("{}_k_kms_{end}", judge.name))),
+        }],
+        truth: Some("true_k_kms".into()),
+        joined: false,
+    };
+    report.figure = JUDGES.iter().map(panel).collect();
     for (judge, outcomes) in JUDGES.iter().zip(&by_judge) {
         report.number(judge.name, shares(outcomes));
     }

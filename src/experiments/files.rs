@@ -2,6 +2,7 @@
 //!
 //! Left out: figures, which are drawn from these files.
 
+use super::report::Panel;
 use super::{Report, Row};
 use crate::io::atomic::{WriteError, write, write_json};
 use crate::io::csv::Table;
@@ -37,6 +38,7 @@ struct SummaryFile<'a> {
     #[serde(flatten)]
     made: &'a Made,
     seed: &'a str,
+    figure: &'a [Panel],
     numbers: &'a Map<String, Value>,
 }
 
@@ -57,6 +59,7 @@ impl Report {
             version: env!("CARGO_PKG_VERSION"),
             made,
             seed: "noise 1 unless the table has a column for it; chains 1",
+            figure: &self.figure,
             numbers: &self.numbers,
         };
         // the summary last: a row is done where it is there

@@ -4,7 +4,7 @@
 
 use super::case;
 use super::laboratory::{ExperimentError, Laboratory};
-use super::report::Report;
+use super::report::{Drawn, Report};
 use super::star::{paper, with};
 use crate::comparison::{Comparison, Pair};
 use crate::landscape::{Axis, Grid, Rule};
@@ -75,6 +75,13 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
     (laboratory.report)("R3: chain");
     let (chain, _) = case::chain(&scene, found, &folder.join("chain"), laboratory.stop)?;
     let comparison = Comparison::of(&Pair::read(&folder.join("chain"), &folder.join("grid"))?, Rule::default())?;
+    let chain_folder = Some(folder.join("chain"));
+    let slices_drawn = AXES.iter().map(|(fixed, ..)| format!("slice_{fixed}"));
+    for name in std::iter::once("grid".to_owned()).chain(slices_drawn) {
+        // a chain over all parameters says nothing of a slice at one of them
+        let chain = chain_folder.clone().filter(|_| name == "grid");
+        report.drawn.push(Drawn { folder: folder.join(&name), name, chain });
+    }
     report.number("grid_seconds", grid.seconds);
     report.number("grid_reconstructions", grid.reconstructions);
     report.number("slices_reconstructions", slices);

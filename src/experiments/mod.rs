@@ -12,7 +12,7 @@ mod laboratory;
 mod landscape;
 mod orbits;
 pub mod outcome;
-mod report;
+pub mod report;
 pub mod star;
 mod stellar;
 

@@ -2,7 +2,9 @@
 //!
 //! Left out: files (`files`).
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::path::PathBuf;
 
 /// The result of a row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,10 +17,23 @@ pub struct Report {
     pub numbers: Map<String, Value>,
     /// The columns that the figure shows.
     pub figure: Vec<Panel>,
+    /// Raw results that have figures of their own.
+    pub drawn: Vec<Drawn>,
+}
+
+/// Raw results that are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn {
+    /// What the names of the figures begin with.
+    pub name: String,
+    /// Their folder.
+    pub folder: PathBuf,
+    /// Folder of a chain whose contours go over them.
+    pub chain: Option<PathBuf>,
 }
 
 /// One panel of the figure: columns against a column.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Panel {
     /// Column along the x axis.
     pub x: String,
@@ -33,7 +48,7 @@ pub struct Panel {
 }
 
 /// Columns of a panel.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Series {
     /// Its name in the legend.
     pub name: String,

@@ -5,7 +5,7 @@
 
 use super::case;
 use super::laboratory::{ExperimentError, Laboratory};
-use super::report::Report;
+use super::report::{Drawn, Report};
 use super::star::{paper, with};
 use crate::comparison::{Comparison, Pair};
 use crate::landscape::Rule;
@@ -96,6 +96,7 @@ pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError
             }
         }
         report.row(row);
+        report.drawn.push(Drawn { name: format!("{dimensions}D"), folder: folder.join("chain"), chain: None });
         report.number(
             &format!("{dimensions}D"),
             json!({

@@ -1,12 +1,13 @@
 //! Figures of what a folder holds, from its files alone; nothing is computed anew.
 //!
-//! Which figures there are goes by the files: those of `simulate`, `map`, `periodogram`, `optimise`, `grid`, `sample` and
-//! `compare`. Left out: how a figure is drawn (`figure`).
+//! Which figures there are goes by the files: those of `simulate`, `map`, `periodogram`, `optimise`, `grid`, `sample`,
+//! `compare` and `reproduce`. Left out: how a figure is drawn (`figure`).
 
 mod comparison;
 mod corner;
 mod density;
 mod dynamic;
+mod experiment;
 mod landscape;
 mod optimum;
 mod paraboloid;
@@ -75,13 +76,14 @@ pub enum PlotError {
 type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 
 /// The files by which a folder is known, with what draws it.
-const KINDS: [(&str, Draw); 7] = [
+const KINDS: [(&str, Draw); 8] = [
     (star_map::FILE, star_map_figures),
     (periodogram::FILE, |folder, _| periodogram::figures(folder)),
     (manifest::FILE, |folder, _| chain_figures(folder)),
     (survey::HEADER, landscape::figures),
     (optimum::FILE, |folder, _| optimum::figures(folder)),
     (comparison::FILE, |folder, _| comparison::figures(folder)),
+    (experiment::FILE, |folder, _| experiment::figures(folder)),
     (star_map::TRUTH, |folder, _| simulation_figures(folder)),
 ];
 
@@ -155,6 +157,16 @@ pub fn write(figure: &Figure, folder: &Path, dpi: f64) -> Result<[String; 2], Wr
     atomic::write(&folder.join(&names[0]), figure.svg().as_bytes())?;
     atomic::write(&folder.join(&names[1]), &figure.png(dpi))?;
     Ok(names)
+}
+
+/// Writes a figure into `folder` as PNG alone; the name of the file.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_png(figure: &Figure, folder: &Path, dpi: f64) -> Result<String, WriteError> {
+    let [_, name] = names(figure);
+    atomic::write(&folder.join(&name), &figure.png(dpi))?;
+    Ok(name)
 }
 
 /// The names of a figure's files.

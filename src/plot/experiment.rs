@@ -1,0 +1,67 @@
+//! The figure of an experiment: columns of its table against each other, as its summary says.
+//!
+//! Left out: what the columns mean (`experiments`).
+
+use super::PlotError;
+use super::symbols::label;
+use crate::experiments::files::{SUMMARY, TABLE};
+use crate::experiments::report::{self, Panel};
+use crate::figure::{Errors, Figure, ScatterPanel, Series, scatter};
+use crate::io::csv::{Columns, CsvError};
+use crate::origin;
+use serde::Deserialize;
+use std::path::Path;
+
+/// The file by which the folder is known.
+pub(super) const FILE: &str = TABLE;
+
+/// What the summary says of the figure.
+#[derive(Deserialize)]
+struct Summary {
+    row: String,
+    figure: Vec<Panel>,
+}
+
+/// The figure of the experiment in `folder`; none if its table is not for the eye.
+pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
+    let summary: Summary = origin::read(folder, SUMMARY)?;
+    let table = Columns::read(&folder.join(TABLE))?;
+    let panels: Vec<ScatterPanel> = summary.figure.iter().map(|panel| drawn(panel, &table)).collect::<Result<_, _>>()?;
+    if panels.is_empty() {
+        return Ok(Vec::new());
+    }
+    Ok(vec![scatter(&summary.row, &panels, panels.len().min(3))])
+}
+
+fn drawn(panel: &Panel, table: &Columns) -> Result<ScatterPanel, CsvError> {
+    let x = table.column(&panel.x)?;
+    // what lies in the same place is moved apart by a hundredth of the axis
+    let reach = x.iter().copied().fold(f64::NEG_INFINITY, f64::max) - x.iter().copied().fold(f64::INFINITY, f64::min);
+    let aside = if panel.joined { 0.0 } else { 0.012 * reach };
+    let middle = 0.5 * (panel.series.len() as f64 - 1.0);
+    let mut series: Vec<Series> = Vec::new();
+    for (k, one) in panel.series.iter().enumerate() {
+        let y = table.column(&one.y)?;
+        series.push(Series {
+            label: one.name.clone(),
+            x: x.iter().map(|x| x + aside * (k as f64 - middle)).collect(),
+            y: y.to_vec(),
+            y_errors: errors(one, y, table)?,
+            joined: panel.joined,
+            ..Series::default()
+        });
+    }
+    if let Some(truth) = &panel.truth {
+        let mut line: Vec<(f64, f64)> = x.iter().copied().zip(table.column(truth)?.iter().copied()).collect();
+        line.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (x, y) = line.into_iter().unzip();
+        series.push(Series { label: "injected".into(), x, y, joined: true, bare: true, ..Series::default() });
+    }
+    Ok(ScatterPanel { x_label: label(&panel.x), y_label: label(&panel.label), series, ..ScatterPanel::default() })
+}
+
+fn errors(series: &report::Series, y: &[f64], table: &Columns) -> Result<Errors, CsvError> {
+    let Some([low, high]) = &series.interval else { return Ok(Errors::None) };
+    let ends = table.column(low)?.iter().zip(table.column(high)?);
+    Ok(Errors::Asymmetric(y.iter().zip(ends).map(|(y, (low, high))| [y - low, high - y]).collect()))
+}
