@@ -26,7 +26,14 @@ struct Summary {
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let summary: Summary = origin::read(folder, SUMMARY)?;
     let table = Columns::read(&folder.join(TABLE))?;
-    let panels: Vec<ScatterPanel> = summary.figure.iter().map(|panel| drawn(panel, &table)).collect::<Result<_, _>>()?;
+    let mut panels: Vec<ScatterPanel> =
+        summary.figure.iter().map(|panel| drawn(panel, &table)).collect::<Result<_, _>>()?;
+    // one legend serves all panels of the same series
+    let labels = |panel: &ScatterPanel| panel.series.iter().map(|s| s.label.clone()).collect::<Vec<_>>();
+    if let Some(first) = panels.first().map(labels) {
+        let alike = panels.iter_mut().skip(1).filter(|panel| labels(panel) == first);
+        alike.for_each(|panel| panel.series.iter_mut().for_each(|series| series.label.clear()));
+    }
     if panels.is_empty() {
         return Ok(Vec::new());
     }
