@@ -108,7 +108,7 @@ impl Convergence {
     /// Length of what is kept in the longest of the autocorrelation times; 0 where one is unknown.
     pub fn kept_times(&self) -> f64 {
         let longest = worst(self.diagnostics.iter().map(|one| one.tau), f64::max);
-        longest.map_or(0.0, |tau| self.kept as f64 / tau)
+        longest.map_or(0.0, |tau| self.kept as f64 / tau.max(1.0))
     }
 
     /// Whether every parameter has reached the goals and no walker is stuck. One ensemble alone never has: there is nothing

@@ -59,8 +59,18 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     for row in rows {
         let folder = out.join(row.name);
         if folder.join(SUMMARY).exists() && !args.force {
+            if quick_there(&folder) != Some(args.quick) {
+                let other = if args.quick { "in full" } else { "the reduced version, by --quick" };
+                let problem = format!("{}: the row was done {other}; give another --out, or --force", folder.display());
+                return Err(Failure::input(problem));
+            }
             let _ = writeln!(stdout, "{}: done before: {}; --force does it again", row.name, folder.display());
             continue;
+        }
+        // what is wrong with the folder is to be known before, not after
+        create(&folder)?;
+        if args.force {
+            remove(&work.join(row.name))?;
         }
         let spinner = progress::bar(global, None, "begins");
         let report = |message: &str| spinner.set_message(message.to_owned());
@@ -70,7 +80,6 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         let result = row.run(&laboratory);
         spinner.finish_and_clear();
         let result = result.map_err(|e| failure(row, e))?;
-        create(&folder)?;
         let made = Made {
             command: format!("dimcmc reproduce {}{}", row.name, if args.quick { " --quick" } else { "" }),
             quick: args.quick,
@@ -78,7 +87,10 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             threads: rayon::current_num_threads(),
         };
         result.write(row, &made, &folder)?;
-        let figures = figures(&result, &folder)?;
+        // without its figures a row is not done
+        let figures = figures(&result, &folder).inspect_err(|_| {
+            let _ = std::fs::remove_file(folder.join(SUMMARY));
+        })?;
         let paper = if row.paper.is_empty() { String::new() } else { format!("\n  paper: {}", row.paper) };
         let _ = write!(stdout, "{}: {}{paper}\n{}", row.name, row.title, result.text());
         let _ = writeln!(stdout, "  in {} s; written: {}: {TABLE}, {SUMMARY}{figures}", made.seconds, folder.display());
@@ -116,7 +128,27 @@ fn rows(names: &[String]) -> Result<Vec<&'static Row>, Failure> {
         Row::from_name(name)
             .ok_or_else(|| Failure::input(format!("no experiment is called {name}: there are {}", known())))
     };
-    names.iter().map(row).collect()
+    let mut rows: Vec<&'static Row> = Vec::new();
+    for name in names {
+        let row = row(name)?;
+        if !rows.iter().any(|other| other.name == row.name) {
+            rows.push(row);
+        }
+    }
+    Ok(rows)
+}
+
+/// Whether what is in the folder is the reduced version.
+fn quick_there(folder: &Path) -> Option<bool> {
+    let summary: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.join(SUMMARY)).ok()?).ok()?;
+    summary["quick"].as_bool()
+}
+
+fn remove(folder: &Path) -> Result<(), Failure> {
+    match std::fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Failure::failed(format!("{}: {e}", folder.display()))),
+        _ => Ok(()),
+    }
 }
 
 fn create(folder: &Path) -> Result<(), Failure> {

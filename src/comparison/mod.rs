@@ -19,7 +19,7 @@ use crate::chain::statistics::wrap;
 use crate::chain::{ChainError, Summary, summarise};
 use crate::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
 use crate::manifest::kinds_and_goals;
-use crate::objective::Parameter;
+use crate::objective::{Parameter, SpotsLeft};
 use draws::Draws;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -143,6 +143,9 @@ impl Comparison {
             parameters,
         };
         comparison.notes = notes::notes(&comparison, &summary);
+        if pair.settings.imaging.spots_left == SpotsLeft::Fitted {
+            comparison.notes.push("the chain counts spots left over as noise, the landscape does not".into());
+        }
         Ok(comparison)
     }
 }

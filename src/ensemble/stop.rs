@@ -23,6 +23,9 @@ pub struct StopPolicy {
 /// A chain ends early only if what is kept of it is so many autocorrelation times long.
 const EARLY_TIMES: f64 = 10.0;
 
+/// No chain ends before this step: with fewer, walkers that are stuck look like others.
+const EARLIEST: usize = 20;
+
 /// What is done with each step: the records, and the diagnostics when they were due.
 pub type OnStep<'a, E> = dyn FnMut(&[Record], Option<&Convergence>) -> Result<(), E> + 'a;
 
@@ -52,7 +55,7 @@ pub enum RunError<E> {
 }
 
 impl StopPolicy {
-    /// The policy of the settings, looking at the goals every 50 steps, and every 10 steps before step 100.
+    /// The policy of the settings, looking at the goals every 50 steps, and every 10 steps from step 20 to 100.
     pub fn new(settings: &SamplerSettings) -> Self {
         let goals = Goals { rhat: settings.rhat, ess: settings.ess };
         StopPolicy { steps: settings.steps, goals, every: 50, least: 0 }
@@ -74,7 +77,7 @@ impl StopPolicy {
         let convergence = if due || early { Some(Convergence::of(chain, kinds)?) } else { None };
         let reason = match &convergence {
             Some(convergence)
-                if (due || convergence.kept_times() >= EARLY_TIMES)
+                if (due || (step >= EARLIEST && convergence.kept_times() >= EARLY_TIMES))
                     && step >= self.least
                     && convergence.reached(&self.goals) =>
             {

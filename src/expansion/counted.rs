@@ -3,12 +3,15 @@
 //! Where the quadratic holds, what they change is the difference of two quadratics: with spots left over as large as the data
 //! say at the reference (`spots`), and with spots as the entropy has them. Far from the reference, where ln L is not the
 //! quadratic any more, it falls in the same proportion: `ln L' = q' + rho (ln L - q)` with q and q' the two quadratics' changes
-//! from the reference and `rho = (1 + drop of q') / (1 + drop of q)`, which is 1 at the reference and at most 1 anywhere as far
-//! as spots left over make the data less certain. Left out: where the reference is.
+//! from the reference and `rho` the ratio of their drops, softened where these are nothing: 1 at the reference, and at most 1 where
+//! spots left over make the data less certain. Left out: where the reference is.
 
 use super::{Expansion, STELLAR, nuisances};
 use crate::log_density::{Evaluation, LogDensity, Status};
 use crate::objective::{Parameter, ParameterValues, Posterior};
+
+/// Drops of ln L below this are nothing.
+const SOFT: f64 = 0.1;
 
 /// A posterior in which spots left over count as noise.
 #[derive(Clone, Debug)]
@@ -42,7 +45,7 @@ impl SpotsCounted {
     pub fn log_likelihood(&self, values: &ParameterValues, log_likelihood: f64) -> f64 {
         let change = |expansion: &Expansion| expansion.log_likelihood_at(values) - expansion.log_likelihood;
         let (entropy, fitted) = (change(&self.entropy), change(&self.fitted));
-        let drop = |change: f64| 1.0 + (-change).max(0.0);
+        let drop = |change: f64| SOFT + (-change).max(0.0);
         self.at_reference + fitted + drop(fitted) / drop(entropy) * (log_likelihood - self.at_reference - entropy)
     }
 }

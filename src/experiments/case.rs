@@ -8,18 +8,21 @@ use super::outcome::{Estimate, Outcome, Route};
 use crate::chain::{Summary, summarise};
 use crate::config::{self, GridSettings};
 use crate::detection::{Detection, DetectionSettings};
+use crate::ensemble::StopReason;
 use crate::io::paraboloid::ParaboloidFile;
 use crate::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
 use crate::manifest::kinds_and_goals;
-use crate::objective::{Parameter, Reference, ReferenceError};
+use crate::objective::{Parameter, ReferenceError};
 use crate::optimise::Optimum;
 use crate::origin::by_name;
 use crate::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
-use crate::run::{Run, StartFrom};
+use crate::run::{Run, RunError, StartFrom};
 use crate::scene::Scene;
 use crate::search::{self, Found, SearchError, SearchSettings};
-use crate::survey::{PARABOLOID, Survey};
+use crate::survey::{PARABOLOID, Survey, SurveyError};
+use crate::io::atomic::write_json;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
@@ -30,14 +33,8 @@ const REACH: f64 = 3.0;
 /// Shortest period on a grid, over the rotation period.
 const SHORTEST: f64 = 0.3;
 
-/// A target out of reach is set this much above what is in reach.
-const ABOVE_REACH: f64 = 1.01;
-
-/// A target at which there is no image at all is raised by this factor, up to the next number.
-const RAISED: f64 = 1.25;
-
-/// A star that does not fit this well is not looked at.
-const HIGHEST_TARGET: f64 = 20.0;
+/// A target out of reach is set above the floor by the first of these factors at which there is an image.
+const ABOVE_FLOOR: [f64; 6] = [1.05, 1.04, 1.06, 1.03, 1.08, 1.1];
 
 /// Where the nodes of a grid over K, Porb/Prot and phi are.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,26 +66,49 @@ impl Case {
     /// # Errors
     /// [`ExperimentError`].
     pub fn run(&self, folder: &Path, stop: &AtomicBool) -> Result<Outcome, ExperimentError> {
+        write_json(&folder.join("config.json"), &self.config)?;
+        match self.tried(folder, stop) {
+            // no image, no maximum: that is a result too
+            Err(error) if error.is_of_the_star() => Ok(Outcome { failed: Some(error.to_string()), ..self.nothing() }),
+            tried => tried,
+        }
+    }
+
+    /// An outcome without any result.
+    fn nothing(&self) -> Outcome {
+        Outcome {
+            config: self.config.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            failed: None,
+            truth: BTreeMap::new(),
+            chi2_target: f64::NAN,
+            lambda_data: f64::NAN,
+            spottedness: f64::NAN,
+            search_reconstructions: 0,
+            search_seconds: 0.0,
+            grid: None,
+            chain: None,
+            k_upper95_kms: None,
+            periodogram: None,
+            false_alarm: None,
+        }
+    }
+
+    fn tried(&self, folder: &Path, stop: &AtomicBool) -> Result<Outcome, ExperimentError> {
         let began = Instant::now();
-        let (scene, found) = search(&self.config, &folder.join("config.json"))?;
+        let (scene, found) = search(&self.config, &folder.join("config.json"), stop)?;
         let search_seconds = began.elapsed().as_secs_f64();
         let reference = found.posterior.reference();
         let data = scene.imager.data.depth.len() as f64;
         let ends = found.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok());
         let mut outcome = Outcome {
-            config: self.config.clone(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
             truth: scene.truth.map(|values| by_name(&values)).unwrap_or_default(),
             chi2_target: scene.settings.imaging.chi2_target,
             lambda_data: reference.solution.image.lambda * data,
             spottedness: reference.solution.spottedness,
             search_reconstructions: ends.map(|end| end.evaluations).sum::<usize>() + found.optimum.evaluations,
             search_seconds,
-            grid: None,
-            chain: None,
-            k_upper95_kms: None,
-            periodogram: None,
-            false_alarm: None,
+            ..self.nothing()
         };
         if let Some(nodes) = &self.grid {
             let grid = nodes.grid(&found.optimum);
@@ -132,24 +152,29 @@ impl Nodes {
     }
 }
 
-/// The star of a config, and the best parameters there; its target chi2 raised if it is out of reach.
-pub fn search(config: &Value, path: &Path) -> Result<(Scene, Found), ExperimentError> {
+/// The star of a config, and the best parameters there; its target chi2 raised above the floor if it is out of reach.
+pub fn search(config: &Value, path: &Path, stop: &AtomicBool) -> Result<(Scene, Found), ExperimentError> {
     let mut config = config.clone();
+    let mut above_floor = ABOVE_FLOOR.iter();
+    let mut floor = f64::NAN;
     loop {
+        if stop.load(Relaxed) {
+            return Err(ExperimentError::Interrupted);
+        }
         let scene = Scene::new(config::from_json(config.to_string().as_bytes(), path)?)?;
         let settings = SearchSettings::new(&scene.settings);
-        let target = settings.chi2_target;
-        match search::find(&scene.imager, &scene.space, settings, &|_| ()) {
-            Err(SearchError::Reference(ReferenceError::TargetBelowFloor { .. })) => {
-                let image = Reference::provisional(&scene.imager, scene.settings.values, target)?;
-                let reached = image.solution.chi2 / scene.imager.data.depth.len() as f64;
-                config["imaging"]["chi2_target"] = json!(ABOVE_REACH * reached.max(target));
-            }
-            Err(SearchError::Reference(ReferenceError::Solver(_))) if target < HIGHEST_TARGET => {
-                config["imaging"]["chi2_target"] = json!(RAISED * target);
-            }
+        let error = match search::find(&scene.imager, &scene.space, settings, &|_| ()) {
+            Err(SearchError::Reference(error)) => error,
             found => return Ok((scene, found?)),
+        };
+        match error {
+            ReferenceError::TargetBelowFloor { floor: found, .. } => floor = found,
+            ReferenceError::Solver(_) if floor.is_nan() => floor = settings.chi2_target,
+            ReferenceError::Solver(_) => {}
+            ReferenceError::NothingToFit { .. } => return Err(error.into()),
         }
+        let Some(factor) = above_floor.next() else { return Err(error.into()) };
+        config["imaging"]["chi2_target"] = json!((1e4 * factor * floor).round() / 1e4);
     }
 }
 
@@ -168,8 +193,8 @@ pub fn landscape(
     std::fs::create_dir_all(folder).map_err(|source| ExperimentError::Folder { path: folder.into(), source })?;
     // one that was stopped goes on
     let mut survey = match Survey::resume(scene, &plan, folder) {
-        Ok(survey) => survey,
-        Err(_) => Survey::begin(scene, &plan, found, folder, true)?,
+        Err(SurveyError::Origin(_)) => Survey::begin(scene, &plan, found, folder, true)?,
+        resumed => resumed?,
     };
     if !survey.go(stop, |_| ())? {
         return Err(ExperimentError::Interrupted);
@@ -186,7 +211,7 @@ pub fn landscape(
     Ok((route, survey))
 }
 
-fn vertex(fitted: &Paraboloid) -> std::collections::BTreeMap<String, Estimate> {
+fn vertex(fitted: &Paraboloid) -> BTreeMap<String, Estimate> {
     let estimate =
         |(name, one): (&String, &crate::landscape::Estimate)| (name.clone(), Estimate::gaussian(one.vertex, one.error));
     fitted.parameters.iter().map(estimate).collect()
@@ -200,9 +225,11 @@ pub fn chain(
     stop: &AtomicBool,
 ) -> Result<(Route, Summary), ExperimentError> {
     let began = Instant::now();
-    let mut run = Run::begin(scene, folder, found, StartFrom::Optimum, true)?;
-    run.go(stop, |_, _| ())?;
-    if stop.load(Relaxed) {
+    let mut run = match Run::resume(scene, folder, None) {
+        Err(RunError::Origin(_)) => Run::begin(scene, folder, found, StartFrom::Optimum, true)?,
+        resumed => resumed?,
+    };
+    if run.go(stop, |_, _| ())? == StopReason::Interrupted {
         return Err(ExperimentError::Interrupted);
     }
     let (kinds, goals) = kinds_and_goals(&scene.settings);

@@ -58,7 +58,7 @@ impl Report {
             paper: row.paper,
             version: env!("CARGO_PKG_VERSION"),
             made,
-            seed: "noise 1 unless the table has a column for it; chains 1",
+            seed: "chains 1; noise 1, or what the column `seed` says",
             figure: &self.figure,
             numbers: &self.numbers,
         };

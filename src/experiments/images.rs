@@ -44,7 +44,7 @@ fn peak_to_peak(x: &[f64]) -> f64 {
 
 fn panel(label: &str, series: &[(&str, &str)], joined: bool) -> Panel {
     let series = series.iter().map(|(name, y)| Series { name: (*name).into(), y: (*y).into(), interval: None });
-    Panel { x: "cycle".into(), label: label.into(), series: series.collect(), truth: None, joined }
+    Panel { x: "cycle".into(), label: label.into(), series: series.collect(), truth: None, joined, only: None }
 }
 
 /// R1: the first moments with and without noise, and of a star without spots.

@@ -79,6 +79,14 @@ pub enum ExperimentError {
     Write(#[from] WriteError),
 }
 
+impl ExperimentError {
+    /// Whether it lies in the star: one that cannot be imaged, or has no best orbit, is a result of an experiment.
+    pub(super) fn is_of_the_star(&self) -> bool {
+        use ExperimentError::{Detection, Reference, Run, Search};
+        matches!(self, Search(_) | Reference(_) | Detection(_) | Run(RunError::SpotsLeft | RunError::PriorStart))
+    }
+}
+
 /// Name of the file of a case that is done.
 const OUTCOME: &str = "outcome.json";
 
@@ -147,5 +155,8 @@ impl Laboratory<'_> {
 /// The outcome at `path`, if it is that of the case as it is now.
 fn done(path: &Path, case: &Case) -> Option<Outcome> {
     let outcome: Outcome = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
-    (outcome.config == case.config && outcome.version == env!("CARGO_PKG_VERSION")).then_some(outcome)
+    let same = outcome.config == case.config && outcome.version == env!("CARGO_PKG_VERSION");
+    let asked = [case.grid.is_some(), case.chain, case.periodogram.is_some()];
+    let there = [outcome.grid.is_some(), outcome.chain.is_some(), outcome.periodogram.is_some()];
+    (same && (asked == there || outcome.failed.is_some())).then_some(outcome)
 }

@@ -27,7 +27,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
     let config = with(paper(), &changes);
     let folder = laboratory.folder("R3")?;
     (laboratory.report)("R3: search");
-    let (scene, found) = case::search(&config, &folder.join("config.json"))?;
+    let (scene, found) = case::search(&config, &folder.join("config.json"), laboratory.stop)?;
     let [along, along_slice] = laboratory.full_or_quick([15, 50], [6, 9]);
     let axis = |&(name, min, max): &(&str, f64, f64), nodes: usize| Axis {
         name: name.to_owned(),

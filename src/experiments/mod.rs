@@ -76,7 +76,7 @@ pub const ROWS: &[Row] = &[
     },
     Row {
         name: "R5",
-        title: "K from 0 to 200 m/s at P = 1.7, phi = 0.5",
+        title: "K from 10 to 200 m/s at P = 1.7, phi = 0.5 (K = 0 is R4)",
         paper: "K within 10 % for K > 20 m/s, error bars < 20 m/s (35 at 60 m/s); P within 2 %; sigma_P 0.05 at 200 m/s, \
                 0.6 at 30 m/s",
         run: orbits::amplitudes,

@@ -36,13 +36,18 @@ pub struct Outcome {
     pub config: serde_json::Value,
     /// Version of the program.
     pub version: String,
+    /// Why there is no result at all.
+    pub failed: Option<String>,
     /// What was injected, all parameters by name.
     pub truth: BTreeMap<String, f64>,
-    /// Target chi2 per datum; above the config's where that could not be reached.
+    /// Target chi2 per datum (null, as the next two, where there is no result); above the config's where that could not be reached.
+    #[serde(deserialize_with = "number_or_null")]
     pub chi2_target: f64,
     /// Multiplier of chi2 / 2 in the image at the best orbit, times the number of data.
+    #[serde(deserialize_with = "number_or_null")]
     pub lambda_data: f64,
     /// Spot coverage of that image.
+    #[serde(deserialize_with = "number_or_null")]
     pub spottedness: f64,
     /// Reconstructions of the search for it, which grid and chain share.
     pub search_reconstructions: usize,
@@ -58,6 +63,11 @@ pub struct Outcome {
     pub periodogram: Option<Route>,
     /// Its false-alarm probability.
     pub false_alarm: Option<f64>,
+}
+
+/// A number; NaN, which is written as null, comes back.
+fn number_or_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 impl Estimate {

@@ -45,6 +45,8 @@ pub struct Panel {
     pub truth: Option<String>,
     /// Whether points of a series are joined.
     pub joined: bool,
+    /// Only rows with this number in this column.
+    pub only: Option<(String, f64)>,
 }
 
 /// Columns of a panel.

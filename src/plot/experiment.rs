@@ -41,25 +41,32 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
 }
 
 fn drawn(panel: &Panel, table: &Columns) -> Result<ScatterPanel, CsvError> {
-    let x = table.column(&panel.x)?;
+    let shown: Vec<bool> = match &panel.only {
+        Some((name, number)) => table.column(name)?.iter().map(|x| x == number).collect(),
+        None => vec![true; table.column(&panel.x)?.len()],
+    };
+    let column = |name: &str| -> Result<Vec<f64>, CsvError> {
+        Ok(table.column(name)?.iter().zip(&shown).filter(|(_, shown)| **shown).map(|(x, _)| *x).collect())
+    };
+    let x = column(&panel.x)?;
     // what lies in the same place is moved apart by a hundredth of the axis
     let reach = x.iter().copied().fold(f64::NEG_INFINITY, f64::max) - x.iter().copied().fold(f64::INFINITY, f64::min);
     let aside = if panel.joined { 0.0 } else { 0.012 * reach };
     let middle = 0.5 * (panel.series.len() as f64 - 1.0);
     let mut series: Vec<Series> = Vec::new();
     for (k, one) in panel.series.iter().enumerate() {
-        let y = table.column(&one.y)?;
+        let y = column(&one.y)?;
         series.push(Series {
             label: one.name.clone(),
             x: x.iter().map(|x| x + aside * (k as f64 - middle)).collect(),
-            y: y.to_vec(),
-            y_errors: errors(one, y, table)?,
+            y_errors: errors(one, &y, &column)?,
+            y,
             joined: panel.joined,
             ..Series::default()
         });
     }
     if let Some(truth) = &panel.truth {
-        let mut line: Vec<(f64, f64)> = x.iter().copied().zip(table.column(truth)?.iter().copied()).collect();
+        let mut line: Vec<(f64, f64)> = x.iter().copied().zip(column(truth)?).collect();
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (x, y) = line.into_iter().unzip();
         series.push(Series { label: "injected".into(), x, y, joined: true, bare: true, ..Series::default() });
@@ -67,8 +74,12 @@ fn drawn(panel: &Panel, table: &Columns) -> Result<ScatterPanel, CsvError> {
     Ok(ScatterPanel { x_label: label(&panel.x), y_label: label(&panel.label), series, ..ScatterPanel::default() })
 }
 
-fn errors(series: &report::Series, y: &[f64], table: &Columns) -> Result<Errors, CsvError> {
+fn errors(
+    series: &report::Series,
+    y: &[f64],
+    column: &dyn Fn(&str) -> Result<Vec<f64>, CsvError>,
+) -> Result<Errors, CsvError> {
     let Some([low, high]) = &series.interval else { return Ok(Errors::None) };
-    let ends = table.column(low)?.iter().zip(table.column(high)?);
+    let ends = column(low)?.into_iter().zip(column(high)?);
     Ok(Errors::Asymmetric(y.iter().zip(ends).map(|(y, (low, high))| [y - low, high - y]).collect()))
 }
