@@ -16,7 +16,7 @@ use crate::objective::{Parameter, ReferenceError};
 use crate::optimise::Optimum;
 use crate::origin::by_name;
 use crate::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
-use crate::run::{Run, RunError, StartFrom};
+use crate::run::{CHAIN, Run, RunError, StartFrom};
 use crate::scene::Scene;
 use crate::search::{self, Found, SearchError, SearchSettings};
 use crate::survey::{PARABOLOID, Survey, SurveyError};
@@ -196,6 +196,7 @@ pub fn landscape(
         Err(SurveyError::Origin(_)) => Survey::begin(scene, &plan, found, folder, true)?,
         resumed => resumed?,
     };
+    let resumed = !survey.landscape.nodes().is_empty();
     if !survey.go(stop, |_| ())? {
         return Err(ExperimentError::Interrupted);
     }
@@ -206,7 +207,7 @@ pub fn landscape(
         note: fitted.as_ref().err().map(Undefined::to_string),
         parameters: fitted.ok().map(|fitted| vertex(&fitted)).unwrap_or_default(),
         reconstructions: survey.landscape.nodes().len(),
-        seconds: began.elapsed().as_secs_f64(),
+        seconds: if resumed { f64::NAN } else { began.elapsed().as_secs_f64() },
     };
     Ok((route, survey))
 }
@@ -225,6 +226,7 @@ pub fn chain(
     stop: &AtomicBool,
 ) -> Result<(Route, Summary), ExperimentError> {
     let began = Instant::now();
+    let resumed = folder.join(CHAIN).exists();
     let mut run = match Run::resume(scene, folder, None) {
         Err(RunError::Origin(_)) => Run::begin(scene, folder, found, StartFrom::Optimum, true)?,
         resumed => resumed?,
@@ -239,7 +241,7 @@ pub fn chain(
     let route = Route {
         parameters: summary.parameters.iter().map(|(name, one)| (name.clone(), estimate(one))).collect(),
         reconstructions: run.preparation + summary.evaluations,
-        seconds: began.elapsed().as_secs_f64(),
+        seconds: if resumed { f64::NAN } else { began.elapsed().as_secs_f64() },
         note: (!summary.converged).then(|| "not converged".to_owned()),
     };
     Ok((route, summary))

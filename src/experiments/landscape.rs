@@ -19,9 +19,9 @@ const AXES: [(&str, f64, f64); 3] = [("k_kms", 0.0, 0.2), ("porb_over_prot", 1.2
 pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let changes = [
         ("/imaging/pixels", json!(laboratory.full_or_quick(20_000, 1000))),
-        ("/sampler/walkers", json!(8)),
-        // a median is as good as the landscape's at 400 effective draws: to a twentieth of its error bar
-        ("/sampler/ess", json!(laboratory.full_or_quick(400, 200))),
+        ("/sampler/walkers", json!(6)),
+        // a median to a twelfth of its error bar, a width to six per cent
+        ("/sampler/ess", json!(laboratory.full_or_quick(250, 200))),
         ("/sampler/rhat", json!(laboratory.full_or_quick(1.02, 1.05))),
     ];
     let config = with(paper(), &changes);
@@ -87,6 +87,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
     report.number("slices_reconstructions", slices);
     report.number("chain_seconds", chain.seconds);
     report.number("chain_reconstructions", chain.reconstructions);
+    report.number("chain_over_grid", chain.reconstructions as f64 / grid.reconstructions as f64);
     report.number("comparison", serde_json::to_value(&comparison).unwrap_or(Value::Null));
     Ok(report)
 }

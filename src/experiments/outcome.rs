@@ -23,7 +23,8 @@ pub struct Route {
     pub parameters: BTreeMap<String, Estimate>,
     /// Reconstructions that it took, the search for the reference left out.
     pub reconstructions: usize,
-    /// Seconds that it took.
+    /// Seconds that it took; NaN (null) where it was stopped and gone on with.
+    #[serde(deserialize_with = "number_or_null")]
     pub seconds: f64,
     /// What is to be said of it: why it came to nothing, or that a chain did not converge.
     pub note: Option<String>,
