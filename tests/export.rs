@@ -242,7 +242,8 @@ fn the_same_bytes_again_and_nothing_overwritten() {
         says(&message, &["config.json/x: ", "config.json is not a folder"]);
     }
     says(&desk.refusal(&["export", "run", "--format", "csv", "--out", ".."]), &["..: is no name"]);
-    for (name, text) in [("night_1.txt", "my notes of that night\n"), ("log_2.txt", "1 2 3\n"), ("a.ranges", "x 0 1\n")] {
+    for (name, text) in [("night_1.txt", "my notes of that night\n"), ("log_2.txt", "1 2 3\n"), ("a.ranges", "x 0 1\n")]
+    {
         desk.write(name, text);
         let root = &name[..name.find(['_', '.']).unwrap()];
         let message = desk.refusal(&["export", "run", "--format", "getdist", "--out", root, "--force"]);
