@@ -39,6 +39,8 @@ struct Curves<'a> {
     panels: Vec<(&'a str, Vec<Series<'a>>)>,
     orbit: Orbit,
     vsys_kms: f64,
+    /// What the orbit is called.
+    orbit_is: &'static str,
     /// The panel of velocities without spots, where the orbit is drawn and which is folded.
     orbital: usize,
 }
@@ -63,6 +65,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         ],
         orbit: Orbit { k_kms: value("k_kms"), porb_over_prot: value("porb_over_prot"), phi: value("phi") },
         vsys_kms: value("vsys_kms"),
+        orbit_is: "assumed orbit",
         orbital: 1,
     };
     let mut figure = curves.draw();
@@ -93,6 +96,7 @@ pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<
         ],
         orbit,
         vsys_kms: offset_kms,
+        orbit_is: "best orbit",
         orbital: 1,
     };
     let mut figure = curves.draw();
@@ -167,7 +171,7 @@ impl Curves<'_> {
         panel.frame(figure, Sides::BOTH);
         let Orbit { k_kms, porb_over_prot, .. } = self.orbit;
         let mut legend = Legend::default();
-        let text = format!("*K* = {k_kms:.3} km/s, *P*_{{orb}} = {porb_over_prot:.3} *P*_{{rot}}");
+        let text = format!("{}: *K* = {k_kms:.3} km/s, *P*_{{orb}} = {porb_over_prot:.3} *P*_{{rot}}", self.orbit_is);
         legend.add(Key::Line(ORBIT), &text);
         legend.draw(figure, frame, [0.5, 0.0]);
     }
