@@ -81,11 +81,14 @@ fn every_folder_has_its_figures() {
     for (file, labels) in [
         ("sample/figures/corner.svg", &["K (km/s)", "φ (orbital cycles)", "injected"][..]),
         ("sample/figures/traces.svg", &["step", "ensemble 4", "burn-in"]),
-        ("map/figures/rv.svg", &["RV (km/s)", "rotation cycle", "orbital phase", "model"]),
+        ("map/figures/rv.svg", &["RV (km/s)", "rotation cycle", "orbital phase", "model", "assumed orbit"]),
         ("map/figures/residuals.svg", &["velocity (km/s)", "rotation phase", "standard errors"]),
-        ("map/figures/map.svg", &["phase 0", "rotation", "longitude", "+60°", "spot filling factor"]),
+        (
+            "map/figures/map.svg",
+            &["phase 0", "rotation", "longitude", "latitude", "observed phases", "+60°", "spot filling factor"],
+        ),
         ("periodogram/figures/periodogram.svg", &["period (d)", "Δ ln L", "window", "0.1 %", "Prot/2", "injected"]),
-        ("grid/figures/landscape.svg", &["√Δχ2", "Δχ2 = 2.30, 5.99", "paraboloid, the same"]),
+        ("grid/figures/landscape.svg", &["√Δχ2", "Δχ2 = 2.30, 5.99", "paraboloid"]),
         ("compare/figures/comparison.svg", &["chain", "paraboloid", "landscape", "injected"]),
     ] {
         let svg = desk.read(file);

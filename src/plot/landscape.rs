@@ -243,7 +243,7 @@ impl Scene {
         let mut legend = Legend::default();
         legend.add(Key::Line(Stroke::new(BLACK, 0.7)), "Δ*χ*^{2} = 2.30, 5.99");
         if self.paraboloid.is_some() {
-            legend.add(Key::Line(paraboloid::PEN), "paraboloid, the same");
+            legend.add(Key::Line(paraboloid::PEN), "paraboloid");
         }
         if self.chain.is_some() {
             legend.add(Key::Line(CHAIN_PEN), "chain, 68 and 95 %");

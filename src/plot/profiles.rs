@@ -125,7 +125,7 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
             one(&mut figure, &panel, line, spacing * row as f64);
         }
         panel.bare_y_frame(&mut figure);
-        figure.text("cycle + phase", [frame.right() + 6.5, top - 3.0], TINY, Align::Left, 0.0);
+        figure.text("cycle + phase", [frame.right() + LABELS - 1.0, top - 3.0], TINY, Align::Right, 0.0);
         if column == 0 {
             let label = "intensity / continuum, shifted by phase";
             figure.text(label, [frame.left - 4.5, frame.centre()[1]], Font::LABEL, Align::Centre, 90.0);

@@ -238,8 +238,9 @@ fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, shade: Sha
         let text = [at[0] - 3.0 - latitude.abs() / 14.0, at[1] + 2.5];
         figure.text(&degrees(latitude), text, Font::SMALL, Align::Right, 0.0);
     }
-    let left = projection.place(0.0, 0.0)[0] - 22.0;
-    figure.text("latitude", [left, centre[1]], Font::LABEL, Align::Centre, 90.0);
+    // in the corner that the ellipse leaves free
+    let corner = [projection.place(0.0, 0.0)[0] - 14.0, centre[1] - radius + 3.0];
+    figure.text("latitude", corner, Font::LABEL, Align::Left, 0.0);
     let below = centre[1] + radius + 9.0;
     for longitude in [0.0, 60.0, 120.0, 180.0, 240.0, 300.0, 360.0] {
         let at = projection.place(longitude, 0.0);

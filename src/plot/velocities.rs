@@ -118,8 +118,9 @@ impl Curves<'_> {
         let folds = self.orbit.k_kms > 0.0 && self.orbit.porb_over_prot > 0.0;
         let rows = self.panels.len() as f64;
         let mut figure = Figure::new("rv", if folds { PAGE_MM } else { COLUMN_MM }, 24.0 + 26.0 * rows);
-        let legend = legend(&self.panels[0].1);
-        let (left, top, gap) = (38.0, if legend.is_empty() { 8.0 } else { 16.0 }, 5.0);
+        let mut legend = legend(&self.panels[0].1);
+        legend.add(Key::Line(ORBIT), self.orbit_is);
+        let (left, top, gap) = (38.0, 16.0, 5.0);
         let width = if folds { 0.56 * figure.width - left } else { figure.width - left - 8.0 };
         let height = (figure.height - top - 28.0 - gap * (rows - 1.0)) / rows;
         let span = range_of(self.cycle.iter().copied(), crate::figure::Scale::Linear, 0.03);
@@ -171,7 +172,7 @@ impl Curves<'_> {
         panel.frame(figure, Sides::BOTH);
         let Orbit { k_kms, porb_over_prot, .. } = self.orbit;
         let mut legend = Legend::default();
-        let text = format!("{}: *K* = {k_kms:.3} km/s, *P*_{{orb}} = {porb_over_prot:.3} *P*_{{rot}}", self.orbit_is);
+        let text = format!("*K* = {k_kms:.3} km/s, *P*_{{orb}} = {porb_over_prot:.3} *P*_{{rot}}");
         legend.add(Key::Line(ORBIT), &text);
         legend.draw(figure, frame, [0.5, 0.0]);
     }

@@ -313,3 +313,42 @@ fn comparison(file: &Value) -> Chapter {
         notes: texts(file, "notes"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn another_peak_nearly_as_high_makes_a_period_ambiguous() {
+        let search = |second: f64| {
+            let alias = json!({ "window_frequency_per_d": 1.003, "window": 0.7 });
+            let peak = |period: f64, height: f64, alias: Value| json!({ "period_d": period, "delta_ln_l": height, "false_alarm_probability": 1e-5, "alias": alias });
+            periodogram(&json!({ "peaks": [peak(4.0, 20.0, Value::Null), peak(1.33, second, alias)] }))
+        };
+        let (good, sentence) = search(16.0).verdict.unwrap();
+        assert!(good && !sentence.contains("ambiguous"), "{sentence}");
+        let chapter = search(17.5);
+        let (good, sentence) = chapter.verdict.unwrap();
+        assert!(
+            !good && sentence.contains("ambiguous: it may as well be 1.3300 d, an alias (ln *L* lower by 2.5)"),
+            "{sentence}"
+        );
+        let peaks = &chapter.tables[1].1;
+        assert_eq!((peaks.head.last().unwrap().as_str(), peaks.rows[0][5].as_str()), ("alias", "–"));
+        assert_eq!(peaks.rows[1][5], "of the first, by 1.003/d");
+    }
+
+    #[test]
+    fn a_landscape_shorter_than_its_error_bars_is_doubtful() {
+        let good = |error: f64| {
+            let header = json!({ "grid": { "axes": [{ "name": "k_kms", "min": 0.1, "max": 0.3, "nodes": 9 }] } });
+            let estimate = json!({ "vertex": 0.2, "error": error });
+            landscape(&header, &json!({ "parameters": { "k_kms": estimate }, "nodes": 9, "rms_chi2": 0.01 }))
+                .verdict
+                .unwrap()
+                .0
+        };
+        assert!(good(0.09) && !good(0.11));
+    }
+}
