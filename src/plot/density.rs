@@ -224,7 +224,6 @@ mod tests {
             for share in [0.68, 0.95] {
                 let lines = density.outlines(share);
                 let held = draws.iter().filter(|d| is_within(**d, &lines)).count() as f64 / shown;
-                println!("{share}: {held}");
                 // cells along the line count as wholes
                 assert!((held / share - 1.0).abs() < 0.05, "{share}: {held}");
             }
