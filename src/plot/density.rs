@@ -212,10 +212,10 @@ mod tests {
     /// Two narrow modes, and a mode with tails ten times as wide: the contours hold what they say, and are no wider than the modes.
     #[test]
     fn contours_of_several_modes_and_of_tails_hold_their_share() {
-        let two = |k: usize, [x, y]: [f64; 2]| if k % 2 == 0 { [x, y] } else { [x + 20.0, y + 10.0] };
-        let tails = |k: usize, [x, y]: [f64; 2]| if k % 5 == 0 { [10.0 * x, 10.0 * y] } else { [x, y] };
-        let cases: [(&dyn Fn(usize, [f64; 2]) -> [f64; 2], [[f64; 2]; 2]); 2] =
-            [(&two, [[-4.0, 24.0], [-4.0, 14.0]]), (&tails, [[-20.0, 20.0]; 2])];
+        let two = |k: usize, [x, y]: [f64; 2]| if k.is_multiple_of(2) { [x, y] } else { [x + 20.0, y + 10.0] };
+        let tails = |k: usize, [x, y]: [f64; 2]| if k.is_multiple_of(5) { [10.0 * x, 10.0 * y] } else { [x, y] };
+        type Place<'a> = &'a dyn Fn(usize, [f64; 2]) -> [f64; 2];
+        let cases: [(Place, [[f64; 2]; 2]); 2] = [(&two, [[-4.0, 24.0], [-4.0, 14.0]]), (&tails, [[-20.0, 20.0]; 2])];
         for (place, range) in cases {
             let draws: Vec<[f64; 2]> = gaussian(6_000, 0.3).into_iter().enumerate().map(|(k, d)| place(k, d)).collect();
             let inside = |d: &&[f64; 2]| (0..2).all(|k| (range[k][0]..range[k][1]).contains(&d[k]));
