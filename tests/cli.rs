@@ -279,3 +279,24 @@ fn lo_peg_has_a_map() {
     assert!(number("filtered_rv_rms_kms") < 0.5 * number("observed_rv_rms_kms"));
     assert!((0.01..0.25).contains(&number("spottedness")), "{}", number("spottedness"));
 }
+
+/// A full disk is a failure, a reader that has seen enough is none.
+#[test]
+#[cfg(target_os = "linux")]
+fn what_cannot_be_printed_is_a_failure() {
+    let desk = Desk::new(json!(null));
+    for args in [&["schema"][..], &["completions", "bash"], &["man", "--out", "man"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let program = || std::process::Command::new(env!("CARGO_BIN_EXE_dimcmc"));
+        let output = program().args(args).current_dir(desk.path("")).stdout(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{args:?}");
+        let message = text(&output.stderr);
+        says(&message, &["error: standard output: cannot write: "]);
+        assert_eq!(message.lines().count(), 1, "{message}");
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let again = [args, if args[0] == "man" { &["--force"] } else { &[] }].concat();
+        let output = program().args(again).current_dir(desk.path("")).stdout(writer).output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{args:?}: {}", text(&output.stderr));
+    }
+}

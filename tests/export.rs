@@ -242,6 +242,20 @@ fn the_same_bytes_again_and_nothing_overwritten() {
         says(&message, &["config.json/x: ", "config.json is not a folder"]);
     }
     says(&desk.refusal(&["export", "run", "--format", "csv", "--out", ".."]), &["..: is no name"]);
+    for (name, text) in [("night_1.txt", "my notes of that night\n"), ("log_2.txt", "1 2 3\n"), ("a.ranges", "x 0 1\n")]
+    {
+        desk.write(name, text);
+        let root = &name[..name.find(['_', '.']).unwrap()];
+        let message = desk.refusal(&["export", "run", "--format", "getdist", "--out", root, "--force"]);
+        says(&message, &[&format!("{name}: is there already, and no earlier export")]);
+        assert_eq!(desk.read(name), text);
+    }
+    // an export that was interrupted is one
+    for name in ["chain.paramnames", "chain.ranges"] {
+        std::fs::remove_file(desk.path(&format!("run/{name}"))).unwrap();
+    }
+    desk.succeed(&["export", "run", "--format", "getdist", "--force"]);
+    assert!(desk.path("run/chain.paramnames").exists());
     // GetDist would read a third chain, of another run perhaps, along with these two
     desk.write("run/chain_3.txt", "1 0 0 0 0 0\n");
     let message = desk.refusal(&["export", "run", "--format", "getdist", "--force"]);

@@ -119,7 +119,7 @@ fn what_nobody_knows_is_marked_and_refused_later() {
 fn options_replace_what_is_measured() {
     let desk = desk();
     let options = [
-        ("--epoch", "/star/epoch_d", 101.5),
+        ("--epoch", "/star/epoch_d", -1.5),
         ("--vsini", "/star/vsini_kms", 30.5),
         ("--domega", "/star/domega_rad_d", -0.01),
         ("--limb-darkening", "/star/limb_darkening/coefficients/0", 0.5),
@@ -163,6 +163,14 @@ fn wrong_errors_are_scaled() {
         assert!((found / expected - 1.0).abs() < 0.12, "{found}");
         desk.succeed(&["map", "star.json", "--out", "map"]);
     }
+}
+
+/// A vsini that is far from the measured one is refused, and soon: no orbit makes up for it.
+#[test]
+fn another_star_is_refused() {
+    let desk = desk();
+    let message = desk.refusal(&[&INIT[..], &["--vsini", "45"]].concat());
+    says(&message, &["data/observations.txt: no map fits unless the errors are ", "vsini = 45 km/s (measured 2"]);
 }
 
 /// A star that is not modelled as well as its errors promise: the config's target is reached all the same.
@@ -216,8 +224,7 @@ fn what_cannot_be_is_refused_in_a_line() {
         (&["--line-sigma", "0"], "star.line.sigma_kms: 0 must be above 0"),
     ];
     for (options, problem) in bad {
-        let options = options.join("=");
-        refused(&["--out", "a.json", &options], &["a.json: ", problem]);
+        refused(&["--out", "a.json", &options.join("=")], &[&format!("{}: ", options[0]), problem]);
     }
     for options in [
         ["--line-sigma=1e9", "--resolving-power=1"],
@@ -231,12 +238,16 @@ fn what_cannot_be_is_refused_in_a_line() {
     }
     for option in ["--limb-darkening=nan", "--resolving-power=nan", "--line-sigma=inf", "--epoch=nan", "--vsini=1e308"]
     {
-        refused(&["--out", "a.json", option], &[": "]);
+        refused(&["--out", "a.json", option], &[&format!("{}: ", option.split('=').next().unwrap())]);
     }
     for period in ["0", "-3", "inf"] {
         let args = ["init", "data/observations.txt", "--out", "a.json", &format!("--rotation-period={period}")];
-        says(&desk.refusal(&args), &["star.rotation_period_d: "]);
+        says(&desk.refusal(&args), &["--rotation-period: "]);
     }
+    says(
+        &desk.refusal(&[&INIT[..5], &["95", "--out", "a.json"]].concat()),
+        &["--inclination: star.inclination_deg: 95"],
+    );
     says(&desk.refusal(&["init", "absent.txt", "--out", "a.json"]), &["absent.txt: cannot read"]);
     desk.write("empty.txt", "# nothing\n");
     says(&desk.refusal(&["init", "empty.txt", "--out", "a.json"]), &["empty.txt: lists no profile"]);

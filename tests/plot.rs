@@ -81,11 +81,14 @@ fn every_folder_has_its_figures() {
     for (file, labels) in [
         ("sample/figures/corner.svg", &["K (km/s)", "φ (orbital cycles)", "injected"][..]),
         ("sample/figures/traces.svg", &["step", "ensemble 4", "burn-in"]),
-        ("map/figures/rv.svg", &["RV (km/s)", "rotation cycle", "orbital phase", "model"]),
+        ("map/figures/rv.svg", &["RV (km/s)", "rotation cycle", "orbital phase", "model", "assumed orbit"]),
         ("map/figures/residuals.svg", &["velocity (km/s)", "rotation phase", "standard errors"]),
-        ("map/figures/map.svg", &["phase 0", "rotation", "longitude", "+60°", "spot filling factor"]),
+        (
+            "map/figures/map.svg",
+            &["phase 0", "rotation", "longitude", "latitude", "observed phases", "+60°", "spot filling factor"],
+        ),
         ("periodogram/figures/periodogram.svg", &["period (d)", "Δ ln L", "window", "0.1 %", "Prot/2", "injected"]),
-        ("grid/figures/landscape.svg", &["√Δχ2", "paraboloid, Δχ2 = 1"]),
+        ("grid/figures/landscape.svg", &["√Δχ2", "Δχ2 = 2.30, 5.99", "paraboloid"]),
         ("compare/figures/comparison.svg", &["chain", "paraboloid", "landscape", "injected"]),
     ] {
         let svg = desk.read(file);
@@ -98,11 +101,16 @@ fn every_folder_has_its_figures() {
     desk.succeed(&["plot", "grid", "--with", "sample", "--out", "with"]);
     let (with, without) = (desk.read("with/landscape.svg"), desk.read("grid/figures/landscape.svg"));
     assert!(paths(&without, "chain").is_empty() && paths(&with, "chain").len() >= 2);
-    // one above the minimum: as wide as the error bars of the vertex
-    let (ellipse, bars) = (extent(&paths(&with, "paraboloid")[0]), paths(&with, "vertex"));
-    for (k, bar) in bars.iter().enumerate() {
-        let (ellipse, bar) = (ellipse[k], extent(bar)[k]);
-        assert!((ellipse[0] - bar[0]).abs() < 0.15 && (ellipse[1] - bar[1]).abs() < 0.15, "{ellipse:?} {bar:?}");
+    // 2.30 and 5.99 above the minimum: their roots times as wide as the error bars of the vertex
+    let (ellipses, bars) = (paths(&with, "paraboloid"), paths(&with, "vertex"));
+    assert_eq!((ellipses.len(), bars.len()), (2, 2));
+    for (line, level) in ellipses.iter().zip([2.30_f64, 5.99]) {
+        for (k, bar) in bars.iter().enumerate() {
+            let width = |[low, high]: [f64; 2]| high - low;
+            let (ellipse, bar) = (width(extent(line)[k]), width(extent(bar)[k]));
+            // hundredths of a point in the file
+            assert!((ellipse - level.sqrt() * bar).abs() < 0.3, "{level}: {ellipse} {bar}");
+        }
     }
 }
 
@@ -115,6 +123,7 @@ fn what_cannot_be_drawn_is_refused() {
     desk.succeed(&["map", CONFIG, "--out", "map"]);
     desk.write("map/figures", "mine");
     says(&desk.refusal(&["plot", "map"]), &["map/figures", "not a folder"]);
+    says(&desk.refusal(&["plot", "map", "--with", "run", "--out", "out"]), &["--with run: map holds no landscape"]);
     desk.succeed(&["plot", "map", "--out", "out"]);
     desk.write("out/mine.txt", "precious");
     says(&desk.refusal(&["plot", "map", "--out", "out"]), &["--out out", "not empty", "--force"]);

@@ -1,8 +1,8 @@
 //! `dimcmc completions`: what a shell needs to complete commands and options.
 
 use super::Failure;
+use super::output::print;
 use clap_complete::Shell;
-use std::io::Write as _;
 
 /// Print a shell's completions of commands and options
 ///
@@ -19,6 +19,5 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut super::command(), "dimcmc", &mut script);
-    let _ = std::io::stdout().write_all(&script);
-    Ok(())
+    print(&script)
 }

@@ -45,10 +45,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         list_in_config: PathBuf::from(list.file_name().unwrap_or_default()),
         schema: args.output.schema(),
     };
+    let known = args.known.over(import.known.clone())?;
     let spinner = progress::bar(global, None, "a first look, and a map to try it out");
-    let proposal = propose(&place, &args.known.over(import.known.clone()));
+    let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
-    let proposal = proposal?;
+    let proposal = proposal.map_err(|error| args.known.failure(error))?;
     args.output.check(Some(&list))?;
     // the list first, so that where the config is its observations are
     atomic::write(&list, import.list.as_bytes())?;

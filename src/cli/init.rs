@@ -2,9 +2,10 @@
 
 use super::output::ConfigFile;
 use super::{Failure, Global, progress};
+use dimcmc::config::ConfigError;
 use dimcmc::io::atomic;
 use dimcmc::io::lsd::LsdError;
-use dimcmc::proposal::{Given, Known, Place, Proposal, propose};
+use dimcmc::proposal::{Given, Known, Place, Proposal, ProposalError, propose};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +35,7 @@ pub struct KnownArgs {
     #[arg(long, value_name = "DAYS")]
     rotation_period: Option<f64>,
     /// Time of rotation cycle 0 (d); the middle of the observations if not given
-    #[arg(long, value_name = "DAYS")]
+    #[arg(long, value_name = "DAYS", allow_negative_numbers = true)]
     epoch: Option<f64>,
     /// Inclination of the rotation axis to the line of sight (degrees)
     #[arg(long, value_name = "DEG")]
@@ -65,28 +66,53 @@ pub struct KnownArgs {
     resolving_power: Option<f64>,
 }
 
+/// Where an option's value goes.
+type Slot = fn(&mut Known) -> &mut Option<Given<f64>>;
+
 impl KnownArgs {
+    /// Every option with its value, its key in the config, and where it goes.
+    fn options(&self) -> [(&'static str, Option<f64>, &'static str, Slot); 11] {
+        [
+            ("--rotation-period", self.rotation_period, "star.rotation_period_d", |known| &mut known.rotation_period_d),
+            ("--epoch", self.epoch, "star.epoch_d", |known| &mut known.epoch_d),
+            ("--inclination", self.inclination, "star.inclination_deg", |known| &mut known.inclination_deg),
+            ("--vsini", self.vsini, "star.vsini_kms", |known| &mut known.vsini_kms),
+            ("--domega", self.domega, "star.domega_rad_d", |known| &mut known.domega_rad_d),
+            ("--limb-darkening", self.limb_darkening, "star.limb_darkening", |known| &mut known.limb_darkening),
+            ("--photosphere", self.photosphere, "star.photosphere_k", |known| &mut known.photosphere_k),
+            ("--spot", self.spot, "star.spot_k", |known| &mut known.spot_k),
+            ("--wavelength", self.wavelength, "star.wavelength_nm", |known| &mut known.wavelength_nm),
+            ("--line-sigma", self.line_sigma, "star.line.sigma_kms", |known| &mut known.line_sigma_kms),
+            ("--resolving-power", self.resolving_power, "instrument.resolving_power", |known| {
+                &mut known.resolving_power
+            }),
+        ]
+    }
+
     /// The options that are there replace what is `known` otherwise.
-    pub fn over(&self, mut known: Known) -> Known {
-        let options = [
-            ("--rotation-period", self.rotation_period, &mut known.rotation_period_d),
-            ("--epoch", self.epoch, &mut known.epoch_d),
-            ("--inclination", self.inclination, &mut known.inclination_deg),
-            ("--vsini", self.vsini, &mut known.vsini_kms),
-            ("--domega", self.domega, &mut known.domega_rad_d),
-            ("--limb-darkening", self.limb_darkening, &mut known.limb_darkening),
-            ("--photosphere", self.photosphere, &mut known.photosphere_k),
-            ("--spot", self.spot, &mut known.spot_k),
-            ("--wavelength", self.wavelength, &mut known.wavelength_nm),
-            ("--line-sigma", self.line_sigma, &mut known.line_sigma_kms),
-            ("--resolving-power", self.resolving_power, &mut known.resolving_power),
-        ];
-        for (name, value, slot) in options {
+    pub fn over(&self, mut known: Known) -> Result<Known, Failure> {
+        for (name, value, _, slot) in self.options() {
             if let Some(value) = value {
-                *slot = Some(Given { value, by: name.to_owned() });
+                if !value.is_finite() {
+                    return Err(Failure::input(format!("{name}: must be a finite number, not {value}")));
+                }
+                *slot(&mut known) = Some(Given { value, by: name.to_owned() });
             }
         }
-        known
+        Ok(known)
+    }
+
+    /// Why there is no proposal; by its option where a value is at fault that was given by one.
+    pub fn failure(&self, error: ProposalError) -> Failure {
+        if let ProposalError::Config(ConfigError::Key { key, problem, .. }) = &error {
+            let at_fault =
+                |given: &str| key == given || key.strip_prefix(given).is_some_and(|rest| rest.starts_with('.'));
+            let option = self.options().into_iter().find(|(_, value, given, _)| value.is_some() && at_fault(given));
+            if let Some((name, ..)) = option {
+                return Failure::input(format!("{name}: {key}: {problem}"));
+            }
+        }
+        error.into()
     }
 }
 
@@ -102,10 +128,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         list_in_config: args.output.relative(list)?,
         schema: args.output.schema(),
     };
+    let known = args.known.over(Known::default())?;
     let spinner = progress::bar(global, None, "a first look, and a map to try it out");
-    let proposal = propose(&place, &args.known.over(Known::default()));
+    let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
-    let proposal = proposal?;
+    let proposal = proposal.map_err(|error| args.known.failure(error))?;
     args.output.check(None)?;
     atomic::write(args.output.path(), proposal.json.as_bytes())?;
     let _ = write!(std::io::stdout(), "{}\nwritten: {}\n", proposal.table(), args.output.path().display());

@@ -1,10 +1,9 @@
 //! `dimcmc man`: the manual, one page a command.
 
 use super::Failure;
-use super::output::Output;
+use super::output::{Output, print};
 use clap_mangen::Man;
 use dimcmc::io::atomic;
-use std::io::Write as _;
 
 /// Write the manual pages
 ///
@@ -25,8 +24,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     for (name, page) in &pages {
         atomic::write(&folder.join(name), page)?;
     }
-    let _ = writeln!(std::io::stdout(), "written: {}: {} pages, dimcmc.1 first", folder.display(), pages.len());
-    Ok(())
+    print(format!("written: {}: {} pages, dimcmc.1 first\n", folder.display(), pages.len()).as_bytes())
 }
 
 /// Every page with its file name.

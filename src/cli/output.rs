@@ -4,7 +4,19 @@
 //! behind.
 
 use super::Failure;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
+
+/// Prints what a command is for. That nobody reads on (a closed pipe) is no failure.
+pub fn print(bytes: &[u8]) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::failed(format!("standard output: cannot write: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Options of every command that writes.
 #[derive(Debug, clap::Args)]

@@ -4,6 +4,7 @@ use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global};
 use dimcmc::plot::{self, DPI};
+use dimcmc::survey::HEADER;
 use std::path::PathBuf;
 
 /// Draw whatever a folder holds, as SVG and PNG
@@ -45,6 +46,14 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| args.folder.join("figures"));
     let output = Output::to(folder, args.force);
     output.check()?;
+    if let Some(run) =
+        args.run.as_ref().filter(|_| args.folder.is_dir() && !plot::kinds(&args.folder).contains(&HEADER))
+    {
+        let (run, folder) = (run.display(), args.folder.display());
+        return Err(Failure::input(format!(
+            "--with {run}: {folder} holds no landscape ({HEADER}) to draw the run over"
+        )));
+    }
     let figures = plot::figures(&args.folder, args.run.as_deref())?;
     let folder = output.create()?;
     let mut files = Vec::new();

@@ -146,7 +146,9 @@ fn quick_there(folder: &Path) -> Option<bool> {
 
 fn remove(folder: &Path) -> Result<(), Failure> {
     match std::fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Failure::failed(format!("{}: {e}", folder.display()))),
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(Failure::failed(format!("{}: {e}", folder.display())))
+        }
         _ => Ok(()),
     }
 }

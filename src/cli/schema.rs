@@ -1,8 +1,8 @@
 //! `dimcmc schema`: the JSON Schema of the config.
 
 use super::Failure;
+use super::output::print;
 use dimcmc::config;
-use std::io::Write as _;
 
 /// Print the JSON Schema of the config
 ///
@@ -14,6 +14,5 @@ pub struct Args {}
 
 /// Runs the command.
 pub fn run(_args: &Args) -> Result<(), Failure> {
-    let _ = std::io::stdout().write_all(config::schema().as_bytes());
-    Ok(())
+    print(config::schema().as_bytes())
 }

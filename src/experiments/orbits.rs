@@ -120,7 +120,8 @@ fn numbers(outcome: &Outcome) -> Vec<f64> {
             let estimate = route.and_then(|route| route.parameters.get(parameter));
             let turns = |e: &Estimate| outcome.deviation(parameter, e).map(|d| outcome.truth[parameter] + d - e.value);
             // a phase in the turn of the truth
-            let three = estimate.map_or([f64::NAN; 3], |e| [e.value, e.ci68[0], e.ci68[1]].map(|x| x + turns(e).unwrap_or(0.0)));
+            let three = estimate
+                .map_or([f64::NAN; 3], |e| [e.value, e.ci68[0], e.ci68[1]].map(|x| x + turns(e).unwrap_or(0.0)));
             numbers.extend(three.map(|x| rounded(x, 6)));
         }
         let cost = route.map_or([f64::NAN; 2], |route| [route.reconstructions as f64, rounded(route.seconds, 3)]);

@@ -12,6 +12,9 @@ use crate::io::atomic::{self, WriteError};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+/// Derived quantities in `.paramnames`; no other program ends the file so.
+const DERIVED: &str = "spottedness*\t\\mathrm{spottedness}\nchi2*\t\\chi^2\n";
+
 /// Writes the files.
 ///
 /// # Errors
@@ -39,6 +42,22 @@ pub fn write(contents: &Contents, root: &Path) -> Result<(), WriteError> {
 pub fn files(root: &Path, ensembles: usize) -> Vec<PathBuf> {
     let chains = (0..ensembles).map(|ensemble| chain(root, ensemble));
     chains.chain([".paramnames", ".ranges"].map(|end| ending(root, end))).collect()
+}
+
+/// Whether the file, one of [`files`], may be of an earlier export: `ROOT.paramnames` is one of ours, or the file has nothing but
+/// rows of a chain of so many parameters (an export that was interrupted).
+pub fn is_own(root: &Path, file: &Path, parameters: usize) -> bool {
+    let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
+    if read(&ending(root, ".paramnames")).ends_with(DERIVED) {
+        return true;
+    }
+    let is_row = |line: &str| {
+        let numbers: Option<Vec<f64>> = line.split(' ').map(|cell| cell.parse().ok()).collect();
+        // weight and -ln P before the parameters, derived quantities after them
+        numbers.is_some_and(|numbers| numbers.len() == 2 + parameters + DERIVED.lines().count() && numbers[0] == 1.0)
+    };
+    let text = read(file);
+    !text.is_empty() && text.lines().all(is_row)
 }
 
 /// Whether GetDist would read other files along with those of an export, taking them for more chains: `ROOT.txt`, and
@@ -91,7 +110,7 @@ fn paramnames(parameters: &[Quantity]) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{}\t{}{unit}", one.name, one.latex);
     }
-    text + "spottedness*\t\\mathrm{spottedness}\nchi2*\t\\chi^2\n"
+    text + DERIVED
 }
 
 /// Bounds, `N` for none.

@@ -116,8 +116,8 @@ fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Resu
     match format {
         Format::Zarr => place::check_folder(out, replace, &zarr::is_own),
         Format::Getdist => {
-            // by their names they can be nothing else
-            place::check_files(&targets(format, ensembles, out), replace, &|_| true)?;
+            let is_own = |file: &Path| getdist::is_own(out, file, contents.parameters.len());
+            place::check_files(&targets(format, ensembles, out), replace, &is_own)?;
             getdist::check_strangers(out, ensembles)
         }
         Format::Emcee => place::check_files(&targets(format, ensembles, out), replace, &emcee::is_own),

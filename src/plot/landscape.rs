@@ -202,7 +202,7 @@ impl Scene {
             panel.points(figure, "truth-point", &[[truth.0, truth.1]], (Marker::Cross, 5.5, VERMILION));
         }
         if let Some(paraboloid) = &self.paraboloid {
-            paraboloid.draw(figure, panel, shown, lowest || self.grid.axes.len() == 2);
+            paraboloid.draw(figure, panel, shown, &LEVELS, lowest || self.grid.axes.len() == 2);
         }
         panel.frame(figure, Sides::BOTH);
     }
@@ -243,7 +243,7 @@ impl Scene {
         let mut legend = Legend::default();
         legend.add(Key::Line(Stroke::new(BLACK, 0.7)), "Δ*χ*^{2} = 2.30, 5.99");
         if self.paraboloid.is_some() {
-            legend.add(Key::Line(paraboloid::PEN), "paraboloid, Δ*χ*^{2} = 1");
+            legend.add(Key::Line(paraboloid::PEN), "paraboloid");
         }
         if self.chain.is_some() {
             legend.add(Key::Line(CHAIN_PEN), "chain, 68 and 95 %");
@@ -257,15 +257,20 @@ impl Scene {
     fn caption(&self, three: bool) -> String {
         let rows = match three {
             true => {
-                "Above: slices through the lowest node, with the section of the paraboloid. Below: the lowest chi2 over the \
-                 third axis, with the projection of the paraboloid, whose extent is its error bars (cross)."
+                " Above: slices through the lowest node, with the section of the paraboloid through its vertex. Below: the lowest \
+                 chi2 over the third axis, with the projection of the paraboloid."
             }
-            false => "The paraboloid's extent is its error bars (cross).",
+            false => "",
         };
-        let chain = if self.chain.is_some() { " Dashed: contours of the chain." } else { "" };
+        let paraboloid = match self.paraboloid {
+            Some(_) => " Cross: vertex of the paraboloid with its error bars, Delta chi2 = 1.",
+            None => "",
+        };
+        let chain = if self.chain.is_some() { " Dashed: 68 and 95 % of the chain." } else { "" };
         format!(
             "Landscape: the root of chi2 = -2 ln L minus its lowest value, {DARKEST} and more in the darkest colour, nodes \
-             without a reconstruction white. {rows}{chain}"
+             without a reconstruction white.{rows} Contours of landscape and paraboloid are at Delta chi2 = 2.30 and 5.99, 68 and \
+             95 % of two Gaussian parameters.{paraboloid}{chain}"
         )
     }
 }

@@ -1,4 +1,4 @@
-//! The paraboloid over a landscape: the ellipse one above its minimum, cut by a plane or projected onto it.
+//! The paraboloid over a landscape: ellipses above its minimum, cut by a plane or projected onto it.
 
 use super::landscape::turned;
 use crate::figure::colour::{VERMILION, WHITE};
@@ -48,16 +48,19 @@ impl Paraboloid {
         })
     }
 
-    /// The ellipse one above the minimum: projected onto the plane, with error bars, or cut by it.
-    pub fn draw(&self, figure: &mut Figure, panel: &Panel, [i, j]: [usize; 2], projected: bool) {
+    /// The ellipses so far (Delta chi2) above the minimum: projected onto the plane, with error bars (Delta chi2 = 1) as a cross
+    /// at the vertex, or cut by the plane through the vertex.
+    pub fn draw(&self, figure: &mut Figure, panel: &Panel, [i, j]: [usize; 2], levels: &[f64], projected: bool) {
         let centre = [self.vertex[i], self.vertex[j]];
         let square = |m: &DMatrix<f64>| [[m[(i, i)], m[(i, j)]], [m[(j, i)], m[(j, j)]]];
         let ellipse = match projected {
             true => Some(square(&self.covariance)),
             false => self.covariance.clone().try_inverse().and_then(|inverse| invert(square(&inverse))),
         };
-        if let Some(covariance) = ellipse {
-            let line = gaussian_contour(centre, covariance, 1.0);
+        for (covariance, level) in
+            ellipse.iter().flat_map(|covariance| levels.iter().map(move |level| (covariance, level)))
+        {
+            let line = gaussian_contour(centre, *covariance, level.sqrt());
             panel.line(figure, "paraboloid-ground", &line, Stroke::new(WHITE, 2.2));
             panel.line(figure, "paraboloid", &line, PEN);
         }

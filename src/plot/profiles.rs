@@ -98,14 +98,14 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     let width_mm = if columns == 1 { crate::figure::COLUMN_MM } else { PAGE_MM };
     let mut figure = Figure::new("profiles", width_mm, height_mm);
     let modelled = lines.iter().any(|line| !line.model.is_empty());
-    let what = if modelled { "Observed (black) and modelled (red) line profiles" } else { "Line profiles" };
+    let what = if modelled { "Observed (black) and modelled (orange) line profiles" } else { "Line profiles" };
     figure.caption = format!(
         "{what} below each other in the order of their rotation phase; numbers are rotation cycles, whole turns + phase. Bars \
          beside the profiles are plus and minus one standard error."
     );
     let [low, high] = extent(lines, |line| &line.observed);
     let spacing = 0.5 * (high - low);
-    let (margin, top, bottom) = (6.0, 20.0, 30.0);
+    let (margin, top, bottom) = (15.0, 25.0, 30.0);
     let cell = figure.width / columns as f64;
     let legend_middle = figure.width / 2.0;
     let velocities = extent(lines, |line| &line.velocity_kms);
@@ -125,7 +125,10 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
             one(&mut figure, &panel, line, spacing * row as f64);
         }
         panel.bare_y_frame(&mut figure);
+        figure.text("cycle + phase", [frame.right() + LABELS - 1.0, top - 3.0], TINY, Align::Right, 0.0);
         if column == 0 {
+            let label = "intensity / continuum, shifted by phase";
+            figure.text(label, [frame.left - 4.5, frame.centre()[1]], Font::LABEL, Align::Centre, 90.0);
             depth_bar(&mut figure, &panel, spacing);
         }
     }
@@ -137,6 +140,8 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     }
     figure
 }
+
+const TINY: Font = Font { size: 6.0, ..Font::SMALL };
 
 const OBSERVED: Stroke = Stroke::new(BLACK, 1.2);
 const MODEL: Stroke = Stroke::new(VERMILION, 0.6);
@@ -155,7 +160,7 @@ fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     let half = 0.5 * (panel.place(last, 0.0)[1] - panel.place(last, 2.0 * sigma)[1]);
     figure.polyline("sigma", &[[bar, middle - half], [bar, middle + half]], Stroke::new(BLACK, 1.0));
     let text = format!("{turns:.0} + {:.3}", line.phase());
-    figure.text(&text, [bar + 3.0, middle + 2.3], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
+    figure.text(&text, [bar + 3.0, middle + 2.3], TINY, Align::Left, 0.0);
 }
 
 /// A bar that shows how much of the continuum a length upwards is.
@@ -170,5 +175,5 @@ fn depth_bar(figure: &mut Figure, panel: &Panel, spacing: f64) {
         figure.polyline("depth-bar", &line, pen);
     }
     let text = format!("{length} *I*_{{c}}");
-    figure.text(&text, [x + 5.0, 0.5 * (foot + head) + 2.5], Font { size: 6.0, ..Font::SMALL }, Align::Left, 0.0);
+    figure.text(&text, [x + 5.0, 0.5 * (foot + head) + 2.5], TINY, Align::Left, 0.0);
 }

@@ -194,13 +194,18 @@ fn polar(figure: &mut Figure, star: &Star, centre: Point, cycles: &[f64], shade:
         let at = toward(phase, RADIUS + 9.5);
         figure.text(text, [at[0], at[1] + down], Font::SMALL, align, 0.0);
     }
-    for latitude in [60.0, 30.0, 0.0] {
+    for latitude in [60.0, 30.0, 0.0, -30.0] {
         let [x, y] = projection.place(207.0, latitude);
         let text = degrees(latitude);
         let width = width_pt(&text, TINY.size);
         let ground = Rect { left: x - 0.5 * width - 1.0, top: y - 3.2, width: width + 2.0, height: 6.4 };
         figure.rect("label-ground", ground, Paint::fill(WHITE.opacity(0.75)));
         figure.text(&text, [x, y + 2.1], TINY, Align::Centre, 0.0);
+    }
+    if !cycles.is_empty() {
+        let [x, y] = [centre[0] - RADIUS + 2.0, centre[1] + RADIUS + 2.0];
+        figure.path("phase-key", open(&[[x, y - 11.0], [x, y - 5.5]]), Paint::stroke(Stroke::new(BLACK, 0.6)));
+        figure.text("observed phases", [x, y + 2.0], TINY, Align::Centre, 0.0);
     }
     rotation_arrow(figure, [centre[0] + RADIUS + 2.0, centre[1] + RADIUS - 6.0]);
 }
@@ -233,6 +238,9 @@ fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, shade: Sha
         let text = [at[0] - 3.0 - latitude.abs() / 14.0, at[1] + 2.5];
         figure.text(&degrees(latitude), text, Font::SMALL, Align::Right, 0.0);
     }
+    // in the corner that the ellipse leaves free
+    let corner = [projection.place(0.0, 0.0)[0] - 14.0, centre[1] - radius + 3.0];
+    figure.text("latitude", corner, Font::LABEL, Align::Left, 0.0);
     let below = centre[1] + radius + 9.0;
     for longitude in [0.0, 60.0, 120.0, 180.0, 240.0, 300.0, 360.0] {
         let at = projection.place(longitude, 0.0);

@@ -135,7 +135,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
             }
         }
         if let Some(truth) = sampled.truth(i) {
-            panel.horizontal(&mut figure, "truth", truth, TRUTH);
+            panel.horizontal(&mut figure, "truth", truth, INJECTED);
         }
         panel.frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
     }
@@ -145,7 +145,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
     }
     legend.add(Key::Area(GREY.opacity(0.2)), "burn-in");
     if sampled.manifest.origin.truth.is_some() {
-        legend.add(Key::Line(TRUTH), "injected");
+        legend.add(Key::Line(INJECTED), "injected");
     }
     let middle = 0.5 * (left + figure.width);
     legend.row(&mut figure, [middle, 9.0]);
@@ -157,6 +157,9 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
 }
 
 pub(super) const TRUTH: Stroke = Stroke::new(VERMILION, 1.0).dashed();
+
+/// The same over traces, where an ensemble has that colour.
+const INJECTED: Stroke = Stroke::new(BLACK, 1.0).dashed();
 
 /// Autocorrelation functions, and autocorrelation times over the length of the chain.
 pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {

@@ -39,6 +39,8 @@ struct Curves<'a> {
     panels: Vec<(&'a str, Vec<Series<'a>>)>,
     orbit: Orbit,
     vsys_kms: f64,
+    /// What the orbit is called.
+    orbit_is: &'static str,
     /// The panel of velocities without spots, where the orbit is drawn and which is folded.
     orbital: usize,
 }
@@ -63,6 +65,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         ],
         orbit: Orbit { k_kms: value("k_kms"), porb_over_prot: value("porb_over_prot"), phi: value("phi") },
         vsys_kms: value("vsys_kms"),
+        orbit_is: "assumed orbit",
         orbital: 1,
     };
     let mut figure = curves.draw();
@@ -93,6 +96,7 @@ pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<
         ],
         orbit,
         vsys_kms: offset_kms,
+        orbit_is: "best orbit",
         orbital: 1,
     };
     let mut figure = curves.draw();
@@ -114,8 +118,9 @@ impl Curves<'_> {
         let folds = self.orbit.k_kms > 0.0 && self.orbit.porb_over_prot > 0.0;
         let rows = self.panels.len() as f64;
         let mut figure = Figure::new("rv", if folds { PAGE_MM } else { COLUMN_MM }, 24.0 + 26.0 * rows);
-        let legend = legend(&self.panels[0].1);
-        let (left, top, gap) = (38.0, if legend.is_empty() { 8.0 } else { 16.0 }, 5.0);
+        let mut legend = legend(&self.panels[0].1);
+        legend.add(Key::Line(ORBIT), self.orbit_is);
+        let (left, top, gap) = (38.0, 16.0, 5.0);
         let width = if folds { 0.56 * figure.width - left } else { figure.width - left - 8.0 };
         let height = (figure.height - top - 28.0 - gap * (rows - 1.0)) / rows;
         let span = range_of(self.cycle.iter().copied(), crate::figure::Scale::Linear, 0.03);

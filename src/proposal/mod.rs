@@ -100,6 +100,24 @@ pub enum ProposalError {
     /// A given value makes no sense.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// The model is nowhere near the profiles.
+    #[error(
+        "{}: no map fits unless the errors are {factor:.1} times as large: with vsini = {vsini_kms} km/s (measured {measured_kms:.1} \
+         +- {error_kms:.1}), the local line or the velocity range is wrong",
+        .list.display()
+    )]
+    OutOfReach {
+        /// The list of profiles.
+        list: PathBuf,
+        /// Factor on the errors at which a map would fit.
+        factor: f64,
+        /// Projected rotation velocity that was tried.
+        vsini_kms: f64,
+        /// That of the mean profile.
+        measured_kms: f64,
+        /// Its error.
+        error_kms: f64,
+    },
     /// A path that JSON cannot hold.
     #[error("{}: the path of the observations cannot be written in JSON: {problem}", .config.display())]
     Path {
@@ -110,11 +128,12 @@ pub enum ProposalError {
     },
 }
 
-/// The proposal for the profiles of a list, of a star of which something is known.
+/// The proposal for the profiles of a list, of a star of which something is known. What looks wrong is said at once by `say`, before
+/// anything is tried out.
 ///
 /// # Errors
-/// Profiles that cannot be read or show no line, given values that make no sense.
-pub fn propose(place: &Place, known: &Known) -> Result<Proposal, ProposalError> {
+/// Profiles that cannot be read or show no line, given values that make no sense or are far from what the profiles say.
+pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Proposal, ProposalError> {
     let read = |options: &ReadOptions| lsd::read_listed(place.list, place.list_bytes, options);
     let whole = read(&ReadOptions::default())?.observations;
     let mut ledger = Ledger::default();
@@ -125,8 +144,9 @@ pub fn propose(place: &Place, known: &Known) -> Result<Proposal, ProposalError> 
     let mut draft = values.draft(&cut, known, &mut ledger);
     draft.observations.clone_from(&place.list_in_config);
     draft.schema.clone_from(&place.schema);
-    let trial = trial::run(&mut draft, place.config, &cut, known.sigma_scale.is_some())?;
     let mut notes = values.notes(known);
+    notes.iter().for_each(|note| say(note));
+    let trial = trial::run(&mut draft, place, &cut, &values, known)?;
     notes.extend(trial.notes(values.look.noise.quoted, &draft));
     if trial.floor_scale.is_some() {
         let remark = "so that a map reaches the target chi2, see the note";

@@ -2,7 +2,8 @@
 //! how much the errors promise too much if none does.
 
 use super::digits::{rounded, significant};
-use super::{ProposalError, to_json};
+use super::values::Values;
+use super::{Known, Place, ProposalError, to_json};
 use crate::config::{self, Draft};
 use crate::objective::{Parameter, Reference, ReferenceError};
 use crate::observation::Observations;
@@ -18,6 +19,9 @@ const CLEARANCE: f64 = 1.2;
 
 /// Most rounds of scaling and trying again; it takes one or two.
 const ROUNDS: usize = 4;
+
+/// Errors that have to be scaled by more than this, beyond what the continuum says, are not at fault: the config is.
+const MOST_SCALE: f64 = 5.0;
 
 /// More of a star is hardly ever spotted in a maximum-entropy map.
 const MANY_SPOTS: f64 = 0.25;
@@ -48,13 +52,19 @@ pub(super) enum End {
 }
 
 /// Tries `draft` on `cut`, the profiles within its velocity range with errors as quoted. Changes the draft's start where only an
-/// orbit makes a map fit, and scales its errors where nothing does, unless they are the user's own.
+/// orbit makes a map fit, and scales its errors where nothing does, unless they are the user's own. No orbit is searched for where
+/// the star is another one than that of the profiles.
+///
+/// # Errors
+/// Given values that make no sense; a model so far from the profiles that their errors would have to be scaled beyond reason.
 pub(super) fn run(
     draft: &mut Draft,
-    config: &Path,
+    Place { config, list, .. }: &Place,
     cut: &Observations,
-    scale_is_given: bool,
+    values: &Values,
+    known: &Known,
 ) -> Result<Trial, ProposalError> {
+    let (scale_is_given, other_star) = (known.sigma_scale.is_some(), values.is_another_star(known));
     let mut trial = Trial { end: End::Untried, floor_scale: None, orbit: false };
     if draft.rotation_period_d.is_none() {
         scene(&Draft { rotation_period_d: Some(STAND_IN_D), ..draft.clone() }, config, cut)?;
@@ -65,6 +75,7 @@ pub(super) fn run(
         *draft = Draft { sigma_scale: draft.sigma_scale, ..without_planet.clone() };
         let mut reached = reach(draft, config, cut)?;
         trial.orbit = matches!(reached, Err(ReferenceError::TargetBelowFloor { .. }));
+        trial.orbit &= !other_star;
         if trial.orbit {
             reached = match search(draft, config, cut)? {
                 Ok(()) => reach(draft, config, cut)?,
@@ -80,6 +91,15 @@ pub(super) fn run(
             }
             Err(ReferenceError::TargetBelowFloor { target, floor }) if !scale_is_given => {
                 let least = draft.sigma_scale * (floor / target).sqrt();
+                if least > MOST_SCALE * without_planet.sigma_scale {
+                    return Err(ProposalError::OutOfReach {
+                        list: list.into(),
+                        factor: least / without_planet.sigma_scale,
+                        vsini_kms: draft.vsini_kms,
+                        measured_kms: values.look.unspotted.vsini_kms,
+                        error_kms: values.look.vsini_error_kms,
+                    });
+                }
                 trial.floor_scale = Some(least);
                 draft.sigma_scale = significant(CLEARANCE * least, f64::ceil);
             }

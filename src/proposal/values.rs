@@ -37,6 +37,9 @@ const VSYS_REACH: (f64, f64) = (6.0, 0.5);
 /// Given and measured vsini that differ by more than that many errors are worth a note.
 const DISAGREEMENT: f64 = 3.0;
 
+/// By more than that many, no orbit makes up for it.
+const ANOTHER_STAR: f64 = 5.0;
+
 /// Differential rotation of the Sun (rad/d), and the angle (rad) between equator and pole from which a map shows it.
 const SOLAR_DOMEGA_RAD_D: f64 = 0.055;
 const SHEAR_RAD: f64 = 0.2;
@@ -207,11 +210,22 @@ impl Values {
         )
     }
 
+    /// By how many of its errors the given vsini is off the measured one; 0 if none is given.
+    fn disagreement(&self, known: &Known) -> f64 {
+        let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
+        known.vsini_kms.as_ref().map_or(0.0, |given| (given.value - measured).abs() / error)
+    }
+
+    /// Whether the given vsini is so wrong that it is not worth searching for an orbit.
+    pub fn is_another_star(&self, known: &Known) -> bool {
+        self.disagreement(known) > ANOTHER_STAR
+    }
+
     /// Given values that the profiles do not agree with, and an assumed one that matters.
     pub fn notes(&self, known: &Known) -> Vec<String> {
         let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
-        let disagrees = |given: &&Given<f64>| (given.value - measured).abs() > DISAGREEMENT * error;
-        let vsini = known.vsini_kms.as_ref().filter(disagrees).map(|given| {
+        let disagrees = self.disagreement(known) > DISAGREEMENT;
+        let vsini = known.vsini_kms.as_ref().filter(|_| disagrees).map(|given| {
             format!("vsini is given as {} km/s, the mean profile looks like {measured:.1} +- {error:.1}", given.value)
         });
         let days = self.look.span_d.1 - self.look.span_d.0;

@@ -103,16 +103,16 @@ fn periodogram(file: &Value) -> Chapter {
     let peaks = file.get("peaks").and_then(Value::as_array).cloned().unwrap_or_default();
     let share = |peak: &Value| peak.get("false_alarm_probability").and_then(Value::as_f64);
     let first = peaks.first().and_then(share).or(probability);
+    let rivals = rivals(&peaks);
     let verdict = first.map(|p| match p {
         p if p < 1e-2 => {
             let sure = if p < 1e-3 { "A significant signal" } else { "A signal, though not a sure one" };
             let shown = if p < 1e-3 { format!("{p:.1e}") } else { format!("{p:.4}") };
-            (
-                p < 1e-3,
-                format!(
-                    "{sure}: the probability that chance gives such a peak is {shown}. The notes say what else may."
-                ),
-            )
+            let what = format!("{sure}: the probability that chance gives such a peak is {shown}");
+            match &rivals {
+                Some(rivals) => (false, format!("{what}. But the period is ambiguous: {rivals}.")),
+                None => (p < 1e-3, format!("{what}. The notes say what else may.")),
+            }
         }
         p => (false, format!("No significant signal: the probability that chance gives such a peak is {p:.2}.")),
     });
@@ -136,11 +136,12 @@ fn periodogram(file: &Value) -> Chapter {
             number(peak, "/sigma_k_kms", 3),
             number(peak, "/delta_ln_l", 2),
             probability,
+            alias(peak).unwrap_or_else(|| "–".into()),
         ]
     };
     let mut notes = texts(file, "warnings");
     notes.extend(file.pointer("/co_rotation/statement").and_then(Value::as_str).map(str::to_owned));
-    let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm"];
+    let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias"];
     Chapter {
         heading: "Search for a planet".into(),
         verdict,
@@ -150,6 +151,32 @@ fn periodogram(file: &Value) -> Chapter {
         ],
         notes,
     }
+}
+
+/// Peaks that are lower than the highest by less than this in ln L may be the true one: odds of 20 to 1.
+const AMBIGUOUS: f64 = 3.0;
+
+/// The peaks that may as well be the true one, in words.
+fn rivals(peaks: &[Value]) -> Option<String> {
+    let height = |peak: &Value| peak.get("delta_ln_l").and_then(Value::as_f64);
+    let highest = peaks.first().and_then(height)?;
+    let rival = |peak: &Value| {
+        let below = highest - height(peak).filter(|height| highest - height < AMBIGUOUS)?;
+        let alias = alias(peak).map(|_| ", an alias").unwrap_or_default();
+        Some(format!("{} d{alias} (ln *L* lower by {below:.1})", number(peak, "/period_d", 4)))
+    };
+    let all: Vec<String> = peaks[1..].iter().filter_map(rival).collect();
+    match all.len() {
+        0 => None,
+        1..=3 => Some(format!("it may as well be {}", all.join(" or "))),
+        more => Some(format!("it may as well be {}, or one of {} more", all[..3].join(" or "), more - 3)),
+    }
+}
+
+/// How a peak is an alias of the highest.
+fn alias(peak: &Value) -> Option<String> {
+    let frequency = peak.pointer("/alias/window_frequency_per_d")?.as_f64()?;
+    Some(format!("of the first, by {frequency:.3}/d"))
 }
 
 fn landscape(header: &Value, paraboloid: &Value) -> Chapter {
@@ -169,15 +196,47 @@ fn landscape(header: &Value, paraboloid: &Value) -> Chapter {
     let verdict = match (paraboloid, refused) {
         (Value::Null, _) => Some((false, "The landscape is not finished, or has no paraboloid.".to_owned())),
         (_, Some(why)) => Some((false, format!("There is no paraboloid: {why}."))),
-        _ => Some((true, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned())),
+        _ => Some(match unbounded(&axes, paraboloid) {
+            Some(name) => (
+                false,
+                format!(
+                    "A paraboloid fits around the highest node, but the error bar of {} is more than half its axis: the nodes \
+                     do not bound it.",
+                    label(&name)
+                ),
+            ),
+            None => (true, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned()),
+        }),
     };
+    let fit = [
+        ("nodes that it was fitted to", number(paraboloid, "/nodes", 0)),
+        ("residuals, rms (chi2)", number(paraboloid, "/rms_chi2", 3)),
+        ("nodes reach above the lowest chi2 by", number(paraboloid, "/delta_chi2", 2)),
+    ];
+    let fitted = if paraboloid.get("nodes").is_some() { pairs(&fit) } else { Table::default() };
     let head = ["parameter", "axis", "nodes", "vertex", "error", "injected"];
     Chapter {
         heading: "Landscape".into(),
         verdict,
-        tables: vec![("Axes and paraboloid.".into(), table(&head, axes.iter().map(row).collect()))],
+        tables: vec![
+            ("Axes and paraboloid.".into(), table(&head, axes.iter().map(row).collect())),
+            ("Fit of the paraboloid.".into(), fitted),
+        ],
         notes: Vec::new(),
     }
+}
+
+/// The first axis that is shorter than two error bars.
+fn unbounded(axes: &[Value], paraboloid: &Value) -> Option<String> {
+    let is_short = |axis: &&Value| {
+        let end = |key: &str| axis.get(key).and_then(Value::as_f64);
+        let name = axis.get("name").and_then(Value::as_str).unwrap_or_default();
+        let error = paraboloid.pointer(&format!("/parameters/{name}/error")).and_then(Value::as_f64);
+        // an axis of a phase that goes once around is as long as that
+        let length = end("max").zip(end("min")).map(|(max, min)| if max > min { max - min } else { max - min + 1.0 });
+        error.zip(length).is_some_and(|(error, length)| error > 0.5 * length)
+    };
+    axes.iter().find(is_short).and_then(|axis| axis.get("name")?.as_str().map(str::to_owned))
 }
 
 fn optimum(file: &Value) -> Chapter {
@@ -252,5 +311,44 @@ fn comparison(file: &Value) -> Chapter {
             table(&["parameter", "by", "value", "68 % interval", "difference", "width"], rows),
         )],
         notes: texts(file, "notes"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn another_peak_nearly_as_high_makes_a_period_ambiguous() {
+        let search = |second: f64| {
+            let alias = json!({ "window_frequency_per_d": 1.003, "window": 0.7 });
+            let peak = |period: f64, height: f64, alias: Value| json!({ "period_d": period, "delta_ln_l": height, "false_alarm_probability": 1e-5, "alias": alias });
+            periodogram(&json!({ "peaks": [peak(4.0, 20.0, Value::Null), peak(1.33, second, alias)] }))
+        };
+        let (good, sentence) = search(16.0).verdict.unwrap();
+        assert!(good && !sentence.contains("ambiguous"), "{sentence}");
+        let chapter = search(17.5);
+        let (good, sentence) = chapter.verdict.unwrap();
+        assert!(
+            !good && sentence.contains("ambiguous: it may as well be 1.3300 d, an alias (ln *L* lower by 2.5)"),
+            "{sentence}"
+        );
+        let peaks = &chapter.tables[1].1;
+        assert_eq!((peaks.head.last().unwrap().as_str(), peaks.rows[0][5].as_str()), ("alias", "–"));
+        assert_eq!(peaks.rows[1][5], "of the first, by 1.003/d");
+    }
+
+    #[test]
+    fn a_landscape_shorter_than_its_error_bars_is_doubtful() {
+        let good = |error: f64| {
+            let header = json!({ "grid": { "axes": [{ "name": "k_kms", "min": 0.1, "max": 0.3, "nodes": 9 }] } });
+            let estimate = json!({ "vertex": 0.2, "error": error });
+            landscape(&header, &json!({ "parameters": { "k_kms": estimate }, "nodes": 9, "rms_chi2": 0.01 }))
+                .verdict
+                .unwrap()
+                .0
+        };
+        assert!(good(0.09) && !good(0.11));
     }
 }

@@ -109,7 +109,8 @@ fn footer(html: &mut String, page: &Page) {
         paper.start,
         doi = paper.doi
     );
-    let _ = writeln!(html, "<p>The program: <i>{}</i>, version {version}.</p>", escape(program));
+    let commit = env!("DIMCMC_COMMIT");
+    let _ = writeln!(html, "<p>The program: <i>{}</i>, version {version}{commit}.</p>", escape(program));
     if !page.provenance.is_empty() {
         html.push_str("<p class=\"source\">");
         for (label, value) in &page.provenance {

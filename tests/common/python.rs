@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 use std::fs::File;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -13,7 +14,8 @@ pub fn python() -> Option<PathBuf> {
     let found = environment();
     if let Err(problem) = &found {
         assert!(std::env::var_os("CI").is_none(), "no Python to test with: {problem}");
-        println!("skipped: no Python to test with: {problem}");
+        // past the test's capture, so that it is seen
+        let _ = writeln!(std::io::stderr(), "skipped: no Python to test with: {problem}");
     }
     found.ok()
 }
