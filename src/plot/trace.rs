@@ -188,7 +188,7 @@ pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
     let time = Panel {
         frame: frame(1.0),
         x: Axis::log("steps after the burn-in", [10.0, (kept as f64).max(20.0)]),
-        y: Axis::log("autocorrelation time *τ* (steps)", [0.7, 2.0 * largest]),
+        y: Axis::log("autocorrelation time *τ* (steps)", [0.15, 2.0 * largest]),
     };
     function.horizontal(&mut figure, "zero", 0.0, Stroke::new(GREY, 0.6));
     time.line(&mut figure, "limit", &[[10.0, 0.2], [1e6, 2e4]], Stroke::new(BLACK, 0.7).dashed());
