@@ -43,7 +43,10 @@
 //! # }
 //! ```
 
+pub mod batch;
 pub mod chain;
+#[cfg(feature = "mpi")]
+pub mod cluster;
 pub mod comparison;
 pub mod config;
 pub mod detection;
@@ -61,6 +64,7 @@ pub mod landscape;
 pub mod log_density;
 pub mod manifest;
 pub mod maxent;
+pub mod merge;
 pub mod objective;
 pub mod observation;
 pub mod optimise;
@@ -68,6 +72,7 @@ pub mod optimum;
 pub mod origin;
 pub mod periodogram;
 pub mod plot;
+pub mod pool;
 pub mod proposal;
 pub mod report;
 pub mod run;

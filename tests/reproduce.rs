@@ -7,7 +7,7 @@ mod desk;
 use desk::{dimcmc, text};
 use dimcmc::experiments::{Case, Nodes, Outcome, ROWS, star};
 use serde_json::{Value, json};
-use std::sync::atomic::AtomicBool;
+use dimcmc::pool::Pool;
 
 /// Injected orbit: no two numbers alike, phi far from its mirror image and from half a turn.
 const ORBIT: [(&str, f64); 3] = [("k_kms", 0.12), ("porb_over_prot", 1.6), ("phi", 0.2)];
@@ -25,7 +25,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
     let case =
         Case { name: "test".into(), config, grid: Some(Nodes::Around(5)), chain: false, periodogram: Some(1000) };
     let folder = tempfile::tempdir().unwrap();
-    case.run(folder.path(), &AtomicBool::new(false)).unwrap()
+    case.run(folder.path(), &Pool::default()).unwrap()
 }
 
 /// Deviation of every route from the injected value, in its error bars.
@@ -73,7 +73,7 @@ fn axes_are_not_swapped() {
     let at = Nodes::At([(0.06, 0.14, 3), (1.5, 1.9, 3), (0.4, 0.6, 3)]);
     let case = Case { name: "axes".into(), config, grid: Some(at), chain: false, periodogram: None };
     let folder = tempfile::tempdir().unwrap();
-    case.run(folder.path(), &AtomicBool::new(false)).unwrap();
+    case.run(folder.path(), &Pool::default()).unwrap();
     let text = std::fs::read_to_string(folder.path().join("grid/landscape.jsonl")).unwrap();
     let nodes: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let height = |node: &Value| node["log_likelihood"].as_f64().unwrap_or(f64::NEG_INFINITY);

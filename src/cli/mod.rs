@@ -4,6 +4,7 @@
 //! each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias = "analyze")]`.
 
 mod analyse;
+mod cluster;
 mod compare;
 mod completions;
 mod export;
@@ -49,12 +50,15 @@ pub struct Cli {
 /// Options of every command.
 #[derive(Debug, clap::Args)]
 pub struct Global {
-    /// Number of threads; all processors if not given. Results do not depend on it
+    /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do not depend on it
     #[arg(long, global = true, value_name = "N")]
     threads: Option<NonZeroUsize>,
     /// No progress bar
     #[arg(long, short, global = true)]
     quiet: bool,
+    #[cfg(feature = "mpi")]
+    #[arg(skip)]
+    ranks: cluster::Ranks,
 }
 
 #[derive(Debug, Subcommand)]
@@ -92,11 +96,8 @@ pub fn parse() -> Cli {
 
 /// Runs the command.
 pub fn run(cli: &Cli) -> Result<(), Failure> {
-    if let Some(threads) = cli.global.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.get())
-            .build_global()
-            .map_err(|e| Failure::failed(format!("--threads {threads}: {e}")))?;
+    if cluster::join(&cli.global)? == cluster::Done::Everything {
+        return Ok(());
     }
     match &cli.command {
         Command::Init(args) => init::run(args, &cli.global),

@@ -3,12 +3,12 @@
 use super::output::Output;
 use super::search::search;
 use super::signals::Signals;
-use super::{Failure, Global, analyse, progress};
+use super::{Failure, Global, analyse, cluster, progress};
 use dimcmc::chain::advice::growth_needed;
 use dimcmc::chain::{Convergence, Goals, Record};
 use dimcmc::ensemble::StopReason;
 use dimcmc::log_density::Status;
-use dimcmc::run::{Run, StartFrom};
+use dimcmc::run::{Run, RunError, StartFrom};
 use dimcmc::scene::Scene;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -54,12 +54,16 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let scene = Scene::load(&args.config)?;
     scene.settings.require_free()?;
     let folder = args.output.folder();
-    let failed = |e| Failure::run(&args.config, e);
     let signals = Signals::catch("step")?;
+    let pool = cluster::pool(global, &signals);
+    let failed = |error| match error {
+        RunError::Interrupted => signals.interrupted(error),
+        error => Failure::run(&args.config, error),
+    };
     let mut run = if resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the chain, reference image");
-        let run = Run::resume(&scene, folder, args.extend);
+        let run = Run::resume(&scene, folder, args.extend, &pool);
         spinner.finish_and_clear();
         run.map_err(failed)?
     } else {
@@ -71,19 +75,19 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         let spinner = progress::bar(global, None, "start of the walkers");
         args.output.check()?;
         signals.defer();
-        let run = Run::begin(&scene, folder, found, from, args.output.replaces());
+        let run = Run::begin(&scene, folder, found, from, args.output.replaces(), &pool);
         spinner.finish_and_clear();
         run.map_err(failed)?
     };
     signals.defer();
     let mut meter = Meter::new(global, &run);
-    let reason = run.go(signals.flag(), |records, convergence| meter.step(records, convergence));
+    let reason = run.go(&pool, |records, convergence| meter.step(records, convergence));
     meter.bar.finish_and_clear();
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);
             let (config, folder) = (args.config.display(), folder.display());
-            Err(Failure::failed(format!(
+            Err(signals.interrupted(format!(
                 "interrupted after step {step}; go on with: dimcmc sample {config} --out {folder} --resume"
             )))
         }
