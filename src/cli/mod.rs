@@ -4,6 +4,7 @@
 //! each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias = "analyze")]`.
 
 mod analyse;
+mod batch;
 mod cluster;
 mod compare;
 mod completions;
@@ -15,6 +16,7 @@ mod import;
 mod init;
 mod man;
 mod map;
+mod merge;
 mod optimise;
 mod output;
 mod periodogram;
@@ -75,6 +77,8 @@ enum Command {
     #[command(alias = "analyze")]
     Analyse(analyse::Args),
     Compare(compare::Args),
+    Merge(merge::Args),
+    Batch(batch::Args),
     Reproduce(reproduce::Args),
     Export(export::Args),
     Schema(schema::Args),
@@ -110,6 +114,8 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Sample(args) => sample::run(args, &cli.global),
         Command::Analyse(args) => analyse::run(args, &cli.global),
         Command::Compare(args) => compare::run(args, &cli.global),
+        Command::Merge(args) => merge::run(args, &cli.global),
+        Command::Batch(args) => batch::run(args, &cli.global),
         Command::Reproduce(args) => reproduce::run(args, &cli.global),
         Command::Export(args) => export::run(args, &cli.global),
         Command::Schema(args) => schema::run(args),

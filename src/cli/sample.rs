@@ -6,6 +6,7 @@ use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
 use dimcmc::chain::advice::growth_needed;
 use dimcmc::chain::{Convergence, Goals, Record};
+use dimcmc::config;
 use dimcmc::ensemble::StopReason;
 use dimcmc::log_density::Status;
 use dimcmc::run::{Run, RunError, StartFrom};
@@ -20,7 +21,8 @@ use std::time::{Duration, Instant};
 /// by whatever, goes on with --resume and comes to the same bytes as one that was not.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc sample configs/demo.json --out runs/demo\n  \
-                        dimcmc sample configs/demo.json --out runs/demo --extend 500")]
+                        dimcmc sample configs/demo.json --out runs/demo --extend 500\n  \
+                        dimcmc sample configs/demo.json --out runs/demo_2 --seed 2")]
 pub struct Args {
     /// Config file (JSON)
     config: PathBuf,
@@ -35,6 +37,9 @@ pub struct Args {
     /// Where the walkers start
     #[arg(long, value_enum, default_value = "optimum", conflicts_with_all = ["resume", "extend"])]
     start: Start,
+    /// In place of the config's sampler.seed: for runs of one config that are merged later
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -51,7 +56,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     if !resume {
         args.output.check()?;
     }
-    let scene = Scene::load(&args.config)?;
+    let scene = Scene::new(config::load_with_seed(&args.config, args.seed)?)?;
     scene.settings.require_free()?;
     let folder = args.output.folder();
     let signals = Signals::catch("step")?;
@@ -87,8 +92,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);
             let (config, folder) = (args.config.display(), folder.display());
+            let seed = args.seed.map(|seed| format!(" --seed {seed}")).unwrap_or_default();
             Err(signals.interrupted(format!(
-                "interrupted after step {step}; go on with: dimcmc sample {config} --out {folder} --resume"
+                "interrupted after step {step}; go on with: dimcmc sample {config} --out {folder}{seed} --resume"
             )))
         }
         StopReason::Converged | StopReason::StepLimit => analyse::report(folder, &run.manifest, &run.chain),
