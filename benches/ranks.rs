@@ -11,8 +11,8 @@ use common::table::{Table, Target, thousands};
 use dimcmc::cluster::{Answer, Queue, Rank, join};
 use dimcmc::ensemble::Sampler;
 use dimcmc::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
-use dimcmc::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Target as Density, Task};
 use dimcmc::origin::Origin;
+use dimcmc::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Target as Density, Task};
 use dimcmc::scene::Scene;
 use dimcmc::search::{self, SearchSettings};
 use dimcmc::surrogate::{Surrogate, SurrogateMove};
@@ -57,7 +57,8 @@ fn main() {
 
 /// A pool of one thread against the bare density, in turn.
 fn seam() {
-    let columns = ["free", "pixels", "bare: evaluations / s", "pool", &format!("seconds of the pool / bare ({OVERHEAD})")];
+    let columns =
+        ["free", "pixels", "bare: evaluations / s", "pool", &format!("seconds of the pool / bare ({OVERHEAD})")];
     let mut table = Table::new("The seam with one rank", &columns);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     one.install(|| {
@@ -66,7 +67,9 @@ fn seam() {
             let pool = Pool::default();
             let evaluations = Evaluations::new(&pool, &target, &task);
             let mut candidates = [
-                Candidate::new("bare", || bulk.points.iter().map(|theta| bulk.posterior.evaluate(theta)).collect::<Vec<_>>()),
+                Candidate::new("bare", || {
+                    bulk.points.iter().map(|theta| bulk.posterior.evaluate(theta)).collect::<Vec<_>>()
+                }),
                 Candidate::new("pool", || evaluations.evaluate(&bulk.points)),
             ];
             let times = in_turn(&mut candidates, ROUNDS, 1);
@@ -141,7 +144,8 @@ fn workers(queue: &Queue) {
 
 /// What a simulated cluster is made of.
 fn ingredients(queue: &Queue) {
-    let columns = ["free", "pixels", "ms of an evaluation: 5 %", "50 %", "95 %", "largest / mean", "ms of rank 0 for a proposal"];
+    let columns =
+        ["free", "pixels", "ms of an evaluation: 5 %", "50 %", "95 %", "largest / mean", "ms of rank 0 for a proposal"];
     let mut table = Table::new("Evaluations of the bulk, and what only rank 0 does", &columns);
     for (free, pixels) in CASES {
         let (bulk, ..) = density(free, pixels);
@@ -156,10 +160,14 @@ fn ingredients(queue: &Queue) {
         let spread = format!("{:.2}", quantile(&ms, 1.0) / mean);
         table.row([free.name().to_owned(), thousands(pixels), at(0.05), at(0.5), at(0.95), spread, proposal]);
     }
-    table.print("The fastest of three evaluations each; a proposal of the default mix, accepting and recording it included.");
+    table.print(
+        "The fastest of three evaluations each; a proposal of the default mix, accepting and recording it included.",
+    );
     let questions = vec![vec![0; 64]; ECHOES];
-    let alone: Vec<f64> = (0..20).map(|k| seconds(|| queue.answers(b"echo", &questions[k..=k], &AtomicBool::new(false)))).collect();
-    let many: Vec<f64> = (0..5).map(|_| seconds(|| queue.answers(b"echo", &questions, &AtomicBool::new(false)))).collect();
+    let alone: Vec<f64> =
+        (0..20).map(|k| seconds(|| queue.answers(b"echo", &questions[k..=k], &AtomicBool::new(false)))).collect();
+    let many: Vec<f64> =
+        (0..5).map(|_| seconds(|| queue.answers(b"echo", &questions, &AtomicBool::new(false)))).collect();
     println!(
         "A question and its answer, nothing to think about: {:.0} us alone, {:.1} us each in a row of {ECHOES} (medians).\n",
         1e6 * quantile(&alone, 0.5),

@@ -165,7 +165,8 @@ pub struct Row {
 /// What came of the stars, with the numbers in their summaries.
 pub fn rows(stars: &[Star], ends: &[End]) -> Vec<Row> {
     let row = |(star, end): (&Star, &End)| {
-        let summary = || -> Option<Summary> { serde_json::from_slice(&std::fs::read(star.folder.join(SUMMARY)).ok()?).ok() };
+        let summary =
+            || -> Option<Summary> { serde_json::from_slice(&std::fs::read(star.folder.join(SUMMARY)).ok()?).ok() };
         let summary = if *end == End::Sampled { summary() } else { None };
         Row {
             name: star.name.clone(),

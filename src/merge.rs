@@ -131,7 +131,10 @@ fn difference(first: &Manifest, second: &Manifest) -> Option<String> {
         }
     }
     if let Some(key) = config::first_difference(&a.config, &alike) {
-        return Some(format!("{} of the config is not the same", key.replace(" then, ", " and ").replace(" now)", ")")));
+        return Some(format!(
+            "{} of the config is not the same",
+            key.replace(" then, ", " and ").replace(" now)", ")")
+        ));
     }
     let what = match () {
         _ if a.data_sha256 != b.data_sha256 => "the observations are not the same".to_owned(),

@@ -53,7 +53,8 @@ fn main() -> ExitCode {
         println!("mpi: skipped, there is no mpirun");
         return if std::env::var_os("CI").is_some() { ExitCode::FAILURE } else { ExitCode::SUCCESS };
     }
-    let wanted = |name: &str| !args.iter().any(|arg| !arg.starts_with('-')) || args.iter().any(|arg| name.contains(arg));
+    let wanted =
+        |name: &str| !args.iter().any(|arg| !arg.starts_with('-')) || args.iter().any(|arg| name.contains(arg));
     for (name, check) in CHECKS.iter().filter(|(name, _)| wanted(name)) {
         let began = Instant::now();
         check();
@@ -287,13 +288,17 @@ fn order_and_rest() {
     let stdout = text(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let number = |name: &str| -> f64 {
-        let line = stdout.lines().find_map(|line| line.strip_prefix(name)).unwrap_or_else(|| panic!("{name}: {stdout}"));
+        let line =
+            stdout.lines().find_map(|line| line.strip_prefix(name)).unwrap_or_else(|| panic!("{name}: {stdout}"));
         line.trim().parse().unwrap()
     };
     assert_eq!(number("in order:"), 1.0);
     // ranks 1 and 2 of two threads each: four at once, so 40 answers of 50 ms take half a second and some
     let seconds = number("seconds:");
-    println!("40 answers of 50 ms by 4 threads on 2 ranks: {seconds:.3} s, processor of rank 0: {:.3} s", number("processor:"));
+    println!(
+        "40 answers of 50 ms by 4 threads on 2 ranks: {seconds:.3} s, processor of rank 0: {:.3} s",
+        number("processor:")
+    );
     assert!((0.5..1.5).contains(&seconds));
     // spinning would be all of it
     assert!(number("processor:") < 0.15 * seconds);

@@ -6,8 +6,8 @@ mod desk;
 
 use desk::{dimcmc, text};
 use dimcmc::experiments::{Case, Nodes, Outcome, ROWS, star};
-use serde_json::{Value, json};
 use dimcmc::pool::Pool;
+use serde_json::{Value, json};
 
 /// Injected orbit: no two numbers alike, phi far from its mirror image and from half a turn.
 const ORBIT: [(&str, f64); 3] = [("k_kms", 0.12), ("porb_over_prot", 1.6), ("phi", 0.2)];

@@ -6,7 +6,7 @@ use super::{Failure, Global, cluster, progress};
 use dimcmc::batch::{End, FILE, ListError, Row, read_list, rows, sample_all};
 use dimcmc::chain::ParameterSummary;
 use dimcmc::io::atomic::write_json;
-use dimcmc::text::aligned;
+use dimcmc::text::{Align, columns};
 use std::io::Write as _;
 use std::path::PathBuf;
 
@@ -68,7 +68,8 @@ fn table(rows: &[Row]) -> String {
             cells.push([vec![row.name.clone(), name.clone()], numbers(one, row.converged)].concat());
         }
     }
-    if cells.len() == 1 { failures } else { aligned(&cells) + &failures }
+    let aligns: Vec<Align> = (0..head.len()).map(|k| if k < 2 { Align::Left } else { Align::Right }).collect();
+    if cells.len() == 1 { failures } else { columns(&cells, &aligns) + &failures }
 }
 
 fn numbers(one: &ParameterSummary, converged: Option<bool>) -> Vec<String> {

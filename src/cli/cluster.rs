@@ -33,9 +33,12 @@ pub fn pool(global: &Global, signals: &Signals) -> Pool {
 #[cfg(not(feature = "mpi"))]
 pub fn join(global: &Global) -> Result<Done, Failure> {
     // as many programs as ranks would do the same in the same place
-    let several = |name| std::env::var(name).ok().and_then(|size: String| size.parse().ok()).is_some_and(|n: usize| n > 1);
+    let several =
+        |name| std::env::var(name).ok().and_then(|size: String| size.parse().ok()).is_some_and(|n: usize| n > 1);
     if ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].into_iter().any(several) {
-        return Err(Failure::input("started as several ranks, but built without MPI: cargo build --release --features mpi"));
+        return Err(Failure::input(
+            "started as several ranks, but built without MPI: cargo build --release --features mpi",
+        ));
     }
     threads(global.threads.map(Into::into))?;
     Ok(Done::Nothing)

@@ -2,8 +2,8 @@
 //!
 //! SIGTERM and SIGUSR1 come from a scheduler whose time is up, and the exit code says that the same command goes on.
 
-use super::failure::{INTERRUPTED, RESUME};
 use super::Failure;
+use super::failure::{INTERRUPTED, RESUME};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals as Incoming;
 use std::io::IsTerminal as _;

@@ -2,13 +2,13 @@
 //!
 //! Left out: the other side (`worker`).
 
+use super::Ranks;
 use super::message::{ANSWER, BRIEF, DISMISS, HELLO, QUESTION, STOP, number, numbered, split};
 use super::nap::Nap;
-use super::Ranks;
+use mpi::Rank;
 use mpi::environment::Universe;
 use mpi::point_to_point::MatchedReceiveVec as _;
 use mpi::traits::{Communicator as _, Destination as _, Root as _, Source as _};
-use mpi::Rank;
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -51,7 +51,10 @@ impl Queue {
         let (mut open, mut hurried, mut nap) = (0, false, Nap::new());
         loop {
             let stopped = stop.load(Relaxed);
-            while !stopped && let Some(&rank) = free.last() && let Some((place, question)) = left.next() {
+            while !stopped
+                && let Some(&rank) = free.last()
+                && let Some((place, question)) = left.next()
+            {
                 self.ranks.world.process_at_rank(rank).send_with_tag(&numbered(place, question)[..], QUESTION);
                 free.pop();
                 open += 1;

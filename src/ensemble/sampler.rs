@@ -96,8 +96,7 @@ impl<'a> Sampler<'a> {
     pub fn start(&self, positions: &[Vec<Vec<f64>>]) -> Result<(State, Vec<Record>), EnsembleError> {
         start::check_shape(positions, [self.ensembles, self.walkers, self.density.names().len()])?;
         start::check_spread(self.density, positions)?;
-        let evaluations =
-            self.evaluate(positions.iter().flatten().cloned().collect()).ok_or(EnsembleError::Stopped)?;
+        let evaluations = self.evaluate(positions.iter().flatten().cloned().collect()).ok_or(EnsembleError::Stopped)?;
         let walkers: Vec<Walker> = positions
             .iter()
             .flatten()

@@ -219,12 +219,7 @@ fn vertex(fitted: &Paraboloid) -> BTreeMap<String, Estimate> {
 }
 
 /// The chain, kept in `folder`, and its summary.
-pub fn chain(
-    scene: &Scene,
-    found: Found,
-    folder: &Path,
-    pool: &Pool,
-) -> Result<(Route, Summary), ExperimentError> {
+pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, Summary), ExperimentError> {
     let began = Instant::now();
     let resumed = folder.join(CHAIN).exists();
     let mut run = match Run::resume(scene, folder, None, pool) {

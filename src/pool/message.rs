@@ -27,13 +27,8 @@ pub trait Answer: Send + Sized {
 }
 
 /// All of them; the place is the number on the way.
-const STATUS: [Status; 5] = [
-    Status::Converged,
-    Status::Unreachable,
-    Status::OutsidePrior,
-    Status::StoppedShort,
-    Status::NonFinite,
-];
+const STATUS: [Status; 5] =
+    [Status::Converged, Status::Unreachable, Status::OutsidePrior, Status::StoppedShort, Status::NonFinite];
 
 /// Passes and status as numbers, which are exact.
 fn ended(passes: u32, status: Status) -> [f64; 2] {
@@ -104,7 +99,8 @@ mod tests {
                 let one = Evaluation { log_prob, spottedness: 0.1, chi2: 1e300, passes: u32::MAX, status };
                 let back = Evaluation::from_bytes(&one.to_bytes()).unwrap();
                 assert_eq!((back.log_prob.to_bits(), &back), (log_prob.to_bits(), &one));
-                let values = Likelihood { log_likelihood: log_prob, spottedness: 0.1, entropy: -2.0, chi2: 3.0, lambda: 0.2 };
+                let values =
+                    Likelihood { log_likelihood: log_prob, spottedness: 0.1, entropy: -2.0, chi2: 3.0, lambda: 0.2 };
                 for likelihood in [None, Some(values)] {
                     let one = Reconstruction { likelihood, passes: 7, status };
                     assert_eq!(Reconstruction::from_bytes(&one.to_bytes()), Some(one));

@@ -15,7 +15,9 @@ pub struct Target {
 
 /// The spots left over have no size that fits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("imaging.spots_left: no size of the spots left over fits the data; \"entropy\" takes them as the entropy has them")]
+#[error(
+    "imaging.spots_left: no size of the spots left over fits the data; \"entropy\" takes them as the entropy has them"
+)]
 pub struct SpotsLeftError;
 
 impl Target {

@@ -17,7 +17,8 @@ pub fn play(role: &str, args: &[String]) -> ExitCode {
         Rank::First(queue) => first(role, args, &queue),
         Rank::Other(worker) => {
             let rank = worker.rank();
-            let learn = |_: &[u8]| Ok::<Answer, Infallible>(Box::new(move |question, _| answer(role, args, rank, question)));
+            let learn =
+                |_: &[u8]| Ok::<Answer, Infallible>(Box::new(move |question, _| answer(role, args, rank, question)));
             let Ok(()) = worker.serve(learn);
         }
     }
