@@ -102,7 +102,7 @@ pub fn sample_all(stars: &[Star], pool: &Pool, done: &(dyn Fn() + Sync)) -> Vec<
         done();
         end
     };
-    let mut ends = pool.answers(&|| Brief::Stars, stars, here);
+    let mut ends = pool.answers(&Brief::Stars.to_bytes(), stars, here);
     ends.resize(stars.len(), End::Interrupted);
     ends
 }

@@ -72,11 +72,11 @@ impl Pool {
         self.stop.load(Relaxed)
     }
 
-    /// The answers to the first questions: to all, unless told to stop meanwhile. Other processes work by `brief`, this one by
-    /// `here`, which is the same; `brief` is asked for only where there are others.
+    /// The answers to the first questions: to all, unless told to stop meanwhile. Other processes work by `brief` (a [`Brief`] as
+    /// bytes), this one by `here`, which is the same.
     pub fn answers<Q: Question, A: Answer>(
         &self,
-        brief: &dyn Fn() -> Brief,
+        brief: &[u8],
         questions: &[Q],
         here: impl Fn(&Q) -> A + Sync,
     ) -> Vec<A> {
@@ -91,7 +91,7 @@ impl Pool {
             #[cfg(feature = "mpi")]
             Workers::Ranks(queue) => {
                 let questions: Vec<Vec<u8>> = questions.iter().map(Question::to_bytes).collect();
-                let answers = queue.answers(&brief().to_bytes(), &questions, &self.stop);
+                let answers = queue.answers(brief, &questions, &self.stop);
                 let read = |bytes: Vec<u8>| A::from_bytes(&bytes).expect("a rank of this very program answers");
                 answers.into_iter().map(read).collect()
             }
@@ -103,14 +103,14 @@ impl Pool {
 pub struct Evaluations<'a> {
     pool: &'a Pool,
     target: &'a Target,
-    task: &'a Task,
+    brief: Vec<u8>,
     count: AtomicUsize,
 }
 
 impl<'a> Evaluations<'a> {
     /// Of `target`, which others know by `task`.
-    pub fn new(pool: &'a Pool, target: &'a Target, task: &'a Task) -> Self {
-        Evaluations { pool, target, task, count: AtomicUsize::new(0) }
+    pub fn new(pool: &'a Pool, target: &'a Target, task: &Task) -> Self {
+        Evaluations { pool, target, brief: Brief::Density(task.clone()).to_bytes(), count: AtomicUsize::new(0) }
     }
 
     /// How many there were.
@@ -122,7 +122,6 @@ impl<'a> Evaluations<'a> {
 impl Evaluator for Evaluations<'_> {
     fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation> {
         self.count.fetch_add(batch.len(), Relaxed);
-        let brief = || Brief::Density(self.task.clone());
-        self.pool.answers(&brief, batch, |theta| self.target.evaluate(theta))
+        self.pool.answers(&self.brief, batch, |theta| self.target.evaluate(theta))
     }
 }
