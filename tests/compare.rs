@@ -70,6 +70,9 @@ fn chain_paraboloid_and_landscape_agree() {
     let phi = &found["parameters"]["phi"]["landscape"];
     assert!(number(&phi["ci68"][0]) <= number(&phi["value"]) && number(&phi["value"]) <= number(&phi["ci68"][1]));
     let cost = &found["cost"];
+    for who in ["chain", "landscape"] {
+        assert!(cost[who]["seconds"].as_f64().unwrap() > 0.0, "{cost}");
+    }
     assert_eq!(cost["chain"]["reconstructions"], summary["evaluations"]);
     assert_eq!((&cost["landscape"]["reconstructions"], &cost["landscape"]["failed"]), (&json!(121), &json!(0)));
     assert_eq!(cost["landscape"]["paraboloid_nodes"], paraboloid["nodes"]);
