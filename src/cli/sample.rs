@@ -8,6 +8,7 @@ use dimcmc::chain::advice::growth_needed;
 use dimcmc::chain::{Convergence, Goals, Record};
 use dimcmc::config;
 use dimcmc::ensemble::StopReason;
+use dimcmc::io::effort::Effort;
 use dimcmc::log_density::Status;
 use dimcmc::run::{Run, RunError, StartFrom};
 use dimcmc::scene::Scene;
@@ -52,6 +53,7 @@ enum Start {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let began = Instant::now();
     let resume = args.resume || args.extend.is_some();
     if !resume {
         args.output.check()?;
@@ -88,6 +90,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut meter = Meter::new(global, &run);
     let reason = run.go(&pool, |records, convergence| meter.step(records, convergence));
     meter.bar.finish_and_clear();
+    Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size())?;
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);

@@ -43,13 +43,6 @@ impl Target {
         };
         Some(surrogate?.fitted(self, evaluator))
     }
-
-    fn density(&self) -> &dyn LogDensity {
-        match &self.counted {
-            Some(counted) => counted,
-            None => &self.posterior,
-        }
-    }
 }
 
 impl LogDensity for Target {
@@ -58,7 +51,11 @@ impl LogDensity for Target {
     }
 
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
-        self.density().evaluate(theta)
+        let evaluation = self.posterior.evaluate(theta);
+        match &self.counted {
+            Some(counted) => counted.recount(self.posterior.space(), theta, evaluation),
+            None => evaluation,
+        }
     }
 
     fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
