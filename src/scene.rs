@@ -78,7 +78,7 @@ impl Scene {
     pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
         settings.check_velocity_grid(&settings.values, observations.step_kms)?;
         let star = settings.star_for(&observations)?;
-        let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
+        let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.entropy());
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, imager, space })

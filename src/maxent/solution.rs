@@ -115,7 +115,7 @@ impl Start {
     /// An image without data: every pixel at the default, and a lambda for which data begin to matter.
     pub fn blank(entropy: &Entropy, pixels: usize, lambda: f64) -> Self {
         Start {
-            image: Image { logit: vec![entropy.default_logit(); pixels], lambda },
+            image: Image { logit: vec![entropy.default_coordinate(); pixels], lambda },
             path: Vec::new(),
             chi2_slope: 0.0,
             adjoint: Vec::new(),

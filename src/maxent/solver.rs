@@ -67,17 +67,17 @@ impl Solver<'_> {
         let mut curvature = Curvature::GaussNewton;
         for newton_steps in 0.. {
             if !(at.chi2.is_finite() && at.entropy.is_finite()) {
-                return self.finish(problem, at, None, Vec::new(), Termination::NonFinite, newton_steps);
+                return self.finish(at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
             let guide = Guide { preconditioner: self.preconditioner, path: &path, adjoint: &start.adjoint };
             let standing = Standing::of(problem, self.entropy, &at, goal, guide);
-            let drop = start.best.map_or(0.0, |best| standing.below(&best, problem.area(), &at, goal));
+            let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal));
             if standing.error < self.settings.tolerance_at(drop) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
-                return self.finish(problem, at, Some(standing), path, why, newton_steps);
+                return self.finish(at, Some(standing), path, why, newton_steps);
             }
             if newton_steps == self.settings.newton_steps {
-                return self.finish(problem, at, Some(standing), path, Termination::StepLimit, newton_steps);
+                return self.finish(at, Some(standing), path, Termination::StepLimit, newton_steps);
             }
             let newton = self.newton(problem, &at, &standing, goal, path, curvature);
             let move_lambda = lambda_step(&at, newton.chi2_path, newton.chi2_step, goal);
@@ -108,7 +108,8 @@ impl Solver<'_> {
         let mut s = vec![0.0; u.len()];
         let entropy = self.entropy.value(&u, problem.area(), &mut s);
         let chi2 = problem.linearise(&s);
-        Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy }
+        let spottedness = self.entropy.spottedness(&s, problem.area());
+        Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy, spottedness }
     }
 
     /// Moves along the start's path to where its slope says that chi2 meets the goal: one pass that spares a Newton step.
@@ -203,14 +204,12 @@ impl Solver<'_> {
 
     fn finish(
         &self,
-        problem: &mut impl Problem,
         at: Point,
         standing: Option<Standing>,
         path: Vec<f64>,
         termination: Termination,
         newton_steps: usize,
     ) -> Solution {
-        let area = problem.area();
         let finite = at.chi2.is_finite() && at.entropy.is_finite() && at.lambda.is_finite();
         let (chi2_slope, spottedness_slope, spottedness_left) =
             standing.map_or((0.0, 0.0, 0.0), |s| (s.chi2_path, s.spottedness_path, s.spottedness_left));
@@ -218,7 +217,7 @@ impl Solver<'_> {
             termination: if finite { termination } else { Termination::NonFinite },
             chi2: at.chi2,
             entropy: at.entropy,
-            spottedness: dot(&at.s, area),
+            spottedness: at.spottedness,
             spottedness_left,
             image: Image { logit: at.u, lambda: at.lambda },
             chi2_slope,

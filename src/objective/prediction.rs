@@ -65,7 +65,8 @@ impl Prediction {
         let adjoint = match kind {
             ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => Vec::new(),
             ObjectiveKind::Spottedness => {
-                let inverse = solver.apply_inverse(&mut problem, &solution.image, &imager.grid.area);
+                let weights = imager.entropy.spottedness_gradient(&map, &imager.grid.area);
+                let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
                 let adjoint = inverse.iter().zip(&scale).zip(&solution.path);
                 adjoint.map(|((y, scale), path)| (y / scale + along_path * path) / scale).collect()
