@@ -10,7 +10,7 @@ use crate::io::truth::Truth;
 use crate::objective::{FreeParameter, ParameterSpace, ParameterValues};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
-use crate::star::{Quadrature, SurfaceGrid};
+use crate::star::{BrightnessModel, Quadrature, SurfaceGrid};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -91,8 +91,22 @@ impl Scene {
 
     /// The true spot map on the pixels of the image, if the observations are simulated.
     pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
+        self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
+    }
+
+    /// What the image should hold on its pixels, if the observations are simulated.
+    pub fn true_map(&self) -> Option<Vec<f64>> {
+        match self.settings.imaging.brightness {
+            BrightnessModel::Spots => self.true_spot_filling(),
+            BrightnessModel::BrightAndDark => {
+                self.simulation().map(|simulation| simulation.brightness(&self.imager.grid, self.imager.star.contrast))
+            }
+        }
+    }
+
+    fn simulation(&self) -> Option<&Simulation> {
         match &self.settings.source {
-            ObservationSource::Simulate(simulation) => Some(simulation.spot_filling(&self.imager.grid)),
+            ObservationSource::Simulate(simulation) => Some(simulation),
             ObservationSource::Files { .. } => None,
         }
     }
@@ -107,6 +121,8 @@ impl Scene {
             parameters: simulation.truth,
             // as the user wrote them: degrees of radians of degrees are not
             spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
+            faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
+            contrast: (!simulation.faculae.is_empty()).then_some(self.imager.star.contrast),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
             sigma: simulation.sigma(),

@@ -173,10 +173,12 @@ impl Posterior {
                 entropy.image(&solution.image.logit, &mut image);
                 entropy.metric(&image, area, &mut scale);
                 let exact = Solver { settings: SolverSettings::exact(), ..self.solver() };
-                let inverse = exact.apply_inverse(problem, &solution.image, &entropy.spottedness_gradient(&image, area));
+                let inverse =
+                    exact.apply_inverse(problem, &solution.image, &entropy.spottedness_gradient(&image, area));
                 let mu = solution.spottedness_slope / solution.chi2_slope;
                 let weight = -0.5 * curve_slope * lambda;
-                let adjoint = |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * (solution.path[p] * scale[p])) };
+                let adjoint =
+                    |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * (solution.path[p] * scale[p])) };
                 let direction = inverse.iter().enumerate().map(adjoint).collect();
                 (-0.5 * curve_slope * mu, Some(direction))
             }

@@ -2,7 +2,11 @@
 //! `S(B) = - sum_p a_p [ B ln(B/m) - B + m ]` with the default m = 1: profiles are divided by their continuum, and say nothing of
 //! the scale of B.
 //!
-//! The coordinate is `u = ln B`, which keeps B above 0. Left out: which entropy an image has (`entropy`), data.
+//! The coordinate is `u = ln B`, which keeps B above 0. Spottedness is the root mean square of `B - 1` over the surface. Its mean
+//! modulus would be nearer to the coverage of spots, but is traded for chi2 less faithfully: on the paper's star with faculae, two
+//! standard errors of K from the optimum, ln L by the root mean square is within 4 % of the regularised likelihood, by the mean
+//! modulus within 22 % (softened at 0.003 to 0.1: 12 to 21 %), because -S is the mean square to lowest order. It has no kink either.
+//! Left out: which entropy an image has (`entropy`), data.
 
 use super::Step;
 use crate::maxent::cg::dot;
@@ -25,6 +29,17 @@ pub(super) fn gradient(u: &[f64], area: &[f64], out: &mut [f64]) {
 /// Scale of the metric, `sqrt(B / a)`.
 pub(super) fn metric(b: &[f64], area: &[f64], out: &mut [f64]) {
     out.iter_mut().zip(b).zip(area).for_each(|((out, b), a)| *out = (b / a).sqrt());
+}
+
+/// Root mean square deviation from the default.
+pub(super) fn spottedness(b: &[f64], area: &[f64]) -> f64 {
+    b.iter().zip(area).map(|(b, a)| a * (b - 1.0).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Its gradient with respect to B; nought at the default, where it has none.
+pub(super) fn spottedness_gradient(b: &[f64], area: &[f64]) -> Vec<f64> {
+    let size = spottedness(b, area).max(f64::MIN_POSITIVE);
+    b.iter().zip(area).map(|(b, a)| a * (b - 1.0) / size).collect()
 }
 
 /// Logarithms moved by an image step: straight in B, in which data are nearly linear, but for what takes more than half of a
@@ -69,37 +84,5 @@ impl Task for NegativeValue<'_> {
             *term = *b * (u - 1.0) + 1.0;
         }
         dot(area, &terms)
-    }
-}
-
-// EXPERIMENT
-fn knob() -> (u8, f64) {
-    static KNOB: std::sync::OnceLock<(u8, f64)> = std::sync::OnceLock::new();
-    *KNOB.get_or_init(|| {
-        let text = std::env::var("H7A").unwrap_or("r".into());
-        let eps = text[1..].parse().unwrap_or(0.0);
-        (text.as_bytes()[0], eps)
-    })
-}
-
-pub(super) fn spottedness(b: &[f64], area: &[f64]) -> f64 {
-    let (kind, eps) = knob();
-    let sum = |f: &dyn Fn(f64) -> f64| b.iter().zip(area).map(|(b, a)| a * f(b - 1.0)).sum::<f64>();
-    match kind {
-        b'l' => sum(&|x| x.abs()),
-        b's' => sum(&|x| (x * x + eps * eps).sqrt() - eps),
-        b'q' => sum(&|x| x * x),
-        _ => sum(&|x| x * x).sqrt(),
-    }
-}
-
-pub(super) fn spottedness_gradient(b: &[f64], area: &[f64]) -> Vec<f64> {
-    let (kind, eps) = knob();
-    let g = |f: &dyn Fn(f64) -> f64| b.iter().zip(area).map(|(b, a)| a * f(b - 1.0)).collect::<Vec<f64>>();
-    match kind {
-        b'l' => g(&|x| x.signum()),
-        b's' => g(&|x| x / (x * x + eps * eps).sqrt()),
-        b'q' => g(&|x| 2.0 * x),
-        _ => { let r = spottedness(b, area); g(&|x| x / r) }
     }
 }
