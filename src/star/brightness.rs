@@ -15,6 +15,14 @@ pub enum BrightnessModel {
 }
 
 impl BrightnessModel {
+    /// The name used in configs and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            BrightnessModel::Spots => "spots",
+            BrightnessModel::BrightAndDark => "bright-and-dark",
+        }
+    }
+
     /// Whether it is the default, which configs need not mention.
     pub fn is_default(&self) -> bool {
         *self == BrightnessModel::default()
