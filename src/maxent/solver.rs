@@ -13,8 +13,8 @@ use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing, lambda_step};
 
-/// Largest change of a logit in one step.
-const LOGIT_CAP: f64 = 2.0;
+/// Largest change of a coordinate in one step.
+const STEP_CAP: f64 = 2.0;
 
 /// Largest change of ln(lambda) that is made before the first Newton step.
 const RESTORE_REACH: f64 = 0.3;
@@ -127,7 +127,7 @@ impl Solver<'_> {
         self.entropy.metric(&at.s, problem.area(), &mut ds);
         ds.iter_mut().zip(&start.path).for_each(|(d, z)| *d *= z);
         let mut u = vec![0.0; at.u.len()];
-        self.entropy.step(&at.u, &at.s, &ds, move_lambda, LOGIT_CAP, &mut u);
+        self.entropy.step(&at.u, &at.s, &ds, move_lambda, STEP_CAP, &mut u);
         self.arrive(problem, u, at.lambda * move_lambda.exp())
     }
 
@@ -195,7 +195,7 @@ impl Solver<'_> {
         let mut length = 1.0;
         loop {
             let mut u = vec![0.0; at.u.len()];
-            self.entropy.step(&at.u, &at.s, &ds, length, LOGIT_CAP, &mut u);
+            self.entropy.step(&at.u, &at.s, &ds, length, STEP_CAP, &mut u);
             let next = self.arrive(problem, u, lambda);
             let small = 1e-9 * before.abs() + self.settings.tolerance * lambda;
             if merit(&next) <= before + small || length < 1e-4 {

@@ -35,7 +35,7 @@ const REST_ERROR: f64 = 40.0;
 
 /// An image with what has been computed there.
 pub(super) struct Point {
-    /// Logits of the image.
+    /// Coordinates of the image.
     pub u: Vec<f64>,
     /// The image.
     pub s: Vec<f64>,

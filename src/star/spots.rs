@@ -1,4 +1,5 @@
-//! Hard-edged circular spots and faculae: the filling factor and the excess of brightness of a point of the surface.
+//! Hard-edged circular spots and faculae: the filling factor and the excess of brightness of a point of the surface. Left out: how bright
+//! a spot is (`brightness`).
 
 /// A circle on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
