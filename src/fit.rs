@@ -130,9 +130,9 @@ impl Fit {
     pub fn new(imager: &Imager, observations: &Observations, reference: &Reference) -> Self {
         let solution = &reference.solution;
         let mut map = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&solution.image.logit, &mut map);
+        imager.entropy.image(&solution.image.coordinates, &mut map);
         let mut problem = imager.problem(reference.response.clone());
-        let test = parallelism(&mut problem, imager.entropy, &solution.image.logit);
+        let test = parallelism(&mut problem, imager.entropy, &solution.image.coordinates);
         problem.linearise(&map);
         let depths: Vec<&[f64]> =
             (0..observations.profiles.len()).map(|k| &problem.model()[reference.response.bins(k)]).collect();

@@ -111,7 +111,7 @@ fn predictions_are_right_to_first_order() {
         let map = |posterior: &Posterior, theta: &[f64]| {
             let image = posterior.reconstruct(theta).0.image;
             let mut map = vec![0.0; imager.grid.len()];
-            imager.entropy.image(&image.logit, &mut map);
+            imager.entropy.image(&image.coordinates, &mut map);
             (map, image.lambda.ln())
         };
         let mut scale = vec![0.0; imager.grid.len()];

@@ -80,7 +80,7 @@ pub enum Termination {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// Coordinate of every pixel, as its entropy has it.
-    pub logit: Vec<f64>,
+    pub coordinates: Vec<f64>,
     /// Lagrange multiplier of chi2/2.
     pub lambda: f64,
 }
@@ -115,7 +115,7 @@ impl Start {
     /// An image without data: every pixel at the default, and a lambda for which data begin to matter.
     pub fn blank(entropy: &Entropy, pixels: usize, lambda: f64) -> Self {
         Start {
-            image: Image { logit: vec![entropy.default_coordinate(); pixels], lambda },
+            image: Image { coordinates: vec![entropy.default_coordinate(); pixels], lambda },
             path: Vec::new(),
             chi2_slope: 0.0,
             adjoint: Vec::new(),

@@ -58,7 +58,7 @@ struct Newton {
 impl Solver<'_> {
     /// Solves `problem` for `goal` from `start`.
     pub fn solve(&self, problem: &mut impl Problem, goal: Goal, start: &Start) -> Solution {
-        let mut at = self.arrive(problem, start.image.logit.clone(), start.image.lambda);
+        let mut at = self.arrive(problem, start.image.coordinates.clone(), start.image.lambda);
         if let Goal::Lambda(lambda) = goal {
             at.lambda = lambda;
         }
@@ -98,7 +98,7 @@ impl Solver<'_> {
     pub fn apply_inverse(&self, problem: &mut impl Problem, image: &Image, right: &[f64]) -> Vec<f64> {
         let n = right.len();
         let (mut s, mut scale) = (vec![0.0; n], vec![0.0; n]);
-        self.entropy.image(&image.logit, &mut s);
+        self.entropy.image(&image.coordinates, &mut s);
         self.entropy.metric(&s, problem.area(), &mut scale);
         let scaled: Vec<f64> = right.iter().zip(&scale).map(|(r, d)| r * d).collect();
         let mut z = vec![0.0; n];
@@ -222,7 +222,7 @@ impl Solver<'_> {
             entropy: at.entropy,
             spottedness: at.spottedness,
             spottedness_left,
-            image: Image { logit: at.u, lambda: at.lambda },
+            image: Image { coordinates: at.u, lambda: at.lambda },
             chi2_slope,
             spottedness_slope,
             path,

@@ -170,7 +170,7 @@ impl Posterior {
             _ => {
                 let (entropy, area) = (self.imager.entropy, &self.imager.grid.area);
                 let [mut image, mut scale] = [(); 2].map(|()| vec![0.0; area.len()]);
-                entropy.image(&solution.image.logit, &mut image);
+                entropy.image(&solution.image.coordinates, &mut image);
                 entropy.metric(&image, area, &mut scale);
                 let exact = Solver { settings: SolverSettings::exact(), ..self.solver() };
                 let inverse =
@@ -227,7 +227,7 @@ impl Gradient for Posterior {
         }
         let (weight, direction) = self.sensitivity(&solution, &mut problem);
         let mut image = vec![0.0; self.imager.grid.len()];
-        self.imager.entropy.image(&solution.image.logit, &mut image);
+        self.imager.entropy.image(&solution.image.coordinates, &mut image);
         let internal = self.space.to_internal(theta);
         let response = problem.response().clone();
         let at_fixed_map = |i: usize, h: f64| {

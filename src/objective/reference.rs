@@ -24,7 +24,8 @@ const CURVE_STEP: f64 = 0.25;
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
 const CURVE_REACH: (f64, f64) = (1.1, 0.8);
 
-/// Data begin to matter at lambda = this over their number, in the entropy's unit as all lambdas here: there the entropy of a spotted star is worth that many chi2.
+/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2. This
+/// and the lambdas below are in the entropy's unit.
 const BLANK_LAMBDA: f64 = 3e-3;
 
 /// A first preconditioner is built at this many times the target chi2, where images are cheap.
@@ -160,7 +161,7 @@ impl Reference {
         };
         let blank = Start::blank(&imager.entropy, imager.grid.len(), unit * BLANK_LAMBDA / data);
         let mut unspotted = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&blank.image.logit, &mut unspotted);
+        imager.entropy.image(&blank.image.coordinates, &mut unspotted);
         let blank_chi2 = problem.linearise(&unspotted);
         if blank_chi2 <= chi2_target {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
@@ -212,9 +213,9 @@ fn start(solution: &Solution) -> Start {
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.
 fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
-    let n = at.image.logit.len();
+    let n = at.image.coordinates.len();
     let (mut s, mut scale, mut scaled) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    imager.entropy.image(&at.image.logit, &mut s);
+    imager.entropy.image(&at.image.coordinates, &mut s);
     imager.entropy.metric(&s, problem.area(), &mut scale);
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
