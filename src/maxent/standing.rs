@@ -97,7 +97,7 @@ impl Standing {
             }
             Goal::Chi2 { .. } if guide.path.len() == n => {
                 let weights = entropy.spottedness_gradient(&at.s, problem.area());
-                standing.forecast(&weights, at, goal, guide);
+                standing.forecast(&weights, at, goal, guide, entropy.lowest_coordinate());
             }
             // without a path there is no telling how far chi2 is from its target
             Goal::Chi2 { .. } => {}
@@ -105,8 +105,8 @@ impl Standing {
         standing
     }
 
-    /// `weights` is the gradient of spottedness with respect to the image.
-    fn forecast(&mut self, weights: &[f64], at: &Point, goal: Goal, guide: Guide) {
+    /// `weights` is the gradient of spottedness with respect to the image, `lowest` the bound of the coordinates.
+    fn forecast(&mut self, weights: &[f64], at: &Point, goal: Goal, guide: Guide, lowest: f64) {
         let Guide { preconditioner, path, adjoint } = guide;
         let (g, right) = (&self.chi2_gradient, &self.right);
         self.chi2_path = 2.0 * dot(g, path);
@@ -119,6 +119,12 @@ impl Standing {
         }
         let mut left = right.clone();
         axpy(-move_lambda * at.lambda, g, &mut left);
+        // a pixel at its bound that would go beyond stays where it is, whatever the steps: no error that they could make smaller
+        for (left, u) in left.iter_mut().zip(&at.u) {
+            if *u <= lowest && *left < 0.0 {
+                *left = 0.0;
+            }
+        }
         let (spanned, rest) = preconditioner.norms(at.lambda, &left);
         let (spanned, rest) = (0.5 * spanned / at.lambda, 0.5 * rest / at.lambda);
         self.error = spanned + rest;

@@ -13,8 +13,8 @@ use crate::maxent::cg::dot;
 use crate::maxent::elementary::{exp_minus, ln_1p};
 use crate::vector::{Instructions, Task};
 
-/// Range of u: a pixel that bright outshines all others, and one that dark is nothing, its part of the gradient too.
-const LN_RANGE: (f64, f64) = (-300.0, 30.0);
+/// Largest |u|: a pixel that bright outshines, and one that dark is nothing beside, all the others.
+pub(super) const LN_LIMIT: f64 = 30.0;
 
 /// The image B.
 pub(super) fn image(u: &[f64], b: &mut [f64]) {
@@ -58,7 +58,7 @@ impl Task for LogarithmStep<'_> {
             let straight = relative.max(-0.5);
             let du = ln_1p(i, straight) + 2.0 * (relative - straight);
             capped |= du.abs() > cap;
-            *out = (u + du.clamp(-cap, cap)).clamp(LN_RANGE.0, LN_RANGE.1);
+            *out = (u + du.clamp(-cap, cap)).clamp(-LN_LIMIT, LN_LIMIT);
         }
         capped
     }

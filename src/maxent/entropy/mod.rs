@@ -56,6 +56,14 @@ impl Entropy {
         }
     }
 
+    /// Bound of the coordinates, below which no step leads: the image is as good as 0 there.
+    pub fn lowest_coordinate(&self) -> f64 {
+        match self {
+            Entropy::Spots { .. } => -spots::LOGIT_LIMIT,
+            Entropy::BrightAndDark => -bright_and_dark::LN_LIMIT,
+        }
+    }
+
     /// Image of the coordinates u.
     pub fn image(&self, u: &[f64], image: &mut [f64]) {
         match self {

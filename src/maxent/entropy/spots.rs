@@ -8,9 +8,8 @@ use crate::maxent::cg::dot;
 use crate::maxent::elementary::{exp_minus, ln_1p};
 use crate::vector::{Instructions, Task};
 
-/// Range of u: above it 1 - s would lose its precision; below it s is nothing, and even so much of a gradient that a pixel kept
-/// from leaving it is nothing beside the tolerances of the solver.
-const LOGIT_RANGE: (f64, f64) = (-300.0, 30.0);
+/// Largest |u|: beyond it s (1-s) would lose its precision.
+pub(super) const LOGIT_LIMIT: f64 = 30.0;
 
 /// The image s.
 pub(super) fn image(u: &[f64], s: &mut [f64]) {
@@ -46,7 +45,7 @@ impl Task for LogitStep<'_> {
         for (((out, u), s), ds) in out.iter_mut().zip(u).zip(image).zip(step) {
             let du = logit_step(i, *s, scale * ds);
             capped |= du.abs() > cap;
-            *out = (u + du.clamp(-cap, cap)).clamp(LOGIT_RANGE.0, LOGIT_RANGE.1);
+            *out = (u + du.clamp(-cap, cap)).clamp(-LOGIT_LIMIT, LOGIT_LIMIT);
         }
         capped
     }
