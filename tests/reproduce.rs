@@ -25,9 +25,9 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
     let lone = [("/planet", json!({ "k_kms": 0.0, "porb_over_prot": 1.0, "phi": 0.0 }))];
     let config = star::with(star::with(star::paper(), &lone), changes);
     std::fs::write(folder.path().join("lone.json"), config.to_string()).unwrap();
-    let simulated = dimcmc(&["simulate", "lone.json", "--out", "."], folder.path());
+    let simulated = dimcmc(&["simulate", "lone.json", "--out", "profiles"], folder.path());
     assert!(simulated.status.success(), "{}", text(&simulated.stderr));
-    let list = std::fs::read_to_string(folder.path().join("observations.txt")).unwrap();
+    let list = std::fs::read_to_string(folder.path().join("profiles/observations.txt")).unwrap();
     let [(_, k), (_, period), (_, phi)] = ORBIT;
     let shifted = |line: &str| {
         let (file, time) = line.split_once(char::is_whitespace).unwrap();
@@ -36,9 +36,9 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
         format!("{file} {time} {}\n", -velocity)
     };
     let shifted: String = list.lines().filter(|line| !line.starts_with('#')).map(shifted).collect();
-    std::fs::write(folder.path().join("shifted.txt"), shifted).unwrap();
+    std::fs::write(folder.path().join("profiles/shifted.txt"), shifted).unwrap();
     let own = [
-        ("/observations", json!({ "path": folder.path().join("shifted.txt") })),
+        ("/observations", json!({ "path": folder.path().join("profiles/shifted.txt") })),
         ("/imaging/pixels", json!(1500)),
         ("/parameters/porb_over_prot/min", json!(1.2)),
         ("/parameters/porb_over_prot/max", json!(2.2)),
@@ -48,7 +48,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
     let config = star::with(config, &own);
     let case =
         Case { name: "test".into(), config, grid: Some(Nodes::Around(5)), chain: false, periodogram: Some(1000) };
-    let mut outcome = case.run(&folder.path().join("case"), &AtomicBool::new(false)).unwrap();
+    let mut outcome = case.run(folder.path(), &AtomicBool::new(false)).unwrap();
     outcome.truth = ORBIT.map(|(name, value)| (name.to_owned(), value)).into();
     outcome
 }
