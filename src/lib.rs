@@ -56,6 +56,7 @@ pub mod first_look;
 pub mod fit;
 pub mod imaging;
 pub mod import;
+pub mod injection;
 pub mod io;
 pub mod landscape;
 pub mod log_density;

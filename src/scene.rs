@@ -4,7 +4,7 @@
 
 use crate::config::{self, ConfigError, ObservationSource, Settings};
 use crate::imaging::Imager;
-use crate::io::lsd::{self, LsdError};
+use crate::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::io::provenance::Provenance;
 use crate::io::truth::Truth;
 use crate::objective::{FreeParameter, ParameterSpace, ParameterValues};
@@ -82,6 +82,23 @@ impl Scene {
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, imager, space })
+    }
+
+    /// The profiles in their whole width, errors as quoted, with what the list says of each: what is injected into.
+    ///
+    /// # Errors
+    /// Files that are no longer what they were.
+    pub fn whole(&self) -> Result<(Observations, Vec<Label>), LsdError> {
+        match &self.settings.source {
+            ObservationSource::Files { path, .. } => {
+                Ok((lsd::read(path, &ReadOptions::default())?.observations, lsd::labels(path)?))
+            }
+            ObservationSource::Simulate(_) => {
+                let name = |k: usize| Label { file: format!("simulated profile {k}"), vrad_kms: 0.0 };
+                let profiles = self.observations.profiles.len();
+                Ok((self.observations.clone(), (0..profiles).map(name).collect()))
+            }
+        }
     }
 
     /// The space of the parameters in `free`, starting at the config's values, all others fixed there.

@@ -15,7 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &["objective"],
     &["expansion"],
     &["surrogate"],
-    &["simulate", "fit", "detection"],
+    &["simulate", "injection", "fit", "detection"],
     &["io"],
     &["config"],
     &["scene", "search"],
@@ -47,6 +47,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("optimise", &["log_density"]),
     ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
     ("first_look", &["observation", "star"]),
+    ("injection", &["observation", "star"]),
     // from saved files alone: nothing that reconstructs, samples or searches
     (
         "plot",

@@ -12,6 +12,7 @@ mod grid;
 mod groups;
 mod import;
 mod init;
+mod inject;
 mod man;
 mod map;
 mod optimise;
@@ -62,6 +63,7 @@ enum Command {
     Init(init::Args),
     Import(import::Args),
     Simulate(simulate::Args),
+    Inject(inject::Args),
     Map(map::Args),
     Periodogram(periodogram::Args),
     #[command(alias = "optimize")]
@@ -102,6 +104,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Init(args) => init::run(args, &cli.global),
         Command::Import(args) => import::run(args, &cli.global),
         Command::Simulate(args) => simulate::run(args),
+        Command::Inject(args) => inject::run(args),
         Command::Map(args) => map::run(args, &cli.global),
         Command::Periodogram(args) => periodogram::run(args, &cli.global),
         Command::Optimise(args) => optimise::run(args, &cli.global),

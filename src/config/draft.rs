@@ -135,7 +135,7 @@ fn bounded(prior: PriorKind, (min, max): (f64, f64)) -> PriorSection {
 }
 
 /// Indented JSON with every object and list that fits on one line put on one line, but for the outermost.
-fn compact(pretty: &str) -> String {
+pub(super) fn compact(pretty: &str) -> String {
     let lines: Vec<&str> = pretty.lines().collect();
     let indent = |line: &str| line.len() - line.trim_start().len();
     let (mut text, mut k) = (String::new(), 0);

@@ -47,6 +47,11 @@ pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
     resolve::resolve(raw, path).map_err(|fault| fault.within(path))
 }
 
+/// A config as text, laid out for people.
+pub fn to_text(config: &serde_json::Value) -> String {
+    draft::compact(&format!("{config:#}"))
+}
+
 /// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.
 pub fn schema() -> String {
     let schema = schemars::schema_for!(raw::Config);

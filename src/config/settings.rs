@@ -154,6 +154,22 @@ impl Settings {
         Ok(())
     }
 
+    /// The config with other observations in place of its own, those of a list at `path`; cut and errors of observed ones stay.
+    pub fn with_observations(&self, path: &str) -> serde_json::Value {
+        let mut config = self.resolved.clone();
+        if let Some(top) = config.as_object_mut() {
+            top.remove("$schema");
+        }
+        let section = &mut config["observations"];
+        match section.as_object_mut().filter(|section| !section.contains_key("simulate")) {
+            Some(section) => {
+                section.insert("path".into(), path.into());
+            }
+            None => *section = serde_json::json!({ "path": path }),
+        }
+        config
+    }
+
     fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }

@@ -136,8 +136,9 @@ fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, Plot
 }
 
 fn simulation_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
-    let map = star_map::injected(folder)?;
-    Ok(vec![map, profiles::figure(&profiles::simulated(folder)?)])
+    let mut figures: Vec<Figure> = star_map::injected(folder)?.into_iter().collect();
+    figures.push(profiles::figure(&profiles::simulated(folder)?));
+    Ok(figures)
 }
 
 fn chain_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {

@@ -31,8 +31,8 @@ struct MapFile {
 /// What is used of `truth.json`.
 #[derive(Deserialize)]
 struct TruthFile {
-    spots: Value,
-    spottedness: f64,
+    spots: Option<Value>,
+    spottedness: Option<f64>,
     times_d: Vec<f64>,
     config: Value,
 }
@@ -78,13 +78,16 @@ pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
 }
 
 /// The injected map of the simulation in `folder`.
-pub(super) fn injected(folder: &Path) -> Result<Figure, PlotError> {
+///
+/// `None` of observed profiles that an orbit was put into.
+pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     let truth: TruthFile = origin::read(folder, TRUTH)?;
+    let (Some(written), Some(spottedness)) = (&truth.spots, truth.spottedness) else { return Ok(None) };
     let number = |key: &str| truth.config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
     let (period, epoch) = (number("rotation_period_d").unwrap_or(f64::NAN), number("epoch_d").unwrap_or(0.0));
     let cycles: Vec<f64> = truth.times_d.iter().map(|t| (t - epoch) / period).filter(|c| c.is_finite()).collect();
-    let star = Star { title: title("injected", Some(truth.spottedness)), pixels: None, spots: spots(&truth.spots) };
-    Ok(draw(&[star], &cycles, format!("Map of the injected spots at cycle 0. {HOW_TO_READ}")))
+    let star = Star { title: title("injected", Some(spottedness)), pixels: None, spots: spots(written) };
+    Ok(Some(draw(&[star], &cycles, format!("Map of the injected spots at cycle 0. {HOW_TO_READ}"))))
 }
 
 fn title(what: &str, spottedness: Option<f64>) -> String {
@@ -102,7 +105,8 @@ const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above th
 fn known_spots(folder: &Path) -> Result<Option<Injected>, PlotError> {
     if folder.join(TRUTH).is_file() {
         let truth: TruthFile = origin::read(folder, TRUTH)?;
-        return Ok(Some(Injected { spots: spots(&truth.spots), spottedness: Some(truth.spottedness) }));
+        let injected = |written| Injected { spots: spots(&written), spottedness: truth.spottedness };
+        return Ok(truth.spots.map(injected));
     }
     if !folder.join(velocities::FIT).is_file() {
         return Ok(None);
