@@ -62,6 +62,7 @@ pub mod landscape;
 pub mod log_density;
 pub mod manifest;
 pub mod maxent;
+pub mod noise;
 pub mod objective;
 pub mod observation;
 pub mod optimise;

@@ -2,12 +2,13 @@
 //!
 //! Left out: anything that takes a reconstruction.
 
-use crate::config::{self, ConfigError, ObservationSource, Settings};
+use crate::config::{self, Automatic, ConfigError, ObservationSource, Settings};
 use crate::imaging::Imager;
 use crate::io::lsd::{self, Label, LsdError, ReadOptions};
-use crate::io::provenance::Provenance;
+use crate::io::provenance::{Measured, Provenance};
 use crate::io::truth::Truth;
-use crate::objective::{FreeParameter, ParameterSpace, ParameterValues};
+use crate::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
+use crate::objective::{FreeParameter, ParameterSpace, ParameterValues, ReferenceError, target};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::{Quadrature, SurfaceGrid};
@@ -25,6 +26,8 @@ pub struct Scene {
     pub data_sha256: String,
     /// The parameters that were simulated; `None` for observations from files.
     pub truth: Option<ParameterValues>,
+    /// What the config leaves to the observations: errors, target chi2. In `settings` the target is a number.
+    pub measured: Measured,
     /// What the observations are imaged with.
     pub imager: Imager,
     /// The free parameters, starting at the config's values; its dimension may be 0.
@@ -56,10 +59,19 @@ impl Scene {
     /// # Errors
     /// Observations that cannot be read or make no sense.
     pub fn new(settings: Settings) -> Result<Self, SceneError> {
+        let mut errors = None;
         let (observations, data_sha256, truth) = match &settings.source {
-            ObservationSource::Files { path, options } => {
+            ObservationSource::Files { path, options, errors: wanted } => {
                 let data = lsd::read(path, options)?;
-                (data.observations, data.sha256, None)
+                if *wanted == ErrorSettings::default() {
+                    (data.observations, data.sha256, None)
+                } else {
+                    let whole = lsd::read(path, &ReadOptions::default())?.observations;
+                    let (observations, measured) = with_errors(&settings, *wanted, &whole, data.observations)?;
+                    errors = Some(measured);
+                    let sha256 = fingerprint(&observations);
+                    (observations, sha256, None)
+                }
             }
             ObservationSource::Simulate(simulation) => {
                 settings.check_velocity_grid(&simulation.truth, simulation.step_kms)?;
@@ -68,20 +80,28 @@ impl Scene {
                 (observations, sha256, Some(simulation.truth))
             }
         };
-        Ok(Scene { data_sha256, truth, ..Scene::of(settings, observations)? })
+        let mut scene = Scene::of(settings, observations)?;
+        scene.measured.errors = errors;
+        Ok(Scene { data_sha256, truth, ..scene })
     }
 
-    /// The scene of observations at hand, whatever `settings` say of where they come from.
+    /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left to them
+    /// is chosen.
     ///
     /// # Errors
     /// Settings that make no sense with these observations.
-    pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
-        settings.check_velocity_grid(&settings.values, observations.step_kms)?;
-        let star = settings.star_for(&observations)?;
-        let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
+    pub fn of(mut settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
+        let imager = imager(&settings, &observations)?;
+        let mut measured = Measured::default();
+        if settings.imaging.chi2_target == Automatic::Auto {
+            let fault = |e: ReferenceError| settings.fault("imaging.chi2_target", &e.to_string());
+            let chosen = target::choose(&imager, settings.values).map_err(fault)?;
+            settings.imaging.chi2_target = Automatic::Fixed(chosen.value);
+            measured.chi2_target = Some(chosen);
+        }
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
-        Ok(Scene { settings, observations, data_sha256, truth: None, imager, space })
+        Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
     }
 
     /// The profiles in their whole width, errors as quoted, with what the list says of each: what is injected into.
@@ -142,8 +162,37 @@ impl Scene {
             data_sha256: self.data_sha256.clone(),
             config_sha256: self.settings.sha256.clone(),
             config: self.settings.resolved.clone(),
+            measured: self.measured.clone(),
         }
     }
+}
+
+/// What `observations` are imaged with.
+fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
+    settings.check_velocity_grid(&settings.values, observations.step_kms)?;
+    let star = settings.star_for(observations)?;
+    Ok(Imager::new(star, observations, settings.imaging.pixels, settings.imaging.default_spot))
+}
+
+/// The observations, cut as they are used, with the errors that they and the `whole` profiles ask for.
+fn with_errors(
+    settings: &Settings,
+    wanted: ErrorSettings,
+    whole: &Observations,
+    cut: Observations,
+) -> Result<(Observations, MeasuredErrors), ConfigError> {
+    let fault = |e: NoiseError| settings.fault(e.key(), &e.to_string());
+    let scaled = |measured: &MeasuredErrors| {
+        let mut observations = cut.clone();
+        measured.apply(&mut observations);
+        observations
+    };
+    let mut measured = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
+    if wanted.measured {
+        let imager = imager(settings, &scaled(&measured))?;
+        measured.count_residuals(&imager, settings.values).map_err(fault)?;
+    }
+    Ok((scaled(&measured), measured))
 }
 
 fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {

@@ -15,7 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &["objective"],
     &["expansion"],
     &["surrogate"],
-    &["simulate", "injection", "fit", "detection"],
+    &["simulate", "injection", "noise", "fit", "detection"],
     &["io"],
     &["config"],
     &["scene", "search"],
@@ -48,6 +48,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
     ("first_look", &["observation", "star"]),
     ("injection", &["observation", "star"]),
+    ("noise", &["first_look", "imaging", "objective", "observation", "star"]),
     // from saved files alone: nothing that reconstructs, samples or searches
     (
         "plot",

@@ -75,7 +75,7 @@ fn what_a_list_says_stays() {
     );
     assert_eq!(config["planet"]["k_kms"], 0.0, "the start is the config's");
     let list = desk.read("injected/observations.txt");
-    assert!(list.contains("p003.prof 2.07 -3.5  # p003.prof"), "{list}");
+    assert!(list.contains("p010.prof 6.9 -3.5  # p010.prof"), "{list}");
     let (before, after) = (read(&desk, "data"), read(&desk, "injected"));
     for (b, a) in before.profiles.iter().zip(&after.profiles) {
         assert_eq!((b.time_d, b.intensity.len()), (a.time_d, a.intensity.len()));

@@ -88,7 +88,7 @@ fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
 
 fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
     DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target,
+        chi2_target: scene.settings.imaging.chi2_target.value(),
         nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
         search: SearchSettings { draws: args.draws as usize, seed: args.seed },
         eccentric: args.eccentric,

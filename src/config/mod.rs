@@ -3,6 +3,7 @@
 //! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for), and every
 //! error names the file and the key. Left out: reading the observations (`io::lsd`), and anything done with the settings.
 
+mod automatic;
 mod domain;
 mod draft;
 mod error;
@@ -17,13 +18,16 @@ mod settings;
 mod suggest;
 
 pub use crate::ensemble::SamplerSettings;
+pub use automatic::Automatic;
 pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, model_difference, section_difference};
-pub use raw_parts::EquivalentWidth;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;
+
+/// Equivalent width of the local line; automatic: the mean area of the observed profiles.
+pub type EquivalentWidth = Automatic;
 
 /// Reads and resolves the config at `path`. Paths in it start from its folder.
 ///

@@ -2,7 +2,7 @@
 
 use super::error::Fault;
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
-use super::raw_parts::EquivalentWidth;
+use super::EquivalentWidth;
 use super::resolve::positive;
 use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use crate::units::{instrumental_sigma_kms, planck_contrast};

@@ -1,9 +1,9 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
-use super::raw_parts::EquivalentWidth;
-use super::{ConfigError, SamplerSettings};
+use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings};
 use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
+use crate::noise::ErrorSettings;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, SpotsLeft};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
@@ -48,8 +48,10 @@ pub enum ObservationSource {
     Files {
         /// The list, relative to the working directory.
         path: PathBuf,
-        /// Cut and scaling.
+        /// Cut and scaling, by 1 where that is left to the observations.
         options: ReadOptions,
+        /// What the observations are to say of their errors.
+        errors: ErrorSettings,
     },
     /// A simulation.
     Simulate(Simulation),
@@ -63,8 +65,9 @@ pub struct ImagingSettings {
     pub pixels: usize,
     /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5.
     pub default_spot: f64,
-    /// Target chi2 per datum, above 0.
-    pub chi2_target: f64,
+    /// Target chi2 per datum, above 0. "auto": the highest value below which the radial velocities that are left over, observed
+    /// minus modelled, stop shrinking, at the config's values.
+    pub chi2_target: Automatic,
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
     /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
@@ -77,7 +80,7 @@ impl Default for ImagingSettings {
         ImagingSettings {
             pixels: 2000,
             default_spot: 1e-4,
-            chi2_target: 0.97,
+            chi2_target: Automatic::Fixed(0.97),
             objective: ObjectiveKind::default(),
             spots_left: SpotsLeft::default(),
         }
@@ -170,7 +173,8 @@ impl Settings {
         config
     }
 
-    fn fault(&self, key: &str, problem: &str) -> ConfigError {
+    /// That something is wrong with a key.
+    pub fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }
 }

@@ -22,6 +22,51 @@ pub struct Noise {
     pub scatter: Option<f64>,
 }
 
+/// How much the continuum of a profile scatters about straight lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scatter {
+    /// Sum of the squares, in units of the quoted errors.
+    pub chi2: f64,
+    /// Number of bins, less two for every line.
+    pub freedom: usize,
+}
+
+impl Scatter {
+    /// The continuum of `profile` beside a line that reaches `reach_kms` to either side of `centre_kms`, as far again, about a
+    /// straight line on each side: neither level nor slope counts.
+    pub fn of(profile: &Profile, step_kms: f64, centre_kms: f64, reach_kms: f64) -> Self {
+        let side = |sign: f64| {
+            let distance = move |j: usize| sign * (profile.velocity_kms(j, step_kms) - centre_kms);
+            let inside = move |j: &usize| (reach_kms..=OUTER * reach_kms).contains(&distance(*j));
+            let bins: Vec<usize> = (0..profile.intensity.len()).filter(inside).collect();
+            about_a_line(bins.iter().map(|&j| (j as f64, profile.intensity[j], profile.sigma[j].powi(-2))))
+        };
+        let sides = [side(-1.0), side(1.0)];
+        Scatter {
+            chi2: sides.iter().map(|side| side.chi2).sum(),
+            freedom: sides.iter().map(|side| side.freedom).sum(),
+        }
+    }
+
+    /// Scatter over quoted errors; `None` of fewer than `least` degrees of freedom, and of none at all.
+    pub fn ratio(&self, least: usize) -> Option<f64> {
+        (self.freedom >= least && self.chi2 > 0.0).then(|| (self.chi2 / self.freedom as f64).sqrt())
+    }
+}
+
+/// Of points (x, y, weight) about the straight line that fits them best; nothing of fewer than three.
+fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatter {
+    let count = points.clone().count();
+    if count < 3 {
+        return Scatter::default();
+    }
+    let sum = |f: &dyn Fn(f64, f64) -> f64| points.clone().map(|(x, y, w)| w * f(x, y)).sum::<f64>();
+    let weight = sum(&|_, _| 1.0);
+    let (x0, y0) = (sum(&|x, _| x) / weight, sum(&|_, y| y) / weight);
+    let slope = sum(&|x, y| (x - x0) * (y - y0)) / sum(&|x, _| (x - x0).powi(2));
+    Scatter { chi2: sum(&|x, y| (y - y0 - slope * (x - x0)).powi(2)), freedom: count - 2 }
+}
+
 impl Noise {
     /// Errors of profiles whose line reaches `reach_kms` to either side of `centre_kms`.
     pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Self {
@@ -48,5 +93,21 @@ impl Noise {
     /// Scatter over quoted errors; `None` where there is no continuum to tell.
     pub fn ratio(&self) -> Option<f64> {
         self.scatter.map(|scatter| scatter / self.quoted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Level and slope leave no trace, and of points about a line the scatter is that of a fit by hand: y = 1, 0, 1 about 2/3.
+    #[test]
+    fn slopes_do_not_count() {
+        let line = |j: usize| 1.3 - 0.01 * j as f64;
+        let even = about_a_line((0..10).map(|j| (j as f64, line(j), 4.0)));
+        assert!(even.chi2 < 1e-20 && even.freedom == 8, "{even:?}");
+        let bent = about_a_line([(0.0, 1.0, 2.0), (1.0, 0.0, 2.0), (2.0, 1.0, 2.0)].into_iter());
+        assert!((bent.chi2 - 2.0 * 2.0 / 3.0).abs() < 1e-12 && bent.freedom == 1, "{bent:?}");
+        assert_eq!(about_a_line([(0.0, 1.0, 1.0); 2].into_iter()), Scatter::default());
     }
 }

@@ -33,8 +33,11 @@ const FIRST_CHI2: f64 = 1.5;
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
 const HOPELESS_LAMBDA: f64 = 40.0;
 
-/// A provisional reference takes what it gets at lambda = this over the number of data.
-const PROVISIONAL_LAMBDA: f64 = 3.0;
+/// chi2 per datum that no map of noisy data comes down to.
+const OUT_OF_REACH: f64 = 1e-6;
+
+/// A provisional reference takes what it gets at lambda = this over the number of data: beyond, noise is turned into spots.
+pub const PROVISIONAL_LAMBDA: f64 = 3.0;
 
 /// The reference image and what belongs to it.
 #[derive(Clone, Debug)]
@@ -132,6 +135,18 @@ impl Reference {
         match reference.solution.termination {
             Termination::NonFinite => Err(ReferenceError::Solver(Termination::NonFinite)),
             _ => Ok(reference),
+        }
+    }
+
+    /// The image at `lambda` over the number of data, whatever its chi2.
+    ///
+    /// # Errors
+    /// If the solver fails.
+    pub fn at_lambda(imager: &Imager, values: ParameterValues, lambda: f64) -> Result<Self, ReferenceError> {
+        let reference = Reference::approach(imager, values, OUT_OF_REACH, lambda)?;
+        match reference.solution.termination {
+            Termination::Unreachable => Ok(reference),
+            other => Err(ReferenceError::Solver(other)),
         }
     }
 
