@@ -20,10 +20,13 @@ const KAISER: f64 = 10.0;
 /// Bins at either end whose mean the continuum goes on with.
 const END: usize = 4;
 
-/// `observations` with the velocity of `orbit` added to every profile's own.
-pub fn inject(observations: &Observations, star: &StarSettings, orbit: &Orbit) -> Observations {
+/// `observations` with the velocities of all `orbits` added to every profile's own.
+pub fn inject(observations: &Observations, star: &StarSettings, orbits: &[Orbit]) -> Observations {
     let step_kms = observations.step_kms;
-    let velocity = |profile: &Profile| orbit.velocity_kms(star.cycle(profile.time_d));
+    let velocity = |profile: &Profile| {
+        let cycle = star.cycle(profile.time_d);
+        orbits.iter().map(|orbit| orbit.velocity_kms(cycle)).sum()
+    };
     let profiles = observations.profiles.iter().map(|profile| shifted(profile, step_kms, velocity(profile))).collect();
     Observations { step_kms, profiles }
 }

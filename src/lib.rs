@@ -59,6 +59,7 @@ pub mod import;
 pub mod injection;
 pub mod io;
 pub mod landscape;
+pub mod limits;
 pub mod log_density;
 pub mod manifest;
 pub mod maxent;

@@ -121,10 +121,7 @@ pub fn by_continuum(
     let reach_kms = values[Parameter::Vsini] + BEYOND * star.line.sigma_kms;
     let of = |profile| Scatter::of(profile, whole.step_kms, values[Parameter::Vsys], reach_kms);
     let scatter: Vec<Scatter> = whole.profiles.iter().map(of).collect();
-    let all = Scatter {
-        chi2: scatter.iter().map(|s| s.chi2).sum(),
-        freedom: scatter.iter().map(|s| s.freedom).sum(),
-    };
+    let all = Scatter { chi2: scatter.iter().map(|s| s.chi2).sum(), freedom: scatter.iter().map(|s| s.freedom).sum() };
     let continuum = all.ratio(FEWEST.0).map(rounded);
     let profiles = match settings.weights {
         Weights::Quoted => Vec::new(),

@@ -4,6 +4,7 @@
 
 use crate::config::{self, Automatic, ConfigError, ObservationSource, Settings};
 use crate::imaging::Imager;
+use crate::injection::inject;
 use crate::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::io::provenance::{Measured, Provenance};
 use crate::io::truth::Truth;
@@ -11,7 +12,7 @@ use crate::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::objective::{FreeParameter, ParameterSpace, ParameterValues, ReferenceError, target};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
-use crate::star::{Quadrature, SurfaceGrid};
+use crate::star::{Orbit, Quadrature, SurfaceGrid};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -119,6 +120,22 @@ impl Scene {
                 Ok((self.observations.clone(), (0..profiles).map(name).collect()))
             }
         }
+    }
+
+    /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors stay.
+    ///
+    /// # Errors
+    /// Profiles that no longer make sense.
+    pub fn injected(&self, whole: &Observations, orbits: &[Orbit]) -> Result<Self, ConfigError> {
+        let mut observations = self.observations.clone();
+        let injected = inject(whole, &self.imager.star, orbits);
+        for (cut, whole) in observations.profiles.iter_mut().zip(&injected.profiles) {
+            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / injected.step_kms).round() as usize;
+            for (intensity, shifted) in cut.intensity.iter_mut().zip(whole.intensity.iter().skip(first)) {
+                *intensity = *shifted;
+            }
+        }
+        Scene::of(self.settings.clone(), observations)
     }
 
     /// The space of the parameters in `free`, starting at the config's values, all others fixed there.

@@ -19,7 +19,7 @@ const LAYERS: &[&[&str]] = &[
     &["io"],
     &["config"],
     &["scene", "search"],
-    &["origin", "proposal"],
+    &["origin", "proposal", "limits"],
     &["manifest", "survey", "optimum", "import"],
     &["run"],
     &["comparison", "export"],

@@ -23,6 +23,7 @@ const ORDER: &[&str] = &[
     "man",
     "map",
     "periodogram",
+    "limits",
     "optimise",
     "grid",
     "sample",

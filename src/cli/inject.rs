@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let (whole, labels) = scene.whole()?;
     let orbit = orbit(args, &whole)?;
     let star = &scene.imager.star;
-    let injected = inject(&whole, star, &orbit);
+    let injected = inject(&whole, star, &[orbit]);
     let text = config::to_text(&scene.settings.with_observations("observations.txt"));
     let velocity_kms: Vec<f64> =
         whole.profiles.iter().map(|profile| orbit.velocity_kms(star.cycle(profile.time_d))).collect();

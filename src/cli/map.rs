@@ -46,6 +46,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     for (label, text) in scene.measured.lines() {
         report = report.line(label, text);
     }
+    for warning in &fit.checks.warnings {
+        report = report.line("warning", warning);
+    }
     report.written(folder, FILES.join(", ")).print();
     Ok(())
 }

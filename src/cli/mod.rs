@@ -13,6 +13,7 @@ mod groups;
 mod import;
 mod init;
 mod inject;
+mod limits;
 mod man;
 mod map;
 mod optimise;
@@ -66,6 +67,7 @@ enum Command {
     Inject(inject::Args),
     Map(map::Args),
     Periodogram(periodogram::Args),
+    Limits(limits::Args),
     #[command(alias = "optimize")]
     Optimise(optimise::Args),
     Grid(grid::Args),
@@ -107,6 +109,7 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Inject(args) => inject::run(args),
         Command::Map(args) => map::run(args, &cli.global),
         Command::Periodogram(args) => periodogram::run(args, &cli.global),
+        Command::Limits(args) => limits::run(args, &cli.global),
         Command::Optimise(args) => optimise::run(args, &cli.global),
         Command::Grid(args) => grid::run(args, &cli.global),
         Command::Sample(args) => sample::run(args, &cli.global),

@@ -3,9 +3,9 @@
 //!
 //! Left out: where the values come from (`proposal`).
 
-use super::{Automatic, EquivalentWidth, ImagingSettings};
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Planet, Star};
 use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
+use super::{Automatic, EquivalentWidth, ImagingSettings};
 use crate::noise::Weights;
 use serde::Serialize;
 use std::path::PathBuf;

@@ -1,11 +1,11 @@
 //! Where the profiles come from: files, or a simulation of the config's own star and planet.
 
-use super::{Automatic, ObservationSource};
 use super::domain::check_value;
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
 use super::resolve::{automatic, check_pixels, positive};
+use super::{Automatic, ObservationSource};
 use crate::io::lsd::ReadOptions;
 use crate::noise::ErrorSettings;
 use crate::objective::ParameterValues;

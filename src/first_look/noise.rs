@@ -42,10 +42,7 @@ impl Scatter {
             about_a_line(bins.iter().map(|&j| (j as f64, profile.intensity[j], profile.sigma[j].powi(-2))))
         };
         let sides = [side(-1.0), side(1.0)];
-        Scatter {
-            chi2: sides.iter().map(|side| side.chi2).sum(),
-            freedom: sides.iter().map(|side| side.freedom).sum(),
-        }
+        Scatter { chi2: sides.iter().map(|side| side.chi2).sum(), freedom: sides.iter().map(|side| side.freedom).sum() }
     }
 
     /// Scatter over quoted errors; `None` of fewer than `least` degrees of freedom, and of none at all.

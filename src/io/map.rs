@@ -5,7 +5,7 @@
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::provenance::Provenance;
-use crate::fit::{Fit, FitSummary};
+use crate::fit::{Checks, Fit, FitSummary};
 use crate::imaging::Imager;
 use crate::objective::ParameterValues;
 use crate::observation::Observations;
@@ -65,6 +65,7 @@ struct FitFile<'a> {
     #[serde(flatten)]
     summary: &'a FitSummary,
     truth: Option<ParameterValues>,
+    checks: &'a Checks,
     trade_off: Vec<TradeOffNode>,
     #[serde(flatten)]
     provenance: &'a Provenance,
@@ -150,6 +151,7 @@ impl MapResult<'_> {
         FitFile {
             summary: &self.fit.summary,
             truth: self.truth,
+            checks: &self.fit.checks,
             trade_off: self.fit.tradeoff.iter().map(node).collect(),
             provenance: self.provenance,
         }

@@ -1,0 +1,159 @@
+//! Errors and target chi2 that are left to the observations: noise of known size comes back, slopes do not count, profiles that are
+//! noisier weigh less, and everything after it is as with the same numbers written down.
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::{Desk, says, star};
+use dimcmc::io::lsd::{self, ReadOptions};
+use dimcmc::observation::Observations;
+use serde_json::{Value, json};
+
+/// A spotted star of S/N 500 with a wide continuum, its profiles in `data` after `change`.
+fn desk(change: impl Fn(&mut Observations)) -> Desk {
+    let desk = Desk::new(json!({
+        "star": star(),
+        "observations": { "simulate": {
+            "spots": [[40, 30, 20, 1], [200, 60, 25, 0.8]],
+            "cycles": (0..20).map(|k| 0.17 * f64::from(k)).collect::<Vec<_>>(),
+            "velocity_kms": { "min": -72.0, "max": 72.0, "step": 1.8 }, "snr": 500, "pixels": 2000
+        } },
+        "imaging": { "pixels": 600, "chi2_target": 0.97 }
+    }));
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    let list = desk.path("data").join("observations.txt");
+    let mut observations = lsd::read(&list, &ReadOptions::default()).unwrap().observations;
+    change(&mut observations);
+    lsd::write(&desk.path("data"), &observations).unwrap();
+    desk.set("/observations", observed("auto", "quoted"));
+    desk
+}
+
+fn observed(sigma_scale: &str, weights: &str) -> Value {
+    json!({
+        "path": "data/observations.txt", "velocity_range_kms": [-30, 30],
+        "sigma_scale": sigma_scale, "weights": weights
+    })
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+#[test]
+fn errors_quoted_too_large_are_put_right() {
+    let desk = desk(|observations| {
+        for (k, profile) in observations.profiles.iter_mut().enumerate() {
+            profile.sigma.iter_mut().for_each(|sigma| *sigma *= 4.0);
+            // a continuum that wanders by many times the noise
+            for (j, intensity) in profile.intensity.iter_mut().enumerate().filter(|(j, _)| !(22..59).contains(j)) {
+                *intensity += 0.02 + 2e-4 * j as f64 * (k as f64 - 10.0);
+            }
+        }
+    });
+    let table = desk.succeed(&["map", "config.json", "--out", "map"]);
+    says(&table, &["errors", "times the quoted ones", "residuals of a map"]);
+    let fit = desk.json("map/fit.json");
+    let errors = &fit["measured"]["errors"];
+    // 20 profiles of some 24 bins of continuum know it to 1/sqrt(2 * 440), 3.4 %; a map of 680 bins to 2.7 %, and 0.97 is the paper's
+    assert!((number(&errors["continuum"]) / 0.25 - 1.0).abs() < 0.1, "{errors}");
+    assert!((number(&errors["residual"]) / 0.25 - 1.0).abs() < 0.1, "{errors}");
+    let scale = number(&errors["sigma_scale"]);
+    assert_eq!(scale, number(&errors["continuum"]).max(number(&errors["residual"])));
+    // the same numbers written down give the same map; data of other errors are other data
+    desk.set(
+        "/observations",
+        json!({
+            "path": "data/observations.txt", "velocity_range_kms": [-30, 30], "sigma_scale": scale
+        }),
+    );
+    desk.succeed(&["map", "config.json", "--out", "by_hand"]);
+    let by_hand = desk.json("by_hand/fit.json");
+    assert_eq!(fit["spottedness"], by_hand["spottedness"]);
+    assert_ne!(fit["data_sha256"], by_hand["data_sha256"]);
+    assert!(by_hand.get("measured").is_none());
+}
+
+#[test]
+fn a_line_that_no_map_fits_counts_for_more_than_the_continuum() {
+    let desk = desk(|observations| {
+        for (k, profile) in observations.profiles.iter_mut().enumerate() {
+            // waves in the line alone that change from profile to profile
+            for (j, intensity) in profile.intensity.iter_mut().enumerate().filter(|(j, _)| (30..51).contains(j)) {
+                *intensity += 5e-3 * (2.5 * j as f64 + 7.0 * k as f64 * k as f64).sin();
+            }
+        }
+    });
+    desk.succeed(&["map", "config.json", "--out", "map"]);
+    let errors = &desk.json("map/fit.json")["measured"]["errors"];
+    assert!((number(&errors["continuum"]) - 1.0).abs() < 0.1, "{errors}");
+    assert!(number(&errors["residual"]) > 1.3, "{errors}");
+    assert_eq!(errors["sigma_scale"], errors["residual"]);
+}
+
+#[test]
+fn noisier_profiles_weigh_less() {
+    let desk = desk(|observations| {
+        // twice the noise, the errors as before
+        let mean = 1.0;
+        for profile in observations.profiles.iter_mut().take(5) {
+            let wild = |j: usize| !(24..57).contains(&j);
+            let bins = profile.intensity.iter_mut().enumerate().filter(|(j, _)| wild(*j));
+            bins.for_each(|(_, intensity)| *intensity = mean + 2.0 * (*intensity - mean));
+        }
+    });
+    desk.set("/observations", observed("auto", "per-profile"));
+    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["from profile to profile"]);
+    let factors = desk.json("map/fit.json")["measured"]["errors"]["profiles"].clone();
+    let factors: Vec<f64> = factors.as_array().unwrap().iter().map(number).collect();
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    // each is known to 15 %, their means to 7 and 4 %
+    let ratio = mean(&factors[..5]) / mean(&factors[5..]);
+    assert!((ratio - 2.0).abs() < 0.35, "{ratio}");
+    let square = mean(&factors.iter().map(|f| f * f).collect::<Vec<_>>());
+    assert!((square - 1.0).abs() < 0.01, "the errors as a whole stay: {square}");
+}
+
+#[test]
+fn without_continuum_there_are_no_weights() {
+    let desk = desk(|observations| {
+        for profile in &mut observations.profiles {
+            (profile.intensity, profile.sigma) = (profile.intensity[22..59].to_vec(), profile.sigma[22..59].to_vec());
+            profile.first_velocity_kms += 22.0 * 1.8;
+        }
+    });
+    let refused = |weights| {
+        desk.set("/observations", observed("auto", weights));
+        desk.refusal(&["map", "config.json", "--out", "x"])
+    };
+    says(&refused("per-profile"), &["config.json: observations.weights: profile 1", "too little continuum"]);
+    desk.set("/observations", observed("auto", "quoted"));
+    desk.succeed(&["map", "config.json", "--out", "map"]);
+    let errors = &desk.json("map/fit.json")["measured"]["errors"];
+    assert_eq!((&errors["continuum"], &errors["sigma_scale"]), (&Value::Null, &errors["residual"]));
+    desk.set("/observations/sigma_scale", json!("guess"));
+    says(&desk.refusal(&["map", "config.json", "--out", "x"]), &["observations.sigma_scale", "a number or \"auto\""]);
+}
+
+/// With the right errors the target is the paper's, and what is left of the velocities is photon noise.
+#[test]
+fn the_target_is_where_velocities_stop_shrinking() {
+    let desk = desk(|_| ());
+    desk.set("/observations", json!({ "path": "data/observations.txt", "velocity_range_kms": [-34.2, 34.2] }));
+    let config = json!({ "pixels": 600, "chi2_target": "auto" });
+    let mut whole: Value = serde_json::from_str(&desk.read("config.json")).unwrap();
+    whole["imaging"] = config;
+    desk.write("config.json", &whole.to_string());
+    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["target chi2", "velocities left over"]);
+    let fit = desk.json("map/fit.json");
+    let target = &fit["measured"]["chi2_target"];
+    assert!((0.85..1.06).contains(&number(&target["value"])), "{target}");
+    assert!((number(&fit["chi2_per_datum"]) - number(&target["value"])).abs() < 1e-6);
+    // between images linear, so a little off
+    let (here, there) = (number(&target["filtered_rv_rms_kms"]), number(&fit["filtered_rv_rms_kms"]));
+    assert!((here / there - 1.0).abs() < 0.02, "{here} {there}");
+    assert!(there < 1.4 * number(&fit["photon_rv_error_kms"]), "{there}");
+    assert_eq!(fit["config"]["imaging"]["chi2_target"], "auto");
+    desk.succeed(&["map", "config.json", "--out", "again"]);
+    assert_eq!(desk.read("map/fit.json"), desk.read("again/fit.json"));
+}
