@@ -4,7 +4,11 @@
 //! The continuum alone may promise too much, for in the core of the line LSD profiles are noisier and the model of the star is not
 //! perfect; what a map leaves over alone may be spots that it lacks. So the larger of the two counts, and both are written down. Of
 //! a map it is the smallest factor on the quoted errors with which it comes down to 0.97 per datum, as one of right errors does,
-//! before noise is turned into spots. Level and slope of the continuum do not count. Left out: which profiles, and files.
+//! before noise is turned into spots. Level and slope of the continuum do not count.
+//!
+//! Noise that goes together over n bins, as that of LSD profiles may, counts for one: errors are larger by the root of n, and a
+//! target chi2 is meant per independent datum, so that the map stays what it was and errors of orbits become what they are. That
+//! is exact for changes of the profiles that are broader than the noise is correlated. Left out: which profiles, and files.
 
 use crate::first_look::Scatter;
 use crate::imaging::Imager;
@@ -43,9 +47,10 @@ pub struct ErrorSettings {
 }
 
 /// What they said.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredErrors {
-    /// Factor on the quoted errors, where it was measured: the larger of the two below.
+    /// Factor on the quoted errors, where it was measured: the larger of the two below times the root of the bins that go
+    /// together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_scale: Option<f64>,
     /// Scatter of the continuum over quoted errors; null where there is too little of it.
@@ -53,6 +58,8 @@ pub struct MeasuredErrors {
     /// What a map at the config's values leaves over, over quoted errors, where that was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<f64>,
+    /// Over how many bins the noise of the continuum goes together, 1 for white noise.
+    pub correlated_bins: f64,
     /// Factor on the errors of each profile beside that; empty where they are weighted as quoted.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub profiles: Vec<f64>,
@@ -121,13 +128,16 @@ pub fn by_continuum(
     let reach_kms = values[Parameter::Vsini] + BEYOND * star.line.sigma_kms;
     let of = |profile| Scatter::of(profile, whole.step_kms, values[Parameter::Vsys], reach_kms);
     let scatter: Vec<Scatter> = whole.profiles.iter().map(of).collect();
-    let all = Scatter { chi2: scatter.iter().map(|s| s.chi2).sum(), freedom: scatter.iter().map(|s| s.freedom).sum() };
+    let all: Scatter = scatter.iter().copied().sum();
     let continuum = all.ratio(FEWEST.0).map(rounded);
     let profiles = match settings.weights {
         Weights::Quoted => Vec::new(),
         Weights::PerProfile => relative(&scatter)?,
     };
-    Ok(MeasuredErrors { sigma_scale: continuum.filter(|_| settings.measured), continuum, residual: None, profiles })
+    let counts = settings.measured && continuum.is_some();
+    let correlated_bins = if counts { rounded(all.correlated_bins()) } else { 1.0 };
+    let sigma_scale = continuum.filter(|_| settings.measured).map(|scale| rounded(scale * correlated_bins.sqrt()));
+    Ok(MeasuredErrors { sigma_scale, continuum, residual: None, correlated_bins, profiles })
 }
 
 /// The scatter of each profile over that of them all.
@@ -152,14 +162,16 @@ impl MeasuredErrors {
         for _ in 0..MOST_MAPS {
             let mut scaled = imager.clone();
             scaled.data.inverse_variance.iter_mut().for_each(|w| *w /= factor * factor);
-            let map = Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA)?;
-            let next = factor * (map.solution.chi2 / (FITTED * scaled.data.depth.len() as f64)).sqrt();
+            let map = Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA * self.correlated_bins)?;
+            let independent = scaled.data.depth.len() as f64 / self.correlated_bins;
+            let next = factor * (map.solution.chi2 / (FITTED * independent)).sqrt();
             let stays = (next / factor - 1.0).abs() < STAYS;
             factor = next;
             if stays {
-                let residual = rounded(before * factor);
+                let root = self.correlated_bins.sqrt();
+                let residual = rounded(before * factor / root);
                 self.residual = Some(residual);
-                self.sigma_scale = Some(self.continuum.unwrap_or(residual).max(residual));
+                self.sigma_scale = Some(rounded(root * self.continuum.unwrap_or(residual).max(residual)));
                 return Ok(());
             }
         }
@@ -179,7 +191,14 @@ impl MeasuredErrors {
         let share = |x: Option<f64>| x.map_or_else(|| "unknown".to_owned(), |x| x.to_string());
         let mut line = format!("continuum {}", share(self.continuum));
         if let Some(scale) = self.sigma_scale {
-            line = format!("{scale} times the quoted ones ({line}, residuals of a map {})", share(self.residual));
+            let together = match self.correlated_bins {
+                1.0 => String::new(),
+                bins => format!(", noise goes together over {bins} bins"),
+            };
+            line = format!(
+                "{scale} times the quoted ones ({line}, residuals of a map {}{together})",
+                share(self.residual)
+            );
         }
         let extreme = |f: fn(f64, f64) -> f64| self.profiles.iter().copied().reduce(f).unwrap_or(1.0);
         if !self.profiles.is_empty() {

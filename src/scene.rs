@@ -81,9 +81,7 @@ impl Scene {
                 (observations, sha256, Some(simulation.truth))
             }
         };
-        let mut scene = Scene::of(settings, observations)?;
-        scene.measured.errors = errors;
-        Ok(Scene { data_sha256, truth, ..scene })
+        Ok(Scene { data_sha256, truth, ..Scene::with_noise(settings, observations, errors)? })
     }
 
     /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left to them
@@ -91,15 +89,28 @@ impl Scene {
     ///
     /// # Errors
     /// Settings that make no sense with these observations.
-    pub fn of(mut settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
+    pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
+        Scene::with_noise(settings, observations, None)
+    }
+
+    /// The same where the errors were measured: a target chi2 is then that of independent data.
+    fn with_noise(
+        mut settings: Settings,
+        observations: Observations,
+        errors: Option<MeasuredErrors>,
+    ) -> Result<Self, ConfigError> {
         let imager = imager(&settings, &observations)?;
-        let mut measured = Measured::default();
-        if settings.imaging.chi2_target == Automatic::Auto {
-            let fault = |e: ReferenceError| settings.fault("imaging.chi2_target", &e.to_string());
-            let chosen = target::choose(&imager, settings.values).map_err(fault)?;
-            settings.imaging.chi2_target = Automatic::Fixed(chosen.value);
-            measured.chi2_target = Some(chosen);
-        }
+        let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        let mut measured = Measured { errors, chi2_target: None };
+        settings.imaging.chi2_target = match settings.imaging.chi2_target {
+            Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
+            Automatic::Auto => {
+                let fault = |e: ReferenceError| settings.fault("imaging.chi2_target", &e.to_string());
+                let chosen = target::choose(&imager, settings.values, correlated_bins).map_err(fault)?;
+                measured.chi2_target = Some(chosen);
+                Automatic::Fixed(chosen.value)
+            }
+        };
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })

@@ -22,13 +22,31 @@ pub struct Noise {
     pub scatter: Option<f64>,
 }
 
-/// How much the continuum of a profile scatters about straight lines.
+/// Bins apart, at most, whose noise may go together.
+const LAGS: usize = 8;
+
+/// How much the continuum of a profile, or of several, scatters about straight lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scatter {
     /// Sum of the squares, in units of the quoted errors.
     pub chi2: f64,
     /// Number of bins, less two for every line.
     pub freedom: usize,
+    /// Sum of the products of bins 1, 2, ... apart, and the number of these pairs.
+    products: [(f64, f64); LAGS],
+}
+
+impl std::iter::Sum for Scatter {
+    fn sum<I: Iterator<Item = Scatter>>(all: I) -> Self {
+        let add = |sum: Scatter, one: Scatter| Scatter {
+            chi2: sum.chi2 + one.chi2,
+            freedom: sum.freedom + one.freedom,
+            products: std::array::from_fn(|lag| {
+                (sum.products[lag].0 + one.products[lag].0, sum.products[lag].1 + one.products[lag].1)
+            }),
+        };
+        all.fold(Scatter::default(), add)
+    }
 }
 
 impl Scatter {
@@ -41,8 +59,16 @@ impl Scatter {
             let bins: Vec<usize> = (0..profile.intensity.len()).filter(inside).collect();
             about_a_line(bins.iter().map(|&j| (j as f64, profile.intensity[j], profile.sigma[j].powi(-2))))
         };
-        let sides = [side(-1.0), side(1.0)];
-        Scatter { chi2: sides.iter().map(|side| side.chi2).sum(), freedom: sides.iter().map(|side| side.freedom).sum() }
+        [side(-1.0), side(1.0)].into_iter().sum()
+    }
+
+    /// Over how many bins noise goes together: `1 + 2 sum rho`, rho the correlation of bins so far apart, as long as it is larger than
+    /// white noise shows by chance. The mean of many bins has an error that is larger by the root of it.
+    pub fn correlated_bins(&self) -> f64 {
+        const CHANCE: f64 = 2.5;
+        let variance = self.chi2 / self.freedom.max(1) as f64;
+        let correlation = self.products.iter().map(|(sum, pairs)| (sum / pairs / variance, CHANCE / pairs.sqrt()));
+        1.0 + 2.0 * correlation.take_while(|(rho, chance)| rho > chance).map(|(rho, _)| rho).sum::<f64>()
     }
 
     /// Scatter over quoted errors; `None` of fewer than `least` degrees of freedom, and of none at all.
@@ -61,7 +87,13 @@ fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatte
     let weight = sum(&|_, _| 1.0);
     let (x0, y0) = (sum(&|x, _| x) / weight, sum(&|_, y| y) / weight);
     let slope = sum(&|x, y| (x - x0) * (y - y0)) / sum(&|x, _| (x - x0).powi(2));
-    Scatter { chi2: sum(&|x, y| (y - y0 - slope * (x - x0)).powi(2)), freedom: count - 2 }
+    let left: Vec<f64> = points.map(|(x, y, w)| w.sqrt() * (y - y0 - slope * (x - x0))).collect();
+    let products = |lag: usize| left.iter().zip(left.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
+    Scatter {
+        chi2: products(0),
+        freedom: count - 2,
+        products: std::array::from_fn(|k| (products(k + 1), count.saturating_sub(k + 1) as f64)),
+    }
 }
 
 impl Noise {
@@ -96,6 +128,9 @@ impl Noise {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
 
     /// Level and slope leave no trace, and of points about a line the scatter is that of a fit by hand: y = 1, 0, 1 about 2/3.
     #[test]
@@ -106,5 +141,26 @@ mod tests {
         let bent = about_a_line([(0.0, 1.0, 2.0), (1.0, 0.0, 2.0), (2.0, 1.0, 2.0)].into_iter());
         assert!((bent.chi2 - 2.0 * 2.0 / 3.0).abs() < 1e-12 && bent.freedom == 1, "{bent:?}");
         assert_eq!(about_a_line([(0.0, 1.0, 1.0); 2].into_iter()), Scatter::default());
+    }
+
+    /// White noise, and noise x_k = rho x_(k-1) + n_k, whose correlations rho^k add up to (1 + rho) / (1 - rho).
+    #[test]
+    fn noise_that_goes_together_is_seen() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut side = |rho: f64| {
+            let mut x = 0.0;
+            let noise: Vec<f64> = (0..40)
+                .map(|_| {
+                    x = rho * x + (1.0 - rho * rho).sqrt() * rng.sample::<f64, _>(StandardNormal);
+                    x
+                })
+                .collect();
+            about_a_line(noise.into_iter().enumerate().map(|(j, y)| (j as f64, y, 1.0)))
+        };
+        let white: Scatter = (0..100).map(|_| side(0.0)).sum();
+        assert_eq!(white.correlated_bins(), 1.0);
+        let together: Scatter = (0..100).map(|_| side(0.5)).sum();
+        // the lines take a little of it, and so does what is cut off at the end
+        assert!((together.correlated_bins() / 3.0 - 1.0).abs() < 0.15, "{}", together.correlated_bins());
     }
 }

@@ -30,6 +30,9 @@ const BLANK_LAMBDA: f64 = 3e-3;
 /// A first preconditioner is built at this many times the target chi2, where images are cheap.
 const FIRST_CHI2: f64 = 1.5;
 
+/// chi2 per datum, all of them independent, that a map fits to: the paper's.
+const USUAL_CHI2: f64 = 0.97;
+
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
 const HOPELESS_LAMBDA: f64 = 40.0;
 
@@ -136,7 +139,9 @@ impl Reference {
     /// # Errors
     /// If a blank star is below the target already, or the solver fails.
     pub fn provisional(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
-        let reference = Reference::approach(imager, values, chi2_per_datum, PROVISIONAL_LAMBDA)?;
+        // a lower target is that of data of which fewer are independent, which bear the larger weight
+        let largest_lambda = PROVISIONAL_LAMBDA / (chi2_per_datum / USUAL_CHI2).min(1.0);
+        let reference = Reference::approach(imager, values, chi2_per_datum, largest_lambda)?;
         match reference.solution.termination {
             Termination::NonFinite => Err(ReferenceError::Solver(Termination::NonFinite)),
             _ => Ok(reference),

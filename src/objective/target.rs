@@ -58,27 +58,27 @@ struct Place {
     rms_kms: f64,
 }
 
-/// The target at `values`.
+/// The target at `values`, for data of which noise goes together over `correlated_bins`: per datum, not per independent one.
 ///
 /// # Errors
 /// If the solver fails.
-pub fn choose(imager: &Imager, values: ParameterValues) -> Result<ChosenTarget, ReferenceError> {
-    let path = path(imager, values)?;
+pub fn choose(imager: &Imager, values: ParameterValues, correlated_bins: f64) -> Result<ChosenTarget, ReferenceError> {
+    let path = path(imager, values, PROVISIONAL_LAMBDA * correlated_bins)?;
     let left: Vec<f64> = path.windows(IMAGES + 1).map(|p| p[IMAGES].rms_kms / p[0].rms_kms).collect();
-    let stops = left.iter().position(|left| *left > STOPPED);
-    let (k, part) = match stops {
-        Some(0) => (0, 0.0),
+    let last = left.len() - 1;
+    let (k, part) = match left.iter().rposition(|left| *left < STOPPED) {
+        None => (0, 0.0),
+        Some(k) if k == last => (last, 0.0),
         // between the last image that still gains and the first that does not
-        Some(k) => (k - 1, (STOPPED - left[k - 1]) / (left[k] - left[k - 1])),
-        None => (left.len() - 1, 0.0),
+        Some(k) => (k, (STOPPED - left[k]) / (left[k + 1] - left[k])),
     };
     let between = |a: f64, b: f64| a + part * (b - a);
-    let next = (k + 1).min(left.len() - 1);
+    let next = (k + 1).min(last);
     Ok(ChosenTarget {
         value: rounded(between(path[k].chi2, path[k + 1].chi2)),
         filtered_rv_rms_kms: between(path[k].rms_kms, path[k + 1].rms_kms),
         left_by_doubling: between(left[k], left[next]),
-        still_shrinking: stops.is_none(),
+        still_shrinking: left[last] < STOPPED,
     })
 }
 
@@ -87,11 +87,11 @@ fn rounded(chi2: f64) -> f64 {
     (1e4 * chi2).round() / 1e4
 }
 
-/// Images from the first lambda to a doubling of the last one.
-fn path(imager: &Imager, values: ParameterValues) -> Result<Vec<Place>, ReferenceError> {
+/// Images from the first lambda to a doubling of `last_lambda`, both over the number of data.
+fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Vec<Place>, ReferenceError> {
     let data = imager.data.depth.len() as f64;
     let first = Reference::at_lambda(imager, values, FIRST)?;
-    let last = Reference::at_lambda(imager, values, PROVISIONAL_LAMBDA)?;
+    let last = Reference::at_lambda(imager, values, last_lambda)?;
     let solver =
         Solver { entropy: imager.entropy, preconditioner: &last.preconditioner, settings: SolverSettings::patient() };
     let observed = moments(imager, &imager.data.depth);
@@ -105,12 +105,12 @@ fn path(imager: &Imager, values: ParameterValues) -> Result<Vec<Place>, Referenc
         Place { chi2: solution.chi2 / data, rms_kms: scatter(&filtered) }
     };
     // the last image is at the last lambda, and a doubling beyond it
-    let steps = (IMAGES as f64 * (PROVISIONAL_LAMBDA / FIRST).log2()).floor();
+    let steps = (IMAGES as f64 * (last_lambda / FIRST).log2()).floor();
     let mut at = first.solution.clone();
     let mut places = Vec::new();
     let mut work = imager.problem(first.response.clone());
     for k in -(steps as i32)..=IMAGES as i32 {
-        let lambda = PROVISIONAL_LAMBDA / data * (f64::from(k) / IMAGES as f64).exp2();
+        let lambda = last_lambda / data * (f64::from(k) / IMAGES as f64).exp2();
         let start =
             Start { image: at.image.clone(), path: Vec::new(), chi2_slope: 0.0, adjoint: Vec::new(), best: None };
         at = solver.solve(&mut work, Goal::Lambda(lambda), &start);
