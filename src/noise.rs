@@ -128,7 +128,7 @@ pub fn by_continuum(
     let reach_kms = values[Parameter::Vsini] + BEYOND * star.line.sigma_kms;
     let of = |profile| Scatter::of(profile, whole.step_kms, values[Parameter::Vsys], reach_kms);
     let scatter: Vec<Scatter> = whole.profiles.iter().map(of).collect();
-    let all: Scatter = scatter.iter().copied().sum();
+    let all: Scatter = scatter.iter().cloned().sum();
     let continuum = all.ratio(FEWEST.0).map(rounded);
     let profiles = match settings.weights {
         Weights::Quoted => Vec::new(),

@@ -2,6 +2,7 @@
 
 use super::median;
 use crate::observation::{Observations, Profile};
+use nalgebra::{DMatrix, DVector};
 
 /// Fewest bins of continuum, in all profiles together, whose scatter means something.
 const FEWEST_BINS: usize = 30;
@@ -26,26 +27,26 @@ pub struct Noise {
 const LAGS: usize = 8;
 
 /// How much the continuum of a profile, or of several, scatters about straight lines.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scatter {
     /// Sum of the squares, in units of the quoted errors.
     pub chi2: f64,
     /// Number of bins, less two for every line.
     pub freedom: usize,
-    /// Sum of the products of bins 1, 2, ... apart, and the number of these pairs.
-    products: [(f64, f64); LAGS],
+    /// Sum of the products of bins 0, 1, 2, ... apart.
+    products: [f64; LAGS + 1],
+    /// Numbers of bins that lines go through.
+    lengths: Vec<usize>,
 }
 
 impl std::iter::Sum for Scatter {
     fn sum<I: Iterator<Item = Scatter>>(all: I) -> Self {
-        let add = |sum: Scatter, one: Scatter| Scatter {
+        all.fold(Scatter::default(), |sum, one| Scatter {
             chi2: sum.chi2 + one.chi2,
             freedom: sum.freedom + one.freedom,
-            products: std::array::from_fn(|lag| {
-                (sum.products[lag].0 + one.products[lag].0, sum.products[lag].1 + one.products[lag].1)
-            }),
-        };
-        all.fold(Scatter::default(), add)
+            products: std::array::from_fn(|lag| sum.products[lag] + one.products[lag]),
+            lengths: [sum.lengths, one.lengths].concat(),
+        })
     }
 }
 
@@ -66,9 +67,27 @@ impl Scatter {
     /// white noise shows by chance. The mean of many bins has an error that is larger by the root of it.
     pub fn correlated_bins(&self) -> f64 {
         const CHANCE: f64 = 2.5;
-        let variance = self.chi2 / self.freedom.max(1) as f64;
-        let correlation = self.products.iter().map(|(sum, pairs)| (sum / pairs / variance, CHANCE / pairs.sqrt()));
-        1.0 + 2.0 * correlation.take_while(|(rho, chance)| rho > chance).map(|(rho, _)| rho).sum::<f64>()
+        let chance = CHANCE / (self.freedom.max(1) as f64).sqrt();
+        let mut bins = 1.0;
+        for lags in 1..=LAGS {
+            let Some(correlation) = self.correlation(lags).filter(|rho| rho[lags - 1] > chance) else { break };
+            bins = 1.0 + 2.0 * correlation.iter().sum::<f64>();
+        }
+        bins
+    }
+
+    /// Correlations of bins 1, ..., `lags` apart, none beyond. The lines take up some of what goes together; what the products of
+    /// their residuals are on average is linear in the covariances, and is solved for these.
+    fn correlation(&self, lags: usize) -> Option<Vec<f64>> {
+        let mut lengths = self.lengths.clone();
+        lengths.sort_unstable();
+        let mut mean = DMatrix::zeros(lags + 1, lags + 1);
+        for same in lengths.chunk_by(|a, b| a == b) {
+            mean += same.len() as f64 * mean_products(same[0], lags);
+        }
+        let covariance = mean.lu().solve(&DVector::from_column_slice(&self.products[..=lags]))?;
+        let correlation: Vec<f64> = covariance.iter().skip(1).map(|c| c / covariance[0]).collect();
+        (covariance[0] > 0.0 && correlation.iter().all(|rho| rho.is_finite())).then_some(correlation)
     }
 
     /// Scatter over quoted errors; `None` of fewer than `least` degrees of freedom, and of none at all.
@@ -92,8 +111,26 @@ fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatte
     Scatter {
         chi2: products(0),
         freedom: count - 2,
-        products: std::array::from_fn(|k| (products(k + 1), count.saturating_sub(k + 1) as f64)),
+        products: std::array::from_fn(products),
+        lengths: vec![count],
     }
+}
+
+/// Mean of the sum of products of residuals that are so many bins apart (row) from a straight line through `bins`, for noise that has
+/// a covariance of 1 at one distance (column).
+fn mean_products(bins: usize, lags: usize) -> DMatrix<f64> {
+    let line = DMatrix::from_fn(bins, 2, |j, power| (j as f64 - 0.5 * (bins - 1) as f64).powi(power as i32));
+    let unit = DMatrix::from_fn(bins, 2, |j, k| line[(j, k)] / line.column(k).norm());
+    let left = DMatrix::identity(bins, bins) - &unit * unit.transpose();
+    let mut mean = DMatrix::zeros(lags + 1, lags + 1);
+    for column in 0..=lags {
+        let noise = DMatrix::from_fn(bins, bins, |a, b| f64::from(u8::from(a.abs_diff(b) == column)));
+        let residuals = &left * noise * &left;
+        for row in 0..=lags {
+            mean[(row, column)] = (row..bins).map(|j| residuals[(j, j - row)]).sum();
+        }
+    }
+    mean
 }
 
 impl Noise {
@@ -160,7 +197,7 @@ mod tests {
         let white: Scatter = (0..100).map(|_| side(0.0)).sum();
         assert_eq!(white.correlated_bins(), 1.0);
         let together: Scatter = (0..100).map(|_| side(0.5)).sum();
-        // the lines take a little of it, and so does what is cut off at the end
+        // what is cut off at the end is a little
         assert!((together.correlated_bins() / 3.0 - 1.0).abs() < 0.15, "{}", together.correlated_bins());
     }
 }
