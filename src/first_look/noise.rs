@@ -108,12 +108,7 @@ fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatte
     let slope = sum(&|x, y| (x - x0) * (y - y0)) / sum(&|x, _| (x - x0).powi(2));
     let left: Vec<f64> = points.map(|(x, y, w)| w.sqrt() * (y - y0 - slope * (x - x0))).collect();
     let products = |lag: usize| left.iter().zip(left.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
-    Scatter {
-        chi2: products(0),
-        freedom: count - 2,
-        products: std::array::from_fn(products),
-        lengths: vec![count],
-    }
+    Scatter { chi2: products(0), freedom: count - 2, products: std::array::from_fn(products), lengths: vec![count] }
 }
 
 /// Mean of the sum of products of residuals that are so many bins apart (row) from a straight line through `bins`, for noise that has

@@ -39,8 +39,8 @@ const HOPELESS_LAMBDA: f64 = 40.0;
 /// chi2 per datum that no map of noisy data comes down to.
 const OUT_OF_REACH: f64 = 1e-6;
 
-/// An image whose chi2 is that many times the target has only its precision left to gain.
-const NEARLY: f64 = 1.001;
+/// A chi2 within this factor of the target is not the floor, wherever the solver stopped.
+const ABOVE_TARGET: f64 = 1.001;
 
 /// A provisional reference takes what it gets at lambda = this over the number of data: beyond, noise is turned into spots.
 pub const PROVISIONAL_LAMBDA: f64 = 3.0;
@@ -107,9 +107,11 @@ impl Reference {
         match reference.solution.termination {
             Termination::Converged => {}
             // out of steps on the doorstep: the exact solution is a few more away
-            Termination::StepLimit if reference.solution.chi2 < NEARLY * reference.chi2_target => {}
-            // a search for the floor that runs out of steps has found it to within what a message needs
-            Termination::Unreachable | Termination::StepLimit => {
+            Termination::StepLimit if reference.solution.chi2 <= ABOVE_TARGET * reference.chi2_target => {}
+            // a search for the floor that runs out of steps far from the target has found it to within what a message needs
+            Termination::Unreachable | Termination::StepLimit
+                if reference.solution.chi2 > ABOVE_TARGET * reference.chi2_target =>
+            {
                 let floor = reference.solution.chi2 / data;
                 return Err(ReferenceError::TargetBelowFloor { target: chi2_per_datum, floor });
             }
