@@ -7,8 +7,9 @@
 //! before noise is turned into spots. Level and slope of the continuum do not count.
 //!
 //! Noise that goes together over n bins, as that of LSD profiles may, counts for one: errors are larger by the root of n, and a
-//! target chi2 is meant per independent datum, so that the map stays what it was and errors of orbits become what they are. That
-//! is exact for changes of the profiles that are broader than the noise is correlated. Left out: which profiles, and files.
+//! target chi2 is meant per independent datum, so that the map stays what it was and errors of orbits become what they are. What
+//! counts is noise that looks like the local line, for nothing in a profile is narrower; where features are broader and the noise goes
+//! together farther, errors are still a little too small. Left out: which profiles, and files.
 
 use crate::first_look::Scatter;
 use crate::imaging::Imager;
@@ -135,7 +136,7 @@ pub fn by_continuum(
         Weights::PerProfile => relative(&scatter)?,
     };
     let counts = settings.measured && continuum.is_some();
-    let correlated_bins = if counts { rounded(all.correlated_bins()) } else { 1.0 };
+    let correlated_bins = if counts { rounded(all.correlated_bins(star.line.sigma_kms / whole.step_kms)) } else { 1.0 };
     let sigma_scale = continuum.filter(|_| settings.measured).map(|scale| rounded(scale * correlated_bins.sqrt()));
     Ok(MeasuredErrors { sigma_scale, continuum, residual: None, correlated_bins, profiles })
 }

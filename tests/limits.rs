@@ -64,7 +64,7 @@ fn both_ways_and_the_closed_form_agree() {
     for limit in file["limits"].as_array().unwrap() {
         let period = limit["period_d"].as_f64().unwrap();
         // spots imitate an orbit at the rotation period of 3 d, the ends of the search see half a peak
-        if (period / 3.0 - 1.0).abs() < 0.3 || period > 14.0 || period < 1.8 {
+        if (period / 3.0 - 1.0).abs() < 0.3 || !(1.8..=14.0).contains(&period) {
             continue;
         }
         let nearest =

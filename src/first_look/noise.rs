@@ -63,15 +63,17 @@ impl Scatter {
         [side(-1.0), side(1.0)].into_iter().sum()
     }
 
-    /// Over how many bins noise goes together: `1 + 2 sum rho`, rho the correlation of bins so far apart, as long as it is larger than
-    /// white noise shows by chance. The mean of many bins has an error that is larger by the root of it.
-    pub fn correlated_bins(&self) -> f64 {
+    /// Over how many bins noise goes together for features of a width (standard deviation) of `sigma_bins`: `1 + 2 sum rho a`, rho the
+    /// correlation of bins so far apart, as long as it is larger than white noise shows by chance, and `a` that of the features. What a
+    /// profile says of them has an error that is larger by the root of it.
+    pub fn correlated_bins(&self, sigma_bins: f64) -> f64 {
+        let overlap = |lag: usize| (-0.25 * (lag as f64 / sigma_bins).powi(2)).exp();
         const CHANCE: f64 = 2.5;
         let chance = CHANCE / (self.freedom.max(1) as f64).sqrt();
         let mut bins = 1.0;
         for lags in 1..=LAGS {
             let Some(correlation) = self.correlation(lags).filter(|rho| rho[lags - 1] > chance) else { break };
-            bins = 1.0 + 2.0 * correlation.iter().sum::<f64>();
+            bins = 1.0 + 2.0 * correlation.iter().enumerate().map(|(k, rho)| rho * overlap(k + 1)).sum::<f64>();
         }
         bins
     }
@@ -190,9 +192,13 @@ mod tests {
             about_a_line(noise.into_iter().enumerate().map(|(j, y)| (j as f64, y, 1.0)))
         };
         let white: Scatter = (0..100).map(|_| side(0.0)).sum();
-        assert_eq!(white.correlated_bins(), 1.0);
+        assert_eq!(white.correlated_bins(9.0), 1.0);
         let together: Scatter = (0..100).map(|_| side(0.5)).sum();
         // what is cut off at the end is a little
-        assert!((together.correlated_bins() / 3.0 - 1.0).abs() < 0.15, "{}", together.correlated_bins());
+        assert!(
+            (together.correlated_bins(f64::INFINITY) / 3.0 - 1.0).abs() < 0.15,
+            "{}",
+            together.correlated_bins(f64::INFINITY)
+        );
     }
 }

@@ -126,12 +126,12 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
 fn moments(imager: &Imager, depths: &[f64]) -> Vec<f64> {
     let step_kms = imager.sampling.step_kms;
     let mut first = 0;
-    let mut moment = |&(time_d, first_velocity_kms, bins): &(f64, f64, usize)| {
+    let moment = |&(time_d, first_velocity_kms, bins): &(f64, f64, usize)| {
         let profile = Profile { time_d, first_velocity_kms, intensity: Vec::new(), sigma: Vec::new() };
         first += bins;
         profile.first_moment_of(&depths[first - bins..first], step_kms)
     };
-    imager.sampling.profiles.iter().map(|profile| moment(profile)).collect()
+    imager.sampling.profiles.iter().map(moment).collect()
 }
 
 /// Root mean square about the mean.

@@ -40,11 +40,12 @@ impl PeriodogramResult<'_> {
     /// What may be wrong, a sentence each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let found = self.detection;
-        let data = self.imager.data.depth.len() as f64;
+        let correlated_bins = self.provenance.measured.errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        let data = self.imager.data.depth.len() as f64 / correlated_bins;
         let mut warnings = Vec::new();
         let view = found.last();
         let chi2 = self.per_datum(view);
-        let far = (chi2 - 1.0) / (2.0 / data).sqrt();
+        let far = (chi2 * correlated_bins - 1.0) / (2.0 / data).sqrt();
         if !view.on_target {
             let target = self.settings.chi2_target;
             warnings.push(format!(
