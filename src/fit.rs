@@ -3,6 +3,10 @@
 //!
 //! Left out: how the reconstruction came about (`objective::reference`), and files (`io::map`).
 
+mod checks;
+
+pub use checks::{Checks, ProfileCheck};
+
 use crate::imaging::Imager;
 use crate::log_density::Status;
 use crate::maxent::entropy::Entropy;
@@ -25,6 +29,19 @@ pub struct Fit {
     pub tradeoff: Vec<Node>,
     /// The numbers.
     pub summary: FitSummary,
+    /// Whether what is left over looks like noise.
+    pub checks: Checks,
+}
+
+/// What is left over in one bin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Residual {
+    /// Depth of the model.
+    depth: f64,
+    /// Observed minus modelled intensity.
+    difference: f64,
+    /// The same over its standard error.
+    scaled: f64,
 }
 
 /// The first moment of one profile, observed and modelled.
@@ -138,11 +155,25 @@ impl Fit {
             (0..observations.profiles.len()).map(|k| &problem.model()[reference.response.bins(k)]).collect();
         let velocities = velocities(imager, observations, reference, &depths);
         let deviation = Deviation::of(imager, &map);
+        let residuals = residuals(observations, &depths);
         let summary =
-            FitSummary { test, deviation, ..summarise(imager, observations, reference, &depths, &velocities) };
+            FitSummary { test, deviation, ..summarise(imager, observations, reference, &residuals, &velocities) };
+        let checks = Checks::of(&residuals);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
-        Fit { map, model, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary }
+        Fit { map, model, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary, checks }
     }
+}
+
+/// Residuals of every profile, with its time.
+fn residuals(observations: &Observations, depths: &[&[f64]]) -> Vec<(f64, Vec<Residual>)> {
+    let of = |(profile, depths): (&crate::observation::Profile, &&[f64])| {
+        let residual = |((intensity, sigma), depth): ((&f64, &f64), &f64)| {
+            let difference = intensity - (1.0 - depth);
+            Residual { depth: *depth, difference, scaled: difference / sigma }
+        };
+        (profile.time_d, profile.intensity.iter().zip(&profile.sigma).zip(depths.iter()).map(residual).collect())
+    };
+    observations.profiles.iter().zip(depths).map(of).collect()
 }
 
 fn velocities(
@@ -170,16 +201,14 @@ fn summarise(
     imager: &Imager,
     observations: &Observations,
     reference: &Reference,
-    depths: &[&[f64]],
+    residuals: &[(f64, Vec<Residual>)],
     velocities: &[FilteredVelocity],
 ) -> FitSummary {
     let solution = &reference.solution;
     let data = observations.len();
-    let deepest = depths.iter().flat_map(|d| d.iter()).copied().fold(0.0, f64::max);
-    let observed = observations.profiles.iter().flat_map(|p| &p.intensity);
-    let modelled = depths.iter().flat_map(|d| d.iter());
-    let residuals: Vec<(f64, f64)> = observed.zip(modelled).map(|(i, depth)| (*depth, i - (1.0 - depth))).collect();
-    let core = residuals.iter().filter(|(depth, _)| *depth > 0.5 * deepest);
+    let all = || residuals.iter().flat_map(|(_, residuals)| residuals);
+    let deepest = all().map(|r| r.depth).fold(0.0, f64::max);
+    let core = || all().filter(|r| r.depth > 0.5 * deepest);
     FitSummary {
         status: match solution.termination {
             Termination::Converged => Status::Converged,
@@ -207,8 +236,8 @@ fn summarise(
         observed_rv_rms_kms: scatter(velocities.iter().map(|v| v.observed.value_kms)),
         filtered_rv_rms_kms: scatter(velocities.iter().map(FilteredVelocity::filtered_kms)),
         photon_rv_error_kms: rms(velocities.iter().map(|v| v.observed.sigma_kms)),
-        residual_rms: rms(residuals.iter().map(|(_, r)| *r)),
-        residual_rms_core: rms(core.map(|(_, r)| *r)),
+        residual_rms: rms(all().map(|r| r.difference)),
+        residual_rms_core: rms(core().map(|r| r.difference)),
         sigma_rms: rms(observations.profiles.iter().flat_map(|p| p.sigma.iter().copied())),
     }
 }

@@ -56,6 +56,23 @@ impl Imager {
         }
     }
 
+    /// The same without some of the profiles.
+    pub fn without(&self, profiles: &[usize]) -> Self {
+        let mut rest = Imager { sampling: Sampling { profiles: Vec::new(), ..self.sampling }, ..self.clone() };
+        rest.data = Data { depth: Vec::new(), inverse_variance: Vec::new() };
+        let mut first = 0;
+        for (k, profile) in self.sampling.profiles.iter().enumerate() {
+            let bins = first..first + profile.2;
+            first = bins.end;
+            if !profiles.contains(&k) {
+                rest.sampling.profiles.push(*profile);
+                rest.data.depth.extend_from_slice(&self.data.depth[bins.clone()]);
+                rest.data.inverse_variance.extend_from_slice(&self.data.inverse_variance[bins]);
+            }
+        }
+        rest
+    }
+
     /// The response at one state of star and planet.
     pub fn response(&self, state: &StarState) -> Response {
         Response::new(&self.grid, &self.star, state, &self.sampling)

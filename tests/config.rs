@@ -91,7 +91,7 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 fn lo_peg_resolves() {
     let settings = config::load(&shipped("lopeg.json")).unwrap();
     assert_eq!(settings.equivalent_width, EquivalentWidth::Auto);
-    let ObservationSource::Files { path, options } = &settings.source else { panic!() };
+    let ObservationSource::Files { path, options, .. } = &settings.source else { panic!() };
     assert!(path.ends_with("configs/../../shared/data/lopeg/observations.txt"));
     assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 0.3));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");

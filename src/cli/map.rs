@@ -27,7 +27,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     let spinner = progress::bar(global, None, "reconstructing");
-    let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target);
+    let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target.value());
     spinner.finish_and_clear();
     let reference = reference.map_err(|e| Failure::reference(&args.config, e))?;
     let fit = Fit::new(&scene.imager, &scene.observations, &reference);
@@ -42,7 +42,14 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     };
     let folder = args.output.create()?;
     result.write(folder)?;
-    report(&fit.summary).written(folder, FILES.join(", ")).print();
+    let mut report = report(&fit.summary);
+    for (label, text) in scene.measured.lines() {
+        report = report.line(label, text);
+    }
+    for warning in &fit.checks.warnings {
+        report = report.line("warning", warning);
+    }
+    report.written(folder, FILES.join(", ")).print();
     Ok(())
 }
 

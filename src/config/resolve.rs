@@ -10,7 +10,7 @@ use super::raw::Config;
 use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
-use super::{ImagingSettings, SamplerSettings, Settings};
+use super::{Automatic, ImagingSettings, SamplerSettings, Settings};
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
 use std::path::Path;
 
@@ -107,7 +107,7 @@ fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));
     }
-    positive("imaging.chi2_target", imaging.chi2_target)
+    automatic("imaging.chi2_target", imaging.chi2_target)
 }
 
 pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
@@ -119,6 +119,14 @@ pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
 
 pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
+}
+
+/// Positive, or left to the observations.
+pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
+    match value {
+        Automatic::Fixed(value) => positive(key, value),
+        Automatic::Auto => Ok(()),
+    }
 }
 
 fn check_sampler(sampler: &SamplerSettings, free: usize) -> Result<(), Fault> {

@@ -1,12 +1,13 @@
 //! Where the profiles come from: files, or a simulation of the config's own star and planet.
 
-use super::ObservationSource;
 use super::domain::check_value;
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
-use super::resolve::{check_pixels, positive};
+use super::resolve::{automatic, check_pixels, positive};
+use super::{Automatic, ObservationSource};
 use crate::io::lsd::ReadOptions;
+use crate::noise::ErrorSettings;
 use crate::objective::ParameterValues;
 use crate::simulate::Simulation;
 use crate::star::{Disc, Facula, Spot, StarSettings};
@@ -26,6 +27,7 @@ pub(super) fn resolve_observations(
             let file_only = [
                 ("velocity_range_kms", section.velocity_range_kms.is_some()),
                 ("sigma_scale", section.sigma_scale.is_some()),
+                ("weights", !section.weights.is_default()),
             ];
             if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
                 return Err(Fault::new(format!("observations.{name}"), "for observations from files only"));
@@ -41,8 +43,10 @@ pub(super) fn resolve_observations(
     if path.as_os_str().is_empty() {
         return Err(Fault::new("observations.path", "is empty"));
     }
-    let sigma_scale = *section.sigma_scale.get_or_insert(ReadOptions::default().sigma_scale);
-    positive("observations.sigma_scale", sigma_scale)?;
+    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Fixed(ReadOptions::default().sigma_scale));
+    automatic("observations.sigma_scale", sigma_scale)?;
+    let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
+    let sigma_scale = if errors.measured { 1.0 } else { sigma_scale.value() };
     if let Some([min, max]) = section.velocity_range_kms
         && min >= max
     {
@@ -50,7 +54,7 @@ pub(super) fn resolve_observations(
         return Err(Fault::new("observations.velocity_range_kms", problem));
     }
     let options = ReadOptions { velocity_range_kms: section.velocity_range_kms.map(Into::into), sigma_scale };
-    Ok(ObservationSource::Files { path: config.parent().unwrap_or(Path::new("")).join(path), options })
+    Ok(ObservationSource::Files { path: config.parent().unwrap_or(Path::new("")).join(path), options, errors })
 }
 
 fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {

@@ -5,7 +5,7 @@
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::provenance::Provenance;
-use crate::fit::{Fit, FitSummary};
+use crate::fit::{Checks, Fit, FitSummary};
 use crate::imaging::Imager;
 use crate::maxent::entropy::Entropy;
 use crate::objective::ParameterValues;
@@ -81,6 +81,7 @@ struct FitFile<'a> {
     #[serde(flatten)]
     summary: &'a FitSummary,
     truth: Option<ParameterValues>,
+    checks: &'a Checks,
     trade_off: Vec<TradeOffNode>,
     #[serde(flatten)]
     provenance: &'a Provenance,
@@ -176,6 +177,7 @@ impl MapResult<'_> {
         FitFile {
             summary: &self.fit.summary,
             truth: self.truth,
+            checks: &self.fit.checks,
             trade_off: self.fit.tradeoff.iter().map(node).collect(),
             provenance: self.provenance,
         }

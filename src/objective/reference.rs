@@ -31,14 +31,20 @@ const BLANK_LAMBDA: f64 = 3e-3;
 /// A first preconditioner is built at this many times the target chi2, where images are cheap.
 const FIRST_CHI2: f64 = 1.5;
 
+/// chi2 per datum, all of them independent, that a map fits to: the paper's.
+const USUAL_CHI2: f64 = 0.97;
+
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
 const HOPELESS_LAMBDA: f64 = 40.0;
+
+/// chi2 per datum that no map of noisy data comes down to.
+const OUT_OF_REACH: f64 = 1e-6;
 
 /// A chi2 within this factor of the target is not the floor, wherever the solver stopped.
 const ABOVE_TARGET: f64 = 1.001;
 
-/// A provisional reference takes what it gets at lambda = this over the number of data.
-const PROVISIONAL_LAMBDA: f64 = 3.0;
+/// A provisional reference takes what it gets at lambda = this over the number of data: beyond, noise is turned into spots.
+pub const PROVISIONAL_LAMBDA: f64 = 3.0;
 
 /// The reference image and what belongs to it.
 #[derive(Clone, Debug)]
@@ -101,6 +107,8 @@ impl Reference {
         let mut reference = Reference::approach(imager, values, chi2_per_datum, HOPELESS_LAMBDA)?;
         match reference.solution.termination {
             Termination::Converged => {}
+            // out of steps on the doorstep: the exact solution is a few more away
+            Termination::StepLimit if reference.solution.chi2 <= ABOVE_TARGET * reference.chi2_target => {}
             // a search for the floor that runs out of steps far from the target has found it to within what a message needs
             Termination::Unreachable | Termination::StepLimit
                 if reference.solution.chi2 > ABOVE_TARGET * reference.chi2_target =>
@@ -134,10 +142,24 @@ impl Reference {
     /// # Errors
     /// If a blank star is below the target already, or the solver fails.
     pub fn provisional(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
-        let reference = Reference::approach(imager, values, chi2_per_datum, PROVISIONAL_LAMBDA)?;
+        // a lower target is that of data of which fewer are independent, which bear the larger weight
+        let largest_lambda = PROVISIONAL_LAMBDA / (chi2_per_datum / USUAL_CHI2).min(1.0);
+        let reference = Reference::approach(imager, values, chi2_per_datum, largest_lambda)?;
         match reference.solution.termination {
             Termination::NonFinite => Err(ReferenceError::Solver(Termination::NonFinite)),
             _ => Ok(reference),
+        }
+    }
+
+    /// The image at `lambda` over the number of data, whatever its chi2.
+    ///
+    /// # Errors
+    /// If the solver fails.
+    pub fn at_lambda(imager: &Imager, values: ParameterValues, lambda: f64) -> Result<Self, ReferenceError> {
+        let reference = Reference::approach(imager, values, OUT_OF_REACH, lambda)?;
+        match reference.solution.termination {
+            Termination::Unreachable => Ok(reference),
+            other => Err(ReferenceError::Solver(other)),
         }
     }
 

@@ -11,11 +11,11 @@ use std::path::Path;
 /// What is used of `truth.json`.
 #[derive(Deserialize)]
 pub(super) struct TruthFile {
-    spots: Value,
+    spots: Option<Value>,
     #[serde(default)]
     faculae: Value,
     pub contrast: Option<f64>,
-    pub spottedness: f64,
+    spottedness: Option<f64>,
     pub times_d: Vec<f64>,
     pub config: Value,
 }
@@ -33,7 +33,7 @@ impl Injected {
     /// Of the folder, if it knows.
     pub fn of(folder: &Path) -> Result<Option<Self>, PlotError> {
         if folder.join(TRUTH).is_file() {
-            return Ok(Some(Injected::of_truth(&origin::read(folder, TRUTH)?)));
+            return Ok(Injected::of_truth(&origin::read(folder, TRUTH)?));
         }
         if !folder.join(velocities::FIT).is_file() {
             return Ok(None);
@@ -47,9 +47,10 @@ impl Injected {
         }))
     }
 
-    /// Of a simulation.
-    pub fn of_truth(truth: &TruthFile) -> Self {
-        Injected { spots: spots(&truth.spots), faculae: faculae(&truth.faculae), coverage: Some(truth.spottedness) }
+    /// Of a simulation; `None` of observed profiles that an orbit was put into.
+    pub fn of_truth(truth: &TruthFile) -> Option<Self> {
+        let spots = spots(truth.spots.as_ref()?);
+        Some(Injected { spots, faculae: faculae(&truth.faculae), coverage: truth.spottedness })
     }
 }
 

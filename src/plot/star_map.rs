@@ -85,19 +85,21 @@ pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
 }
 
 /// The injected map of the simulation in `folder`.
-pub(super) fn injected(folder: &Path) -> Result<Figure, PlotError> {
+///
+/// `None` of observed profiles that an orbit was put into.
+pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     let truth: TruthFile = origin::read(folder, TRUTH)?;
+    let Some(injected) = Injected::of_truth(&truth) else { return Ok(None) };
     let number = |key: &str| truth.config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
     let (period, epoch) = (number("rotation_period_d").unwrap_or(f64::NAN), number("epoch_d").unwrap_or(0.0));
     let cycles: Vec<f64> = truth.times_d.iter().map(|t| (t - epoch) / period).filter(|c| c.is_finite()).collect();
-    let injected = Injected::of_truth(&truth);
     let (content, what) = match (injected.faculae.is_empty(), truth.contrast) {
         (false, Some(contrast)) => (Content::Brightness(Brightness::of_spots(contrast)), "spots and faculae"),
         _ => (Content::Spots, "spots"),
     };
     let mut star = Star::injected(content, None, &injected);
     star.title = Content::Spots.title("injected", injected.coverage);
-    Ok(draw(&[star], content, &cycles, format!("Map of the injected {what} at cycle 0. {HOW_TO_READ}")))
+    Ok(Some(draw(&[star], content, &cycles, format!("Map of the injected {what} at cycle 0. {HOW_TO_READ}"))))
 }
 
 /// How phases and longitudes are to be read.

@@ -127,7 +127,7 @@ fn scene(draft: &Draft, config: &Path, cut: &Observations) -> Result<Scene, Prop
 /// Spottedness of the map at the draft's values.
 fn reach(draft: &Draft, config: &Path, cut: &Observations) -> Result<Result<f64, ReferenceError>, ProposalError> {
     let Scene { settings, imager, .. } = scene(draft, config, cut)?;
-    let reference = Reference::build(&imager, settings.values, settings.imaging.chi2_target);
+    let reference = Reference::build(&imager, settings.values, settings.imaging.chi2_target.value());
     Ok(reference.map(|reference| reference.solution.spottedness))
 }
 

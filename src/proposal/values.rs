@@ -3,7 +3,7 @@
 use super::digits::{rounded, significant};
 use super::ledger::{Ledger, Source};
 use super::{Given, Known};
-use crate::config::{Draft, EquivalentWidth, ImagingSettings};
+use crate::config::{Automatic, Draft, EquivalentWidth, ImagingSettings};
 use crate::first_look::{FirstLook, LineModel, LookError};
 use crate::observation::Observations;
 use crate::periodogram::{Frequencies, FrequencySettings};
@@ -274,7 +274,7 @@ fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
         ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());
     }
     if let Some(given) = &known.chi2_target {
-        imaging.chi2_target = given.value;
+        imaging.chi2_target = Automatic::Fixed(given.value);
         ledger.note("imaging.chi2_target", given.value, "", Source::Given, given.by.as_str());
     }
     imaging

@@ -1,6 +1,6 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, Table, run};
+use super::{Chapter, Table, injection, run};
 use crate::manifest;
 use crate::objective::Parameter;
 use crate::origin;
@@ -27,21 +27,23 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<(Chapter, Value), 
         }
         "optimum.json" => (optimum(&whole), whole),
         "comparison.json" => (comparison(&whole), whole),
+        "limits.json" => (injection::limits(&whole), whole),
+        _ if whole.get("injected").is_some() => (injection::injection(&whole), whole),
         _ => (simulation(&whole), whole),
     })
 }
 
 /// A number of a file with so many decimals; a dash where there is none.
-fn number(file: &Value, pointer: &str, digits: usize) -> String {
+pub(super) fn number(file: &Value, pointer: &str, digits: usize) -> String {
     file.pointer(pointer).and_then(Value::as_f64).map_or_else(|| "–".into(), |x| format!("{x:.digits$}"))
 }
 
-fn texts(file: &Value, key: &str) -> Vec<String> {
+pub(super) fn texts(file: &Value, key: &str) -> Vec<String> {
     let list = file.get(key).and_then(Value::as_array);
     list.into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
 }
 
-fn pairs(rows: &[(&str, String)]) -> Table {
+pub(super) fn pairs(rows: &[(&str, String)]) -> Table {
     Table { head: Vec::new(), rows: rows.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
 }
 
