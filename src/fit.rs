@@ -6,6 +6,7 @@
 use crate::imaging::Imager;
 use crate::log_density::Status;
 use crate::maxent::{Problem, Termination, parallelism};
+use crate::nuisances::LineAndContinuum;
 use crate::objective::tradeoff::Node;
 use crate::objective::{ParameterValues, Reference};
 use crate::observation::{Observations, RadialVelocity};
@@ -16,8 +17,10 @@ use serde::Serialize;
 pub struct Fit {
     /// Spot filling factor of every pixel.
     pub spot_filling: Vec<f64>,
-    /// Model intensity of every bin, one vector a profile, in units of the continuum.
+    /// Model intensity of every bin, one vector a profile, in units of the continuum; with its nuisances, where there are any.
     pub model: Vec<Vec<f64>>,
+    /// Posterior mean of the nuisances of each profile, given the map; empty where none are integrated out.
+    pub nuisances: Vec<LineAndContinuum>,
     /// Radial velocities, one a profile.
     pub velocities: Vec<FilteredVelocity>,
     /// Nodes of the trade-off curve, in order of falling chi2.
@@ -108,12 +111,18 @@ impl Fit {
         let mut problem = imager.problem(reference.response.clone());
         let test = parallelism(&mut problem, imager.entropy, &solution.image.logit);
         problem.linearise(&spot_filling);
-        let depths: Vec<&[f64]> =
-            (0..observations.profiles.len()).map(|k| &problem.model()[reference.response.bins(k)]).collect();
+        let mut depth = problem.model().to_vec();
+        let bins = (0..observations.profiles.len()).map(|k| reference.response.bins(k));
+        let estimate = |bins| imager.data.nuisances.estimate(bins, problem.weighted_residual(), &mut depth);
+        let nuisances = match imager.data.nuisances.is_empty() {
+            true => Vec::new(),
+            false => bins.clone().map(estimate).collect(),
+        };
+        let depths: Vec<&[f64]> = bins.map(|bins| &depth[bins]).collect();
         let velocities = velocities(imager, observations, reference, &depths);
         let summary = FitSummary { test, ..summarise(imager, observations, reference, &depths, &velocities) };
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
-        Fit { spot_filling, model, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary }
+        Fit { spot_filling, model, nuisances, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary }
     }
 }
 

@@ -5,8 +5,10 @@
 
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Curvature, Problem};
+use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
 use crate::star::{Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use std::ops::Range;
 
 /// Data in the form that the misfit needs.
 #[derive(Clone, Debug)]
@@ -15,6 +17,8 @@ pub struct Data {
     pub depth: Vec<f64>,
     /// `1 / sigma^2` of every bin.
     pub inverse_variance: Vec<f64>,
+    /// What may be wrong with each profile by itself, integrated out.
+    pub nuisances: Nuisances,
 }
 
 impl Data {
@@ -24,7 +28,24 @@ impl Data {
         Data {
             depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
             inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
+            nuisances: Nuisances::default(),
         }
+    }
+
+    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
+    pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+        for j in bins.clone() {
+            out[j] = x[j] * self.inverse_variance[j];
+        }
+        self.nuisances.weigh(bins, x, out);
+    }
+
+    /// Sets `out = R x` in the `bins` of one profile, `R^t R = W`.
+    pub fn weigh_root(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+        for j in bins.clone() {
+            out[j] = x[j] * self.inverse_variance[j].sqrt();
+        }
+        self.nuisances.weigh_root(bins, x, out);
     }
 }
 
@@ -53,6 +74,12 @@ impl Imager {
             data: Data::of(observations),
             entropy: Entropy::new(default_spot),
         }
+    }
+
+    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard deviations.
+    pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
+        self.data.nuisances = Nuisances::new(priors, observations);
+        self
     }
 
     /// The response at one state of star and planet.
@@ -98,11 +125,13 @@ pub struct ImagingProblem<'a> {
     passes: u32,
     /// Model depth of every bin at the current map.
     model: Vec<f64>,
-    /// `(model - data) / sigma^2`.
+    /// `W (model - data)`, without nuisances `(model - data) / sigma^2`.
     weighted_residual: Vec<f64>,
     continuum: Vec<f64>,
     brightness: Vec<f64>,
     bins: Vec<f64>,
+    /// Residuals or changes of the model, before they are weighed.
+    differences: Vec<f64>,
     constants: Vec<f64>,
 }
 
@@ -121,6 +150,7 @@ impl<'a> ImagingProblem<'a> {
             continuum: vec![0.0; profiles],
             brightness: vec![0.0; pixels],
             bins: vec![0.0; bins],
+            differences: vec![0.0; bins],
             constants: vec![0.0; profiles],
         }
     }
@@ -128,6 +158,11 @@ impl<'a> ImagingProblem<'a> {
     /// Model depth `1 - I` of every bin at the current map.
     pub fn model(&self) -> &[f64] {
         &self.model
+    }
+
+    /// Weights times what the model is above the data, at the current map.
+    pub fn weighted_residual(&self) -> &[f64] {
+        &self.weighted_residual
     }
 
     /// The response that the problem was made with.
@@ -190,9 +225,11 @@ impl Problem for ImagingProblem<'_> {
         for k in 0..self.response.profiles() {
             for j in self.response.bins(k) {
                 self.model[j] /= self.continuum[k];
-                let residual = self.model[j] - self.data.depth[j];
-                self.weighted_residual[j] = residual * self.data.inverse_variance[j];
-                chi2 += residual * self.weighted_residual[j];
+                self.differences[j] = self.model[j] - self.data.depth[j];
+            }
+            self.data.weigh(self.response.bins(k), &self.differences, &mut self.weighted_residual);
+            for j in self.response.bins(k) {
+                chi2 += self.differences[j] * self.weighted_residual[j];
             }
         }
         chi2
@@ -217,12 +254,15 @@ impl Problem for ImagingProblem<'_> {
         for k in 0..self.response.profiles() {
             let scale = -self.darkness / self.continuum[k];
             let d_continuum = self.constants[k] * scale;
+            for j in self.response.bins(k) {
+                self.differences[j] = scale * self.bins[j] - self.model[j] * d_continuum;
+            }
+            self.data.weigh(self.response.bins(k), &self.differences, &mut self.bins);
             let mut constant = 0.0;
             for j in self.response.bins(k) {
-                let d_model = scale * self.bins[j] - self.model[j] * d_continuum;
                 let residual = second_order * self.weighted_residual[j];
-                let back = scale * (self.data.inverse_variance[j] * d_model - residual * d_continuum);
-                constant -= back * self.model[j] + scale * residual * d_model;
+                let back = scale * (self.bins[j] - residual * d_continuum);
+                constant -= back * self.model[j] + scale * residual * self.differences[j];
                 self.bins[j] = back;
             }
             self.constants[k] = constant;

@@ -61,6 +61,7 @@ pub mod landscape;
 pub mod log_density;
 pub mod manifest;
 pub mod maxent;
+pub mod nuisances;
 pub mod objective;
 pub mod observation;
 pub mod optimise;

@@ -78,7 +78,10 @@ impl Scene {
     pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
         settings.check_velocity_grid(&settings.values, observations.step_kms)?;
         let star = settings.star_for(&observations)?;
-        let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
+        let mut imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
+        if let Some(priors) = settings.imaging.nuisances {
+            imager = imager.with_nuisances(priors, &observations);
+        }
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, imager, space })
@@ -107,6 +110,7 @@ impl Scene {
             parameters: simulation.truth,
             // as the user wrote them: degrees of radians of degrees are not
             spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
+            continuum: simulation.nuisances(),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
             sigma: simulation.sigma(),

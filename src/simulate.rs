@@ -4,6 +4,7 @@
 //! The spots are hard-edged discs, each pixel of the star holding the fraction of it that they cover. The same simulation gives
 //! the same numbers on every machine and with any number of threads. Left out: where the settings come from (`config`).
 
+use crate::nuisances::{LineAndContinuum, templates};
 use crate::objective::ParameterValues;
 use crate::observation::{Observations, Profile};
 use crate::star::spots::filling_at;
@@ -39,7 +40,12 @@ pub struct Simulation {
     pub seed: u64,
     /// Pixels of the star.
     pub pixels: usize,
+    /// Standard deviations of what is wrong with each profile by itself, in line and continuum.
+    pub continuum: LineAndContinuum,
 }
+
+/// Stream of the random numbers of line and continuum; noise is drawn from stream 0.
+const CONTINUUM_STREAM: u64 = 1;
 
 impl Simulation {
     /// Standard error of each bin, in units of the continuum.
@@ -54,7 +60,13 @@ impl Simulation {
         let brightness: Vec<f64> = filling.iter().map(|s| 1.0 - (1.0 - star.contrast) * s).collect();
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
-        let depths = Response::new(&grid, star, &self.truth.state(), &sampling).depths(&brightness);
+        let mut depths = Response::new(&grid, star, &self.truth.state(), &sampling).depths(&brightness);
+        for (depths, nuisances) in depths.chunks_exact_mut(self.bins).zip(self.nuisances()) {
+            for (j, depth) in depths.iter_mut().enumerate() {
+                let changes = templates(j, self.bins, *depth).into_iter().zip(nuisances.numbers());
+                *depth += changes.map(|(template, number)| template * number).sum::<f64>();
+            }
+        }
         let noise = self.noise(depths.len());
         let intensity: Vec<f64> = depths.iter().zip(noise).map(|(depth, noise)| 1.0 - depth + noise).collect();
         let profile = |(intensity, time_d): (&[f64], &f64)| Profile {
@@ -70,6 +82,20 @@ impl Simulation {
     /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own filling.
     pub fn spot_filling(&self, grid: &SurfaceGrid) -> Vec<f64> {
         grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
+    }
+
+    /// What is wrong with each profile by itself; empty if nothing is.
+    pub fn nuisances(&self) -> Vec<LineAndContinuum> {
+        if self.continuum == LineAndContinuum::default() {
+            return Vec::new();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(CONTINUUM_STREAM);
+        let mut draw = || LineAndContinuum::of_numbers(self.continuum.numbers().map(|sd| {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            sd * normal
+        }));
+        self.times_d.iter().map(|_| draw()).collect()
     }
 
     /// Gaussian noise of `n` bins, all profiles one after the other.

@@ -49,6 +49,7 @@ fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) 
         snr: Some(700.0),
         seed: 1,
         pixels: 3000,
+        continuum: Default::default(),
     };
     simulation.observe(&star)
 }

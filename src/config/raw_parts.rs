@@ -151,6 +151,9 @@ pub(super) struct SimulateSection {
     /// Pixels of the star that is simulated, 100 to 2,000,000; more than of the image, for honesty.
     #[serde(default = "default_simulation_pixels")]
     pub pixels: usize,
+    /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuum: Option<ContinuumSection>,
     /// Values of parameters that are simulated in place of those under `star` and `planet`, so that the start of an
     /// inference may be wrong.
     #[serde(default)]
@@ -167,6 +170,18 @@ fn default_seed() -> u64 {
 
 fn default_simulation_pixels() -> usize {
     20_000
+}
+
+/// Wandering line and continuum: standard deviations, from 0 to 10, of one Gaussian number a profile.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ContinuumSection {
+    /// Level of the continuum, in its own units.
+    pub offset: f64,
+    /// Slope of the continuum: by how much it is higher at the last bin than in the middle.
+    pub slope: f64,
+    /// Equivalent width of the line, relative.
+    pub equivalent_width: f64,
 }
 
 /// Centres of the velocity bins: `min`, `min + step`, ... up to `max` (km/s).

@@ -11,6 +11,7 @@ use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
 use super::{ImagingSettings, SamplerSettings, Settings};
+use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
 use std::path::Path;
 
@@ -107,7 +108,21 @@ fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));
     }
+    if let Some(priors) = &imaging.nuisances {
+        check_nuisances(
+            priors,
+            ["continuum_offset", "continuum_slope", "equivalent_width"].map(|n| format!("imaging.nuisances.{n}")),
+        )?;
+    }
     positive("imaging.chi2_target", imaging.chi2_target)
+}
+
+/// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
+pub(super) fn check_nuisances(priors: &LineAndContinuum, keys: [String; 3]) -> Result<(), Fault> {
+    match keys.iter().zip(priors.numbers()).find(|(_, sd)| !(0.0..=10.0).contains(sd)) {
+        Some((key, sd)) => Err(Fault::new(key, format!("{sd} must be from 0 to 10"))),
+        None => Ok(()),
+    }
 }
 
 pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {

@@ -5,8 +5,9 @@ use super::domain::check_value;
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
-use super::resolve::{check_pixels, positive};
+use super::resolve::{check_nuisances, check_pixels, positive};
 use crate::io::lsd::ReadOptions;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use crate::simulate::Simulation;
 use crate::star::{Spot, StarSettings};
@@ -67,6 +68,13 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         positive(&at("snr"), snr)?;
     }
     check_pixels(&at("pixels"), section.pixels)?;
+    let continuum = section.continuum.map_or(LineAndContinuum::default(), |c| {
+        LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width])
+    });
+    check_nuisances(
+        &continuum,
+        ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))),
+    )?;
     let mut truth = *values;
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
@@ -82,6 +90,7 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         snr: section.snr,
         seed: section.seed,
         pixels: section.pixels,
+        continuum,
     })
 }
 

@@ -4,6 +4,7 @@ use super::raw_parts::EquivalentWidth;
 use super::{ConfigError, SamplerSettings};
 use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, SpotsLeft};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
@@ -70,6 +71,10 @@ pub struct ImagingSettings {
     /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
     #[serde(skip_serializing_if = "SpotsLeft::is_default")]
     pub spots_left: SpotsLeft,
+    /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors around 0, from
+    /// 0 (no nuisance) to 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nuisances: Option<LineAndContinuum>,
 }
 
 impl Default for ImagingSettings {
@@ -80,6 +85,7 @@ impl Default for ImagingSettings {
             chi2_target: 0.97,
             objective: ObjectiveKind::default(),
             spots_left: SpotsLeft::default(),
+            nuisances: None,
         }
     }
 }

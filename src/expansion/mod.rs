@@ -87,13 +87,11 @@ impl Expansion {
                 information[(y, x)] -= share;
             }
         }
-        let root_weight: Vec<f64> = imager.data.inverse_variance.iter().map(|w| w.sqrt()).collect();
         let mut unanswered = model.tangents();
         for (mut column, (_, depths)) in unanswered.column_iter_mut().zip(&answers) {
-            for ((c, d), w) in column.iter_mut().zip(depths).zip(&root_weight) {
-                *c = (*c - d) * w;
-            }
+            column.iter_mut().zip(depths).for_each(|(c, d)| *c -= d);
         }
+        let unanswered = model.weigh_root(&unanswered);
         let solution = &reference.solution;
         Expansion {
             values: reference.values,

@@ -7,6 +7,7 @@ use super::csv::Table;
 use super::provenance::Provenance;
 use crate::fit::{Fit, FitSummary};
 use crate::imaging::Imager;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use crate::observation::Observations;
 use crate::star::SurfaceGrid;
@@ -64,6 +65,9 @@ struct MapFile<'a> {
 struct FitFile<'a> {
     #[serde(flatten)]
     summary: &'a FitSummary,
+    /// One entry a profile, in the order of the list.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    nuisances: &'a [LineAndContinuum],
     truth: Option<ParameterValues>,
     trade_off: Vec<TradeOffNode>,
     #[serde(flatten)]
@@ -149,6 +153,7 @@ impl MapResult<'_> {
         };
         FitFile {
             summary: &self.fit.summary,
+            nuisances: &self.fit.nuisances,
             truth: self.truth,
             trade_off: self.fit.tradeoff.iter().map(node).collect(),
             provenance: self.provenance,

@@ -2,6 +2,7 @@
 
 use super::atomic::{WriteError, write_json};
 use super::provenance::Provenance;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use serde::Serialize;
 use std::path::Path;
@@ -13,6 +14,9 @@ pub struct Truth {
     pub parameters: ParameterValues,
     /// The spots: longitude, latitude and radius in degrees, filling factor.
     pub spots: serde_json::Value,
+    /// What is wrong with each profile by itself, in line and continuum.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub continuum: Vec<LineAndContinuum>,
     /// Fractional spot coverage.
     pub spottedness: f64,
     /// Signal-to-noise ratio of each bin; null for no noise.
