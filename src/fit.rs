@@ -155,6 +155,7 @@ fn summarise(
     velocities: &[FilteredVelocity],
 ) -> FitSummary {
     let solution = &reference.solution;
+    let star = imager.star.with(&reference.values.state().surface);
     let data = observations.len();
     let deepest = depths.iter().flat_map(|d| d.iter()).copied().fold(0.0, f64::max);
     let observed = observations.profiles.iter().flat_map(|p| &p.intensity);
@@ -181,8 +182,8 @@ fn summarise(
         profiles: observations.profiles.len(),
         data,
         pixels: imager.grid.len(),
-        equivalent_width_kms: imager.star.line.equivalent_width_kms,
-        contrast: imager.star.contrast,
+        equivalent_width_kms: star.line.equivalent_width_kms,
+        contrast: star.contrast,
         parameters: reference.values,
         observed_rv_rms_kms: scatter(velocities.iter().map(|v| v.observed.value_kms)),
         filtered_rv_rms_kms: scatter(velocities.iter().map(FilteredVelocity::filtered_kms)),

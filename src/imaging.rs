@@ -54,7 +54,7 @@ impl Data {
 pub struct Imager {
     /// Pixels of the map.
     pub grid: SurfaceGrid,
-    /// The star, but for the eight parameters.
+    /// The star, but for the parameters.
     pub star: StarSettings,
     /// Times and velocity bins.
     pub sampling: Sampling,
@@ -89,7 +89,8 @@ impl Imager {
 
     /// The misfit of maps seen through `response`.
     pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
-        ImagingProblem::new(&self.grid.area, &self.data, response, self.star.contrast)
+        let contrast = response.contrast();
+        ImagingProblem::new(&self.grid.area, &self.data, response, contrast)
     }
 
     /// Rotation cycle of each profile.

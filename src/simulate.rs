@@ -24,7 +24,7 @@ const COVERAGE_POINTS: usize = 8;
 pub struct Simulation {
     /// The spots (radians).
     pub spots: Vec<Spot>,
-    /// All eight parameters as simulated: those of the config, but for `truth`.
+    /// All parameters as simulated: those of the config, but for `truth`.
     pub truth: ParameterValues,
     /// Times of the profiles (d).
     pub times_d: Vec<f64>,
@@ -57,10 +57,12 @@ impl Simulation {
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
         let filling = self.spot_filling(&grid);
-        let brightness: Vec<f64> = filling.iter().map(|s| 1.0 - (1.0 - star.contrast) * s).collect();
+        let state = self.truth.state();
+        let contrast = star.with(&state.surface).contrast;
+        let brightness: Vec<f64> = filling.iter().map(|s| 1.0 - (1.0 - contrast) * s).collect();
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
-        let mut depths = Response::new(&grid, star, &self.truth.state(), &sampling).depths(&brightness);
+        let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
         for (depths, nuisances) in depths.chunks_exact_mut(self.bins).zip(self.nuisances()) {
             for (j, depth) in depths.iter_mut().enumerate() {
                 let changes = templates(j, self.bins, *depth).into_iter().zip(nuisances.numbers());

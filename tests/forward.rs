@@ -12,6 +12,7 @@ fn state() -> StarState {
         vsini_kms: 40.0,
         vsys_kms: 0.0,
         orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.7, phi: 0.5 },
+        surface: Default::default(),
     }
 }
 

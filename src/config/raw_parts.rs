@@ -35,6 +35,18 @@ pub(super) struct PerParameter<T> {
     /// Systemic radial velocity (km/s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vsys_kms: Option<T>,
+    /// First coefficient of the limb darkening, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limb_darkening: Option<T>,
+    /// Standard deviation of the local line (km/s), before the spectrograph.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_sigma_kms: Option<T>,
+    /// Equivalent width of the local line (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equivalent_width_kms: Option<T>,
+    /// Brightness of a spot over that of the photosphere, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<T>,
 }
 
 impl<T> Default for PerParameter<T> {
@@ -48,6 +60,10 @@ impl<T> Default for PerParameter<T> {
             inclination_deg: None,
             vsini_kms: None,
             vsys_kms: None,
+            limb_darkening: None,
+            line_sigma_kms: None,
+            equivalent_width_kms: None,
+            contrast: None,
         }
     }
 }
@@ -64,6 +80,10 @@ impl<T> PerParameter<T> {
             Parameter::Inclination => &mut self.inclination_deg,
             Parameter::Vsini => &mut self.vsini_kms,
             Parameter::Vsys => &mut self.vsys_kms,
+            Parameter::LimbDarkening => &mut self.limb_darkening,
+            Parameter::LineSigma => &mut self.line_sigma_kms,
+            Parameter::EquivalentWidth => &mut self.equivalent_width_kms,
+            Parameter::Contrast => &mut self.contrast,
         }
     }
 }

@@ -13,6 +13,7 @@ use super::resolve_star::resolve_star;
 use super::{ImagingSettings, SamplerSettings, Settings};
 use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use crate::star::StarSettings;
 use std::path::Path;
 
 /// Fewest and most pixels of an image or a simulated star.
@@ -20,7 +21,7 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
-    let mut values = values(&raw)?;
+    let mut values = values(&mut raw, &star)?;
     let source = resolve_observations(&mut raw, &star, &values, path)?;
     check_imaging(&raw.imaging)?;
     let free = resolve_free(&mut raw, &mut values)?;
@@ -42,11 +43,18 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     })
 }
 
-/// The eight parameters as the config gives them.
-fn values(raw: &Config) -> Result<ParameterValues, Fault> {
+/// The parameters as the config gives them; those of the surface where they are free or on an axis.
+fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, Fault> {
+    let free = Parameter::ALL.map(|p| {
+        let axis = raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(p).is_some());
+        axis || raw.parameters.slot(p).is_some()
+    });
     let (star, planet) = (&raw.star, &raw.planet);
-    let mut values = ParameterValues([0.0; 8]);
+    let mut values = ParameterValues::of_eight([0.0; 8]);
     for parameter in Parameter::ALL {
+        if parameter.is_surface() && !free[parameter as usize] {
+            continue;
+        }
         values[parameter] = match parameter {
             Parameter::K => planet.k_kms,
             Parameter::PorbOverProt => planet.porb_over_prot,
@@ -57,6 +65,13 @@ fn values(raw: &Config) -> Result<ParameterValues, Fault> {
             Parameter::Inclination => star.inclination_deg,
             Parameter::Vsini => star.vsini_kms,
             Parameter::Vsys => star.vsys_kms,
+            Parameter::LimbDarkening => resolved.limb_darkening.coefficients().0,
+            Parameter::LineSigma => star.line.sigma_kms,
+            Parameter::EquivalentWidth if resolved.line.equivalent_width_kms.is_nan() => {
+                return Err(Fault::new(key(parameter), "auto is no start of a free parameter, give a number"));
+            }
+            Parameter::EquivalentWidth => resolved.line.equivalent_width_kms,
+            Parameter::Contrast => resolved.contrast,
         };
         check_value(parameter, values[parameter], &key(parameter))?;
     }

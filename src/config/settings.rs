@@ -9,7 +9,7 @@ use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues,
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
-use crate::star::{Response, StarSettings};
+use crate::star::{Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub struct Settings {
     pub star: StarSettings,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
-    /// All eight parameters as the config gives them: the fixed ones, and the start of the free ones.
+    /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
     pub values: ParameterValues,
     /// Where the profiles come from.
     pub source: ObservationSource,
@@ -134,6 +134,10 @@ impl Settings {
                 return Err(self.fault("star.line.equivalent_width_kms", &problem));
             }
             star.line.equivalent_width_kms = width;
+            if star.line.gamma_kms > 0.0 {
+                // wings beyond the profiles count too
+                star.line.equivalent_width_kms = width / share_observed(&star, &self.values, observations);
+            }
         }
         Ok(star)
     }
@@ -163,4 +167,13 @@ impl Settings {
     fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }
+}
+
+/// How much of its line an unspotted star shows within the velocities of `observations`.
+fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
+    const PIXELS: usize = 2000;
+    let grid = SurfaceGrid::equal_area(PIXELS, Quadrature::Gauss2x2);
+    let depths = Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()]);
+    let areas = depths.iter().sum::<f64>() * observations.step_kms / observations.profiles.len() as f64;
+    areas / star.line.equivalent_width_kms
 }

@@ -22,7 +22,16 @@ pub use marginal::{Nuisance, nuisances};
 pub use spots::SPOTS_LEFT;
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
-pub const STELLAR: [Parameter; 4] = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination, Parameter::Vsini];
+pub const STELLAR: [Parameter; 8] = [
+    Parameter::OmegaEq,
+    Parameter::DOmega,
+    Parameter::Inclination,
+    Parameter::Vsini,
+    Parameter::LimbDarkening,
+    Parameter::LineSigma,
+    Parameter::EquivalentWidth,
+    Parameter::Contrast,
+];
 
 /// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic velocity
 /// together), then the stellar parameters in the units of their names.

@@ -22,6 +22,9 @@ fn step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64
         Parameter::OmegaEq => turn,
         Parameter::DOmega => 3.0 * turn,
         Parameter::Inclination => 0.5,
+        // the model is smooth in these, but for 1e-7 of it where a narrower line needs another velocity grid
+        Parameter::LimbDarkening | Parameter::Contrast => 0.02,
+        Parameter::LineSigma | Parameter::EquivalentWidth => 0.02 * values[parameter],
         _ => 1e-3 * values[parameter],
     }
 }

@@ -105,7 +105,7 @@ impl MapResult<'_> {
             rotation_period_d: self.imager.star.rotation_period_d,
             epoch_d: self.imager.star.epoch_d,
             parameters: self.fit.summary.parameters,
-            contrast: self.imager.star.contrast,
+            contrast: self.fit.summary.contrast,
             spottedness: self.fit.summary.spottedness,
             true_spottedness: self.true_spot_filling.map(mean),
             pixels: self.imager.grid.len(),

@@ -10,7 +10,7 @@ use std::path::Path;
 /// The content of `truth.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Truth {
-    /// All eight parameters as simulated.
+    /// The parameters as simulated.
     pub parameters: ParameterValues,
     /// The spots: longitude, latitude and radius in degrees, filling factor.
     pub spots: serde_json::Value,

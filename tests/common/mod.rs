@@ -42,7 +42,10 @@ pub fn oracle() -> Oracle {
         epoch_d: 0.0,
         limb_darkening: LimbDarkening::Linear(number("u")),
         contrast: planck_contrast(number("tspot"), number("tphot"), 1000.0 * number("wavelength_um")),
-        line: LocalLine { sigma_kms, equivalent_width_kms: number("ew") },
+        line: LocalLine {
+            instrumental_sigma_kms: instrumental_sigma_kms(number("R")),
+            ..LocalLine::gaussian(sigma_kms, number("ew"))
+        },
     };
     let pixels = &json["pixels"];
     let table = |key: &str| numbers(&pixels[key]);
@@ -81,7 +84,7 @@ pub fn truth(oracle: &Oracle) -> ParameterValues {
 pub fn values(theta: &Value, rotation_period_d: f64) -> ParameterValues {
     let number = |key: &str| theta[key].as_f64().unwrap();
     let omega_eq = TAU / rotation_period_d * number("oeq");
-    let mut values = ParameterValues([0.0; 8]);
+    let mut values = ParameterValues::of_eight([0.0; 8]);
     values[Parameter::K] = number("K");
     values[Parameter::PorbOverProt] = number("P");
     values[Parameter::Phi] = number("phi");
