@@ -105,6 +105,17 @@ mod tests {
     }
 
     #[test]
+    fn a_voigt_profile_without_a_lorentzian_is_the_gaussian() {
+        let line = LocalLine::gaussian(3.0, 5.8);
+        let gaussian = LineKernel::new(line, 0.85);
+        let voigt = LineKernel::new(LocalLine { gamma_kms: 1e-12, ..line }, 0.85);
+        for v in (0..400).map(|i| 0.1 * f64::from(i)) {
+            // rounding of the sixth derivative, which the recurrence loses up to |z|^6 of
+            assert!((voigt.at(v) - gaussian.at(v)).abs() < 1e-12 * gaussian.at(0.0), "{v}");
+        }
+    }
+
+    #[test]
     fn deposit_and_kernel_give_back_the_line_widened_by_the_pixel() {
         let line = LocalLine::gaussian(3.0, 5.8);
         let peak = gaussian(0.0, 9.0, 5.8);

@@ -80,6 +80,17 @@ pub fn truth(oracle: &Oracle) -> ParameterValues {
     values(&oracle.json["results"]["fixed_lambda"][0]["theta"], oracle.star.rotation_period_d)
 }
 
+/// The injected values, those of the surface too.
+pub fn whole_truth(oracle: &Oracle) -> ParameterValues {
+    let mut values = truth(oracle);
+    let LimbDarkening::Linear(u) = oracle.star.limb_darkening else { panic!() };
+    values[Parameter::LimbDarkening] = u;
+    values[Parameter::LineSigma] = oracle.json["spec"]["sigma_local"].as_f64().unwrap();
+    values[Parameter::EquivalentWidth] = oracle.star.line.equivalent_width_kms;
+    values[Parameter::Contrast] = oracle.star.contrast;
+    values
+}
+
 /// Parameter values of one of the oracle's `theta` objects.
 pub fn values(theta: &Value, rotation_period_d: f64) -> ParameterValues {
     let number = |key: &str| theta[key].as_f64().unwrap();
