@@ -93,10 +93,12 @@ impl Simulation {
         }
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(CONTINUUM_STREAM);
-        let mut draw = || LineAndContinuum::of_numbers(self.continuum.numbers().map(|sd| {
-            let normal: f64 = StandardNormal.sample(&mut rng);
-            sd * normal
-        }));
+        let mut draw = || {
+            LineAndContinuum::of_numbers(self.continuum.numbers().map(|sd| {
+                let normal: f64 = StandardNormal.sample(&mut rng);
+                sd * normal
+            }))
+        };
         self.times_d.iter().map(|_| draw()).collect()
     }
 

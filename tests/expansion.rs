@@ -115,9 +115,9 @@ fn stellar_parameters_one_sigma_off() {
         Parameter::Inclination => 0.4,
         Parameter::Vsini => 0.015,
         Parameter::LimbDarkening => 0.003,
-        Parameter::LineSigma => 0.01,
+        Parameter::LineSigma => 0.025,
         Parameter::EquivalentWidth => 0.002,
-        Parameter::Contrast => 0.01,
+        Parameter::Contrast => 0.02,
     };
     for (s, &p) in STELLAR.iter().enumerate() {
         let i = expansion.profiles() + s;

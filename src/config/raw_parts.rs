@@ -41,10 +41,12 @@ pub(super) struct PerParameter<T> {
     /// Standard deviation of the local line (km/s), before the spectrograph.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_sigma_kms: Option<T>,
-    /// Equivalent width of the local line (km/s).
+    /// Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a nuisance of each profile's
+    /// own by the priors alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equivalent_width_kms: Option<T>,
-    /// Brightness of a spot over that of the photosphere, 0 to 1.
+    /// Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter than some value: the
+    /// darker they are, the fewer a map needs, so that a flat prior ends at 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contrast: Option<T>,
 }

@@ -68,13 +68,10 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         positive(&at("snr"), snr)?;
     }
     check_pixels(&at("pixels"), section.pixels)?;
-    let continuum = section.continuum.map_or(LineAndContinuum::default(), |c| {
-        LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width])
-    });
-    check_nuisances(
-        &continuum,
-        ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))),
-    )?;
+    let continuum = section
+        .continuum
+        .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
+    check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
     let mut truth = *values;
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;

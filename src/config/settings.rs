@@ -173,7 +173,8 @@ impl Settings {
 fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
     const PIXELS: usize = 2000;
     let grid = SurfaceGrid::equal_area(PIXELS, Quadrature::Gauss2x2);
-    let depths = Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()]);
+    let depths =
+        Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()]);
     let areas = depths.iter().sum::<f64>() * observations.step_kms / observations.profiles.len() as f64;
     areas / star.line.equivalent_width_kms
 }

@@ -27,7 +27,11 @@ fn dense(nuisances: &Nuisances, k: usize, power: i32, root: bool) -> DMatrix<f64
         x[20 * k + j] = 1.0;
         let sigma = &observations.profiles[k].sigma;
         bins.clone().for_each(|i| out[i] = x[i] * sigma[i - 20 * k].powi(-power));
-        if root { nuisances.weigh_root(bins.clone(), &x, &mut out) } else { nuisances.weigh(bins.clone(), &x, &mut out) }
+        if root {
+            nuisances.weigh_root(bins.clone(), &x, &mut out)
+        } else {
+            nuisances.weigh(bins.clone(), &x, &mut out)
+        }
         matrix.column_mut(j).copy_from_slice(&out[bins.clone()]);
     }
     matrix

@@ -178,7 +178,13 @@ mod tests {
             uniform(Parameter::K, 0.0, 0.3),
             uniform(Parameter::PorbOverProt, 0.5, 4.0),
         ];
-        ParameterSpace::new(free, ParameterValues::of_eight([0.1, 1.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]), 1.47, 2.94, 3.0)
+        ParameterSpace::new(
+            free,
+            ParameterValues::of_eight([0.1, 1.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]),
+            1.47,
+            2.94,
+            3.0,
+        )
     }
 
     #[test]
