@@ -3,7 +3,7 @@
 #[path = "common/desk.rs"]
 mod desk;
 
-use desk::{Desk, says, star};
+use desk::{Desk, says, two_spots};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -12,23 +12,9 @@ const FILE: &str = "comparison.json";
 
 /// Error bars are 0.0097 (K) and 0.0083 (phi): nodes are one of them apart.
 fn config() -> Value {
-    json!({
-        "star": star(),
-        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.0 },
-        "observations": { "simulate": {
-            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
-            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
-            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
-            "snr": 1000, "seed": 7, "pixels": 2000
-        } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
-        "parameters": {
-            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
-            "phi": { "prior": "periodic" }
-        },
-        "sampler": { "ensembles": 4, "walkers": 8, "steps": 400, "ess": 1000, "rhat": 1.02 },
-        "grid": { "axes": { "k_kms": [0.15, 0.25, 11], "phi": [-0.05, 0.04, 11] } }
-    })
+    let mut config = two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 400, "ess": 1000, "rhat": 1.02 }));
+    config["grid"] = json!({ "axes": { "k_kms": [0.15, 0.25, 11], "phi": [-0.05, 0.04, 11] } });
+    config
 }
 
 /// A desk with a run in `run` and a landscape in `grid`.
@@ -84,6 +70,9 @@ fn chain_paraboloid_and_landscape_agree() {
     let phi = &found["parameters"]["phi"]["landscape"];
     assert!(number(&phi["ci68"][0]) <= number(&phi["value"]) && number(&phi["value"]) <= number(&phi["ci68"][1]));
     let cost = &found["cost"];
+    for who in ["chain", "landscape"] {
+        assert!(cost[who]["seconds"].as_f64().unwrap() > 0.0, "{cost}");
+    }
     assert_eq!(cost["chain"]["reconstructions"], summary["evaluations"]);
     assert_eq!((&cost["landscape"]["reconstructions"], &cost["landscape"]["failed"]), (&json!(121), &json!(0)));
     assert_eq!(cost["landscape"]["paraboloid_nodes"], paraboloid["nodes"]);

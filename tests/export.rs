@@ -5,7 +5,7 @@ mod desk;
 #[path = "common/python.rs"]
 mod python;
 
-use desk::{Desk, dimcmc, says, star, text};
+use desk::{Desk, dimcmc, says, text, two_spots};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;
@@ -20,30 +20,10 @@ const ENSEMBLES: usize = 2;
 /// Walkers of each.
 const WALKERS: usize = 6;
 
-/// A planet whose phase is around 0; without the surrogate move, so that steps hang together.
-fn config(sampler: Value) -> Value {
-    json!({
-        "star": star(),
-        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.0 },
-        "observations": { "simulate": {
-            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
-            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
-            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
-            "snr": 1000, "seed": 7, "pixels": 2000
-        } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
-        "parameters": {
-            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
-            "phi": { "prior": "periodic" }
-        },
-        "sampler": sampler,
-    })
-}
-
 /// A desk with a run of 31 steps in `run`.
 fn small() -> Desk {
     let desk =
-        Desk::new(config(json!({ "ensembles": ENSEMBLES, "walkers": WALKERS, "steps": 30, "seed": 3, "ess": 1e6 })));
+        Desk::new(two_spots(json!({ "ensembles": ENSEMBLES, "walkers": WALKERS, "steps": 30, "seed": 3, "ess": 1e6 })));
     desk.succeed(&["sample", CONFIG, "--out", "run"]);
     desk
 }
@@ -80,7 +60,7 @@ fn in_order(desk: &Desk, records: &[Value], store: &str, group: &str) -> Vec<Val
 fn other_programs_find_what_the_summary_says() {
     let Some(python) = python::python() else { return };
     let moves = json!({ "surrogate": 0 });
-    let desk = Desk::new(config(json!({ "ensembles": 4, "walkers": 8, "steps": 400, "ess": 1e6, "moves": moves })));
+    let desk = Desk::new(two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 400, "ess": 1e6, "moves": moves })));
     desk.succeed(&["sample", CONFIG, "--out", "run"]);
     for format in FORMATS {
         let said = desk.succeed(&["export", "run", "--format", format]);

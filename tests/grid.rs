@@ -6,7 +6,7 @@ mod desk;
 
 #[cfg(unix)]
 use desk::interrupt;
-use desk::{Desk, dimcmc, kill, says, star, text};
+use desk::{Desk, dimcmc, kill, says, text, two_spots};
 use dimcmc::log_density::{LogDensity, Status};
 use dimcmc::objective::{Parameter, Posterior, Reference};
 use dimcmc::scene::Scene;
@@ -29,24 +29,14 @@ const AXES: &str = r#"{ "k_kms": [0.11, 0.26, 4], "porb_over_prot": [1.62, 1.92,
 const COUNT: usize = 48;
 
 fn config() -> Value {
-    let axes: Value = serde_json::from_str(AXES).unwrap();
-    json!({
-        "star": star(),
-        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.5 },
-        "observations": { "simulate": {
-            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
-            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
-            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
-            "snr": 1000, "seed": 7, "pixels": 2000
-        } },
-        "imaging": { "pixels": 300, "chi2_target": 1.05 },
-        "parameters": {
-            "k_kms": { "prior": "uniform", "min": 0.0, "max": 0.25 },
-            "porb_over_prot": { "prior": "log-uniform", "min": 1.0, "max": 3.0 },
-            "phi": { "prior": "periodic" }
-        },
-        "grid": { "axes": axes }
-    })
+    let mut config = two_spots(Value::Null);
+    config.as_object_mut().unwrap().remove("sampler");
+    config["planet"]["phi"] = json!(0.5);
+    config["imaging"]["pixels"] = json!(300);
+    config["parameters"]["k_kms"]["max"] = json!(0.25);
+    config["parameters"]["porb_over_prot"] = json!({ "prior": "log-uniform", "min": 1.0, "max": 3.0 });
+    config["grid"] = json!({ "axes": serde_json::from_str::<Value>(AXES).unwrap() });
+    config
 }
 
 /// A config of one free parameter, for what needs no shape.

@@ -5,7 +5,7 @@ mod desk;
 #[path = "common/svg.rs"]
 mod svg;
 
-use desk::{Desk, says, star};
+use desk::{Desk, says, two_spots};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -16,23 +16,10 @@ const CONFIG: &str = "config.json";
 
 /// A small star that takes seconds.
 fn config() -> Value {
-    json!({
-        "star": star(),
-        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.0 },
-        "observations": { "simulate": {
-            "spots": [[30, 40, 25, 0.8], [250, 10, 15, 0.9]],
-            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
-            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
-            "snr": 1000, "seed": 7, "pixels": 2000
-        } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
-        "parameters": {
-            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
-            "phi": { "prior": "periodic" }
-        },
-        "sampler": { "ensembles": 4, "walkers": 8, "steps": 30, "ess": 100, "rhat": 1.1 },
-        "grid": { "axes": { "k_kms": [0.15, 0.25, 5], "phi": [-0.05, 0.04, 5] } }
-    })
+    let mut config = two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 30, "ess": 100, "rhat": 1.1 }));
+    config["observations"]["simulate"]["spots"][1] = json!([250, 10, 15, 0.9]);
+    config["grid"] = json!({ "axes": { "k_kms": [0.15, 0.25, 5], "phi": [-0.05, 0.04, 5] } });
+    config
 }
 
 /// What every command writes, in a folder of its name.

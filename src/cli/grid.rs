@@ -4,6 +4,7 @@ use super::output::Output;
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, progress};
+use dimcmc::io::effort::Effort;
 use dimcmc::io::paraboloid::ParaboloidFile;
 use dimcmc::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
 use dimcmc::scene::Scene;
@@ -42,6 +43,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let began = Instant::now();
     if !args.resume {
         args.output.check()?;
     }
@@ -65,6 +67,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut meter = Meter::new(global, &survey.landscape);
     let whole = survey.go(signals.flag(), |landscape| meter.show(landscape));
     meter.bar.finish_and_clear();
+    Effort::add(folder, !args.resume, began.elapsed().as_secs_f64(), rayon::current_num_threads())?;
     if !whole.map_err(failed)? {
         let (config, folder, nodes) = (args.config.display(), folder.display(), survey.landscape.nodes().len());
         return Err(Failure::failed(format!(

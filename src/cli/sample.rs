@@ -7,6 +7,7 @@ use super::{Failure, Global, analyse, progress};
 use dimcmc::chain::advice::growth_needed;
 use dimcmc::chain::{Convergence, Goals, Record};
 use dimcmc::ensemble::StopReason;
+use dimcmc::io::effort::Effort;
 use dimcmc::log_density::Status;
 use dimcmc::run::{Run, StartFrom};
 use dimcmc::scene::Scene;
@@ -47,6 +48,7 @@ enum Start {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let began = Instant::now();
     let resume = args.resume || args.extend.is_some();
     if !resume {
         args.output.check()?;
@@ -79,6 +81,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut meter = Meter::new(global, &run);
     let reason = run.go(signals.flag(), |records, convergence| meter.step(records, convergence));
     meter.bar.finish_and_clear();
+    Effort::add(folder, !resume, began.elapsed().as_secs_f64(), rayon::current_num_threads())?;
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);

@@ -1,6 +1,6 @@
 //! What chain and landscape took: reconstructions, and passes, which hardly depend on the machine.
 //!
-//! Left out: the search for the reference before them.
+//! Left out: the reconstructions of the search for the reference before them.
 
 use super::{Compared, Pair};
 use crate::chain::Summary;
@@ -32,6 +32,8 @@ pub struct ChainCost {
     pub passes_median: f64,
     /// Applications of all together.
     pub passes: u64,
+    /// Seconds, the search before it included; null where they are not recorded.
+    pub seconds: Option<f64>,
     /// Effective draws of the parameter that has fewest; null where unknown.
     pub effective_draws: Option<f64>,
 }
@@ -49,6 +51,8 @@ pub struct LandscapeCost {
     pub passes_median: u32,
     /// Applications of all together.
     pub passes: u64,
+    /// Seconds, the search before it included; null where they are not recorded.
+    pub seconds: Option<f64>,
     /// Nodes that the paraboloid was fitted to; null without one.
     pub paraboloid_nodes: Option<usize>,
 }
@@ -57,6 +61,7 @@ impl Cost {
     /// What chain and landscape took.
     pub(super) fn of(pair: &Pair, summary: &Summary, paraboloid: Option<&Paraboloid>) -> Self {
         let (chain, landscape) = (&pair.chain, &pair.landscape);
+        let [chain_seconds, landscape_seconds] = pair.efforts.map(|effort| Some(effort?.seconds));
         let ess = summary.parameters.values().map(|one| one.ess);
         Cost {
             chain: ChainCost {
@@ -64,6 +69,7 @@ impl Cost {
                 failed: summary.failures,
                 passes_median: summary.passes_median,
                 passes: chain.records().iter().map(|record| u64::from(record.passes)).sum(),
+                seconds: chain_seconds,
                 effective_draws: ess.reduce(|a, b| Some(a?.min(b?))).flatten(),
             },
             landscape: LandscapeCost {
@@ -72,6 +78,7 @@ impl Cost {
                 failed: landscape.count(Status::is_failure),
                 passes_median: landscape.passes_median(),
                 passes: landscape.nodes().iter().map(|node| u64::from(node.reconstruction.passes)).sum(),
+                seconds: landscape_seconds,
                 paraboloid_nodes: paraboloid.map(|paraboloid| paraboloid.nodes),
             },
         }

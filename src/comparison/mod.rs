@@ -2,8 +2,8 @@
 //! (method section 6).
 //!
 //! The landscape has no prior: it gets the run's before it is integrated. Differences are in units of the chain's error bar, half
-//! its 68 % interval. A sampled parameter without an axis is fixed in the landscape, which is then conditional. Left out: seconds,
-//! which no file records because equal runs would not give equal files then; passes stand for them.
+//! its 68 % interval. A sampled parameter without an axis is fixed in the landscape, which is then conditional. Left
+//! out: how either was made.
 
 mod cost;
 mod draws;

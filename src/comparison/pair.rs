@@ -4,6 +4,7 @@
 
 use crate::chain::Chain;
 use crate::config::{self, Difference, Settings};
+use crate::io::effort::Effort;
 use crate::io::journal;
 use crate::io::landscape;
 use crate::io::lines::JournalError;
@@ -28,6 +29,8 @@ pub struct Pair {
     pub header: Header,
     /// All its nodes.
     pub landscape: Landscape,
+    /// How long the run took, and the landscape, where that is recorded.
+    pub efforts: [Option<Effort>; 2],
 }
 
 /// Why they cannot be compared.
@@ -82,7 +85,8 @@ impl Pair {
             return Err(PairError::Unfinished { folder: grid.into(), found, total });
         }
         let chain = journal::read(&run.join(CHAIN), &manifest.shape())?;
-        Ok(Pair { manifest, settings, chain, header, landscape })
+        let efforts = [run, grid].map(Effort::read);
+        Ok(Pair { manifest, settings, chain, header, landscape, efforts })
     }
 
     /// Number of a sampled parameter among the axes.

@@ -62,16 +62,19 @@ fn cost(cost: &Cost) -> String {
     let draws = chain.effective_draws.map_or_else(String::new, |draws| format!(", {draws:.0} effective draws"));
     let used =
         landscape.paraboloid_nodes.map_or_else(String::new, |nodes| format!(", {nodes} of them in the paraboloid"));
-    let lines = [
-        ("chain", chain.reconstructions, chain.passes_median, chain.passes, draws),
-        ("landscape", landscape.reconstructions, f64::from(landscape.passes_median), landscape.passes, used),
-    ];
-    let line = |(who, reconstructions, median, passes, rest): (&str, usize, f64, u64, String)| {
-        format!(
-            "{who}: {reconstructions} reconstructions, {median:.0} passes each in the median, {passes} in all{rest}\n"
-        )
-    };
-    lines.map(line).concat()
+    let seconds = |seconds: Option<f64>| seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.1} s"));
+    format!(
+        "chain: {} reconstructions{}, {:.0} passes each in the median, {} in all{draws}\n\
+         landscape: {} reconstructions{}, {} passes each in the median, {} in all{used}\n",
+        chain.reconstructions,
+        seconds(chain.seconds),
+        chain.passes_median,
+        chain.passes,
+        landscape.reconstructions,
+        seconds(landscape.seconds),
+        landscape.passes_median,
+        landscape.passes,
+    )
 }
 
 /// Decimals that show two digits of the error bar.

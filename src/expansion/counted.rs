@@ -7,16 +7,15 @@
 //! spots left over make the data less certain. Left out: where the reference is.
 
 use super::{Expansion, STELLAR, nuisances};
-use crate::log_density::{Evaluation, LogDensity, Status};
-use crate::objective::{Parameter, ParameterValues, Posterior};
+use crate::log_density::{Evaluation, Status};
+use crate::objective::{Parameter, ParameterSpace, ParameterValues, Posterior};
 
 /// Drops of ln L below this are nothing.
 const SOFT: f64 = 0.1;
 
-/// A posterior in which spots left over count as noise.
+/// What a posterior becomes where spots left over count as noise.
 #[derive(Clone, Debug)]
 pub struct SpotsCounted {
-    posterior: Posterior,
     /// ln L as the objective has it at the reference.
     at_reference: f64,
     entropy: Expansion,
@@ -33,7 +32,7 @@ impl SpotsCounted {
         let fitted = entropy.with_spots_left(entropy.spots_left(&nuisances(free))?)?;
         let theta = posterior.space().theta_of(&reference.values);
         let at_reference = posterior.likelihood(&theta).likelihood?.log_likelihood;
-        Some(SpotsCounted { posterior: posterior.clone(), at_reference, entropy, fitted })
+        Some(SpotsCounted { at_reference, entropy, fitted })
     }
 
     /// ln L at the reference to second order, spots left over counted: what a surrogate is made of.
@@ -48,36 +47,17 @@ impl SpotsCounted {
         let drop = |change: f64| SOFT + (-change).max(0.0);
         self.at_reference + fitted + drop(fitted) / drop(entropy) * (log_likelihood - self.at_reference - entropy)
     }
-}
 
-impl LogDensity for SpotsCounted {
-    fn names(&self) -> &[String] {
-        self.posterior.names()
-    }
-
-    fn evaluate(&self, theta: &[f64]) -> Evaluation {
-        let evaluation = self.posterior.evaluate(theta);
+    /// The posterior's `evaluation` at `theta`, spots left over counted.
+    pub fn recount(&self, space: &ParameterSpace, theta: &[f64], evaluation: Evaluation) -> Evaluation {
         if !evaluation.log_prob.is_finite() {
             return evaluation;
         }
-        let space = self.posterior.space();
         let log_prior = space.log_prior(theta);
         let log_likelihood = self.log_likelihood(&space.values_at(theta), evaluation.log_prob - log_prior);
         if log_likelihood.is_nan() {
             return Evaluation { passes: evaluation.passes, ..Evaluation::rejected(Status::NonFinite) };
         }
         Evaluation { log_prob: log_prior + log_likelihood, ..evaluation }
-    }
-
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
-        self.posterior.to_internal(theta)
-    }
-
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
-        self.posterior.to_written(internal)
-    }
-
-    fn log_jacobian(&self, theta: &[f64]) -> f64 {
-        self.posterior.log_jacobian(theta)
     }
 }

@@ -5,6 +5,7 @@
 
 use super::laboratory::ExperimentError;
 use super::outcome::{Estimate, Outcome, Route};
+use super::star::with;
 use crate::chain::{Summary, summarise};
 use crate::config::{self, GridSettings};
 use crate::detection::{Detection, DetectionSettings};
@@ -13,7 +14,7 @@ use crate::io::atomic::write_json;
 use crate::io::paraboloid::ParaboloidFile;
 use crate::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
 use crate::manifest::kinds_and_goals;
-use crate::objective::{Parameter, ReferenceError};
+use crate::objective::{Parameter, Reference, ReferenceError};
 use crate::optimise::Optimum;
 use crate::origin::by_name;
 use crate::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
@@ -33,8 +34,9 @@ const REACH: f64 = 3.0;
 /// Shortest period on a grid, over the rotation period.
 const SHORTEST: f64 = 0.3;
 
-/// A target out of reach is set above the floor by the first of these factors at which there is an image.
-const ABOVE_FLOOR: [f64; 6] = [1.05, 1.04, 1.06, 1.03, 1.08, 1.1];
+/// A target out of reach is set above what a provisional reference reaches, by the first of these factors at which there is an
+/// image at the best orbit.
+const ABOVE_REACHED: [f64; 4] = [1.05, 1.08, 1.12, 1.2];
 
 /// Where the nodes of a grid over K, Porb/Prot and phi are.
 #[derive(Clone, Debug, PartialEq)]
@@ -152,30 +154,39 @@ impl Nodes {
     }
 }
 
-/// The star of a config, and the best parameters there; its target chi2 raised above the floor if it is out of reach.
+/// The star of a config, and the best parameters there; its target chi2 is raised if it is out of reach.
 pub fn search(config: &Value, path: &Path, stop: &AtomicBool) -> Result<(Scene, Found), ExperimentError> {
-    let mut config = config.clone();
-    let mut above_floor = ABOVE_FLOOR.iter();
-    let mut floor = f64::NAN;
-    loop {
+    let found =
+        |scene: Scene| match search::find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ()) {
+            Ok(found) => Ok(Ok((scene, found))),
+            Err(SearchError::Reference(error)) => Ok(Err(error)),
+            Err(error) => Err(error),
+        };
+    let mut last = match found(scene(config, path)?)? {
+        Ok(found) => return Ok(found),
+        Err(error) => error,
+    };
+    if matches!(last, ReferenceError::NothingToFit { .. }) {
+        return Err(last.into());
+    }
+    let Scene { imager, settings, .. } = scene(config, path)?;
+    let reached = Reference::provisional(&imager, settings.values, settings.imaging.chi2_target)?.solution.chi2;
+    let reached = reached / imager.data.depth.len() as f64;
+    for factor in ABOVE_REACHED {
         if stop.load(Relaxed) {
             return Err(ExperimentError::Interrupted);
         }
-        let scene = Scene::new(config::from_json(config.to_string().as_bytes(), path)?)?;
-        let settings = SearchSettings::new(&scene.settings);
-        let error = match search::find(&scene.imager, &scene.space, settings, &|_| ()) {
-            Err(SearchError::Reference(error)) => error,
-            found => return Ok((scene, found?)),
-        };
-        match error {
-            ReferenceError::TargetBelowFloor { floor: found, .. } => floor = found,
-            ReferenceError::Solver(_) if floor.is_nan() => floor = settings.chi2_target,
-            ReferenceError::Solver(_) => {}
-            ReferenceError::NothingToFit { .. } => return Err(error.into()),
+        let target = json!((1e4 * factor * reached).round() / 1e4);
+        match found(scene(&with(config.clone(), &[("/imaging/chi2_target", target)]), path)?)? {
+            Ok(found) => return Ok(found),
+            Err(error) => last = error,
         }
-        let Some(factor) = above_floor.next() else { return Err(error.into()) };
-        config["imaging"]["chi2_target"] = json!((1e4 * factor * floor).round() / 1e4);
     }
+    Err(last.into())
+}
+
+fn scene(config: &Value, path: &Path) -> Result<Scene, ExperimentError> {
+    Ok(Scene::new(config::from_json(config.to_string().as_bytes(), path)?)?)
 }
 
 /// The landscape on `grid`, kept in `folder`, and its paraboloid.

@@ -141,11 +141,11 @@ fn noise_seed(map: u64, seed: u64) -> u64 {
     1000 * (map + 1) + seed
 }
 
-/// Share and its binomial error.
+/// Share and its binomial error: that of the share with one more of either kind, which is not nothing where all are alike.
 fn share(count: usize, of: usize) -> [f64; 2] {
     let n = of.max(1) as f64;
-    let p = count as f64 / n;
-    [p, (p * (1.0 - p) / n).sqrt()].map(|x| (1000.0 * x).round() / 1000.0)
+    let p = (count as f64 + 1.0) / (n + 2.0);
+    [count as f64 / n, (p * (1.0 - p) / n).sqrt()].map(|x| (1000.0 * x).round() / 1000.0)
 }
 
 /// Whether the injected value is inside the interval of 68 (0) or 95 % (1); a phase in any turn.
@@ -176,9 +176,8 @@ fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, Experimen
         ("/observations/simulate/spots", json!(spots)),
         ("/observations/simulate/seed", json!(noise_seed(map, seed))),
         ("/planet", json!({ "k_kms": k_kms, "porb_over_prot": period, "phi": rng.random::<f64>() })),
-        // pixels matched in their moments: errors of 1e-5 of the continuum, a hundredth of the noise
-        ("/observations/simulate/pixels", json!(6000)),
-        ("/imaging/pixels", json!(laboratory.full_or_quick(1000, 800))),
+        ("/observations/simulate/pixels", json!(laboratory.full_or_quick(20_000, 6000))),
+        ("/imaging/pixels", json!(laboratory.full_or_quick(5000, 800))),
         ("/parameters/k_kms", json!({ "prior": "uniform", "min": K_KMS.0, "max": K_KMS.1 })),
         ("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": PERIODS.0, "max": PERIODS.1 })),
         ("/sampler/walkers", json!(10)),

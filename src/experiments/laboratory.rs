@@ -138,15 +138,10 @@ impl Laboratory<'_> {
         if self.quick { quick } else { full }
     }
 
-    /// A few of many cases where it has to be quick.
+    /// The first and the last of many cases where it has to be quick.
     pub fn some<T>(&self, mut all: Vec<T>) -> Vec<T> {
-        if self.quick {
-            let last = all.len() - 1;
-            let mut k = 0;
-            all.retain(|_| {
-                k += 1;
-                k == 1 || k == last + 1
-            });
+        if self.quick && all.len() > 2 {
+            all.drain(1..all.len() - 1);
         }
         all
     }

@@ -85,7 +85,15 @@ fn tabulated(
 }
 
 /// Columns that say in which of two ways a star was modelled.
-const WAYS: [&str; 2] = ["equatorial_velocity_kept", "rotation_fitted"];
+const WAYS: [&str; 3] = ["equatorial_velocity_kept", "rotation_fitted", SPOTS_LEFT_FITTED];
+
+/// The way in which the chain counts what maps leave over of spots.
+const SPOTS_LEFT_FITTED: &str = "spots_left_fitted";
+
+/// Both ways of taking what maps leave over of spots: what is varied, and the change of the config that it takes.
+fn ways_with_spots_left() -> [((&'static str, f64), Option<(&'static str, Value)>); 2] {
+    [((SPOTS_LEFT_FITTED, 0.0), None), ((SPOTS_LEFT_FITTED, 1.0), Some(("/imaging/spots_left", json!("fitted"))))]
+}
 
 const ROUTES: [&str; 3] = ["grid", "chain", "periodogram"];
 
@@ -208,20 +216,25 @@ fn panel(x: &str, name: &str) -> Panel {
 
 const SEED: &str = "/observations/simulate/seed";
 
-/// R4.
+/// R4. The landscape knows nothing of spots left over, so that only the chain is made in both ways.
 pub(super) fn no_planet(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
-    let star = |seed: u32| {
-        let anywhere = [
-            ("/parameters/porb_over_prot/min", json!(0.5)),
-            ("/parameters/porb_over_prot/max", json!(4.0)),
-            (SEED, json!(seed)),
-        ];
-        let mut star = star(laboratory, &[("seed", f64::from(seed))], [0.0, 1.7, 0.5], &anywhere);
-        let [k, period, phi] = laboratory.full_or_quick([11, 15, 12], [5, 5, 5]);
-        star.case.grid = Some(Nodes::At([(0.0, 0.2, k), (0.5, 4.0, period), (0.0, 1.0, phi)]));
-        star
-    };
-    tabulated(laboratory, "R4", &["seed"], (1..=5).map(star).collect())
+    let mut stars = Vec::new();
+    for (way, spots_left) in ways_with_spots_left() {
+        for seed in 1..=5_u32 {
+            let mut changes = vec![
+                ("/parameters/porb_over_prot/min", json!(0.5)),
+                ("/parameters/porb_over_prot/max", json!(4.0)),
+                (SEED, json!(seed)),
+            ];
+            changes.extend(spots_left.clone());
+            let mut star = star(laboratory, &[("seed", f64::from(seed)), way], [0.0, 1.7, 0.5], &changes);
+            let [k, period, phi] = laboratory.full_or_quick([11, 15, 12], [5, 5, 5]);
+            let nodes = Nodes::At([(0.0, 0.2, k), (0.5, 4.0, period), (0.0, 1.0, phi)]);
+            star.case.grid = spots_left.is_none().then_some(nodes);
+            stars.push(star);
+        }
+    }
+    tabulated(laboratory, "R4", &["seed", SPOTS_LEFT_FITTED], stars)
 }
 
 /// R5.
@@ -327,16 +340,21 @@ pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Experimen
 /// K = 100 m/s at the rotation period, the same number of profiles over more and more rotations, for several noise seeds.
 pub(super) fn co_rotation(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     const PROFILES: u32 = 50;
-    let star = |(rotations, seed): (u32, u32)| {
-        let cycle = |k: u32| f64::from(k * rotations) / f64::from(PROFILES);
-        let cycles: Vec<f64> = (0..PROFILES).map(cycle).collect();
-        let changes = [("/observations/simulate/cycles", json!(cycles)), (SEED, json!(seed))];
-        let varied = [("rotations", f64::from(rotations)), ("seed", f64::from(seed))];
-        let mut star = star(laboratory, &varied, [0.1, 1.0, 0.5], &changes);
-        // that it agrees with the chain is seen in the other rows
-        star.case.grid = None;
-        star
-    };
-    let all = [1, 2, 3, 4, 6, 8].into_iter().flat_map(|rotations| (1..=2).map(move |seed| (rotations, seed)));
-    tabulated(laboratory, "co-rotation", &["rotations", "seed"], all.map(star).collect())
+    let mut stars = Vec::new();
+    for (way, spots_left) in ways_with_spots_left() {
+        for (rotations, seed) in
+            [1, 2, 3, 4, 6, 8].into_iter().flat_map(|rotations| (1..=3).map(move |seed| (rotations, seed)))
+        {
+            let cycle = |k: u32| f64::from(k * rotations) / f64::from(PROFILES);
+            let cycles: Vec<f64> = (0..PROFILES).map(cycle).collect();
+            let mut changes = vec![("/observations/simulate/cycles", json!(cycles)), (SEED, json!(seed))];
+            changes.extend(spots_left.clone());
+            let varied = [("rotations", f64::from(rotations)), ("seed", f64::from(seed)), way];
+            let mut star = star(laboratory, &varied, [0.1, 1.0, 0.5], &changes);
+            // that it agrees with the chain is seen in the other rows
+            star.case.grid = None;
+            stars.push(star);
+        }
+    }
+    tabulated(laboratory, "co-rotation", &["rotations", "seed", SPOTS_LEFT_FITTED], stars)
 }

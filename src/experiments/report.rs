@@ -76,10 +76,4 @@ impl Report {
     pub fn number(&mut self, name: &str, value: impl Into<Value>) {
         self.numbers.insert(name.to_owned(), value.into());
     }
-
-    /// The values of a column.
-    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
-        let k = self.columns.iter().position(|column| column == name)?;
-        Some(self.rows.iter().map(|row| row[k]).collect())
-    }
 }

@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod csv;
+pub mod effort;
 pub mod journal;
 pub mod landscape;
 pub mod lines;

@@ -19,6 +19,9 @@ const LOGIT_CAP: f64 = 2.0;
 /// Largest change of ln(lambda) that is made before the first Newton step.
 const RESTORE_REACH: f64 = 0.3;
 
+/// An error below this part of chi2 is rounding, and no step makes it smaller.
+const ROUNDING: f64 = 1.5e-12;
+
 /// The exact curvature is used once a step is worth less than this in `S/lambda - chi2/2`.
 const EXACT_BELOW: f64 = 100.0;
 
@@ -72,7 +75,7 @@ impl Solver<'_> {
             let guide = Guide { preconditioner: self.preconditioner, path: &path, adjoint: &start.adjoint };
             let standing = Standing::of(problem, self.entropy, &at, goal, guide);
             let drop = start.best.map_or(0.0, |best| standing.below(&best, problem.area(), &at, goal));
-            if standing.error < self.settings.tolerance_at(drop) {
+            if standing.error < self.settings.tolerance_at(drop).max(ROUNDING * at.chi2) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
                 return self.finish(problem, at, Some(standing), path, why, newton_steps);
             }

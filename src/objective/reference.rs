@@ -33,6 +33,9 @@ const FIRST_CHI2: f64 = 1.5;
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
 const HOPELESS_LAMBDA: f64 = 40.0;
 
+/// A chi2 within this factor of the target is not the floor, wherever the solver stopped.
+const ABOVE_TARGET: f64 = 1.001;
+
 /// A provisional reference takes what it gets at lambda = this over the number of data.
 const PROVISIONAL_LAMBDA: f64 = 3.0;
 
@@ -97,8 +100,10 @@ impl Reference {
         let mut reference = Reference::approach(imager, values, chi2_per_datum, HOPELESS_LAMBDA)?;
         match reference.solution.termination {
             Termination::Converged => {}
-            // a search for the floor that runs out of steps has found it to within what a message needs
-            Termination::Unreachable | Termination::StepLimit => {
+            // a search for the floor that runs out of steps far from the target has found it to within what a message needs
+            Termination::Unreachable | Termination::StepLimit
+                if reference.solution.chi2 > ABOVE_TARGET * reference.chi2_target =>
+            {
                 let floor = reference.solution.chi2 / data;
                 return Err(ReferenceError::TargetBelowFloor { target: chi2_per_datum, floor });
             }

@@ -41,13 +41,6 @@ impl Target {
         };
         Some(surrogate?.fitted(self, &Threads(self)))
     }
-
-    fn density(&self) -> &dyn LogDensity {
-        match &self.counted {
-            Some(counted) => counted,
-            None => &self.posterior,
-        }
-    }
 }
 
 impl LogDensity for Target {
@@ -57,7 +50,11 @@ impl LogDensity for Target {
 
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
         self.evaluations.fetch_add(1, Relaxed);
-        self.density().evaluate(theta)
+        let evaluation = self.posterior.evaluate(theta);
+        match &self.counted {
+            Some(counted) => counted.recount(self.posterior.space(), theta, evaluation),
+            None => evaluation,
+        }
     }
 
     fn to_internal(&self, theta: &[f64]) -> Vec<f64> {

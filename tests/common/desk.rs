@@ -20,6 +20,26 @@ pub fn star() -> Value {
     })
 }
 
+/// A config of that star with two spots and a planet, K and phi free, that takes a second or two; `sampler` as given.
+pub fn two_spots(sampler: Value) -> Value {
+    json!({
+        "star": star(),
+        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.0 },
+        "observations": { "simulate": {
+            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
+            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
+            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
+            "snr": 1000, "seed": 7, "pixels": 2000
+        } },
+        "imaging": { "pixels": 200, "chi2_target": 1.05 },
+        "parameters": {
+            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
+            "phi": { "prior": "periodic" }
+        },
+        "sampler": sampler
+    })
+}
+
 pub fn dimcmc(args: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dimcmc")).args(args).current_dir(folder).output().unwrap()
 }
