@@ -3,51 +3,15 @@
 //! The map s gives the brightness `B = 1 - (1 - c) s`; the model is `D = line(B) / continuum(B)` (method section 1), whose
 //! second derivative is kept, so that the solver's Newton steps are exact. Left out: which parameters are tried, and why.
 
+mod data;
+
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Curvature, Problem};
 use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
 use crate::star::{Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
-use std::ops::Range;
 
-/// Data in the form that the misfit needs.
-#[derive(Clone, Debug)]
-pub struct Data {
-    /// Observed depth `1 - I` of every bin.
-    pub depth: Vec<f64>,
-    /// `1 / sigma^2` of every bin.
-    pub inverse_variance: Vec<f64>,
-    /// What may be wrong with each profile by itself, integrated out.
-    pub nuisances: Nuisances,
-}
-
-impl Data {
-    /// Depths and weights of all profiles, one after the other.
-    pub fn of(observations: &Observations) -> Self {
-        let profiles = || observations.profiles.iter();
-        Data {
-            depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
-            inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
-            nuisances: Nuisances::default(),
-        }
-    }
-
-    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
-    pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
-        for j in bins.clone() {
-            out[j] = x[j] * self.inverse_variance[j];
-        }
-        self.nuisances.weigh(bins, x, out);
-    }
-
-    /// Sets `out = R x` in the `bins` of one profile, `R^t R = W`.
-    pub fn weigh_root(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
-        for j in bins.clone() {
-            out[j] = x[j] * self.inverse_variance[j].sqrt();
-        }
-        self.nuisances.weigh_root(bins, x, out);
-    }
-}
+pub use data::Data;
 
 /// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
 #[derive(Clone, Debug)]

@@ -66,8 +66,7 @@ fn wide_priors_project_the_templates_out() {
     for k in 0..2 {
         let weights = dense(&nuisances, k, 2, false);
         let rows = templates_of(&observations.profiles[k], &observations);
-        for i in 0..3 {
-            let template = DVector::from_fn(20, |j, _| rows[j][i]);
+        for template in [0, 1, 2].map(|i| DVector::from_iterator(20, rows.iter().map(|row| row[i]))) {
             // what is left is the prior's: 1/100 where the data say 1e6
             assert!((&weights * &template).dot(&template) < 0.02);
         }
