@@ -169,9 +169,8 @@ pub fn search(config: &Value, path: &Path, stop: &AtomicBool) -> Result<(Scene, 
     if matches!(last, ReferenceError::NothingToFit { .. }) {
         return Err(last.into());
     }
-    let Scene { imager, settings, .. } = scene(config, path)?;
-    let reached = Reference::provisional(&imager, settings.values, settings.imaging.chi2_target)?.solution.chi2;
-    let reached = reached / imager.data.depth.len() as f64;
+    let first = scene(config, path)?;
+    let reached = attained(&first, first.settings.imaging.chi2_target)?;
     for factor in ABOVE_REACHED {
         if stop.load(Relaxed) {
             return Err(ExperimentError::Interrupted);
@@ -185,7 +184,14 @@ pub fn search(config: &Value, path: &Path, stop: &AtomicBool) -> Result<(Scene, 
     Err(last.into())
 }
 
-fn scene(config: &Value, path: &Path) -> Result<Scene, ExperimentError> {
+/// chi2 per datum of a provisional image at the config's values, no lower than `target`.
+pub(super) fn attained(scene: &Scene, target: f64) -> Result<f64, ExperimentError> {
+    let image = Reference::provisional(&scene.imager, scene.settings.values, target)?;
+    Ok(image.solution.chi2 / scene.imager.data.depth.len() as f64)
+}
+
+/// The star of a config that is kept at `path`.
+pub(super) fn scene(config: &Value, path: &Path) -> Result<Scene, ExperimentError> {
     Ok(Scene::new(config::from_json(config.to_string().as_bytes(), path)?)?)
 }
 

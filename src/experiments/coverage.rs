@@ -4,14 +4,11 @@
 //! Orbits are drawn from the very prior that the chain has, so that an exact posterior covers just as often as it says. Left out:
 //! the periodogram's intervals (`examples/calibration.rs`).
 
-use super::case::Case;
+use super::case::{self, Case};
 use super::laboratory::{ExperimentError, Laboratory};
-use super::outcome::{Estimate, Outcome};
+use super::outcome::{Estimate, Outcome, share};
 use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
-use crate::config;
-use crate::objective::Reference;
-use crate::scene::Scene;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -37,9 +34,6 @@ const K_KMS: (f64, f64) = (0.03, 0.2);
 
 /// Prior of Porb/Prot, log-uniform.
 const PERIODS: (f64, f64) = (0.5, 4.0);
-
-/// A chi2 per datum that no image comes down to.
-const OUT_OF_REACH: f64 = 0.5;
 
 /// Periods within this share of the rotation period are near co-rotation.
 const NEAR: f64 = 0.15;
@@ -121,7 +115,7 @@ fn shares(outcomes: &[Outcome]) -> Value {
     let of_group = |(group, stars): (&str, Vec<&Outcome>)| {
         let of_one = |name: &str| {
             let shares = [("inside_68", 0), ("inside_95", 1)].map(|(level, k)| {
-                let inside = stars.iter().filter(|star| is_inside(star, name, k)).count();
+                let inside = stars.iter().filter(|star| star.is_covered(name, k)).count();
                 (level.to_owned(), json!(share(inside, stars.len())))
             });
             (name.to_owned(), Value::Object(shares.into_iter().collect()))
@@ -141,39 +135,15 @@ fn noise_seed(map: u64, seed: u64) -> u64 {
     1000 * (map + 1) + seed
 }
 
-/// Share and its binomial error: that of the share with one more of either kind, which is not nothing where all are alike.
-fn share(count: usize, of: usize) -> [f64; 2] {
-    let n = of.max(1) as f64;
-    let p = (count as f64 + 1.0) / (n + 2.0);
-    [count as f64 / n, (p * (1.0 - p) / n).sqrt()].map(|x| (1000.0 * x).round() / 1000.0)
-}
-
-/// Whether the injected value is inside the interval of 68 (0) or 95 % (1); a phase in any turn.
-fn is_inside(outcome: &Outcome, name: &str, level: usize) -> bool {
-    // a star without a result counts as one that is missed
-    let Some(one) = estimate(outcome, name) else { return false };
-    let [low, high] = [one.ci68, one.ci95][level];
-    let truth = injected(outcome, name);
-    let turns: &[f64] = if name == "phi" { &[-1.0, 0.0, 1.0] } else { &[0.0] };
-    turns.iter().any(|turn| (low..=high).contains(&(truth + turn)))
-}
-
-/// A star with spots of its map, and orbit and noise of its seed. Its target is the chi2 of the image where lambda is three
-/// over the number of data (the paper's star at 0.97 has 1.6): how far down a noise realisation lets chi2 come is up to it, and a
-/// target near the floor would make noise of the spots.
+/// A star with spots of its map, and orbit and noise of its seed.
 fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, ExperimentError> {
     let mut rng = ChaCha8Rng::seed_from_u64(map);
-    let mut spot = || {
-        let longitude = rng.random_range(0.0..360.0f64);
-        let latitude = rng.random_range(-0.3f64..1.0).asin().to_degrees();
-        json!([longitude, latitude, rng.random_range(5.0..17.0f64), rng.random_range(0.5..0.92f64)])
-    };
-    let spots: Vec<Value> = (0..12).map(|_| spot()).collect();
+    let spots = random_spots(&mut rng);
     rng.set_stream(1 + seed);
     let k_kms = rng.random_range(K_KMS.0..K_KMS.1);
     let period = rng.random_range(PERIODS.0.ln()..PERIODS.1.ln()).exp();
     let changes = [
-        ("/observations/simulate/spots", json!(spots)),
+        ("/observations/simulate/spots", spots),
         ("/observations/simulate/seed", json!(noise_seed(map, seed))),
         ("/planet", json!({ "k_kms": k_kms, "porb_over_prot": period, "phi": rng.random::<f64>() })),
         ("/observations/simulate/pixels", json!(laboratory.full_or_quick(20_000, 6000))),
@@ -185,9 +155,27 @@ fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, Experimen
         ("/sampler/rhat", json!(laboratory.full_or_quick(1.05, 1.1))),
     ];
     let config = with(paper(), &changes);
-    let scene = Scene::new(config::from_json(config.to_string().as_bytes(), &laboratory.folder.join("config.json"))?)?;
-    // a target out of reach: the image ends at the largest weight of chi2 that a first image may have
-    let image = Reference::provisional(&scene.imager, scene.settings.values, OUT_OF_REACH)?;
-    let chi2 = image.solution.chi2 / scene.imager.data.depth.len() as f64;
-    Ok(with(config, &[("/imaging/chi2_target", json!((1e4 * chi2).round() / 1e4))]))
+    attainable(laboratory, config)
+}
+
+/// A chi2 per datum that no image comes down to.
+const OUT_OF_REACH: f64 = 0.5;
+
+/// `config` with a target chi2 that its image attains: that of the image where lambda is three over the number of data (the
+/// paper's star at 0.97 has 1.6). How far down a noise realisation lets chi2 come is up to it, and a target near the floor would
+/// make noise of the spots.
+pub(super) fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, ExperimentError> {
+    let scene = case::scene(&config, &laboratory.folder.join("config.json"))?;
+    let chi2 = (1e4 * case::attained(&scene, OUT_OF_REACH)?).round() / 1e4;
+    Ok(with(config, &[("/imaging/chi2_target", json!(chi2))]))
+}
+
+/// A dozen spots from the pole down to latitude -17.
+pub(super) fn random_spots(rng: &mut ChaCha8Rng) -> Value {
+    let mut spot = || {
+        let longitude = rng.random_range(0.0..360.0f64);
+        let latitude = rng.random_range(-0.3f64..1.0).asin().to_degrees();
+        json!([longitude, latitude, rng.random_range(5.0..17.0f64), rng.random_range(0.5..0.92f64)])
+    };
+    (0..12).map(|_| spot()).collect()
 }

@@ -10,6 +10,7 @@ pub mod files;
 mod images;
 mod laboratory;
 mod landscape;
+mod models;
 mod orbits;
 pub mod outcome;
 pub mod report;
@@ -129,5 +130,11 @@ pub const ROWS: &[Row] = &[
         title: "truths inside the chain's intervals, over spot maps and noise seeds",
         paper: "",
         run: coverage::coverage,
+    },
+    Row {
+        name: "models",
+        title: "stars with faculae, wings and a wandering continuum, by the right model and the plain one",
+        paper: "",
+        run: models::models,
     },
 ];

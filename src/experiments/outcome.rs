@@ -71,6 +71,13 @@ fn number_or_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
+/// Share of `of` and its binomial error: that of the share with one more of either kind, which is not nothing where all are alike.
+pub fn share(count: usize, of: usize) -> [f64; 2] {
+    let n = of.max(1) as f64;
+    let p = (count as f64 + 1.0) / (n + 2.0);
+    [count as f64 / n, (p * (1.0 - p) / n).sqrt()].map(|x| (1000.0 * x).round() / 1000.0)
+}
+
 impl Estimate {
     /// A value with a Gaussian error bar.
     pub fn gaussian(value: f64, sigma: f64) -> Self {
@@ -89,6 +96,16 @@ impl Outcome {
     pub fn routes(&self) -> impl Iterator<Item = (&'static str, &Route)> {
         let all = [("grid", &self.grid), ("chain", &self.chain), ("periodogram", &self.periodogram)];
         all.into_iter().filter_map(|(name, route)| Some((name, route.as_ref()?)))
+    }
+
+    /// Whether the injected value is inside the chain's interval of 68 (level 0) or 95 % (1); a phase in any turn. A star without
+    /// a result counts as one that is missed.
+    pub fn is_covered(&self, name: &str, level: usize) -> bool {
+        let estimate = self.chain.as_ref().and_then(|chain| chain.parameters.get(name));
+        let (Some(one), Some(truth)) = (estimate, self.truth.get(name)) else { return false };
+        let [low, high] = [one.ci68, one.ci95][level];
+        let turns: &[f64] = if name == "phi" { &[-1.0, 0.0, 1.0] } else { &[0.0] };
+        turns.iter().any(|turn| (low..=high).contains(&(truth + turn)))
     }
 
     /// Value minus the injected one; of a phase, the shorter way round.
