@@ -64,6 +64,7 @@ pub mod log_density;
 pub mod manifest;
 pub mod maxent;
 pub mod noise;
+pub mod nuisances;
 pub mod objective;
 pub mod observation;
 pub mod optimise;

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: &[&[&str]] = &[
     &["units", "text", "vector", "velocities", "log_density", "figure"],
     &["observation"],
-    &["star", "maxent", "chain", "landscape", "periodogram"],
+    &["star", "maxent", "chain", "landscape", "periodogram", "nuisances"],
     &["imaging", "ensemble", "optimise", "first_look"],
     &["objective"],
     &["expansion"],
@@ -39,7 +39,8 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
     ("maxent", &["units", "vector"]),
-    ("imaging", &["maxent", "observation", "star", "units", "vector"]),
+    ("nuisances", &["observation"]),
+    ("imaging", &["maxent", "nuisances", "observation", "star", "units", "vector"]),
     ("chain", &["log_density", "text"]),
     ("landscape", &["log_density", "text"]),
     ("periodogram", &["velocities"]),

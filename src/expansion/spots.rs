@@ -115,7 +115,7 @@ mod tests {
             let shift = &information * DMatrix::from_element(n, 1, 0.3) * normal(1, 1);
             let gradient = 2.0 * normal(n, 1) + (30.0f64 * 0.05).sqrt() * &waves * normal(12, 1) + shift;
             let expansion = Expansion {
-                values: ParameterValues([0.0, 1.7, 0.0, 2.0, 0.0, 40.0, 40.0, 0.0]),
+                values: ParameterValues::of_eight([0.0, 1.7, 0.0, 2.0, 0.0, 40.0, 40.0, 0.0]),
                 cycles: (0..n).map(|k| k as f64).collect(),
                 stellar: Vec::new(),
                 log_likelihood: 0.0,
