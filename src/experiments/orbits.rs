@@ -330,7 +330,7 @@ pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Experimen
         let prior = json!({ "prior": "uniform", "min": 2.0, "max": 2.2 });
         let injected = ("/observations/simulate/truth/omega_eq_rad_d", json!(TAU / ROTATION_PERIOD_D));
         let free = with(star.case.config.clone(), &[injected.clone(), ("/parameters/omega_eq_rad_d", prior)]);
-        let (scene, found) = search(&free, &laboratory.folder.join("config.json"), laboratory.stop)?;
+        let (scene, found) = search(&free, &laboratory.folder.join("config.json"), laboratory.pool)?;
         let index = scene.space.names().iter().position(|name| name == "omega_eq_rad_d").expect("it is free");
         let omega = rounded(found.optimum.theta[index], 7);
         star.case.name += "_rotation_fitted";
