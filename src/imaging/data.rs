@@ -30,9 +30,8 @@ impl Data {
 
     /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
     pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
-        for j in bins.clone() {
-            out[j] = x[j] * self.inverse_variance[j];
-        }
+        let weights = x[bins.clone()].iter().zip(&self.inverse_variance[bins.clone()]);
+        out[bins.clone()].iter_mut().zip(weights).for_each(|(out, (x, weight))| *out = x * weight);
         self.nuisances.weigh(bins, x, out);
     }
 
