@@ -1,14 +1,16 @@
 //! Synthetic observations: a spotted star with its planet through the forward model, and photon noise (Petit et al. 2015,
 //! section 2).
 //!
-//! The spots are hard-edged discs, each pixel of the star holding the fraction of it that they cover. The same simulation gives
+//! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of filling
+//! factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the largest s and the
+//! largest excess e of the discs that overlap. The same simulation gives
 //! the same numbers on every machine and with any number of threads. Left out: where the settings come from (`config`).
 
 use crate::nuisances::{LineAndContinuum, templates};
 use crate::objective::ParameterValues;
 use crate::observation::{Observations, Profile};
-use crate::star::spots::filling_at;
-use crate::star::{Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use crate::star::spots::{excess_at, filling_at};
+use crate::star::{Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -24,6 +26,8 @@ const COVERAGE_POINTS: usize = 8;
 pub struct Simulation {
     /// The spots (radians).
     pub spots: Vec<Spot>,
+    /// The faculae (radians).
+    pub faculae: Vec<Facula>,
     /// All parameters as simulated: those of the config, but for `truth`.
     pub truth: ParameterValues,
     /// Times of the profiles (d).
@@ -56,10 +60,8 @@ impl Simulation {
     /// The observations of `star`.
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
-        let filling = self.spot_filling(&grid);
         let state = self.truth.state();
-        let contrast = star.with(&state.surface).contrast;
-        let brightness: Vec<f64> = filling.iter().map(|s| 1.0 - (1.0 - contrast) * s).collect();
+        let brightness = self.brightness(&grid, star);
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
         let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
@@ -100,6 +102,22 @@ impl Simulation {
             }))
         };
         self.times_d.iter().map(|_| draw()).collect()
+    }
+
+    /// Brightness of spots on `star` over that of the photosphere.
+    pub fn contrast(&self, star: &StarSettings) -> f64 {
+        star.with(&self.truth.state().surface).contrast
+    }
+
+    /// The true brightness of each pixel of `grid` on `star`, that of the photosphere being 1.
+    pub fn brightness(&self, grid: &SurfaceGrid, star: &StarSettings) -> Vec<f64> {
+        let of_spots = Brightness::of_spots(self.contrast(star));
+        let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
+        if !self.faculae.is_empty() {
+            let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);
+            brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
+        }
+        brightness
     }
 
     /// Gaussian noise of `n` bins, all profiles one after the other.

@@ -15,11 +15,11 @@ const LAYERS: &[&[&str]] = &[
     &["objective"],
     &["expansion"],
     &["surrogate"],
-    &["simulate", "fit", "detection"],
+    &["simulate", "injection", "noise", "fit", "detection"],
     &["io"],
     &["config"],
     &["scene", "search"],
-    &["origin", "proposal"],
+    &["origin", "proposal", "limits"],
     &["manifest", "survey", "optimum", "import"],
     &["run"],
     &["comparison", "export"],
@@ -48,6 +48,8 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("optimise", &["log_density"]),
     ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
     ("first_look", &["observation", "star"]),
+    ("injection", &["observation", "star"]),
+    ("noise", &["first_look", "imaging", "objective", "observation", "star"]),
     // from saved files alone: nothing that reconstructs, samples or searches
     (
         "plot",

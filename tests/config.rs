@@ -91,7 +91,7 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 fn lo_peg_resolves() {
     let settings = config::load(&shipped("lopeg.json")).unwrap();
     assert_eq!(settings.equivalent_width, EquivalentWidth::Auto);
-    let ObservationSource::Files { path, options } = &settings.source else { panic!() };
+    let ObservationSource::Files { path, options, .. } = &settings.source else { panic!() };
     assert!(path.ends_with("configs/../../shared/data/lopeg/observations.txt"));
     assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 0.3));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
@@ -304,6 +304,11 @@ fn senseless_values_name_their_key() {
             json!({ "prior": "uniform", "min": -1, "max": 5 }),
             "parameters.line_sigma_kms.min",
         ),
+        ("/imaging/brightness", json!("bright"), "imaging.brightness"),
+        ("/observations/simulate/faculae", json!([[0, 91, 5, 0.1]]), "observations.simulate.faculae[0]"),
+        ("/observations/simulate/faculae", json!([[0, 9, 5, 0.1], [0, 9, 0, 0.1]]), "observations.simulate.faculae[1]"),
+        ("/observations/simulate/faculae", json!([[0, 9, 5, 0]]), "observations.simulate.faculae[0]"),
+        ("/observations/simulate/faculae", json!([[0, 9, 5, 1e9]]), "observations.simulate.faculae[0]"),
         ("/parameters/k_kms/min", json!(0.3), "parameters.k_kms.min"),
         ("/parameters/k_kms/min", json!(0.5), "parameters.k_kms.min"),
         ("/parameters/k_kms/prior", json!("periodic"), "parameters.k_kms.prior"),
@@ -349,6 +354,9 @@ fn senseless_values_name_their_key() {
         let message = message(&with(demo(), pointer, value));
         assert!(message.starts_with(&format!(": {key}: ")), "{pointer}: {message}");
     }
+    let brightness = with(demo(), "/imaging/brightness", json!("bright-and-dark"));
+    let contrast = json!({ "prior": "uniform", "min": 0, "max": 1 });
+    assert!(message(&with(brightness, "/parameters/contrast", contrast)).starts_with(": parameters.contrast: "));
     for (pointer, value, key) in [
         ("/observations/velocity_range_kms", json!([90, -90]), "observations.velocity_range_kms"),
         ("/observations/sigma_scale", json!(0), "observations.sigma_scale"),

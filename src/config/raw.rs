@@ -2,7 +2,8 @@
 //!
 //! Left out: whether the values make sense (`resolve`). Fields of `PerParameter` and the observations are in `raw_parts`.
 
-use super::raw_parts::{EquivalentWidth, Grid, ObservationsSection, PerParameter, PriorSection};
+use super::EquivalentWidth;
+use super::raw_parts::{Grid, ObservationsSection, PerParameter, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

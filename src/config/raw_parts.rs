@@ -1,9 +1,10 @@
 //! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
 
+use super::automatic::Automatic;
+use crate::noise::Weights;
 use crate::objective::Parameter;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-use std::borrow::Cow;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// One optional entry for each parameter that may be free.
@@ -134,7 +135,7 @@ pub(super) enum PriorKind {
     Periodic,
 }
 
-/// The line profiles: either `path` (with its two options), or `simulate`.
+/// The line profiles: either `path` (with its options), or `simulate`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObservationsSection {
@@ -144,9 +145,13 @@ pub(super) struct ObservationsSection {
     /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_range_kms: Option<[f64; 2]>,
-    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given.
+    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given. "auto": the larger of what the
+    /// scatter of the continuum says and what a map at the config's values leaves over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sigma_scale: Option<f64>,
+    pub sigma_scale: Option<Automatic>,
+    /// With `path`: how the profiles are weighted against each other.
+    #[serde(default, skip_serializing_if = "Weights::is_default")]
+    pub weights: Weights,
     /// Simulated profiles of the star and planet of this config.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateSection>,
@@ -160,6 +165,11 @@ pub(super) struct SimulateSection {
     /// larger filling counts where they overlap.
     #[serde(default)]
     pub spots: Vec<[f64; 4]>,
+    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter than the
+    /// photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of filling s overlaps,
+    /// the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faculae: Vec<[f64; 4]>,
     /// Rotation cycles of the profiles, counted from `epoch_d`.
     pub cycles: Vec<f64>,
     /// Velocity bins.
@@ -227,70 +237,4 @@ pub(super) struct Grid {
     /// An axis of `phi` may wrap around 0 or 1 (nodes are written in [0, 1)); where it spans a whole period, as [0, 1, n],
     /// max is the same place as min and is left out.
     pub axes: PerParameter<(f64, f64, usize)>,
-}
-
-/// Equivalent width of the local line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum EquivalentWidth {
-    /// A number (km/s).
-    Fixed(f64),
-    /// The mean area of the observed profiles.
-    Auto,
-}
-
-impl Serialize for EquivalentWidth {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            EquivalentWidth::Fixed(width) => serializer.serialize_f64(*width),
-            EquivalentWidth::Auto => serializer.serialize_str("auto"),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for EquivalentWidth {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(EquivalentWidthVisitor)
-    }
-}
-
-struct EquivalentWidthVisitor;
-
-impl de::Visitor<'_> for EquivalentWidthVisitor {
-    type Value = EquivalentWidth;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str("a number or \"auto\"")
-    }
-
-    fn visit_f64<E: de::Error>(self, value: f64) -> Result<EquivalentWidth, E> {
-        Ok(EquivalentWidth::Fixed(value))
-    }
-
-    fn visit_i64<E: de::Error>(self, value: i64) -> Result<EquivalentWidth, E> {
-        Ok(EquivalentWidth::Fixed(value as f64))
-    }
-
-    fn visit_u64<E: de::Error>(self, value: u64) -> Result<EquivalentWidth, E> {
-        Ok(EquivalentWidth::Fixed(value as f64))
-    }
-
-    fn visit_str<E: de::Error>(self, value: &str) -> Result<EquivalentWidth, E> {
-        match value {
-            "auto" => Ok(EquivalentWidth::Auto),
-            _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
-        }
-    }
-}
-
-impl JsonSchema for EquivalentWidth {
-    fn schema_name() -> Cow<'static, str> {
-        "EquivalentWidth".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "description": "A number (km/s), above 0, or \"auto\": the mean area of the observed profiles.",
-            "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "const": "auto" }]
-        })
-    }
 }

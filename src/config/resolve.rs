@@ -10,10 +10,10 @@ use super::raw::Config;
 use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
-use super::{ImagingSettings, SamplerSettings, Settings};
+use super::{Automatic, ImagingSettings, SamplerSettings, Settings};
 use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
-use crate::star::StarSettings;
+use crate::star::{BrightnessModel, StarSettings};
 use std::path::Path;
 
 /// Fewest and most pixels of an image or a simulated star.
@@ -26,6 +26,12 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     check_imaging(&raw.imaging)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
+        return Err(Fault::new(
+            "parameters.contrast",
+            "has no effect on a bright-and-dark map, which holds the brightness itself",
+        ));
+    }
     let grid = raw.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
     let resolved = serde_json::to_value(&raw).map_err(|e| Fault::new("config", e.to_string()))?;
     Ok(Settings {
@@ -129,7 +135,7 @@ fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
             ["continuum_offset", "continuum_slope", "equivalent_width"].map(|n| format!("imaging.nuisances.{n}")),
         )?;
     }
-    positive("imaging.chi2_target", imaging.chi2_target)
+    automatic("imaging.chi2_target", imaging.chi2_target)
 }
 
 /// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
@@ -149,6 +155,14 @@ pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
 
 pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
+}
+
+/// Positive, or left to the observations.
+pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
+    match value {
+        Automatic::Fixed(value) => positive(key, value),
+        Automatic::Auto => Ok(()),
+    }
 }
 
 fn check_sampler(sampler: &SamplerSettings, free: usize) -> Result<(), Fault> {

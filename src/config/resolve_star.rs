@@ -1,8 +1,8 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
+use super::EquivalentWidth;
 use super::error::Fault;
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
-use super::raw_parts::EquivalentWidth;
 use super::resolve::positive;
 use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use crate::units::{instrumental_sigma_kms, planck_contrast};

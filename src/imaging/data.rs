@@ -28,6 +28,16 @@ impl Data {
         }
     }
 
+    /// That of the profiles with these `bins` alone, all errors multiplied by `factor`.
+    pub fn of_profiles(&self, profiles: &[Range<usize>], factor: f64) -> Self {
+        let of = |x: &[f64]| profiles.iter().flat_map(|bins| x[bins.clone()].to_vec()).collect::<Vec<f64>>();
+        let mut inverse_variance = of(&self.inverse_variance);
+        inverse_variance.iter_mut().for_each(|w| *w /= factor * factor);
+        let sigma: Vec<f64> = inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
+        let nuisances = self.nuisances.of_profiles(profiles, &sigma);
+        Data { depth: of(&self.depth), inverse_variance, nuisances }
+    }
+
     /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
     pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
         let weights = x[bins.clone()].iter().zip(&self.inverse_variance[bins.clone()]);
