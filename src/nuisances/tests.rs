@@ -92,7 +92,7 @@ fn fewer_profiles_or_larger_errors_are_as_if_made_so() {
     let priors = LineAndContinuum::of_numbers([1e-3, 2e-3, 0.02]);
     let all = Nuisances::new(priors, &observations());
     let sigma: Vec<f64> = observations().profiles[1].sigma.iter().map(|s| 3.0 * s).collect();
-    let second = all.of_profiles(&[20..40], &sigma);
+    let second = all.of_profiles(std::slice::from_ref(&(20..40)), &sigma);
     let x: Vec<f64> = (0..20).map(|j| (j as f64).cos()).collect();
     let mut weighted: Vec<f64> = x.iter().zip(&sigma).map(|(x, s)| x / (s * s)).collect();
     second.weigh(0..20, &x, &mut weighted);
