@@ -169,7 +169,8 @@ impl Fit {
             FitSummary { test, deviation, ..summarise(imager, observations, reference, &residuals, &velocities) };
         let checks = Checks::of(&residuals);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
-        Fit { map, model, nuisances, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary, checks }
+        let tradeoff = reference.tradeoff.nodes().to_vec();
+        Fit { map, model, nuisances, velocities, tradeoff, summary, checks }
     }
 }
 

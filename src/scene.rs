@@ -163,9 +163,9 @@ impl Scene {
     pub fn true_map(&self) -> Option<Vec<f64>> {
         match self.settings.imaging.brightness {
             BrightnessModel::Spots => self.true_spot_filling(),
-            BrightnessModel::BrightAndDark => {
-                self.simulation().map(|simulation| simulation.brightness(&self.imager.grid, &self.imager.star))
-            }
+            BrightnessModel::BrightAndDark => self
+                .simulation()
+                .map(|simulation| simulation.brightness(&self.imager.grid, simulation.contrast(&self.imager.star))),
         }
     }
 

@@ -61,7 +61,7 @@ impl Simulation {
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
         let state = self.truth.state();
-        let brightness = self.brightness(&grid, star);
+        let brightness = self.brightness(&grid, self.contrast(star));
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
         let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
@@ -109,9 +109,9 @@ impl Simulation {
         star.with(&self.truth.state().surface).contrast
     }
 
-    /// The true brightness of each pixel of `grid` on `star`, that of the photosphere being 1.
-    pub fn brightness(&self, grid: &SurfaceGrid, star: &StarSettings) -> Vec<f64> {
-        let of_spots = Brightness::of_spots(self.contrast(star));
+    /// The true brightness of each pixel of `grid`, that of the photosphere being 1 and that of spots `contrast`.
+    pub fn brightness(&self, grid: &SurfaceGrid, contrast: f64) -> Vec<f64> {
+        let of_spots = Brightness::of_spots(contrast);
         let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
         if !self.faculae.is_empty() {
             let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);

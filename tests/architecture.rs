@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
 const LAYERS: &[&[&str]] = &[
-    &["units", "text", "vector", "velocities", "log_density", "figure"],
+    &["units", "text", "vector", "velocities", "log_density", "figure", "cluster"],
     &["observation"],
     &["star", "maxent", "chain", "landscape", "periodogram", "nuisances"],
     &["imaging", "ensemble", "optimise", "first_look"],
@@ -20,9 +20,10 @@ const LAYERS: &[&[&str]] = &[
     &["config"],
     &["scene", "search"],
     &["origin", "proposal", "limits"],
+    &["pool"],
     &["manifest", "survey", "optimum", "import"],
     &["run"],
-    &["comparison", "export"],
+    &["comparison", "export", "merge", "batch"],
     &["experiments"],
     &["plot"],
     &["report"],
@@ -36,6 +37,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("velocities", &[]),
     ("figure", &[]),
     ("log_density", &[]),
+    ("cluster", &[]),
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
     ("maxent", &["units", "vector"]),

@@ -137,6 +137,13 @@ impl Expansion {
         direction
     }
 
+    /// The same quadratic, written around other values.
+    pub fn recentred(&self, values: &ParameterValues) -> Self {
+        let centre = self.coordinates(values);
+        let gradient = &self.gradient - &self.information * (&centre - &self.centre);
+        Expansion { values: *values, log_likelihood: self.log_likelihood_at(values), centre, gradient, ..self.clone() }
+    }
+
     /// ln L there, to second order.
     pub fn log_likelihood_at(&self, values: &ParameterValues) -> f64 {
         let step = self.coordinates(values) - &self.centre;

@@ -42,11 +42,15 @@ impl Expansion {
     /// With `S = noise + factor (information - noise)` the covariance of the gradient, the best coordinates `centre + I^-1 g`
     /// stay, and their covariance is `I^-1 S I^-1`: the new information is `I S^-1 I`, the new gradient `I S^-1 g`.
     pub fn with_spots_left(&self, factor: f64) -> Option<Self> {
-        let covariance = &self.noise + factor * self.spots();
-        let answer = covariance.cholesky()?.solve(&self.information);
+        let answer = self.covariance_with_spots_left(factor).cholesky()?.solve(&self.information);
         let information = symmetric(self.information.tr_mul(&answer));
         let gradient = answer.tr_mul(&self.gradient);
         Some(Expansion { gradient, noise: information.clone(), information, ..self.clone() })
+    }
+
+    /// Covariance of the gradient with spots left over, `factor` times as large as the entropy expects in variance.
+    pub(super) fn covariance_with_spots_left(&self, factor: f64) -> DMatrix<f64> {
+        &self.noise + factor * self.spots()
     }
 
     /// What spots add to the covariance of the gradient, as the entropy has it: positive, whatever rounding and the curvature of
