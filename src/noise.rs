@@ -161,8 +161,7 @@ impl MeasuredErrors {
         let before = self.sigma_scale.unwrap_or(1.0);
         let mut factor = 1.0;
         for _ in 0..MOST_MAPS {
-            let mut scaled = imager.clone();
-            scaled.data.inverse_variance.iter_mut().for_each(|w| *w /= factor * factor);
+            let scaled = imager.with_errors(factor);
             let map = Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA * self.correlated_bins)?;
             let independent = scaled.data.depth.len() as f64 / self.correlated_bins;
             let next = factor * (map.solution.chi2 / (FITTED * independent)).sqrt();

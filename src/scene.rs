@@ -163,9 +163,9 @@ impl Scene {
     pub fn true_map(&self) -> Option<Vec<f64>> {
         match self.settings.imaging.brightness {
             BrightnessModel::Spots => self.true_spot_filling(),
-            BrightnessModel::BrightAndDark => {
-                self.simulation().map(|simulation| simulation.brightness(&self.imager.grid, self.imager.star.contrast))
-            }
+            BrightnessModel::BrightAndDark => self
+                .simulation()
+                .map(|simulation| simulation.brightness(&self.imager.grid, simulation.contrast(&self.imager.star))),
         }
     }
 
@@ -187,7 +187,7 @@ impl Scene {
             // as the user wrote them: degrees of radians of degrees are not
             spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
             faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
-            contrast: (!simulation.faculae.is_empty()).then_some(self.imager.star.contrast),
+            contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
             continuum: simulation.nuisances(),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
