@@ -70,7 +70,7 @@ fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) 
     let star = scene.imager.star.clone();
     let observations = simulation.observe(&star);
     let imaging = &scene.settings.imaging;
-    (Imager::new(star, &observations, imaging.pixels, imaging.default_spot), truth)
+    (Imager::new(star, &observations, imaging.pixels, imaging.entropy()), truth)
 }
 
 fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {

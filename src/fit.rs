@@ -9,6 +9,7 @@ pub use checks::{Checks, ProfileCheck};
 
 use crate::imaging::Imager;
 use crate::log_density::Status;
+use crate::maxent::entropy::Entropy;
 use crate::maxent::{Problem, Termination, parallelism};
 use crate::objective::tradeoff::Node;
 use crate::objective::{ParameterValues, Reference};
@@ -18,8 +19,8 @@ use serde::Serialize;
 /// A reconstruction and what it makes of the data.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Spot filling factor of every pixel.
-    pub spot_filling: Vec<f64>,
+    /// What the map holds: spot filling factor or brightness of every pixel.
+    pub map: Vec<f64>,
     /// Model intensity of every bin, one vector a profile, in units of the continuum.
     pub model: Vec<Vec<f64>>,
     /// Radial velocities, one a profile.
@@ -82,8 +83,11 @@ pub struct FitSummary {
     pub alpha: f64,
     /// Entropy.
     pub entropy: f64,
-    /// Fractional spot coverage.
+    /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
     pub spottedness: f64,
+    /// Of an image of bright and dark pixels, what is darker and what is brighter than the photosphere.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<Deviation>,
     /// Skilling & Bryan's TEST, 0 at a maximum-entropy image.
     pub test: f64,
     /// Applications of the response or its transpose, those for the trade-off curve included.
@@ -116,23 +120,47 @@ pub struct FitSummary {
     pub sigma_rms: f64,
 }
 
+/// Deviation from the brightness of the photosphere, means over the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Deviation {
+    /// Mean of what pixels lack in brightness, 0 for bright ones.
+    pub darkness: f64,
+    /// Mean of what they have too much, 0 for dark ones.
+    pub brightness_excess: f64,
+}
+
+impl Deviation {
+    /// Of a map of brightnesses; `None` if maps hold something else.
+    fn of(imager: &Imager, map: &[f64]) -> Option<Self> {
+        let mean = |part: fn(f64) -> f64| map.iter().zip(&imager.grid.area).map(|(b, a)| a * part(b - 1.0)).sum();
+        match imager.entropy {
+            Entropy::Spots { .. } => None,
+            Entropy::BrightAndDark => {
+                Some(Deviation { darkness: mean(|x| (-x).max(0.0)), brightness_excess: mean(|x| x.max(0.0)) })
+            }
+        }
+    }
+}
+
 impl Fit {
     /// Holds `reference` against the `observations` that `imager` was made for.
     pub fn new(imager: &Imager, observations: &Observations, reference: &Reference) -> Self {
         let solution = &reference.solution;
-        let mut spot_filling = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&solution.image.logit, &mut spot_filling);
+        let mut map = vec![0.0; imager.grid.len()];
+        imager.entropy.image(&solution.image.coordinates, &mut map);
         let mut problem = imager.problem(reference.response.clone());
-        let test = parallelism(&mut problem, imager.entropy, &solution.image.logit);
-        problem.linearise(&spot_filling);
+        let test = parallelism(&mut problem, imager.entropy, &solution.image.coordinates);
+        problem.linearise(&map);
         let depths: Vec<&[f64]> =
             (0..observations.profiles.len()).map(|k| &problem.model()[reference.response.bins(k)]).collect();
         let velocities = velocities(imager, observations, reference, &depths);
+        let deviation = Deviation::of(imager, &map);
         let residuals = residuals(observations, &depths);
-        let summary = FitSummary { test, ..summarise(imager, observations, reference, &residuals, &velocities) };
+        let summary =
+            FitSummary { test, deviation, ..summarise(imager, observations, reference, &residuals, &velocities) };
         let checks = Checks::of(&residuals);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
-        Fit { spot_filling, model, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary, checks }
+        Fit { map, model, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary, checks }
     }
 }
 
@@ -168,7 +196,7 @@ fn velocities(
     observations.profiles.iter().zip(depths).map(velocity).collect()
 }
 
-/// All numbers but `test`.
+/// All numbers but `test` and `deviation`.
 fn summarise(
     imager: &Imager,
     observations: &Observations,
@@ -195,6 +223,7 @@ fn summarise(
         alpha: 1.0 / solution.image.lambda,
         entropy: solution.entropy,
         spottedness: solution.spottedness,
+        deviation: None,
         test: f64::NAN,
         passes: reference.passes,
         newton_steps: solution.newton_steps,

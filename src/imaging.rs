@@ -1,12 +1,13 @@
-//! Star and maximum entropy meet: the misfit of a map of spot filling factors to observed profiles, and the Doppler image.
+//! Star and maximum entropy meet: the misfit of a map to observed profiles, and the Doppler image.
 //!
-//! The map s gives the brightness `B = 1 - (1 - c) s`; the model is `D = line(B) / continuum(B)` (method section 1), whose
-//! second derivative is kept, so that the solver's Newton steps are exact. Left out: which parameters are tried, and why.
+//! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is
+//! `D = line(B) / continuum(B)` (method section 1), whose second derivative is kept, so that the solver's Newton steps are exact.
+//! Left out: which parameters are tried, and why.
 
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Curvature, Problem};
 use crate::observation::Observations;
-use crate::star::{Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use crate::star::{Brightness, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
 
 /// Data in the form that the misfit needs.
 #[derive(Clone, Debug)]
@@ -44,14 +45,14 @@ pub struct Imager {
 }
 
 impl Imager {
-    /// For `observations` of `star`, on about `pixels` pixels, with the entropy's default filling factor `default_spot`.
-    pub fn new(star: StarSettings, observations: &Observations, pixels: usize, default_spot: f64) -> Self {
+    /// For `observations` of `star`, on about `pixels` pixels, with maps of the given `entropy`.
+    pub fn new(star: StarSettings, observations: &Observations, pixels: usize, entropy: Entropy) -> Self {
         Imager {
             grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
             star,
             sampling: Sampling::of(observations),
             data: Data::of(observations),
-            entropy: Entropy::new(default_spot),
+            entropy,
         }
     }
 
@@ -79,7 +80,11 @@ impl Imager {
 
     /// The misfit of maps seen through `response`.
     pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
-        ImagingProblem::new(&self.grid.area, &self.data, response, self.star.contrast)
+        let brightness = match self.entropy {
+            Entropy::Spots { .. } => Brightness::of_spots(self.star.contrast),
+            Entropy::BrightAndDark => Brightness::ITSELF,
+        };
+        ImagingProblem::of_brightness(&self.grid.area, &self.data, response, brightness)
     }
 
     /// Rotation cycle of each profile.
@@ -105,13 +110,12 @@ impl Imager {
     }
 }
 
-/// The misfit of spot maps to profiles, for one response.
+/// The misfit of maps to profiles, for one response.
 pub struct ImagingProblem<'a> {
     area: &'a [f64],
     data: &'a Data,
     response: Response,
-    /// `1 - c`: what a wholly spotted pixel lacks in brightness.
-    darkness: f64,
+    brightness_of: Brightness,
     passes: u32,
     /// Model depth of every bin at the current map.
     model: Vec<f64>,
@@ -126,12 +130,17 @@ pub struct ImagingProblem<'a> {
 impl<'a> ImagingProblem<'a> {
     /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness `contrast`.
     pub fn new(area: &'a [f64], data: &'a Data, response: Response, contrast: f64) -> Self {
+        ImagingProblem::of_brightness(area, data, response, Brightness::of_spots(contrast))
+    }
+
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the `brightness`.
+    fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Brightness) -> Self {
         let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
         ImagingProblem {
             area,
             data,
             response,
-            darkness: 1.0 - contrast,
+            brightness_of,
             passes: 0,
             model: vec![0.0; bins],
             weighted_residual: vec![0.0; bins],
@@ -163,7 +172,7 @@ impl<'a> ImagingProblem<'a> {
 
     /// What profile `k` hands to the transpose for the gradient: its bins, and the constant that comes with them.
     fn pull(&self, k: usize, bins: &mut [f64]) -> f64 {
-        let scale = -self.darkness / self.continuum[k];
+        let scale = self.brightness_of.slope / self.continuum[k];
         let mut constant = 0.0;
         for j in self.response.bins(k) {
             bins[j] = scale * self.weighted_residual[j];
@@ -177,7 +186,7 @@ impl<'a> ImagingProblem<'a> {
         self.passes += 1;
         self.response.apply(v, out, &mut self.constants);
         for k in 0..self.response.profiles() {
-            let scale = -self.darkness / self.continuum[k];
+            let scale = self.brightness_of.slope / self.continuum[k];
             for j in self.response.bins(k) {
                 out[j] = scale * (out[j] - self.model[j] * self.constants[k]);
             }
@@ -201,7 +210,7 @@ impl Problem for ImagingProblem<'_> {
 
     fn linearise(&mut self, s: &[f64]) -> f64 {
         self.passes += 1;
-        self.brightness.iter_mut().zip(s).for_each(|(b, s)| *b = 1.0 - self.darkness * s);
+        self.brightness.iter_mut().zip(s).for_each(|(b, s)| *b = self.brightness_of.at(*s));
         self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
         let mut chi2 = 0.0;
         for k in 0..self.response.profiles() {
@@ -232,7 +241,7 @@ impl Problem for ImagingProblem<'_> {
         let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
         self.response.apply(v, &mut self.bins, &mut self.constants);
         for k in 0..self.response.profiles() {
-            let scale = -self.darkness / self.continuum[k];
+            let scale = self.brightness_of.slope / self.continuum[k];
             let d_continuum = self.constants[k] * scale;
             let mut constant = 0.0;
             for j in self.response.bins(k) {

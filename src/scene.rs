@@ -12,7 +12,7 @@ use crate::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::objective::{FreeParameter, ParameterSpace, ParameterValues, ReferenceError, target};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
-use crate::star::{Orbit, Quadrature, SurfaceGrid};
+use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -156,8 +156,22 @@ impl Scene {
 
     /// The true spot map on the pixels of the image, if the observations are simulated.
     pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
+        self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
+    }
+
+    /// What the image should hold on its pixels, if the observations are simulated.
+    pub fn true_map(&self) -> Option<Vec<f64>> {
+        match self.settings.imaging.brightness {
+            BrightnessModel::Spots => self.true_spot_filling(),
+            BrightnessModel::BrightAndDark => {
+                self.simulation().map(|simulation| simulation.brightness(&self.imager.grid, self.imager.star.contrast))
+            }
+        }
+    }
+
+    fn simulation(&self) -> Option<&Simulation> {
         match &self.settings.source {
-            ObservationSource::Simulate(simulation) => Some(simulation.spot_filling(&self.imager.grid)),
+            ObservationSource::Simulate(simulation) => Some(simulation),
             ObservationSource::Files { .. } => None,
         }
     }
@@ -172,6 +186,8 @@ impl Scene {
             parameters: simulation.truth,
             // as the user wrote them: degrees of radians of degrees are not
             spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
+            faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
+            contrast: (!simulation.faculae.is_empty()).then_some(self.imager.star.contrast),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
             sigma: simulation.sigma(),
@@ -199,7 +215,7 @@ impl Scene {
 fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
     settings.check_velocity_grid(&settings.values, observations.step_kms)?;
     let star = settings.star_for(observations)?;
-    Ok(Imager::new(star, observations, settings.imaging.pixels, settings.imaging.default_spot))
+    Ok(Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy()))
 }
 
 /// The observations, cut as they are used, with the errors that they and the `whole` profiles ask for.

@@ -1,13 +1,15 @@
 //! Synthetic observations: a spotted star with its planet through the forward model, and photon noise (Petit et al. 2015,
 //! section 2).
 //!
-//! The spots are hard-edged discs, each pixel of the star holding the fraction of it that they cover. The same simulation gives
+//! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of filling
+//! factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the largest s and the
+//! largest excess e of the discs that overlap. The same simulation gives
 //! the same numbers on every machine and with any number of threads. Left out: where the settings come from (`config`).
 
 use crate::objective::ParameterValues;
 use crate::observation::{Observations, Profile};
-use crate::star::spots::filling_at;
-use crate::star::{Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use crate::star::spots::{excess_at, filling_at};
+use crate::star::{Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -23,6 +25,8 @@ const COVERAGE_POINTS: usize = 8;
 pub struct Simulation {
     /// The spots (radians).
     pub spots: Vec<Spot>,
+    /// The faculae (radians).
+    pub faculae: Vec<Facula>,
     /// All eight parameters as simulated: those of the config, but for `truth`.
     pub truth: ParameterValues,
     /// Times of the profiles (d).
@@ -50,8 +54,7 @@ impl Simulation {
     /// The observations of `star`.
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
-        let filling = self.spot_filling(&grid);
-        let brightness: Vec<f64> = filling.iter().map(|s| 1.0 - (1.0 - star.contrast) * s).collect();
+        let brightness = self.brightness(&grid, star.contrast);
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
         let depths = Response::new(&grid, star, &self.truth.state(), &sampling).depths(&brightness);
@@ -70,6 +73,17 @@ impl Simulation {
     /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own filling.
     pub fn spot_filling(&self, grid: &SurfaceGrid) -> Vec<f64> {
         grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
+    }
+
+    /// The true brightness of each pixel of `grid`, that of the photosphere being 1 and that of spots `contrast`.
+    pub fn brightness(&self, grid: &SurfaceGrid, contrast: f64) -> Vec<f64> {
+        let of_spots = Brightness::of_spots(contrast);
+        let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
+        if !self.faculae.is_empty() {
+            let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);
+            brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
+        }
+        brightness
     }
 
     /// Gaussian noise of `n` bins, all profiles one after the other.

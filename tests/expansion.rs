@@ -6,6 +6,7 @@ use common::{Oracle, imager, json, numbers, oracle, truth};
 use dimcmc::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
 use dimcmc::imaging::Imager;
 use dimcmc::maxent::SolverSettings;
+use dimcmc::maxent::entropy::Entropy;
 use dimcmc::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
@@ -61,9 +62,14 @@ fn oracle_chi2(oracle: &Oracle) -> f64 {
 fn orbits_of_up_to_150_metres_per_second() {
     let oracle = oracle();
     let imager = imager(&oracle, oracle.grid.clone());
-    let (reference, alone) = planet_free(&oracle, &imager);
-    let expansion = Expansion::of(&imager, &reference, &[]);
-    let exact = exact(&imager, &reference);
+    orbits(&oracle, &imager);
+    orbits(&oracle, &Imager { entropy: Entropy::BrightAndDark, ..imager });
+}
+
+fn orbits(oracle: &Oracle, imager: &Imager) {
+    let (reference, alone) = planet_free(oracle, imager);
+    let expansion = Expansion::of(imager, &reference, &[]);
+    let exact = exact(imager, &reference);
     let none = exact(&alone);
     assert!((expansion.log_likelihood - none).abs() < 1e-4);
     let mut rng = ChaCha8Rng::seed_from_u64(4);

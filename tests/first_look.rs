@@ -41,6 +41,7 @@ fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) 
     let reach = vsini_kms + beyond_kms;
     let simulation = Simulation {
         spots,
+        faculae: Vec::new(),
         truth,
         times_d: (0..20).map(|_| rng.random_range(0.0..12.0)).collect(),
         first_velocity_kms: -reach,

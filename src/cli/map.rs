@@ -3,7 +3,7 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
-use dimcmc::fit::{Fit, FitSummary};
+use dimcmc::fit::{Deviation, Fit, FitSummary};
 use dimcmc::io::map::{FILES, MapResult};
 use dimcmc::objective::Reference;
 use dimcmc::scene::Scene;
@@ -31,12 +31,12 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     spinner.finish_and_clear();
     let reference = reference.map_err(|e| Failure::reference(&args.config, e))?;
     let fit = Fit::new(&scene.imager, &scene.observations, &reference);
-    let true_spot_filling = scene.true_spot_filling();
+    let true_map = scene.true_map();
     let result = MapResult {
         imager: &scene.imager,
         observations: &scene.observations,
         fit: &fit,
-        true_spot_filling: true_spot_filling.as_deref(),
+        true_map: true_map.as_deref(),
         truth: scene.truth,
         provenance: &scene.provenance(),
     };
@@ -55,9 +55,16 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
 
 fn report(fit: &FitSummary) -> Report {
     let FitSummary { chi2, chi2_per_datum, data, profiles, .. } = fit;
-    Report::default()
-        .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"))
-        .line("spottedness", format!("{:.5}", fit.spottedness))
+    let report = Report::default()
+        .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"));
+    let report = match fit.deviation {
+        None => report.line("spottedness", format!("{:.5}", fit.spottedness)),
+        Some(Deviation { darkness, brightness_excess }) => report.line(
+            "spottedness",
+            format!("{:.5} rms: {darkness:.5} dark, {brightness_excess:.5} bright", fit.spottedness),
+        ),
+    };
+    report
         .line("entropy", format!("{:.5} at lambda = {:.4e}", fit.entropy, fit.lambda))
         .line("TEST", format!("{:.1e}", fit.test))
         .line("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core))

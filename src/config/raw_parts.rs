@@ -143,6 +143,11 @@ pub(super) struct SimulateSection {
     /// larger filling counts where they overlap.
     #[serde(default)]
     pub spots: Vec<[f64; 4]>,
+    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter than the
+    /// photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of filling s overlaps,
+    /// the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faculae: Vec<[f64; 4]>,
     /// Rotation cycles of the profiles, counted from `epoch_d`.
     pub cycles: Vec<f64>,
     /// Velocity bins.

@@ -10,7 +10,7 @@ use crate::io::lsd::ReadOptions;
 use crate::noise::ErrorSettings;
 use crate::objective::ParameterValues;
 use crate::simulate::Simulation;
-use crate::star::{Spot, StarSettings};
+use crate::star::{Disc, Facula, Spot, StarSettings};
 use std::path::Path;
 
 /// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start from.
@@ -60,6 +60,7 @@ pub(super) fn resolve_observations(
 fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {
     let at = |field: &str| format!("observations.simulate.{field}");
     let spots = section.spots.iter().enumerate().map(|(k, s)| spot(s, &at(&format!("spots[{k}]"))));
+    let faculae = section.faculae.iter().enumerate().map(|(k, f)| facula(f, &at(&format!("faculae[{k}]"))));
     if section.cycles.is_empty() {
         return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
     }
@@ -78,6 +79,7 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
     }
     Ok(Simulation {
         spots: spots.collect::<Result<_, _>>()?,
+        faculae: faculae.collect::<Result<_, _>>()?,
         truth,
         times_d,
         first_velocity_kms: section.velocity_kms.min,
@@ -89,14 +91,33 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
     })
 }
 
+/// Most brightness that a facula may add, in units of the photosphere's.
+const LARGEST_EXCESS: f64 = 10.0;
+
 fn spot(&[longitude, latitude, radius, filling]: &[f64; 4], key: &str) -> Result<Spot, Fault> {
+    let Disc { longitude, latitude, radius } = disc([longitude, latitude, radius], key)?;
+    match (0.0..=1.0).contains(&filling) {
+        true => Ok(Spot { longitude, latitude, radius, filling }),
+        false => Err(Fault::new(key, format!("filling {filling} must be from 0 to 1"))),
+    }
+}
+
+fn facula(&[longitude, latitude, radius, excess]: &[f64; 4], key: &str) -> Result<Facula, Fault> {
+    let disc = disc([longitude, latitude, radius], key)?;
+    match excess > 0.0 && excess <= LARGEST_EXCESS {
+        true => Ok(Facula { disc, excess }),
+        false => Err(Fault::new(key, format!("excess {excess} must be above 0 and up to {LARGEST_EXCESS}"))),
+    }
+}
+
+/// A circle given in degrees.
+fn disc([longitude, latitude, radius]: [f64; 3], key: &str) -> Result<Disc, Fault> {
     let problem = match () {
         _ if latitude.abs() > 90.0 => format!("latitude {latitude} must be from -90 to 90"),
         _ if !(radius > 0.0 && radius <= 180.0) => format!("radius {radius} must be above 0 and up to 180"),
-        _ if !(0.0..=1.0).contains(&filling) => format!("filling {filling} must be from 0 to 1"),
         _ => {
             let [longitude, latitude, radius] = [longitude, latitude, radius].map(f64::to_radians);
-            return Ok(Spot { longitude, latitude, radius, filling });
+            return Ok(Disc { longitude, latitude, radius });
         }
     };
     Err(Fault::new(key, problem))

@@ -3,12 +3,13 @@
 use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings};
 use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
+use crate::maxent::entropy::Entropy;
 use crate::noise::ErrorSettings;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, SpotsLeft};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
-use crate::star::{Response, StarSettings};
+use crate::star::{BrightnessModel, Response, StarSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -63,7 +64,11 @@ pub enum ObservationSource {
 pub struct ImagingSettings {
     /// Pixels of the image, 100 to 2,000,000 (approximately: rings hold whole numbers of pixels).
     pub pixels: usize,
-    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5.
+    /// What the pixels of the image hold.
+    #[serde(skip_serializing_if = "BrightnessModel::is_default")]
+    pub brightness: BrightnessModel,
+    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5; an image of bright and dark pixels
+    /// has no use for it.
     pub default_spot: f64,
     /// Target chi2 per datum, above 0. "auto": the highest value below which the radial velocities that are left over, observed
     /// minus modelled, stop shrinking, at the config's values.
@@ -79,10 +84,21 @@ impl Default for ImagingSettings {
     fn default() -> Self {
         ImagingSettings {
             pixels: 2000,
+            brightness: BrightnessModel::default(),
             default_spot: 1e-4,
             chi2_target: Automatic::Fixed(0.97),
             objective: ObjectiveKind::default(),
             spots_left: SpotsLeft::default(),
+        }
+    }
+}
+
+impl ImagingSettings {
+    /// Entropy of the image.
+    pub fn entropy(&self) -> Entropy {
+        match self.brightness {
+            BrightnessModel::Spots => Entropy::new(self.default_spot),
+            BrightnessModel::BrightAndDark => Entropy::BrightAndDark,
         }
     }
 }

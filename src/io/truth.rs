@@ -14,6 +14,12 @@ pub struct Truth {
     pub parameters: ParameterValues,
     /// The spots: longitude, latitude and radius in degrees, filling factor.
     pub spots: serde_json::Value,
+    /// The faculae, if there are any: longitude, latitude and radius in degrees, excess of brightness.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faculae: Option<serde_json::Value>,
+    /// Beside faculae: brightness of a spot over that of the photosphere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<f64>,
     /// Fractional spot coverage.
     pub spottedness: f64,
     /// Signal-to-noise ratio of each bin; null for no noise.

@@ -155,7 +155,7 @@ impl Posterior {
     /// What changes of the forward model at a fixed map do to ln L: `weight_chi2 * chi2 + slope along direction`.
     ///
     /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem). Spottedness
-    /// is not: with `A' = a` and the constraint chi2 = target, the adjoint system `H y = a - 2 mu g`, `g y = 0` (g the
+    /// is not: with `A'` the gradient of spottedness and the constraint chi2 = target, the adjoint system `H y = A' - 2 mu g`, `g y = 0` (g the
     /// gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`.
     fn sensitivity(&self, solution: &Solution, problem: &mut ImagingProblem) -> (f64, Option<Vec<f64>>) {
         let curve_slope = self.log_likelihood(solution).1;
@@ -168,15 +168,17 @@ impl Posterior {
             // beyond the reach of the target: the leading term of its misfit
             _ if unreachable => (-0.5, None),
             _ => {
-                let area = self.imager.grid.area.clone();
+                let (entropy, area) = (self.imager.entropy, &self.imager.grid.area);
+                let [mut image, mut scale] = [(); 2].map(|()| vec![0.0; area.len()]);
+                entropy.image(&solution.image.coordinates, &mut image);
+                entropy.metric(&image, area, &mut scale);
                 let exact = Solver { settings: SolverSettings::exact(), ..self.solver() };
-                let inverse = exact.apply_inverse(problem, &solution.image, &area);
+                let inverse =
+                    exact.apply_inverse(problem, &solution.image, &entropy.spottedness_gradient(&image, area));
                 let mu = solution.spottedness_slope / solution.chi2_slope;
-                let mut image = vec![0.0; area.len()];
-                self.imager.entropy.image(&solution.image.logit, &mut image);
-                let path = |p: usize| solution.path[p] * (image[p] * (1.0 - image[p]) / area[p]).sqrt();
                 let weight = -0.5 * curve_slope * lambda;
-                let adjoint = |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * path(p)) };
+                let adjoint =
+                    |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * (solution.path[p] * scale[p])) };
                 let direction = inverse.iter().enumerate().map(adjoint).collect();
                 (-0.5 * curve_slope * mu, Some(direction))
             }
@@ -225,7 +227,7 @@ impl Gradient for Posterior {
         }
         let (weight, direction) = self.sensitivity(&solution, &mut problem);
         let mut image = vec![0.0; self.imager.grid.len()];
-        self.imager.entropy.image(&solution.image.logit, &mut image);
+        self.imager.entropy.image(&solution.image.coordinates, &mut image);
         let internal = self.space.to_internal(theta);
         let response = problem.response().clone();
         let at_fixed_map = |i: usize, h: f64| {

@@ -24,7 +24,8 @@ const CURVE_STEP: f64 = 0.25;
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
 const CURVE_REACH: (f64, f64) = (1.1, 0.8);
 
-/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2.
+/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2. This
+/// and the lambdas below are in the entropy's unit.
 const BLANK_LAMBDA: f64 = 3e-3;
 
 /// A first preconditioner is built at this many times the target chi2, where images are cheap.
@@ -170,7 +171,8 @@ impl Reference {
         largest_lambda: f64,
     ) -> Result<Self, ReferenceError> {
         let data = imager.data.depth.len() as f64;
-        let (chi2_target, largest_lambda) = (chi2_per_datum * data, largest_lambda / data);
+        let unit = imager.entropy.lambda_unit();
+        let (chi2_target, largest_lambda) = (chi2_per_datum * data, unit * largest_lambda / data);
         let response = imager.response(&values.state());
         let mut problem = imager.problem(response.clone());
         let none = Preconditioner::identity();
@@ -179,9 +181,9 @@ impl Reference {
             preconditioner: &none,
             settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::patient() },
         };
-        let blank = Start::blank(&imager.entropy, imager.grid.len(), BLANK_LAMBDA / data);
+        let blank = Start::blank(&imager.entropy, imager.grid.len(), unit * BLANK_LAMBDA / data);
         let mut unspotted = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&blank.image.logit, &mut unspotted);
+        imager.entropy.image(&blank.image.coordinates, &mut unspotted);
         let blank_chi2 = problem.linearise(&unspotted);
         if blank_chi2 <= chi2_target {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
@@ -210,7 +212,7 @@ impl Reference {
 
     /// A blank star, where an evaluation far from the reference starts.
     pub fn blank(&self, imager: &Imager) -> Start {
-        let lambda = BLANK_LAMBDA / imager.data.depth.len() as f64;
+        let lambda = imager.entropy.lambda_unit() * BLANK_LAMBDA / imager.data.depth.len() as f64;
         Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.grid.len(), lambda) }
     }
 
@@ -233,9 +235,9 @@ fn start(solution: &Solution) -> Start {
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.
 fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
-    let n = at.image.logit.len();
+    let n = at.image.coordinates.len();
     let (mut s, mut scale, mut scaled) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    imager.entropy.image(&at.image.logit, &mut s);
+    imager.entropy.image(&at.image.coordinates, &mut s);
     imager.entropy.metric(&s, problem.area(), &mut scale);
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {

@@ -98,7 +98,7 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
     let mut problem = imager.problem(first.response.clone());
     let mut place = |solution: &Solution| {
         let mut map = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&solution.image.logit, &mut map);
+        imager.entropy.image(&solution.image.coordinates, &mut map);
         problem.linearise(&map);
         let modelled = moments(imager, problem.model());
         let filtered: Vec<f64> = observed.iter().zip(modelled).map(|(o, m)| o - m).collect();

@@ -4,10 +4,12 @@
 //! `compare` and `reproduce`. Left out: how a figure is drawn (`figure`).
 
 mod comparison;
+mod content;
 mod corner;
 mod density;
 mod dynamic;
 mod experiment;
+mod injected;
 mod landscape;
 mod limits;
 mod optimum;

@@ -265,6 +265,10 @@ fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> E
 
 fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
     let mut imaging = ImagingSettings::default();
+    if let Some(given) = &known.brightness {
+        imaging.brightness = given.value;
+        ledger.note("imaging.brightness", given.value.name(), "", Source::Given, given.by.as_str());
+    }
     if let Some(given) = &known.pixels {
         imaging.pixels = given.value;
         ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());

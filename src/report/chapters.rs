@@ -57,10 +57,14 @@ fn map(fit: &Value) -> Chapter {
         true => "The map reaches the target chi2 and is the one of greatest entropy that does.",
         false => "The reconstruction did not converge: this map is not the one of greatest entropy at the target chi2.",
     };
+    let spottedness = match fit.get("darkness") {
+        None => ("spot coverage", number(fit, "/spottedness", 4)),
+        Some(_) => ("brightness minus 1, rms (mean of dark, of bright parts)", deviation(fit)),
+    };
     let rows = [
         ("chi2 per datum", number(fit, "/chi2_per_datum", 4)),
         ("data in profiles", format!("{} in {}", number(fit, "/data", 0), number(fit, "/profiles", 0))),
-        ("spot coverage", number(fit, "/spottedness", 4)),
+        spottedness,
         ("entropy", number(fit, "/entropy", 4)),
         ("scatter of the radial velocities (km/s)", number(fit, "/observed_rv_rms_kms", 4)),
         ("the same with the model taken out (km/s)", number(fit, "/filtered_rv_rms_kms", 4)),
@@ -74,6 +78,12 @@ fn map(fit: &Value) -> Chapter {
         tables: vec![("The fit.".into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters(fit))],
         notes: Vec::new(),
     }
+}
+
+/// How far the brightness is from that of the photosphere.
+fn deviation(fit: &Value) -> String {
+    let [rms, dark, bright] = ["/spottedness", "/darkness", "/brightness_excess"].map(|key| number(fit, key, 4));
+    format!("{rms} ({dark}, {bright})")
 }
 
 /// The parameters of a file, and the injected ones where it has them.

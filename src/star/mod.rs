@@ -1,8 +1,9 @@
-//! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots, and the response
-//! that turns a brightness map into line profiles (method section 1; Petit et al. 2015, section 2).
+//! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots and faculae, and the
+//! response that turns a brightness map into line profiles (method section 1; Petit et al. 2015, section 2).
 //!
 //! Left out: priors, chi2, chains, files. Angles are radians here, velocities km/s, times days.
 
+pub mod brightness;
 mod convolution;
 mod correlate;
 mod deposit;
@@ -16,12 +17,13 @@ pub mod rotation;
 pub mod spots;
 mod view;
 
+pub use brightness::{Brightness, BrightnessModel};
 pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use orbit::Orbit;
 pub use response::{Response, Sampling};
 pub use rotation::Rotation;
-pub use spots::Spot;
+pub use spots::{Disc, Facula, Spot};
 
 /// Everything about the star that is not one of the eight parameters that may be sampled.
 #[derive(Clone, Debug, PartialEq)]
