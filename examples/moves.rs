@@ -6,11 +6,11 @@
 
 use dimcmc::chain::{MoveKind, Summary, summarise};
 use dimcmc::manifest::kinds_and_goals;
+use dimcmc::pool::Pool;
 use dimcmc::run::{Run, StartFrom};
 use dimcmc::scene::Scene;
 use dimcmc::search::{SearchSettings, find};
 use serde_json::{Value, json};
-use std::sync::atomic::AtomicBool;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -66,8 +66,8 @@ fn chain(config: &Value, surrogate: f64, ess: f64) -> Result<Summary, Failure> {
     std::fs::write(&file, config.to_string())?;
     let scene = Scene::load(&file)?;
     let found = find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ())?;
-    let mut run = Run::begin(&scene, &folder.path().join("run"), found, StartFrom::default(), false)?;
-    run.go(&AtomicBool::new(false), |_, _| ())?;
+    let mut run = Run::begin(&scene, &folder.path().join("run"), found, StartFrom::default(), false, &Pool::default())?;
+    run.go(&Pool::default(), |_, _| ())?;
     let (kinds, goals) = kinds_and_goals(&scene.settings);
     Ok(summarise(&run.chain, &kinds, &goals)?)
 }

@@ -11,6 +11,7 @@ use crate::imaging::Imager;
 use crate::log_density::Status;
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Problem, Termination, parallelism};
+use crate::nuisances::LineAndContinuum;
 use crate::objective::tradeoff::Node;
 use crate::objective::{ParameterValues, Reference};
 use crate::observation::{Observations, RadialVelocity};
@@ -21,8 +22,10 @@ use serde::Serialize;
 pub struct Fit {
     /// What the map holds: spot filling factor or brightness of every pixel.
     pub map: Vec<f64>,
-    /// Model intensity of every bin, one vector a profile, in units of the continuum.
+    /// Model intensity of every bin, one vector a profile, in units of the continuum; with its nuisances, where there are any.
     pub model: Vec<Vec<f64>>,
+    /// Posterior mean of the nuisances of each profile, given the map; empty where none are integrated out.
+    pub nuisances: Vec<LineAndContinuum>,
     /// Radial velocities, one a profile.
     pub velocities: Vec<FilteredVelocity>,
     /// Nodes of the trade-off curve, in order of falling chi2.
@@ -151,8 +154,14 @@ impl Fit {
         let mut problem = imager.problem(reference.response.clone());
         let test = parallelism(&mut problem, imager.entropy, &solution.image.coordinates);
         problem.linearise(&map);
-        let depths: Vec<&[f64]> =
-            (0..observations.profiles.len()).map(|k| &problem.model()[reference.response.bins(k)]).collect();
+        let mut depth = problem.model().to_vec();
+        let bins = (0..observations.profiles.len()).map(|k| reference.response.bins(k));
+        let estimate = |bins| imager.data.nuisances.estimate(bins, problem.weighted_residual(), &mut depth);
+        let nuisances = match imager.data.nuisances.is_empty() {
+            true => Vec::new(),
+            false => bins.clone().map(estimate).collect(),
+        };
+        let depths: Vec<&[f64]> = bins.map(|bins| &depth[bins]).collect();
         let velocities = velocities(imager, observations, reference, &depths);
         let deviation = Deviation::of(imager, &map);
         let residuals = residuals(observations, &depths);
@@ -160,7 +169,8 @@ impl Fit {
             FitSummary { test, deviation, ..summarise(imager, observations, reference, &residuals, &velocities) };
         let checks = Checks::of(&residuals);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
-        Fit { map, model, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary, checks }
+        let tradeoff = reference.tradeoff.nodes().to_vec();
+        Fit { map, model, nuisances, velocities, tradeoff, summary, checks }
     }
 }
 
@@ -205,6 +215,7 @@ fn summarise(
     velocities: &[FilteredVelocity],
 ) -> FitSummary {
     let solution = &reference.solution;
+    let star = imager.star.with(&reference.values.state().surface);
     let data = observations.len();
     let all = || residuals.iter().flat_map(|(_, residuals)| residuals);
     let deepest = all().map(|r| r.depth).fold(0.0, f64::max);
@@ -230,8 +241,8 @@ fn summarise(
         profiles: observations.profiles.len(),
         data,
         pixels: imager.grid.len(),
-        equivalent_width_kms: imager.star.line.equivalent_width_kms,
-        contrast: imager.star.contrast,
+        equivalent_width_kms: star.line.equivalent_width_kms,
+        contrast: star.contrast,
         parameters: reference.values,
         observed_rv_rms_kms: scatter(velocities.iter().map(|v| v.observed.value_kms)),
         filtered_rv_rms_kms: scatter(velocities.iter().map(FilteredVelocity::filtered_kms)),

@@ -4,37 +4,22 @@
 //! `D = line(B) / continuum(B)` (method section 1), whose second derivative is kept, so that the solver's Newton steps are exact.
 //! Left out: which parameters are tried, and why.
 
+mod data;
+
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Curvature, Problem};
+use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
 use crate::star::{Brightness, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
 
-/// Data in the form that the misfit needs.
-#[derive(Clone, Debug)]
-pub struct Data {
-    /// Observed depth `1 - I` of every bin.
-    pub depth: Vec<f64>,
-    /// `1 / sigma^2` of every bin.
-    pub inverse_variance: Vec<f64>,
-}
-
-impl Data {
-    /// Depths and weights of all profiles, one after the other.
-    pub fn of(observations: &Observations) -> Self {
-        let profiles = || observations.profiles.iter();
-        Data {
-            depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
-            inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
-        }
-    }
-}
+pub use data::Data;
 
 /// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
 #[derive(Clone, Debug)]
 pub struct Imager {
     /// Pixels of the map.
     pub grid: SurfaceGrid,
-    /// The star, but for the eight parameters.
+    /// The star, but for the parameters.
     pub star: StarSettings,
     /// Times and velocity bins.
     pub sampling: Sampling,
@@ -56,21 +41,26 @@ impl Imager {
         }
     }
 
+    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard deviations.
+    pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
+        self.data.nuisances = Nuisances::new(priors, observations);
+        self
+    }
+
     /// The same without some of the profiles.
     pub fn without(&self, profiles: &[usize]) -> Self {
-        let mut rest = Imager { sampling: Sampling { profiles: Vec::new(), ..self.sampling }, ..self.clone() };
-        rest.data = Data { depth: Vec::new(), inverse_variance: Vec::new() };
+        let mut kept = Vec::new();
+        let mut rest = Sampling { profiles: Vec::new(), ..self.sampling };
         let mut first = 0;
         for (k, profile) in self.sampling.profiles.iter().enumerate() {
             let bins = first..first + profile.2;
             first = bins.end;
             if !profiles.contains(&k) {
-                rest.sampling.profiles.push(*profile);
-                rest.data.depth.extend_from_slice(&self.data.depth[bins.clone()]);
-                rest.data.inverse_variance.extend_from_slice(&self.data.inverse_variance[bins]);
+                rest.profiles.push(*profile);
+                kept.push(bins);
             }
         }
-        rest
+        Imager { sampling: rest, data: self.data.of_bins(&kept), ..self.clone() }
     }
 
     /// The response at one state of star and planet.
@@ -81,7 +71,7 @@ impl Imager {
     /// The misfit of maps seen through `response`.
     pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
         let brightness = match self.entropy {
-            Entropy::Spots { .. } => Brightness::of_spots(self.star.contrast),
+            Entropy::Spots { .. } => Brightness::of_spots(response.contrast()),
             Entropy::BrightAndDark => Brightness::ITSELF,
         };
         ImagingProblem::of_brightness(&self.grid.area, &self.data, response, brightness)
@@ -119,11 +109,13 @@ pub struct ImagingProblem<'a> {
     passes: u32,
     /// Model depth of every bin at the current map.
     model: Vec<f64>,
-    /// `(model - data) / sigma^2`.
+    /// `W (model - data)`, without nuisances `(model - data) / sigma^2`.
     weighted_residual: Vec<f64>,
     continuum: Vec<f64>,
     brightness: Vec<f64>,
     bins: Vec<f64>,
+    /// Residuals or changes of the model, before they are weighed.
+    differences: Vec<f64>,
     constants: Vec<f64>,
 }
 
@@ -147,6 +139,7 @@ impl<'a> ImagingProblem<'a> {
             continuum: vec![0.0; profiles],
             brightness: vec![0.0; pixels],
             bins: vec![0.0; bins],
+            differences: vec![0.0; bins],
             constants: vec![0.0; profiles],
         }
     }
@@ -154,6 +147,11 @@ impl<'a> ImagingProblem<'a> {
     /// Model depth `1 - I` of every bin at the current map.
     pub fn model(&self) -> &[f64] {
         &self.model
+    }
+
+    /// Weights times what the model is above the data, at the current map.
+    pub fn weighted_residual(&self) -> &[f64] {
+        &self.weighted_residual
     }
 
     /// The response that the problem was made with.
@@ -216,9 +214,11 @@ impl Problem for ImagingProblem<'_> {
         for k in 0..self.response.profiles() {
             for j in self.response.bins(k) {
                 self.model[j] /= self.continuum[k];
-                let residual = self.model[j] - self.data.depth[j];
-                self.weighted_residual[j] = residual * self.data.inverse_variance[j];
-                chi2 += residual * self.weighted_residual[j];
+                self.differences[j] = self.model[j] - self.data.depth[j];
+            }
+            self.data.weigh(self.response.bins(k), &self.differences, &mut self.weighted_residual);
+            for j in self.response.bins(k) {
+                chi2 += self.differences[j] * self.weighted_residual[j];
             }
         }
         chi2
@@ -243,12 +243,15 @@ impl Problem for ImagingProblem<'_> {
         for k in 0..self.response.profiles() {
             let scale = self.brightness_of.slope / self.continuum[k];
             let d_continuum = self.constants[k] * scale;
+            for j in self.response.bins(k) {
+                self.differences[j] = scale * self.bins[j] - self.model[j] * d_continuum;
+            }
+            self.data.weigh(self.response.bins(k), &self.differences, &mut self.bins);
             let mut constant = 0.0;
             for j in self.response.bins(k) {
-                let d_model = scale * self.bins[j] - self.model[j] * d_continuum;
                 let residual = second_order * self.weighted_residual[j];
-                let back = scale * (self.data.inverse_variance[j] * d_model - residual * d_continuum);
-                constant -= back * self.model[j] + scale * residual * d_model;
+                let back = scale * (self.bins[j] - residual * d_continuum);
+                constant -= back * self.model[j] + scale * residual * self.differences[j];
                 self.bins[j] = back;
             }
             self.constants[k] = constant;

@@ -23,10 +23,10 @@
 //! [`first_look`] measures what profiles say by themselves, [`proposal`] makes a first config of it, also of another program's
 //! files ([`import`]). [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
 //! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
-//! what they were begun with; [`export`] writes a chain for other programs. [`plot`] draws what a folder holds, with the means of [`mod@figure`], and [`mod@report`] makes a page
+//! what they were begun with; [`merge`] and [`batch`] are runs of one star joined and runs of many; [`export`] writes a chain for other programs. [`plot`] draws what a folder holds, with the means of [`mod@figure`], and [`mod@report`] makes a page
 //! of it.
 //! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
-//! of the star.
+//! of the star. [`pool`] is behind it: threads, or the ranks of a cluster (`cluster`, feature `mpi`).
 //!
 //! # A map in a few lines
 //!
@@ -43,7 +43,10 @@
 //! # }
 //! ```
 
+pub mod batch;
 pub mod chain;
+#[cfg(feature = "mpi")]
+pub mod cluster;
 pub mod comparison;
 pub mod config;
 pub mod detection;
@@ -63,7 +66,9 @@ pub mod limits;
 pub mod log_density;
 pub mod manifest;
 pub mod maxent;
+pub mod merge;
 pub mod noise;
+pub mod nuisances;
 pub mod objective;
 pub mod observation;
 pub mod optimise;
@@ -71,6 +76,7 @@ pub mod optimum;
 pub mod origin;
 pub mod periodogram;
 pub mod plot;
+pub mod pool;
 pub mod proposal;
 pub mod report;
 pub mod run;

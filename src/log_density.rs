@@ -1,7 +1,7 @@
 //! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few derived numbers out.
 //!
 //! The ensemble, the optimiser and the landscape know only this file; the objective implements it. Batches go through
-//! [`Evaluator`], so that threads of one machine and ranks of a cluster are two implementations of one trait.
+//! [`Evaluator`], behind which are the threads of one machine or the ranks of a cluster.
 //! Left out: what the parameters mean, and how a log-probability comes about.
 
 use rayon::prelude::*;
@@ -126,7 +126,7 @@ pub trait Gradient: LogDensity {
 
 /// Evaluates a batch of parameter vectors; the order of the answers is the order of the questions.
 pub trait Evaluator {
-    /// One evaluation a vector.
+    /// One evaluation a vector; or fewer, those of the first vectors, where it was told to stop meanwhile.
     fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation>;
 }
 

@@ -37,6 +37,9 @@ pub struct Manifest {
     pub seed: u64,
     /// Step that the chain goes on to in any case, where it was extended.
     pub extend_to: Option<usize>,
+    /// Seeds of the runs that were joined, where this is several joined ones, which cannot go on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub merged_seeds: Vec<u64>,
     /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
     pub start: Positions,
 }
@@ -103,6 +106,11 @@ impl Manifest {
         }
         self.origin.config = settings.resolved.clone();
         before != (self.extend_to, self.origin.config.clone())
+    }
+
+    /// Seeds of all random numbers in it.
+    pub fn seeds(&self) -> Vec<u64> {
+        if self.merged_seeds.is_empty() { vec![self.seed] } else { self.merged_seeds.clone() }
     }
 
     /// Shape of the chain.

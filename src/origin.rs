@@ -218,7 +218,7 @@ impl ReferenceRecord {
         })
     }
 
-    /// All eight parameters; those missing in the record are taken from `others`.
+    /// All parameters; those missing in the record are taken from `others`.
     pub fn values(&self, others: &ParameterValues) -> ParameterValues {
         let mut values = *others;
         for p in Parameter::ALL {
@@ -240,7 +240,7 @@ impl OptimumRecord {
     }
 }
 
-/// All eight values by name.
+/// The values that are given, by name.
 pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
-    Parameter::ALL.iter().map(|&p| (p.name().to_string(), values[p])).collect()
+    Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.given(p)?))).collect()
 }

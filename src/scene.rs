@@ -188,6 +188,7 @@ impl Scene {
             spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
             faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
             contrast: (!simulation.faculae.is_empty()).then_some(self.imager.star.contrast),
+            continuum: simulation.nuisances(),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
             sigma: simulation.sigma(),
@@ -215,7 +216,11 @@ impl Scene {
 fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
     settings.check_velocity_grid(&settings.values, observations.step_kms)?;
     let star = settings.star_for(observations)?;
-    Ok(Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy()))
+    let imager = Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy());
+    Ok(match settings.imaging.nuisances {
+        Some(priors) => imager.with_nuisances(priors, observations),
+        None => imager,
+    })
 }
 
 /// The observations, cut as they are used, with the errors that they and the `whole` profiles ask for.

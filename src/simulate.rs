@@ -6,6 +6,7 @@
 //! largest excess e of the discs that overlap. The same simulation gives
 //! the same numbers on every machine and with any number of threads. Left out: where the settings come from (`config`).
 
+use crate::nuisances::{LineAndContinuum, templates};
 use crate::objective::ParameterValues;
 use crate::observation::{Observations, Profile};
 use crate::star::spots::{excess_at, filling_at};
@@ -27,7 +28,7 @@ pub struct Simulation {
     pub spots: Vec<Spot>,
     /// The faculae (radians).
     pub faculae: Vec<Facula>,
-    /// All eight parameters as simulated: those of the config, but for `truth`.
+    /// All parameters as simulated: those of the config, but for `truth`.
     pub truth: ParameterValues,
     /// Times of the profiles (d).
     pub times_d: Vec<f64>,
@@ -43,7 +44,12 @@ pub struct Simulation {
     pub seed: u64,
     /// Pixels of the star.
     pub pixels: usize,
+    /// Standard deviations of what is wrong with each profile by itself, in line and continuum.
+    pub continuum: LineAndContinuum,
 }
+
+/// Stream of the random numbers of line and continuum; noise is drawn from stream 0.
+const CONTINUUM_STREAM: u64 = 1;
 
 impl Simulation {
     /// Standard error of each bin, in units of the continuum.
@@ -54,10 +60,17 @@ impl Simulation {
     /// The observations of `star`.
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
-        let brightness = self.brightness(&grid, star.contrast);
+        let state = self.truth.state();
+        let brightness = self.brightness(&grid, star.with(&state.surface).contrast);
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
-        let depths = Response::new(&grid, star, &self.truth.state(), &sampling).depths(&brightness);
+        let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
+        for (depths, nuisances) in depths.chunks_exact_mut(self.bins).zip(self.nuisances()) {
+            for (j, depth) in depths.iter_mut().enumerate() {
+                let changes = templates(j, self.bins, *depth).into_iter().zip(nuisances.numbers());
+                *depth += changes.map(|(template, number)| template * number).sum::<f64>();
+            }
+        }
         let noise = self.noise(depths.len());
         let intensity: Vec<f64> = depths.iter().zip(noise).map(|(depth, noise)| 1.0 - depth + noise).collect();
         let profile = |(intensity, time_d): (&[f64], &f64)| Profile {
@@ -84,6 +97,22 @@ impl Simulation {
             brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
         }
         brightness
+    }
+
+    /// What is wrong with each profile by itself; empty if nothing is.
+    pub fn nuisances(&self) -> Vec<LineAndContinuum> {
+        if self.continuum == LineAndContinuum::default() {
+            return Vec::new();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(CONTINUUM_STREAM);
+        let mut draw = || {
+            LineAndContinuum::of_numbers(self.continuum.numbers().map(|sd| {
+                let normal: f64 = StandardNormal.sample(&mut rng);
+                sd * normal
+            }))
+        };
+        self.times_d.iter().map(|_| draw()).collect()
     }
 
     /// Gaussian noise of `n` bins, all profiles one after the other.

@@ -11,12 +11,11 @@ use crate::io::lines::{JournalError, LineFile};
 use crate::landscape::{Grid, Landscape, LandscapeError, Node};
 use crate::objective::Posterior;
 use crate::origin::{self, Origin, OriginError};
+use crate::pool::{Asked, Brief, Pool, Task};
 use crate::scene::Scene;
 use crate::search::Found;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Name of the file that says what a landscape was begun with.
 pub const HEADER: &str = "landscape.json";
@@ -27,8 +26,8 @@ pub const NODES: &str = "landscape.jsonl";
 /// Name of the file with its paraboloid, where the landscape is whole.
 pub const PARABOLOID: &str = "paraboloid.json";
 
-/// Nodes of a batch for each thread: enough that threads seldom wait for the slowest node.
-const BATCH_PER_THREAD: usize = 8;
+/// Nodes of a batch for each reconstruction under way: enough that threads or ranks seldom wait for the slowest node.
+const BATCH_EACH: usize = 8;
 
 /// The content of `landscape.json`, written before the first node and never changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +47,7 @@ pub struct Survey {
     pub posterior: Posterior,
     /// The nodes so far.
     pub landscape: Landscape,
+    task: Task,
     file: LineFile,
 }
 
@@ -91,7 +91,8 @@ impl Survey {
             _ => {}
         }
         write_json(&folder.join(HEADER), &header)?;
-        Ok(Survey { header, posterior: found.posterior, landscape: Landscape::new(grid.clone()), file })
+        let (landscape, task) = (Landscape::new(grid.clone()), task(scene, &header.origin, &found.posterior));
+        Ok(Survey { header, posterior: found.posterior, landscape, task, file })
     }
 
     /// Goes on with the landscape of `plan` in `folder`.
@@ -106,35 +107,38 @@ impl Survey {
         }
         let (file, landscape) = landscape::recover(&folder.join(NODES), plan.grid.clone())?;
         let posterior = header.origin.posterior(scene, scene.space_of(&plan.free), folder)?;
-        Ok(Survey { header, posterior, landscape, file })
+        let task = task(scene, &header.origin, &posterior);
+        Ok(Survey { header, posterior, landscape, task, file })
     }
 
-    /// Reconstructs until the landscape is whole or `stop` is set, after which no node is begun; every batch is on disk before
-    /// the next one. Returns whether the landscape is whole.
+    /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one, and of the
+    /// last what was finished in time. Returns whether the landscape is whole.
     ///
     /// # Errors
     /// Nodes that cannot be written.
-    pub fn go(&mut self, stop: &AtomicBool, mut on_batch: impl FnMut(&Landscape)) -> Result<bool, SurveyError> {
-        let Survey { header: Header { grid, .. }, posterior, landscape, file } = self;
+    pub fn go(&mut self, pool: &Pool, mut on_batch: impl FnMut(&Landscape)) -> Result<bool, SurveyError> {
+        let Survey { header: Header { grid, .. }, posterior, landscape, task, file } = self;
+        let brief = Brief::Density(task.clone()).to_bytes();
         while !landscape.is_whole() {
-            if stop.load(Ordering::Relaxed) {
+            if pool.stopped() {
                 return Ok(false);
             }
             let first = landscape.nodes().len();
-            let after = (first + BATCH_PER_THREAD * rayon::current_num_threads()).min(grid.len());
-            let node = |index: usize| {
-                let theta = grid.theta(index);
-                let going = !stop.load(Ordering::Relaxed);
-                going.then(|| Node { index, reconstruction: posterior.likelihood(&theta), theta })
-            };
-            let batch: Vec<Option<Node>> = (first..after).into_par_iter().with_max_len(1).map(node).collect();
-            let batch: Vec<Node> = batch.into_iter().map_while(|node| node).collect();
+            let after = (first + BATCH_EACH * pool.size()).min(grid.len());
+            let thetas: Vec<Vec<f64>> = (first..after).map(|index| grid.theta(index)).collect();
+            let found = pool.answers(&brief, &thetas, |theta| posterior.likelihood(theta));
+            let node = |(index, (theta, reconstruction))| Node { index, theta, reconstruction };
+            let batch: Vec<Node> = (first..).zip(thetas.into_iter().zip(found)).map(node).collect();
             landscape::append(file, grid, &batch)?;
             batch.into_iter().try_for_each(|node| landscape.push(node))?;
             on_batch(landscape);
         }
         Ok(true)
     }
+}
+
+fn task(scene: &Scene, origin: &Origin, posterior: &Posterior) -> Task {
+    Task::new(scene, origin, posterior.space().names(), Asked::Likelihood)
 }
 
 /// The first axis that is not the same.

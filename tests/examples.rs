@@ -27,6 +27,8 @@ const ORDER: &[&str] = &[
     "optimise",
     "grid",
     "sample",
+    "merge",
+    "batch",
     "analyse",
     "compare",
     "plot",
@@ -89,6 +91,7 @@ fn desk() -> Desk {
     let desk = Desk::new(json!(null));
     std::fs::create_dir(desk.path("configs")).unwrap();
     desk.write("configs/demo.json", &small_demo().to_string());
+    desk.write("configs/stars.txt", "demo.json\n");
     std::fs::copy(root().join("configs/dimcmc.schema.json"), desk.path("configs/dimcmc.schema.json")).unwrap();
     desk
 }

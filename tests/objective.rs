@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{oracle, values};
+use common::{oracle, values, whole_truth};
 use dimcmc::imaging::Imager;
 use dimcmc::log_density::{Gradient, LogDensity};
 use dimcmc::maxent::SolverSettings;
@@ -73,6 +73,41 @@ fn gradients_match_differences_of_reconstructions() {
             let size = difference.abs() + 0.3 / scale;
             // numerical derivatives: h^2 terms, and pixels that appear at the limb
             assert!((gradient[j] - difference).abs() < 0.01 * size, "{j}: {} {difference}", gradient[j]);
+        }
+    }
+}
+
+/// The same for the parameters of the star's surface.
+#[test]
+fn gradients_along_the_surface_match_differences_of_reconstructions() {
+    let (imager, ..) = setup(None);
+    let values = whole_truth(&oracle());
+    let reference = Reference::build(&imager, values, 0.97).unwrap();
+    let uniform = |parameter, min, max| FreeParameter { parameter, prior: Prior::Uniform { min, max } };
+    let free = vec![
+        uniform(Parameter::LimbDarkening, 0.0, 1.0),
+        uniform(Parameter::LineSigma, 1.0, 9.0),
+        uniform(Parameter::EquivalentWidth, 1.0, 9.0),
+        uniform(Parameter::Contrast, 0.0, 1.0),
+    ];
+    let space = ParameterSpace::new(free, values, imager.mid_cycle(), imager.time_base_cycles(), 3.0);
+    for kind in KINDS {
+        let exact = Posterior::new(imager.clone(), space.clone(), kind, reference.clone());
+        let exact = exact.with_settings(SolverSettings::exact());
+        let sigma = [0.003, 0.01, 0.002, 0.01];
+        let theta: Vec<f64> = space.start().iter().zip(sigma).map(|(x, sigma)| x + 0.7 * sigma).collect();
+        let (_, gradient) = exact.evaluate_with_gradient(&theta);
+        for (j, scale) in exact.scales().iter().enumerate() {
+            let h = 0.05 * scale;
+            let at = |h: f64| {
+                let mut y = theta.clone();
+                y[j] += h;
+                exact.evaluate(&y).log_prob
+            };
+            let difference = (at(h) - at(-h)) / (2.0 * h);
+            let size = difference.abs() + 0.3 / scale;
+            println!("{kind:?} {j}: {} {difference}", gradient[j]);
+            assert!((gradient[j] - difference).abs() < 0.01 * size, "{kind:?} {j}: {} {difference}", gradient[j]);
         }
     }
 }

@@ -40,6 +40,8 @@ fn the_commands_of_the_readme_exist() {
         "analyse",
         "grid",
         "compare",
+        "merge",
+        "batch",
         "export",
         "reproduce",
         "plot",

@@ -6,9 +6,9 @@ mod desk;
 
 use desk::{dimcmc, text};
 use dimcmc::experiments::{Case, Nodes, Outcome, ROWS, star};
+use dimcmc::pool::Pool;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
-use std::sync::atomic::AtomicBool;
 
 /// Rotation period of the paper's star (d).
 const ROTATION_PERIOD_D: f64 = 3.0;
@@ -48,7 +48,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
     let config = star::with(config, &own);
     let case =
         Case { name: "test".into(), config, grid: Some(Nodes::Around(5)), chain: false, periodogram: Some(1000) };
-    let mut outcome = case.run(folder.path(), &AtomicBool::new(false)).unwrap();
+    let mut outcome = case.run(folder.path(), &Pool::default()).unwrap();
     outcome.truth = ORBIT.map(|(name, value)| (name.to_owned(), value)).into();
     outcome
 }
@@ -98,7 +98,7 @@ fn axes_are_not_swapped() {
     let at = Nodes::At([(0.06, 0.14, 3), (1.5, 1.9, 3), (0.4, 0.6, 3)]);
     let case = Case { name: "axes".into(), config, grid: Some(at), chain: false, periodogram: None };
     let folder = tempfile::tempdir().unwrap();
-    case.run(folder.path(), &AtomicBool::new(false)).unwrap();
+    case.run(folder.path(), &Pool::default()).unwrap();
     let text = std::fs::read_to_string(folder.path().join("grid/landscape.jsonl")).unwrap();
     let nodes: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let height = |node: &Value| node["log_likelihood"].as_f64().unwrap_or(f64::NEG_INFINITY);

@@ -1,4 +1,5 @@
-//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 1 for anything else.
+//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 75 where a scheduler stopped what can go on, 1
+//! for anything else.
 
 use dimcmc::comparison::PairError;
 use dimcmc::config::ConfigError;
@@ -18,6 +19,12 @@ use dimcmc::survey::SurveyError;
 use std::path::Path;
 use std::process::ExitCode;
 
+/// Exit code of a command that Ctrl-C stopped.
+pub const INTERRUPTED: u8 = 1;
+
+/// Exit code of a command that a scheduler stopped and that can go on: sysexits' EX_TEMPFAIL.
+pub const RESUME: u8 = 75;
+
 /// A message of one line for the user, with its exit code.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
@@ -35,6 +42,11 @@ impl Failure {
     /// The input was right, and yet it did not work.
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Failure { code: 1, message: message.to_string() }
+    }
+
+    /// A signal stopped it.
+    pub fn interrupted(code: u8, message: impl std::fmt::Display) -> Self {
+        Failure { code, message: message.to_string() }
     }
 
     /// No reference image at the values of the config at `path`.
@@ -61,8 +73,10 @@ impl Failure {
             RunError::Origin(error) => Failure::origin(path, error),
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
-            RunError::PriorStart | RunError::SpotsLeft => Failure::input(format!("{}: {error}", path.display())),
+            RunError::Merged(_) => Failure::input(error),
+            RunError::PriorStart | RunError::SpotsLeft(_) => Failure::input(format!("{}: {error}", path.display())),
             RunError::Journal(error) => error.into(),
+            RunError::Interrupted => Failure::failed(error),
         }
     }
 

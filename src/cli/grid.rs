@@ -3,7 +3,7 @@
 use super::output::Output;
 use super::search::search;
 use super::signals::Signals;
-use super::{Failure, Global, progress};
+use super::{Failure, Global, cluster, progress};
 use dimcmc::io::effort::Effort;
 use dimcmc::io::paraboloid::ParaboloidFile;
 use dimcmc::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
@@ -52,6 +52,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let folder = args.output.folder();
     let failed = |e| Failure::survey(&args.config, e);
     let signals = Signals::catch("node")?;
+    let pool = cluster::pool(global, &signals);
     let mut survey = if args.resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the landscape, reference image");
@@ -65,12 +66,12 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         Survey::begin(&scene, plan, found, folder, args.output.replaces()).map_err(failed)?
     };
     let mut meter = Meter::new(global, &survey.landscape);
-    let whole = survey.go(signals.flag(), |landscape| meter.show(landscape));
+    let whole = survey.go(&pool, |landscape| meter.show(landscape));
     meter.bar.finish_and_clear();
-    Effort::add(folder, !args.resume, began.elapsed().as_secs_f64(), rayon::current_num_threads())?;
+    Effort::add(folder, !args.resume, began.elapsed().as_secs_f64(), pool.size())?;
     if !whole.map_err(failed)? {
         let (config, folder, nodes) = (args.config.display(), folder.display(), survey.landscape.nodes().len());
-        return Err(Failure::failed(format!(
+        return Err(signals.interrupted(format!(
             "interrupted after {nodes} nodes; go on with: dimcmc grid {config} --out {folder} --resume"
         )));
     }

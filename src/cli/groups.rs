@@ -6,7 +6,7 @@ use clap::Command;
 const GROUPS: &[(&str, &[&str])] = &[
     ("Begin", &["init", "import", "simulate", "inject"]),
     ("Image and search", &["map", "periodogram", "limits", "optimise", "grid"]),
-    ("Sample", &["sample", "analyse", "compare"]),
+    ("Sample", &["sample", "analyse", "compare", "merge", "batch"]),
     ("Show and pass on", &["plot", "report", "export", "reproduce"]),
     ("This program", &["schema", "completions", "man", "help"]),
 ];

@@ -42,7 +42,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     };
     let folder = args.output.create()?;
     result.write(folder)?;
-    let mut report = report(&fit.summary);
+    let mut report = report(&fit);
     for (label, text) in scene.measured.lines() {
         report = report.line(label, text);
     }
@@ -53,7 +53,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-fn report(fit: &FitSummary) -> Report {
+fn report(Fit { summary: fit, nuisances, .. }: &Fit) -> Report {
     let FitSummary { chi2, chi2_per_datum, data, profiles, .. } = fit;
     let report = Report::default()
         .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"));
@@ -64,11 +64,20 @@ fn report(fit: &FitSummary) -> Report {
             format!("{:.5} rms: {darkness:.5} dark, {brightness_excess:.5} bright", fit.spottedness),
         ),
     };
-    report
+    let report = report
         .line("entropy", format!("{:.5} at lambda = {:.4e}", fit.entropy, fit.lambda))
         .line("TEST", format!("{:.1e}", fit.test))
         .line("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core))
         .line("RV observed", format!("{:.4} km/s rms", fit.observed_rv_rms_kms))
         .line("RV filtered", format!("{:.4} km/s rms", fit.filtered_rv_rms_kms))
-        .line("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms))
+        .line("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms));
+    if nuisances.is_empty() {
+        return report;
+    }
+    let [offset, slope, width] = [0, 1, 2].map(|i| {
+        let squares: f64 = nuisances.iter().map(|n| n.numbers()[i].powi(2)).sum();
+        (squares / nuisances.len() as f64).sqrt()
+    });
+    let rms = format!("offset {offset:.1e}, slope {slope:.1e}, equivalent width {:.2} % rms", 100.0 * width);
+    report.line("continuum", rms)
 }

@@ -4,6 +4,8 @@
 //! each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias = "analyze")]`.
 
 mod analyse;
+mod batch;
+mod cluster;
 mod compare;
 mod completions;
 mod export;
@@ -16,6 +18,7 @@ mod inject;
 mod limits;
 mod man;
 mod map;
+mod merge;
 mod optimise;
 mod output;
 mod periodogram;
@@ -51,12 +54,15 @@ pub struct Cli {
 /// Options of every command.
 #[derive(Debug, clap::Args)]
 pub struct Global {
-    /// Number of threads; all processors if not given. Results do not depend on it
+    /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do not depend on it
     #[arg(long, global = true, value_name = "N")]
     threads: Option<NonZeroUsize>,
     /// No progress bar
     #[arg(long, short, global = true)]
     quiet: bool,
+    #[cfg(feature = "mpi")]
+    #[arg(skip)]
+    ranks: cluster::Ranks,
 }
 
 #[derive(Debug, Subcommand)]
@@ -75,6 +81,8 @@ enum Command {
     #[command(alias = "analyze")]
     Analyse(analyse::Args),
     Compare(compare::Args),
+    Merge(merge::Args),
+    Batch(batch::Args),
     Reproduce(reproduce::Args),
     Export(export::Args),
     Schema(schema::Args),
@@ -96,11 +104,8 @@ pub fn parse() -> Cli {
 
 /// Runs the command.
 pub fn run(cli: &Cli) -> Result<(), Failure> {
-    if let Some(threads) = cli.global.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.get())
-            .build_global()
-            .map_err(|e| Failure::failed(format!("--threads {threads}: {e}")))?;
+    if cluster::join(&cli.global)? == cluster::Done::Everything {
+        return Ok(());
     }
     match &cli.command {
         Command::Init(args) => init::run(args, &cli.global),
@@ -115,6 +120,8 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Sample(args) => sample::run(args, &cli.global),
         Command::Analyse(args) => analyse::run(args, &cli.global),
         Command::Compare(args) => compare::run(args, &cli.global),
+        Command::Merge(args) => merge::run(args, &cli.global),
+        Command::Batch(args) => batch::run(args, &cli.global),
         Command::Reproduce(args) => reproduce::run(args, &cli.global),
         Command::Export(args) => export::run(args, &cli.global),
         Command::Schema(args) => schema::run(args),

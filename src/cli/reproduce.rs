@@ -1,10 +1,11 @@
 //! `dimcmc reproduce`: the paper's experiments.
 
 use super::signals::Signals;
-use super::{Failure, Global, progress};
+use super::{Failure, Global, cluster, progress};
 use dimcmc::experiments::files::{Made, SUMMARY, TABLE};
 use dimcmc::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
 use dimcmc::plot::{self, DPI};
+use dimcmc::run::RunError;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -56,6 +57,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let out = or(&args.out, "results", "runs/quick");
     let work = or(&args.work, "runs/reproduce", "runs/reproduce_quick");
     let signals = Signals::catch("reconstruction")?;
+    let pool = cluster::pool(global, &signals);
     for row in rows {
         let folder = out.join(row.name);
         if folder.join(SUMMARY).exists() && !args.force {
@@ -75,11 +77,16 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         let spinner = progress::bar(global, None, "begins");
         let report = |message: &str| spinner.set_message(message.to_owned());
         signals.defer();
-        let laboratory = Laboratory { folder: work.clone(), quick: args.quick, stop: signals.flag(), report: &report };
+        let laboratory = Laboratory { folder: work.clone(), quick: args.quick, pool: &pool, report: &report };
         let began = Instant::now();
         let result = row.run(&laboratory);
         spinner.finish_and_clear();
-        let result = result.map_err(|e| failure(row, e))?;
+        let result = result.map_err(|error| match error {
+            ExperimentError::Interrupted | ExperimentError::Run(RunError::Interrupted) => {
+                signals.interrupted(format!("{}: {}", row.name, ExperimentError::Interrupted))
+            }
+            error => Failure::failed(format!("{}: {error}", row.name)),
+        })?;
         let made = Made {
             command: format!("dimcmc reproduce {}{}", row.name, if args.quick { " --quick" } else { "" }),
             quick: args.quick,
@@ -155,8 +162,4 @@ fn remove(folder: &Path) -> Result<(), Failure> {
 
 fn create(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|e| Failure::failed(format!("{}: {e}", folder.display())))
-}
-
-fn failure(row: &Row, error: ExperimentError) -> Failure {
-    Failure::failed(format!("{}: {error}", row.name))
 }

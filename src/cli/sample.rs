@@ -3,13 +3,14 @@
 use super::output::Output;
 use super::search::search;
 use super::signals::Signals;
-use super::{Failure, Global, analyse, progress};
+use super::{Failure, Global, analyse, cluster, progress};
 use dimcmc::chain::advice::growth_needed;
 use dimcmc::chain::{Convergence, Goals, Record};
+use dimcmc::config;
 use dimcmc::ensemble::StopReason;
 use dimcmc::io::effort::Effort;
 use dimcmc::log_density::Status;
-use dimcmc::run::{Run, StartFrom};
+use dimcmc::run::{Run, RunError, StartFrom};
 use dimcmc::scene::Scene;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -21,7 +22,8 @@ use std::time::{Duration, Instant};
 /// by whatever, goes on with --resume and comes to the same bytes as one that was not.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc sample configs/demo.json --out runs/demo\n  \
-                        dimcmc sample configs/demo.json --out runs/demo --extend 500")]
+                        dimcmc sample configs/demo.json --out runs/demo --extend 500\n  \
+                        dimcmc sample configs/demo.json --out runs/demo_2 --seed 2")]
 pub struct Args {
     /// Config file (JSON)
     config: PathBuf,
@@ -36,6 +38,9 @@ pub struct Args {
     /// Where the walkers start
     #[arg(long, value_enum, default_value = "optimum", conflicts_with_all = ["resume", "extend"])]
     start: Start,
+    /// In place of the config's sampler.seed: for runs of one config that are merged later
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -53,15 +58,19 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     if !resume {
         args.output.check()?;
     }
-    let scene = Scene::load(&args.config)?;
+    let scene = Scene::new(config::load_with_seed(&args.config, args.seed)?)?;
     scene.settings.require_free()?;
     let folder = args.output.folder();
-    let failed = |e| Failure::run(&args.config, e);
     let signals = Signals::catch("step")?;
+    let pool = cluster::pool(global, &signals);
+    let failed = |error| match error {
+        RunError::Interrupted => signals.interrupted(error),
+        error => Failure::run(&args.config, error),
+    };
     let mut run = if resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the chain, reference image");
-        let run = Run::resume(&scene, folder, args.extend);
+        let run = Run::resume(&scene, folder, args.extend, &pool);
         spinner.finish_and_clear();
         run.map_err(failed)?
     } else {
@@ -73,21 +82,22 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         let spinner = progress::bar(global, None, "start of the walkers");
         args.output.check()?;
         signals.defer();
-        let run = Run::begin(&scene, folder, found, from, args.output.replaces());
+        let run = Run::begin(&scene, folder, found, from, args.output.replaces(), &pool);
         spinner.finish_and_clear();
         run.map_err(failed)?
     };
     signals.defer();
     let mut meter = Meter::new(global, &run);
-    let reason = run.go(signals.flag(), |records, convergence| meter.step(records, convergence));
+    let reason = run.go(&pool, |records, convergence| meter.step(records, convergence));
     meter.bar.finish_and_clear();
-    Effort::add(folder, !resume, began.elapsed().as_secs_f64(), rayon::current_num_threads())?;
+    Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size())?;
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);
             let (config, folder) = (args.config.display(), folder.display());
-            Err(Failure::failed(format!(
-                "interrupted after step {step}; go on with: dimcmc sample {config} --out {folder} --resume"
+            let seed = args.seed.map(|seed| format!(" --seed {seed}")).unwrap_or_default();
+            Err(signals.interrupted(format!(
+                "interrupted after step {step}; go on with: dimcmc sample {config} --out {folder}{seed} --resume"
             )))
         }
         StopReason::Converged | StopReason::StepLimit => analyse::report(folder, &run.manifest, &run.chain),

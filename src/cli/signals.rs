@@ -1,39 +1,56 @@
-//! Ctrl-C and SIGTERM: at once where there is nothing to lose, at the end of a half-step or a batch where there is.
+//! Ctrl-C, SIGTERM and SIGUSR1: at once where there is nothing to lose, after the reconstructions under way where there is.
+//!
+//! SIGTERM and SIGUSR1 come from a scheduler whose time is up, and the exit code says that the same command goes on.
 
 use super::Failure;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use super::failure::{INTERRUPTED, RESUME};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals as Incoming;
 use std::io::IsTerminal as _;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 /// What signals do from now on.
 pub struct Signals {
     stop: Arc<AtomicBool>,
     deferred: Arc<AtomicBool>,
+    code: Arc<AtomicU8>,
 }
 
 impl Signals {
     /// Catches the signals: until [`Signals::defer`], the first one ends the program with a message; after it, the first one
-    /// sets the flag, and the second one ends the program. The message names what has not begun: the first `unit`.
+    /// sets the flag, and a second Ctrl-C ends the program. The message names what has not begun: the first `unit`.
     pub fn catch(unit: &'static str) -> Result<Self, Failure> {
-        let signals = Signals { stop: Arc::default(), deferred: Arc::default() };
-        let (stop, deferred) = (Arc::clone(&signals.stop), Arc::clone(&signals.deferred));
-        let mut incoming =
-            Incoming::new([SIGINT, SIGTERM]).map_err(|e| Failure::failed(format!("signals cannot be caught: {e}")))?;
+        let signals = Signals { stop: Arc::default(), deferred: Arc::default(), code: Arc::new(INTERRUPTED.into()) };
+        let Signals { stop, deferred, code } = &signals;
+        let (stop, deferred, code) = (Arc::clone(stop), Arc::clone(deferred), Arc::clone(code));
+        let mut incoming = Incoming::new([SIGINT, SIGTERM, SIGUSR1])
+            .map_err(|e| Failure::failed(format!("signals cannot be caught: {e}")))?;
         std::thread::spawn(move || {
-            for _ in &mut incoming {
+            for signal in &mut incoming {
+                let by_hand = signal == SIGINT;
+                if !by_hand {
+                    code.store(RESUME, Ordering::SeqCst);
+                }
                 if !deferred.load(Ordering::SeqCst) {
                     // a terminal is in the middle of the progress line
                     let line_break = if std::io::stderr().is_terminal() { "\n" } else { "" };
                     eprintln!("{line_break}error: interrupted before the first {unit}; nothing was written");
-                    std::process::exit(1);
+                    std::process::exit(code.load(Ordering::SeqCst).into());
                 }
-                if stop.swap(true, Ordering::SeqCst) {
-                    std::process::exit(1);
+                if stop.swap(true, Ordering::SeqCst) && by_hand {
+                    std::process::exit(INTERRUPTED.into());
                 }
             }
         });
+        Ok(signals)
+    }
+
+    /// Catches the signals and leaves it at that: somebody else decides when to stop.
+    #[cfg(feature = "mpi")]
+    pub fn ignore() -> Result<Self, Failure> {
+        let signals = Signals::catch("answer")?;
+        signals.defer();
         Ok(signals)
     }
 
@@ -43,7 +60,12 @@ impl Signals {
     }
 
     /// Set once a signal has come.
-    pub fn flag(&self) -> &AtomicBool {
-        &self.stop
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.stop)
+    }
+
+    /// That a signal ended the command, with the exit code that belongs to it.
+    pub fn interrupted(&self, message: impl std::fmt::Display) -> Failure {
+        Failure::interrupted(self.code.load(Ordering::SeqCst), message)
     }
 }

@@ -126,6 +126,7 @@ impl Draft {
             line: Line {
                 shape: LineShape::Gaussian,
                 sigma_kms: self.line_sigma_kms,
+                gamma_kms: None,
                 equivalent_width_kms: self.equivalent_width,
             },
         }

@@ -38,6 +38,18 @@ pub fn load(path: &Path) -> Result<Settings, ConfigError> {
     from_json(&bytes, path)
 }
 
+/// As [`load`], the sampler's seed replaced if another one is given.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with_seed(path: &Path, seed: Option<u64>) -> Result<Settings, ConfigError> {
+    let settings = load(path)?;
+    let Some(seed) = seed else { return Ok(settings) };
+    let mut config = settings.resolved;
+    config["sampler"]["seed"] = seed.into();
+    from_json(config.to_string().as_bytes(), path)
+}
+
 /// Resolves a config already read; `path` is what errors name and whose folder paths start from.
 ///
 /// # Errors

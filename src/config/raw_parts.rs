@@ -36,6 +36,20 @@ pub(super) struct PerParameter<T> {
     /// Systemic radial velocity (km/s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vsys_kms: Option<T>,
+    /// First coefficient of the limb darkening, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limb_darkening: Option<T>,
+    /// Standard deviation of the local line (km/s), before the spectrograph.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_sigma_kms: Option<T>,
+    /// Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a nuisance of each profile's
+    /// own by the priors alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equivalent_width_kms: Option<T>,
+    /// Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter than some value: the
+    /// darker they are, the fewer a map needs, so that a flat prior ends at 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<T>,
 }
 
 impl<T> Default for PerParameter<T> {
@@ -49,6 +63,10 @@ impl<T> Default for PerParameter<T> {
             inclination_deg: None,
             vsini_kms: None,
             vsys_kms: None,
+            limb_darkening: None,
+            line_sigma_kms: None,
+            equivalent_width_kms: None,
+            contrast: None,
         }
     }
 }
@@ -65,6 +83,10 @@ impl<T> PerParameter<T> {
             Parameter::Inclination => &mut self.inclination_deg,
             Parameter::Vsini => &mut self.vsini_kms,
             Parameter::Vsys => &mut self.vsys_kms,
+            Parameter::LimbDarkening => &mut self.limb_darkening,
+            Parameter::LineSigma => &mut self.line_sigma_kms,
+            Parameter::EquivalentWidth => &mut self.equivalent_width_kms,
+            Parameter::Contrast => &mut self.contrast,
         }
     }
 }
@@ -161,6 +183,9 @@ pub(super) struct SimulateSection {
     /// Pixels of the star that is simulated, 100 to 2,000,000; more than of the image, for honesty.
     #[serde(default = "default_simulation_pixels")]
     pub pixels: usize,
+    /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuum: Option<ContinuumSection>,
     /// Values of parameters that are simulated in place of those under `star` and `planet`, so that the start of an
     /// inference may be wrong.
     #[serde(default)]
@@ -177,6 +202,18 @@ fn default_seed() -> u64 {
 
 fn default_simulation_pixels() -> usize {
     20_000
+}
+
+/// Wandering line and continuum: standard deviations, from 0 to 10, of one Gaussian number a profile.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ContinuumSection {
+    /// Level of the continuum, in its own units.
+    pub offset: f64,
+    /// Slope of the continuum: by how much it is higher at the last bin than in the middle.
+    pub slope: f64,
+    /// Equivalent width of the line, relative.
+    pub equivalent_width: f64,
 }
 
 /// Centres of the velocity bins: `min`, `min + step`, ... up to `max` (km/s).

@@ -4,10 +4,11 @@ use super::domain::check_value;
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
-use super::resolve::{automatic, check_pixels, positive};
+use super::resolve::{automatic, check_nuisances, check_pixels, positive};
 use super::{Automatic, ObservationSource};
 use crate::io::lsd::ReadOptions;
 use crate::noise::ErrorSettings;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use crate::simulate::Simulation;
 use crate::star::{Disc, Facula, Spot, StarSettings};
@@ -72,6 +73,10 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         positive(&at("snr"), snr)?;
     }
     check_pixels(&at("pixels"), section.pixels)?;
+    let continuum = section
+        .continuum
+        .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
+    check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
     let mut truth = *values;
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
@@ -88,6 +93,7 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         snr: section.snr,
         seed: section.seed,
         pixels: section.pixels,
+        continuum,
     })
 }
 

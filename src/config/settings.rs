@@ -5,11 +5,12 @@ use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
 use crate::maxent::entropy::Entropy;
 use crate::noise::ErrorSettings;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, SpotsLeft};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
-use crate::star::{BrightnessModel, Response, StarSettings};
+use crate::star::{BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ pub struct Settings {
     pub star: StarSettings,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
-    /// All eight parameters as the config gives them: the fixed ones, and the start of the free ones.
+    /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
     pub values: ParameterValues,
     /// Where the profiles come from.
     pub source: ObservationSource,
@@ -78,6 +79,10 @@ pub struct ImagingSettings {
     /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
     #[serde(skip_serializing_if = "SpotsLeft::is_default")]
     pub spots_left: SpotsLeft,
+    /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors around 0, from
+    /// 0 (no nuisance) to 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nuisances: Option<LineAndContinuum>,
 }
 
 impl Default for ImagingSettings {
@@ -89,6 +94,7 @@ impl Default for ImagingSettings {
             chi2_target: Automatic::Fixed(0.97),
             objective: ObjectiveKind::default(),
             spots_left: SpotsLeft::default(),
+            nuisances: None,
         }
     }
 }
@@ -147,6 +153,10 @@ impl Settings {
                 return Err(self.fault("star.line.equivalent_width_kms", &problem));
             }
             star.line.equivalent_width_kms = width;
+            if star.line.gamma_kms > 0.0 {
+                // wings beyond the profiles count too
+                star.line.equivalent_width_kms = width / share_observed(&star, &self.values, observations);
+            }
         }
         Ok(star)
     }
@@ -193,4 +203,14 @@ impl Settings {
     pub fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }
+}
+
+/// How much of its line an unspotted star shows within the velocities of `observations`.
+fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
+    const PIXELS: usize = 2000;
+    let grid = SurfaceGrid::equal_area(PIXELS, Quadrature::Gauss2x2);
+    let depths =
+        Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()]);
+    let areas = depths.iter().sum::<f64>() * observations.step_kms / observations.profiles.len() as f64;
+    areas / star.line.equivalent_width_kms
 }

@@ -47,6 +47,9 @@ pub enum EnsembleError {
         /// Names in the chain.
         found: Vec<String>,
     },
+    /// The evaluator stopped before the start was evaluated.
+    #[error("stopped before the first step")]
+    Stopped,
     /// The chain to go on from has no complete step.
     #[error("the chain has no complete step to go on from")]
     NothingToResume,

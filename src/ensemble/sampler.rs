@@ -92,11 +92,11 @@ impl<'a> Sampler<'a> {
     ///
     /// # Errors
     /// [`EnsembleError`] when the start has the wrong shape, is degenerate in internal coordinates (naming the parameter),
-    /// or a walker has no finite log-probability.
+    /// a walker has no finite log-probability, or the evaluator stopped.
     pub fn start(&self, positions: &[Vec<Vec<f64>>]) -> Result<(State, Vec<Record>), EnsembleError> {
         start::check_shape(positions, [self.ensembles, self.walkers, self.density.names().len()])?;
         start::check_spread(self.density, positions)?;
-        let evaluations = self.evaluate(positions.iter().flatten().cloned().collect());
+        let evaluations = self.evaluate(positions.iter().flatten().cloned().collect()).ok_or(EnsembleError::Stopped)?;
         let walkers: Vec<Walker> = positions
             .iter()
             .flatten()
@@ -150,7 +150,8 @@ impl<'a> Sampler<'a> {
         Ok(State { step: chain.steps() - 1, ensembles })
     }
 
-    /// Moves every walker once. `None`, with the state as it was, when `stop` was set before the last half was evaluated.
+    /// Moves every walker once. `None`, with the state as it was, when `stop` was set before the last half was begun, or the
+    /// evaluator stopped within a half.
     pub fn step(&self, state: &mut State, stop: &AtomicBool) -> Option<Vec<Record>> {
         let step = state.step + 1;
         let mut next = State { step, ensembles: state.ensembles.clone() };
@@ -163,7 +164,7 @@ impl<'a> Sampler<'a> {
             let trials = self.propose(&next, &splits, half);
             let batch =
                 trials.iter().filter(|trial| trial.refused.is_none()).map(|trial| trial.theta.clone()).collect();
-            let mut evaluations = self.evaluate(batch).into_iter();
+            let mut evaluations = self.evaluate(batch)?.into_iter();
             for trial in trials {
                 let evaluation = match trial.refused {
                     Some(status) => Evaluation::rejected(status),
@@ -242,10 +243,14 @@ impl<'a> Sampler<'a> {
         walker.evaluation.log_prob + self.density.log_jacobian(&walker.theta)
     }
 
-    /// Evaluates a batch. Whatever is not a usable number is turned into a rejection here, where it enters the sampler.
-    fn evaluate(&self, batch: Vec<Vec<f64>>) -> Vec<Evaluation> {
+    /// Evaluates a batch; `None` if it was not evaluated to its end. Whatever is not a usable number is turned into a rejection
+    /// here, where it enters the sampler.
+    fn evaluate(&self, batch: Vec<Vec<f64>>) -> Option<Vec<Evaluation>> {
         let mut evaluations = if batch.is_empty() { Vec::new() } else { self.evaluator.evaluate(&batch) };
-        assert_eq!(evaluations.len(), batch.len(), "an evaluator answers every question of a batch");
+        assert!(evaluations.len() <= batch.len(), "an evaluator answers no more than it is asked");
+        if evaluations.len() < batch.len() {
+            return None;
+        }
         for evaluation in &mut evaluations {
             let derived = evaluation.spottedness.is_finite() && evaluation.chi2.is_finite();
             let usable = evaluation.log_prob.is_finite() && derived;
@@ -256,7 +261,7 @@ impl<'a> Sampler<'a> {
                 evaluation.log_prob = f64::NEG_INFINITY;
             }
         }
-        evaluations
+        Some(evaluations)
     }
 
     /// The walkers of an ensemble in the order of this step's halves, each half sorted.

@@ -18,6 +18,7 @@ use crate::objective::{Parameter, Reference, ReferenceError};
 use crate::optimise::Optimum;
 use crate::origin::by_name;
 use crate::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
+use crate::pool::Pool;
 use crate::run::{CHAIN, Run, RunError, StartFrom};
 use crate::scene::Scene;
 use crate::search::{self, Found, SearchError, SearchSettings};
@@ -25,7 +26,6 @@ use crate::survey::{PARABOLOID, Survey, SurveyError};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
 /// Nodes to each side of the best orbit along every axis, in standard deviations of the curvature.
@@ -67,9 +67,9 @@ impl Case {
     ///
     /// # Errors
     /// [`ExperimentError`].
-    pub fn run(&self, folder: &Path, stop: &AtomicBool) -> Result<Outcome, ExperimentError> {
+    pub fn run(&self, folder: &Path, pool: &Pool) -> Result<Outcome, ExperimentError> {
         write_json(&folder.join("config.json"), &self.config)?;
-        match self.tried(folder, stop) {
+        match self.tried(folder, pool) {
             // no image, no maximum: that is a result too
             Err(error) if error.is_of_the_star() => Ok(Outcome { failed: Some(error.to_string()), ..self.nothing() }),
             tried => tried,
@@ -96,9 +96,9 @@ impl Case {
         }
     }
 
-    fn tried(&self, folder: &Path, stop: &AtomicBool) -> Result<Outcome, ExperimentError> {
+    fn tried(&self, folder: &Path, pool: &Pool) -> Result<Outcome, ExperimentError> {
         let began = Instant::now();
-        let (scene, found) = search(&self.config, &folder.join("config.json"), stop)?;
+        let (scene, found) = search(&self.config, &folder.join("config.json"), pool)?;
         let search_seconds = began.elapsed().as_secs_f64();
         let reference = found.posterior.reference();
         let data = scene.imager.data.depth.len() as f64;
@@ -114,10 +114,10 @@ impl Case {
         };
         if let Some(nodes) = &self.grid {
             let grid = nodes.grid(&found.optimum);
-            outcome.grid = Some(landscape(&scene, found.clone(), grid, &folder.join("grid"), stop)?.0);
+            outcome.grid = Some(landscape(&scene, found.clone(), grid, &folder.join("grid"), pool)?.0);
         }
         if self.chain {
-            let (route, summary) = chain(&scene, found, &folder.join("chain"), stop)?;
+            let (route, summary) = chain(&scene, found, &folder.join("chain"), pool)?;
             outcome.k_upper95_kms = summary.parameters[Parameter::K.name()].upper95;
             outcome.chain = Some(route);
         }
@@ -155,7 +155,7 @@ impl Nodes {
 }
 
 /// The star of a config, and the best parameters there; its target chi2 is raised if it is out of reach.
-pub fn search(config: &Value, path: &Path, stop: &AtomicBool) -> Result<(Scene, Found), ExperimentError> {
+pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found), ExperimentError> {
     let found =
         |scene: Scene| match search::find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ()) {
             Ok(found) => Ok(Ok((scene, found))),
@@ -172,7 +172,7 @@ pub fn search(config: &Value, path: &Path, stop: &AtomicBool) -> Result<(Scene, 
     let first = scene(config, path)?;
     let reached = attained(&first, first.settings.imaging.chi2_target.value())?;
     for factor in ABOVE_REACHED {
-        if stop.load(Relaxed) {
+        if pool.stopped() {
             return Err(ExperimentError::Interrupted);
         }
         let target = json!((1e4 * factor * reached).round() / 1e4);
@@ -201,7 +201,7 @@ pub fn landscape(
     found: Found,
     grid: Grid,
     folder: &Path,
-    stop: &AtomicBool,
+    pool: &Pool,
 ) -> Result<(Route, Survey), ExperimentError> {
     let began = Instant::now();
     let names: Vec<String> = grid.names().map(str::to_owned).collect();
@@ -214,7 +214,7 @@ pub fn landscape(
         resumed => resumed?,
     };
     let resumed = !survey.landscape.nodes().is_empty();
-    if !survey.go(stop, |_| ())? {
+    if !survey.go(pool, |_| ())? {
         return Err(ExperimentError::Interrupted);
     }
     let fitted = paraboloid(&survey.landscape, Rule::default());
@@ -236,19 +236,14 @@ fn vertex(fitted: &Paraboloid) -> BTreeMap<String, Estimate> {
 }
 
 /// The chain, kept in `folder`, and its summary.
-pub fn chain(
-    scene: &Scene,
-    found: Found,
-    folder: &Path,
-    stop: &AtomicBool,
-) -> Result<(Route, Summary), ExperimentError> {
+pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, Summary), ExperimentError> {
     let began = Instant::now();
     let resumed = folder.join(CHAIN).exists();
-    let mut run = match Run::resume(scene, folder, None) {
-        Err(RunError::Origin(_)) => Run::begin(scene, folder, found, StartFrom::Optimum, true)?,
+    let mut run = match Run::resume(scene, folder, None, pool) {
+        Err(RunError::Origin(_)) => Run::begin(scene, folder, found, StartFrom::Optimum, true, pool)?,
         resumed => resumed?,
     };
-    if run.go(stop, |_, _| ())? == StopReason::Interrupted {
+    if run.go(pool, |_, _| ())? == StopReason::Interrupted {
         return Err(ExperimentError::Interrupted);
     }
     let (kinds, goals) = kinds_and_goals(&scene.settings);

@@ -11,12 +11,12 @@ use crate::detection::DetectionError;
 use crate::io::atomic::{WriteError, write_json};
 use crate::objective::ReferenceError;
 use crate::periodogram::FrequencyError;
+use crate::pool::Pool;
 use crate::run::RunError;
 use crate::scene::SceneError;
 use crate::search::SearchError;
 use crate::survey::SurveyError;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Runs experiments and keeps what they came to.
 pub struct Laboratory<'a> {
@@ -24,8 +24,8 @@ pub struct Laboratory<'a> {
     pub folder: PathBuf,
     /// A reduced version of everything, to see that it works: fewer cases, pixels and draws.
     pub quick: bool,
-    /// Set from outside to stop.
-    pub stop: &'a AtomicBool,
+    /// Who reconstructs, until told to stop.
+    pub pool: &'a Pool,
     /// Told what is under way.
     pub report: &'a (dyn Fn(&str) + Sync),
 }
@@ -83,7 +83,7 @@ impl ExperimentError {
     /// Whether it lies in the star: one that cannot be imaged, or has no best orbit, is a result of an experiment.
     pub(super) fn is_of_the_star(&self) -> bool {
         use ExperimentError::{Detection, Reference, Run, Search};
-        matches!(self, Search(_) | Reference(_) | Detection(_) | Run(RunError::SpotsLeft | RunError::PriorStart))
+        matches!(self, Search(_) | Reference(_) | Detection(_) | Run(RunError::SpotsLeft(_) | RunError::PriorStart))
     }
 }
 
@@ -110,7 +110,7 @@ impl Laboratory<'_> {
             return Ok(done);
         }
         self.go_on()?;
-        let outcome = case.run(&folder, self.stop)?;
+        let outcome = case.run(&folder, self.pool)?;
         write_json(&path, &outcome)?;
         Ok(outcome)
     }
@@ -130,7 +130,7 @@ impl Laboratory<'_> {
     /// # Errors
     /// [`ExperimentError::Interrupted`].
     pub fn go_on(&self) -> Result<(), ExperimentError> {
-        if self.stop.load(Relaxed) { Err(ExperimentError::Interrupted) } else { Ok(()) }
+        if self.pool.stopped() { Err(ExperimentError::Interrupted) } else { Ok(()) }
     }
 
     /// The one or the other, as the effort is full or quick.

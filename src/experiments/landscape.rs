@@ -27,7 +27,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
     let config = with(paper(), &changes);
     let folder = laboratory.folder("R3")?;
     (laboratory.report)("R3: search");
-    let (scene, found) = case::search(&config, &folder.join("config.json"), laboratory.stop)?;
+    let (scene, found) = case::search(&config, &folder.join("config.json"), laboratory.pool)?;
     let [along, along_slice] = laboratory.full_or_quick([15, 50], [6, 9]);
     let axis = |&(name, min, max): &(&str, f64, f64), nodes: usize| Axis {
         name: name.to_owned(),
@@ -38,7 +38,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
     };
     (laboratory.report)("R3: landscape in three dimensions");
     let whole = Grid { axes: AXES.iter().map(|a| axis(a, along)).collect() };
-    let (grid, survey) = case::landscape(&scene, found.clone(), whole, &folder.join("grid"), laboratory.stop)?;
+    let (grid, survey) = case::landscape(&scene, found.clone(), whole, &folder.join("grid"), laboratory.pool)?;
     let mut report = Report::new(["k_kms", "porb_over_prot", "phi", "spottedness", "chi2", "ln_l"]);
     for node in survey.landscape.nodes() {
         let Some(likelihood) = node.reconstruction.likelihood else { continue };
@@ -55,7 +55,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         let found = search::find(&scene.imager, &scene.space_of(&free), settings, &|_| ())?;
         let grid = Grid { axes: others.collect() };
         let (route, survey) =
-            case::landscape(&scene, found, grid, &folder.join(format!("slice_{fixed}")), laboratory.stop)?;
+            case::landscape(&scene, found, grid, &folder.join(format!("slice_{fixed}")), laboratory.pool)?;
         slices += route.reconstructions;
         let lowest = survey.landscape.nodes().iter().filter_map(|node| Some((node, node.reconstruction.likelihood?)));
         let lowest = lowest.min_by(|a, b| a.1.spottedness.total_cmp(&b.1.spottedness));
@@ -73,7 +73,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         );
     }
     (laboratory.report)("R3: chain");
-    let (chain, _) = case::chain(&scene, found, &folder.join("chain"), laboratory.stop)?;
+    let (chain, _) = case::chain(&scene, found, &folder.join("chain"), laboratory.pool)?;
     let comparison = Comparison::of(&Pair::read(&folder.join("chain"), &folder.join("grid"))?, Rule::default())?;
     let chain_folder = Some(folder.join("chain"));
     let slices_drawn = AXES.iter().map(|(fixed, ..)| format!("slice_{fixed}"));

@@ -90,8 +90,11 @@ const WAYS: [&str; 3] = ["equatorial_velocity_kept", "rotation_fitted", SPOTS_LE
 /// The way in which the chain counts what maps leave over of spots.
 const SPOTS_LEFT_FITTED: &str = "spots_left_fitted";
 
-/// Both ways of taking what maps leave over of spots: what is varied, and the change of the config that it takes.
-fn ways_with_spots_left() -> [((&'static str, f64), Option<(&'static str, Value)>); 2] {
+/// What is varied, and the change of the config that it takes.
+type Way = ((&'static str, f64), Option<(&'static str, Value)>);
+
+/// Both ways of taking what maps leave over of spots.
+fn ways_with_spots_left() -> [Way; 2] {
     [((SPOTS_LEFT_FITTED, 0.0), None), ((SPOTS_LEFT_FITTED, 1.0), Some(("/imaging/spots_left", json!("fitted"))))]
 }
 
@@ -327,7 +330,7 @@ pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Experimen
         let prior = json!({ "prior": "uniform", "min": 2.0, "max": 2.2 });
         let injected = ("/observations/simulate/truth/omega_eq_rad_d", json!(TAU / ROTATION_PERIOD_D));
         let free = with(star.case.config.clone(), &[injected.clone(), ("/parameters/omega_eq_rad_d", prior)]);
-        let (scene, found) = search(&free, &laboratory.folder.join("config.json"), laboratory.stop)?;
+        let (scene, found) = search(&free, &laboratory.folder.join("config.json"), laboratory.pool)?;
         let index = scene.space.names().iter().position(|name| name == "omega_eq_rad_d").expect("it is free");
         let omega = rounded(found.optimum.theta[index], 7);
         star.case.name += "_rotation_fitted";

@@ -65,7 +65,8 @@ const STELLAR: [Stellar; 4] = [
 
 /// R12.
 pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
-    let names: Vec<&str> = Parameter::ALL.iter().filter(|&&p| p != Parameter::Vsys).map(|p| p.name()).collect();
+    let names: Vec<&str> =
+        Parameter::ALL.iter().filter(|&&p| p != Parameter::Vsys && !p.is_surface()).map(|p| p.name()).collect();
     let ends = ["true", "median", "low68", "high68", "low95", "high95"];
     let of_one = |name: &&str| ends.map(|end| format!("{name}_{end}"));
     let mut report = Report::new(["dimensions".to_owned()].into_iter().chain(names.iter().flat_map(of_one)));
@@ -75,13 +76,13 @@ pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError
         laboratory.go_on()?;
         (laboratory.report)(&format!("R12, {dimensions} parameters: chain"));
         let (scene, found) =
-            case::search(&config(laboratory, &STELLAR[..free], true), &folder.join("config.json"), laboratory.stop)?;
-        let (chain, summary) = case::chain(&scene, found, &folder.join("chain"), laboratory.stop)?;
+            case::search(&config(laboratory, &STELLAR[..free], true), &folder.join("config.json"), laboratory.pool)?;
+        let (chain, summary) = case::chain(&scene, found, &folder.join("chain"), laboratory.pool)?;
         (laboratory.report)(&format!("R12, {dimensions} parameters: landscape of the orbit"));
         let (conditional, found) =
-            case::search(&config(laboratory, &[], false), &folder.join("config.json"), laboratory.stop)?;
+            case::search(&config(laboratory, &[], false), &folder.join("config.json"), laboratory.pool)?;
         let grid = case::Nodes::Around(laboratory.full_or_quick(9, 5)).grid(&found.optimum);
-        let (grid, _) = case::landscape(&conditional, found, grid, &folder.join("grid"), laboratory.stop)?;
+        let (grid, _) = case::landscape(&conditional, found, grid, &folder.join("grid"), laboratory.pool)?;
         let comparison = Comparison::of(&Pair::read(&folder.join("chain"), &folder.join("grid"))?, Rule::default())?;
         let truth = &scene.truth.expect("the star is simulated");
         let mut row = vec![f64::from(dimensions as u32)];

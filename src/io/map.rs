@@ -8,6 +8,7 @@ use super::provenance::Provenance;
 use crate::fit::{Checks, Fit, FitSummary};
 use crate::imaging::Imager;
 use crate::maxent::entropy::Entropy;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use crate::observation::Observations;
 use crate::star::SurfaceGrid;
@@ -80,6 +81,9 @@ enum MapColumns<'a> {
 struct FitFile<'a> {
     #[serde(flatten)]
     summary: &'a FitSummary,
+    /// One entry a profile, in the order of the list.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    nuisances: &'a [LineAndContinuum],
     truth: Option<ParameterValues>,
     checks: &'a Checks,
     trade_off: Vec<TradeOffNode>,
@@ -129,7 +133,7 @@ impl MapResult<'_> {
             rotation_period_d: self.imager.star.rotation_period_d,
             epoch_d: self.imager.star.epoch_d,
             parameters: self.fit.summary.parameters,
-            contrast: self.imager.star.contrast,
+            contrast: self.fit.summary.contrast,
             spottedness: self.fit.summary.spottedness,
             true_spottedness,
             pixels: self.imager.grid.len(),
@@ -176,6 +180,7 @@ impl MapResult<'_> {
         };
         FitFile {
             summary: &self.fit.summary,
+            nuisances: &self.fit.nuisances,
             truth: self.truth,
             checks: &self.fit.checks,
             trade_off: self.fit.tradeoff.iter().map(node).collect(),

@@ -2,6 +2,7 @@
 
 use super::atomic::{WriteError, write_json};
 use super::provenance::Provenance;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use crate::star::Orbit;
 use serde::Serialize;
@@ -10,7 +11,7 @@ use std::path::Path;
 /// The content of `truth.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Truth {
-    /// All eight parameters as simulated.
+    /// The parameters as simulated.
     pub parameters: ParameterValues,
     /// The spots: longitude, latitude and radius in degrees, filling factor.
     pub spots: serde_json::Value,
@@ -20,6 +21,9 @@ pub struct Truth {
     /// Beside faculae: brightness of a spot over that of the photosphere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contrast: Option<f64>,
+    /// What is wrong with each profile by itself, in line and continuum.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub continuum: Vec<LineAndContinuum>,
     /// Fractional spot coverage.
     pub spottedness: f64,
     /// Signal-to-noise ratio of each bin; null for no noise.

@@ -36,7 +36,7 @@ pub enum SpotsLeft {
     /// Porb = Prot.
     #[default]
     Entropy,
-    /// Their size is fitted to the data, as a jitter's would be, and the chain counts them as noise.
+    /// The chain counts them as noise, of a size that the data tell, as a jitter's, and that is integrated over.
     Fitted,
 }
 

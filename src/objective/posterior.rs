@@ -12,7 +12,7 @@ use crate::imaging::{Imager, ImagingProblem};
 use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
 use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Termination};
 use crate::star::Response;
-use crate::star::response::MOST_NODES;
+use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
 
 /// The posterior of the free parameters.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ impl Posterior {
     pub fn new(imager: Imager, space: ParameterSpace, kind: ObjectiveKind, reference: Reference) -> Self {
         // the reference's pixels serve only if its fixed parameters are those of the space
         let here = space.values_at(&space.theta_of(&reference.values));
-        let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here[p] == reference.values[p])
+        let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.agrees(&reference.values, p))
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
         let mut posterior = Posterior { imager, space, kind, reference, settings, prediction: None, velocities_only };
@@ -90,11 +90,14 @@ impl Posterior {
         let values = self.space.values_at(theta);
         let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
         let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
-        if !values.0.iter().all(|x| x.is_finite()) {
+        if !Parameter::ALL.iter().filter_map(|&p| values.given(p)).chain(theta.iter().copied()).all(f64::is_finite) {
             return false;
         }
-        let (_, nodes) = Response::velocity_grid(&self.imager.star, &values.state(), self.imager.sampling.step_kms);
+        let state = values.state();
+        let (steps, nodes) = Response::velocity_grid(&self.imager.star, &state, self.imager.sampling.step_kms);
         nodes <= MOST_NODES
+            && steps <= MOST_STEPS_PER_BIN
+            && self.imager.star.with(&state.surface).is_possible()
             && fastest.is_finite()
             && fastest <= LARGEST_VSINI_KMS
             && values[Parameter::Vsini] > 0.0

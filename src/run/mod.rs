@@ -1,23 +1,23 @@
 //! A sampling run: start, chain on disk; begun afresh or resumed to the same bytes.
 //!
-//! `target` is what is sampled, `start` where the walkers begin. Left out: the search before it (`search`), how progress is shown, and the analysis of the chain (`chain`).
+//! `start` is where the walkers begin. Left out: the search before it (`search`), who reconstructs (`pool`), how progress is shown,
+//! and the analysis of the chain (`chain`).
 
+mod error;
 mod start;
-mod target;
+
+pub use error::RunError;
 
 use crate::chain::{Chain, Convergence, Goals, ParameterKind, Record};
 use crate::ensemble::{self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason};
-use crate::io::atomic::WriteError;
 use crate::io::journal::{Journal, JournalError};
-use crate::log_density::Threads;
 use crate::manifest::{Manifest, kinds_and_goals};
-use crate::origin::{Origin, OriginError};
+use crate::origin::Origin;
+use crate::pool::{Asked, Evaluations, Pool, Target, Task};
 use crate::scene::Scene;
 use crate::search::Found;
 use crate::surrogate::{Surrogate, SurrogateMove};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
-use target::Target;
 
 /// Name of the chain in a run's folder.
 pub const CHAIN: &str = "chain.jsonl";
@@ -47,6 +47,7 @@ pub struct Run {
     /// Reconstructions before its first step: to fit and try the surrogate, and for the start.
     pub preparation: usize,
     target: Target,
+    task: Task,
     kinds: Vec<ParameterKind>,
     policy: StopPolicy,
     settings: ensemble::SamplerSettings,
@@ -55,66 +56,39 @@ pub struct Run {
     journal: Journal,
 }
 
-/// Why a run cannot begin, or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The start is no start, or the sampler's settings are wrong.
-    #[error(transparent)]
-    Ensemble(#[from] EnsembleError),
-    /// A walker found no place in the prior where a reconstruction succeeds.
-    #[error(
-        "start from the prior: no reconstruction succeeds at {} draws; narrow the priors under `parameters`",
-        start::PRIOR_TRIES
-    )]
-    PriorStart,
-    /// The spots left over have no size that fits.
-    #[error(
-        "imaging.spots_left: no size of the spots left over fits the data; \"entropy\" takes them as the entropy has them"
-    )]
-    SpotsLeft,
-    /// What the run was begun with is missing, wrong, or not what is there now.
-    #[error(transparent)]
-    Origin(#[from] OriginError),
-    /// The chain on disk is wrong or locked.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    /// A file cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// The folder cannot be made, or not cleared.
-    #[error("{}: {source}", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The chain refused a step: a fault of the program.
-    #[error(transparent)]
-    Chain(#[from] crate::chain::ChainError),
-}
-
 impl Run {
     /// Begins a run at what a search `found`: draws the start, makes the folder with chain, manifest and step 0. A run that is
     /// in the folder already is replaced if `replace`, and refused otherwise.
     ///
     /// # Errors
     /// [`RunError`]; nothing is written where there is no start.
-    pub fn begin(scene: &Scene, folder: &Path, found: Found, from: StartFrom, replace: bool) -> Result<Self, RunError> {
+    pub fn begin(
+        scene: &Scene,
+        folder: &Path,
+        found: Found,
+        from: StartFrom,
+        replace: bool,
+        pool: &Pool,
+    ) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
         let needed = from == StartFrom::Optimum || scene.settings.sampler.moves.surrogate > 0.0;
         let target = Target::new(found.posterior.clone(), scene.settings.imaging.spots_left)?;
-        let surrogate = if needed { target.surrogate() } else { None };
+        let origin = Origin::of(scene, &found);
+        let task = Task::new(scene, &origin, scene.space.names(), Asked::LogProbability);
+        let evaluator = Evaluations::new(pool, &target, &task);
+        let surrogate = if needed { target.surrogate(&evaluator) } else { None };
         let start = match from {
             StartFrom::Optimum => {
-                let drawn = surrogate.as_ref().and_then(|(s, _)| start::from_surrogate(s, &target, scene));
-                drawn.map_or_else(|| start::around_maxima(&found, &target, scene), Ok)?
+                let drawn = surrogate.as_ref().and_then(|(s, _)| start::from_surrogate(s, &target, &evaluator, scene));
+                drawn.map_or_else(|| start::around_maxima(&found, &target, &evaluator, scene), Ok)
             }
-            StartFrom::Prior => start::over_prior(&target, scene)?,
+            StartFrom::Prior => start::over_prior(&evaluator, scene),
         };
-        let preparation = target.evaluations();
-        let first = first_step(scene, &target, &start)?;
-        let manifest = manifest(scene, &found, start);
+        let preparation = evaluator.count();
+        let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
+        // what was not evaluated looks like a start that is none
+        let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
+        let manifest = manifest(scene, origin, start);
         std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
         // the chain first: whoever holds it may write the manifest
         let mut journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
@@ -127,7 +101,7 @@ impl Run {
         let mut chain = Chain::new(manifest.shape());
         journal.append(&first)?;
         chain.push_step(&first)?;
-        let run = Run::new(scene, folder, manifest, target, surrogate, (journal, chain));
+        let run = Run::new(scene, folder, manifest, (target, task), surrogate, (journal, chain));
         Ok(Run { preparation, ..run })
     }
 
@@ -135,14 +109,19 @@ impl Run {
     ///
     /// # Errors
     /// [`RunError`]: no run there, changed config or data, a broken chain.
-    pub fn resume(scene: &Scene, folder: &Path, extend: Option<usize>) -> Result<Self, RunError> {
+    pub fn resume(scene: &Scene, folder: &Path, extend: Option<usize>, pool: &Pool) -> Result<Self, RunError> {
         let mut manifest = Manifest::read(folder)?;
+        if !manifest.merged_seeds.is_empty() {
+            return Err(RunError::Merged(folder.into()));
+        }
         manifest.origin.check(scene, folder)?;
         let (mut journal, mut chain) = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
         let posterior = manifest.origin.posterior(scene, scene.space.clone(), folder)?;
         let target = Target::new(posterior, scene.settings.imaging.spots_left)?;
+        let task = Task::new(scene, &manifest.origin, scene.space.names(), Asked::LogProbability);
+        let evaluator = Evaluations::new(pool, &target, &task);
         if chain.steps() == 0 {
-            let first = first_step(scene, &target, &manifest.start)?;
+            let first = first_step(scene, &target, &evaluator, &manifest.start)?;
             journal.append(&first)?;
             chain.push_step(&first)?;
         }
@@ -150,9 +129,10 @@ impl Run {
         if manifest.update(&scene.settings, extend.map(|steps| last_step + steps)) {
             manifest.write(folder)?;
         }
-        let surrogate = if scene.settings.sampler.moves.surrogate > 0.0 { target.surrogate() } else { None };
-        let preparation = target.evaluations();
-        let run = Run::new(scene, folder, manifest, target, surrogate, (journal, chain));
+        let wanted = scene.settings.sampler.moves.surrogate > 0.0;
+        let surrogate = if wanted { target.surrogate(&evaluator) } else { None };
+        let preparation = evaluator.count();
+        let run = Run::new(scene, folder, manifest, (target, task), surrogate, (journal, chain));
         Ok(Run { preparation, ..run })
     }
 
@@ -161,7 +141,7 @@ impl Run {
         scene: &Scene,
         folder: &Path,
         manifest: Manifest,
-        target: Target,
+        (target, task): (Target, Task),
         surrogate: Option<(Surrogate, f64)>,
         (journal, chain): (Journal, Chain),
     ) -> Self {
@@ -177,6 +157,7 @@ impl Run {
             policy,
             manifest,
             target,
+            task,
             chain,
             preparation: 0,
             kinds,
@@ -196,23 +177,23 @@ impl Run {
         &self.policy.goals
     }
 
-    /// Steps until the goals are reached, the step limit, or `stop`; every step is on disk before the next begins.
+    /// Steps until the goals are reached, the step limit, or `pool` is told to stop; every step is on disk before the next begins.
     ///
     /// # Errors
     /// A chain that cannot be written.
     pub fn go(
         &mut self,
-        stop: &AtomicBool,
+        pool: &Pool,
         mut on_step: impl FnMut(&[Record], Option<&Convergence>),
     ) -> Result<StopReason, RunError> {
-        let Run { target, chain, kinds, policy, settings, surrogate, journal, .. } = self;
-        let evaluator = Threads(&*target);
+        let Run { target, task, chain, kinds, policy, settings, surrogate, journal, .. } = self;
+        let evaluator = Evaluations::new(pool, target, task);
         let mut sampler = Sampler::new(&*target, &evaluator, settings)?;
         if let Some((surrogate, acceptance)) = surrogate {
             let weight = settings.moves.surrogate * acceptance.powi(2);
             sampler = sampler.with_move(weight, Box::new(SurrogateMove(surrogate.clone())));
         }
-        let result = ensemble::run(&sampler, chain, kinds, policy, stop, &mut |records, convergence| {
+        let result = ensemble::run(&sampler, chain, kinds, policy, pool.stop(), &mut |records, convergence| {
             journal.append(records)?;
             on_step(records, convergence);
             Ok::<(), JournalError>(())
@@ -225,24 +206,33 @@ impl Run {
     }
 }
 
-fn manifest(scene: &Scene, found: &Found, start: Positions) -> Manifest {
+fn manifest(scene: &Scene, origin: Origin, start: Positions) -> Manifest {
     let prior = |f: &crate::objective::FreeParameter| {
         (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
     };
     Manifest {
-        origin: Origin::of(scene, found),
+        origin,
         names: scene.space.names().to_vec(),
         priors: scene.space.free().iter().map(prior).collect(),
         ensembles: scene.settings.sampler.ensembles,
         walkers: scene.settings.sampler.walkers,
         seed: scene.settings.sampler.seed,
         extend_to: None,
+        merged_seeds: Vec::new(),
         start,
     }
 }
 
 /// The walkers at step 0, evaluated; refused here, before anything is written, if they are no start.
-fn first_step(scene: &Scene, target: &Target, start: &Positions) -> Result<Vec<Record>, RunError> {
-    let evaluator = Threads(target);
-    Ok(Sampler::new(target, &evaluator, &scene.settings.sampler)?.start(start)?.1)
+fn first_step(
+    scene: &Scene,
+    target: &Target,
+    evaluator: &Evaluations,
+    start: &Positions,
+) -> Result<Vec<Record>, RunError> {
+    let first = Sampler::new(target, evaluator, &scene.settings.sampler)?.start(start);
+    first.map(|(_, records)| records).map_err(|error| match error {
+        EnsembleError::Stopped => RunError::Interrupted,
+        error => error.into(),
+    })
 }

@@ -1,45 +1,47 @@
-//! What a run samples: the posterior, with spots left over counted as noise or not; and how often it was evaluated.
+//! What a run samples: the posterior, with spots left over counted as noise or not.
 //!
 //! Left out: what the posterior is worth anywhere (`objective`, `expansion`).
 
-use super::RunError;
 use crate::expansion::SpotsCounted;
-use crate::log_density::{Evaluation, LogDensity, Threads};
+use crate::log_density::{Evaluation, Evaluator, LogDensity};
 use crate::objective::{Posterior, SpotsLeft};
 use crate::surrogate::Surrogate;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// The density that is sampled.
-pub(super) struct Target {
+pub struct Target {
     posterior: Posterior,
     counted: Option<SpotsCounted>,
-    evaluations: AtomicUsize,
 }
+
+/// The spots left over have no size that fits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "imaging.spots_left: no size of the spots left over fits the data; \"entropy\" takes them as the entropy has them"
+)]
+pub struct SpotsLeftError;
 
 impl Target {
     /// Of `posterior`, spots left over taken as the config says.
-    pub(super) fn new(posterior: Posterior, spots_left: SpotsLeft) -> Result<Self, RunError> {
+    ///
+    /// # Errors
+    /// [`SpotsLeftError`].
+    pub fn new(posterior: Posterior, spots_left: SpotsLeft) -> Result<Self, SpotsLeftError> {
         let counted = match spots_left {
             SpotsLeft::Entropy => None,
-            SpotsLeft::Fitted => Some(SpotsCounted::new(&posterior).ok_or(RunError::SpotsLeft)?),
+            SpotsLeft::Fitted => Some(SpotsCounted::new(&posterior).ok_or(SpotsLeftError)?),
         };
-        Ok(Target { posterior, counted, evaluations: AtomicUsize::new(0) })
-    }
-
-    /// How often it was evaluated.
-    pub(super) fn evaluations(&self) -> usize {
-        self.evaluations.load(Relaxed)
+        Ok(Target { posterior, counted })
     }
 
     /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density alone, so that
     /// a resumed run has the same.
-    pub(super) fn surrogate(&self) -> Option<(Surrogate, f64)> {
+    pub fn surrogate(&self, evaluator: &dyn Evaluator) -> Option<(Surrogate, f64)> {
         let (imager, space) = (self.posterior.imager(), self.posterior.space());
         let surrogate = match &self.counted {
             Some(counted) => Surrogate::of_expansion(counted.expansion(), space, imager),
             None => Surrogate::new(imager, space, self.posterior.reference()),
         };
-        Some(surrogate?.fitted(self, &Threads(self)))
+        Some(surrogate?.fitted(self, evaluator))
     }
 }
 
@@ -49,7 +51,6 @@ impl LogDensity for Target {
     }
 
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
-        self.evaluations.fetch_add(1, Relaxed);
         let evaluation = self.posterior.evaluate(theta);
         match &self.counted {
             Some(counted) => counted.recount(self.posterior.space(), theta, evaluation),

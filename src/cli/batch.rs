@@ -1,0 +1,88 @@
+//! `dimcmc batch`: the chains of many stars.
+
+use super::output::Output;
+use super::signals::Signals;
+use super::{Failure, Global, cluster, progress};
+use dimcmc::batch::{End, FILE, ListError, Row, read_list, rows, sample_all};
+use dimcmc::chain::ParameterSummary;
+use dimcmc::io::atomic::write_json;
+use dimcmc::text::{Align, columns};
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Sample the posteriors of many stars
+///
+/// The list names a config in each line. Each gets a run as by `sample`, in a folder of its own name below --out, several at once: as
+/// many as there are threads, or ranks of a cluster. Stars that are done are left alone, those that were stopped go on when
+/// the same command is given again, and one that fails stops no other. Writes batch.json, and prints a table.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc batch configs/stars.txt --out runs/stars")]
+pub struct Args {
+    /// List of configs, one a line, from the list's folder; `#` begins a comment
+    list: PathBuf,
+    /// Folder for the runs and the table; one that is there already is gone on with
+    #[arg(long = "out", value_name = "DIR")]
+    folder: PathBuf,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let stars = read_list(&args.list, &args.folder).map_err(|error| match error {
+        ListError::Read { .. } | ListError::Line { .. } | ListError::Empty(_) => Failure::input(error),
+    })?;
+    let output = Output::to(args.folder.clone(), true);
+    let folder = output.create()?;
+    let signals = Signals::catch("star")?;
+    let pool = cluster::pool(global, &signals);
+    signals.defer();
+    let bar = progress::bar(global, Some(stars.len() as u64), "stars");
+    let ends = sample_all(&stars, &pool, &|| bar.inc(1));
+    bar.finish_and_clear();
+    let rows = rows(&stars, &ends);
+    write_json(&folder.join(FILE), &rows)?;
+    let _ = write!(std::io::stdout(), "{}written: {}: {FILE}\n", table(&rows), folder.display());
+    let count = |is: &dyn Fn(&End) -> bool| ends.iter().filter(|end| is(end)).count();
+    let (interrupted, failed) = (count(&|end| *end == End::Interrupted), count(&|end| matches!(end, End::Failed(_))));
+    if interrupted > 0 {
+        let message = format!("interrupted with {interrupted} of {} stars to do; the same command goes on", ends.len());
+        return Err(signals.interrupted(message));
+    }
+    match failed {
+        0 => Ok(()),
+        _ => Err(Failure::failed(format!("{failed} of {} stars have no chain", ends.len()))),
+    }
+}
+
+/// A line a star and parameter; in place of the numbers, why there are none.
+fn table(rows: &[Row]) -> String {
+    let head = ["star", "parameter", "median", "- 68%", "+ 68%", "R-hat", "ESS", "converged"];
+    let mut cells = vec![head.map(str::to_owned).to_vec()];
+    let mut failures = String::new();
+    for row in rows {
+        match &row.end {
+            End::Sampled => {}
+            End::Interrupted => failures += &format!("{}: interrupted\n", row.name),
+            End::Failed(why) => failures += &format!("{}: {why}\n", row.name),
+        }
+        for (name, one) in &row.parameters {
+            cells.push([vec![row.name.clone(), name.clone()], numbers(one, row.converged)].concat());
+        }
+    }
+    let aligns: Vec<Align> = (0..head.len()).map(|k| if k < 2 { Align::Left } else { Align::Right }).collect();
+    if cells.len() == 1 { failures } else { columns(&cells, &aligns) + &failures }
+}
+
+fn numbers(one: &ParameterSummary, converged: Option<bool>) -> Vec<String> {
+    let [low, high] = one.ci68;
+    let number = |x: f64| format!("{x:.4}");
+    let or_none = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
+    let converged = if converged == Some(true) { "yes" } else { "no" };
+    vec![
+        number(one.median),
+        number(one.median - low),
+        number(high - one.median),
+        or_none(one.rhat, 3),
+        or_none(one.ess, 0),
+        converged.to_owned(),
+    ]
+}

@@ -1,0 +1,48 @@
+//! `dimcmc merge`: runs of independent ensembles joined into one.
+
+use super::output::Output;
+use super::{Failure, Global, analyse};
+use dimcmc::merge::{MergeError, merge};
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Join runs of the same config but for the seed into one
+///
+/// For chains that an array of jobs has sampled. The runs must be of the same config, data and program and have the same reference;
+/// their seeds must differ. The joined run has the ensembles of all, as many steps as the shortest, and R-hat between all
+/// of them; `analyse`, `compare`, `plot`, `report` and `export` take it as any other. It cannot go on: extend the runs, and join them
+/// again. Writes manifest.json, chain.jsonl and summary.json.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc merge runs/demo runs/demo_2 --out runs/merged")]
+pub struct Args {
+    /// Folders of the runs
+    #[arg(required = true, value_name = "RUN")]
+    runs: Vec<PathBuf>,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
+    args.output.check()?;
+    let merged = merge(&args.runs).map_err(failure)?;
+    let folder = args.output.create()?;
+    merged.write(folder, args.output.replaces()).map_err(failure)?;
+    analyse::report(folder, &merged.manifest, &merged.chain)?;
+    for (run, beyond) in args.runs.iter().zip(&merged.beyond).filter(|(_, beyond)| **beyond > 0) {
+        let shortest = merged.chain.steps() - 1;
+        let _ = writeln!(
+            std::io::stdout(),
+            "note: {}: its last {beyond} steps are left out, the shortest run ends at step {shortest}",
+            run.display()
+        );
+    }
+    Ok(())
+}
+
+fn failure(error: MergeError) -> Failure {
+    match error {
+        MergeError::Write(_) | MergeError::Chain(_) => Failure::failed(error),
+        error => Failure::input(error),
+    }
+}

@@ -1,0 +1,33 @@
+//! Waiting without burning a processor: naps that grow with the wait.
+//!
+//! MPI's own blocking calls spin. Left out: what is waited for.
+
+use std::time::{Duration, Instant};
+
+/// Share of the wait so far that a nap takes, and so the most that waiting this way adds to it.
+const SHARE: u32 = 20;
+
+/// The shortest nap; the kernel adds some 50 us.
+const SHORTEST: Duration = Duration::from_micros(10);
+
+/// The longest, an eye to how long a rank takes to hear that it is wanted.
+const LONGEST: Duration = Duration::from_millis(5);
+
+/// A wait that began when this was made.
+pub(super) struct Nap(Instant);
+
+impl Nap {
+    pub(super) fn new() -> Self {
+        Nap(Instant::now())
+    }
+
+    /// How long the next nap is.
+    pub(super) fn length(&self) -> Duration {
+        (self.0.elapsed() / SHARE).clamp(SHORTEST, LONGEST)
+    }
+
+    /// Takes it.
+    pub(super) fn take(&self) {
+        std::thread::sleep(self.length());
+    }
+}

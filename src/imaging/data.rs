@@ -1,0 +1,56 @@
+//! The observed depths and the weights of their bins, which is all that the misfit needs of the observations.
+//!
+//! Left out: the model that they are compared with.
+
+use crate::nuisances::Nuisances;
+use crate::observation::Observations;
+use std::ops::Range;
+
+/// Data in the form that the misfit needs.
+#[derive(Clone, Debug)]
+pub struct Data {
+    /// Observed depth `1 - I` of every bin.
+    pub depth: Vec<f64>,
+    /// `1 / sigma^2` of every bin.
+    pub inverse_variance: Vec<f64>,
+    /// What may be wrong with each profile by itself, integrated out.
+    pub nuisances: Nuisances,
+}
+
+impl Data {
+    /// Depths and weights of all profiles, one after the other.
+    pub fn of(observations: &Observations) -> Self {
+        let profiles = || observations.profiles.iter();
+        Data {
+            depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
+            inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
+            nuisances: Nuisances::default(),
+        }
+    }
+
+    /// Those of some of the bins, which are whole profiles.
+    pub fn of_bins(&self, kept: &[Range<usize>]) -> Self {
+        let of_bins = |all: &[f64]| kept.iter().flat_map(|bins| &all[bins.clone()]).copied().collect();
+        Data {
+            depth: of_bins(&self.depth),
+            inverse_variance: of_bins(&self.inverse_variance),
+            nuisances: self.nuisances.of_bins(of_bins),
+        }
+    }
+
+    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
+    pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+        for j in bins.clone() {
+            out[j] = x[j] * self.inverse_variance[j];
+        }
+        self.nuisances.weigh(bins, x, out);
+    }
+
+    /// Sets `out = R x` in the `bins` of one profile, `R^t R = W`.
+    pub fn weigh_root(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+        for j in bins.clone() {
+            out[j] = x[j] * self.inverse_variance[j].sqrt();
+        }
+        self.nuisances.weigh_root(bins, x, out);
+    }
+}

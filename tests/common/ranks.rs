@@ -1,0 +1,66 @@
+//! What this program does as a rank of a job: go wrong on purpose, or be asked and measured.
+
+use dimcmc::cluster::{Answer, Queue, Rank, join};
+use std::convert::Infallible;
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant, SystemTime};
+
+/// Questions of a job.
+const QUESTIONS: u8 = 40;
+
+/// Plays a role; whoever panics notes down when.
+pub fn play(role: &str, args: &[String]) -> ExitCode {
+    let at_once = if role == "order-and-rest" { 2 } else { 1 };
+    match join(at_once).unwrap() {
+        Rank::Only => panic!("started without mpirun"),
+        Rank::First(queue) => first(role, args, &queue),
+        Rank::Other(worker) => {
+            let rank = worker.rank();
+            let learn =
+                |_: &[u8]| Ok::<Answer, Infallible>(Box::new(move |question, _| answer(role, args, rank, question)));
+            let Ok(()) = worker.serve(learn);
+        }
+    }
+    ExitCode::SUCCESS
+}
+
+/// Seconds since 1970.
+pub fn now_s() -> f64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_secs_f64()
+}
+
+fn first(role: &str, args: &[String], queue: &Queue) {
+    let questions: Vec<Vec<u8>> = (0..QUESTIONS).map(|k| vec![k]).collect();
+    let (began, before) = (Instant::now(), processor_s());
+    let answers = queue.answers(b"a brief", &questions, &AtomicBool::new(false));
+    if role == "panic-on-first" {
+        panic_noted(&args[0], 0);
+    }
+    println!("in order: {}", u8::from(answers.iter().zip(&questions).all(|(a, q)| a[0] == 2 * q[0])));
+    println!("seconds: {}", began.elapsed().as_secs_f64());
+    println!("processor: {}", processor_s() - before);
+}
+
+fn answer(role: &str, args: &[String], rank: i32, question: &[u8]) -> Vec<u8> {
+    match (role, question[0]) {
+        ("panic-on-worker", 9..) if rank == 2 => panic_noted(&args[0], rank),
+        // the other one is busy for longer than a test may take
+        ("panic-on-worker", 9..) => std::thread::sleep(Duration::from_secs(100)),
+        ("order-and-rest", _) => std::thread::sleep(Duration::from_millis(50)),
+        _ => {}
+    }
+    vec![2 * question[0]]
+}
+
+fn panic_noted(file: &str, rank: i32) {
+    std::fs::write(file, now_s().to_string()).unwrap();
+    panic!("on purpose on rank {rank}");
+}
+
+/// Processor time of this process, in hundredths of a second.
+fn processor_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+    let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split_whitespace().collect();
+    fields[11..13].iter().map(|ticks| ticks.parse::<f64>().unwrap() / 100.0).sum()
+}
