@@ -70,7 +70,7 @@ fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) 
     let star = scene.imager.star.clone();
     let observations = simulation.observe(&star);
     let imaging = &scene.settings.imaging;
-    (Imager::new(star, &observations, imaging.pixels, imaging.default_spot), truth)
+    (Imager::new(star, &observations, imaging.pixels, imaging.entropy()), truth)
 }
 
 fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
@@ -80,7 +80,7 @@ fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
 
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
     let settings = DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target,
+        chi2_target: scene.settings.imaging.chi2_target.value(),
         nuisances: Vec::new(),
         search: SearchSettings { draws, seed: 1 },
         eccentric: false,

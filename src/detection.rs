@@ -6,6 +6,10 @@
 //! around the image that it implies, and so on until K stays. A second planet is searched for in the last expansion, where the
 //! first is small. Left out: what is written (`io::periodogram`).
 
+mod robustness;
+
+pub use robustness::{AtTarget, Robustness, WithoutNight, robustness};
+
 use crate::expansion::{Expansion, Nuisance, STELLAR};
 use crate::imaging::Imager;
 use crate::maxent::Termination;
@@ -14,6 +18,7 @@ use crate::periodogram::eccentric::keplerian;
 use crate::periodogram::offset::{Offset, offset};
 use crate::periodogram::peaks::refined;
 use crate::periodogram::two_planets::{both, without};
+use crate::periodogram::window::{Alias, alias, window_peaks};
 use crate::periodogram::{
     CircularOrbit, DETECTION_FAP, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
     co_rotation_penalty,
@@ -125,9 +130,12 @@ pub enum Stage {
 }
 
 impl View {
-    /// The image at `values`. Where the target chi2 takes more than three times the entropy's weight over the number of data, the
+    /// The star imaged at `values`. Where the target chi2 takes more than three times the entropy's weight over the number of data, the
     /// image stops short of it: beyond, noise is turned into spots.
-    fn new(imager: &Imager, values: ParameterValues, settings: &DetectionSettings) -> Result<Self, DetectionError> {
+    ///
+    /// # Errors
+    /// [`DetectionError`].
+    pub fn new(imager: &Imager, values: ParameterValues, settings: &DetectionSettings) -> Result<Self, DetectionError> {
         let reference = Reference::provisional(imager, values, settings.chi2_target)?;
         let on_target = reference.solution.termination == Termination::Converged;
         let nuisances = &settings.nuisances;
@@ -209,6 +217,15 @@ impl Detection {
     pub fn fraction_of_rotation(&self) -> Option<u32> {
         let frequency = 1.0 / self.best.porb_over_prot;
         (1..=4).find(|&n| (frequency - f64::from(n)).abs() * self.frequencies.time_base_cycles < 0.5)
+    }
+
+    /// n and the peak of the window function by which the best period is an alias of `Prot/n`, n up to 4: there spots imitate
+    /// orbits as they do at the rotation period.
+    pub fn alias_of_rotation(&self) -> Option<(u32, Alias)> {
+        let window = window_peaks(&self.planet_free.quadratic.cycles, &self.frequencies);
+        let base = self.frequencies.time_base_cycles;
+        let alias = |n: u32| Some((n, alias(1.0 / self.best.porb_over_prot, f64::from(n), &window, base)?));
+        (1..=4).find_map(alias)
     }
 
     /// The search that periods are judged by.

@@ -3,9 +3,15 @@
 //!
 //! Left out: how the reconstruction came about (`objective::reference`), and files (`io::map`).
 
+mod checks;
+
+pub use checks::{Checks, ProfileCheck};
+
 use crate::imaging::Imager;
 use crate::log_density::Status;
+use crate::maxent::entropy::Entropy;
 use crate::maxent::{Problem, Termination, parallelism};
+use crate::nuisances::LineAndContinuum;
 use crate::objective::tradeoff::Node;
 use crate::objective::{ParameterValues, Reference};
 use crate::observation::{Observations, RadialVelocity};
@@ -14,16 +20,31 @@ use serde::Serialize;
 /// A reconstruction and what it makes of the data.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Spot filling factor of every pixel.
-    pub spot_filling: Vec<f64>,
-    /// Model intensity of every bin, one vector a profile, in units of the continuum.
+    /// What the map holds: spot filling factor or brightness of every pixel.
+    pub map: Vec<f64>,
+    /// Model intensity of every bin, one vector a profile, in units of the continuum; with its nuisances, where there are any.
     pub model: Vec<Vec<f64>>,
+    /// Posterior mean of the nuisances of each profile, given the map; empty where none are integrated out.
+    pub nuisances: Vec<LineAndContinuum>,
     /// Radial velocities, one a profile.
     pub velocities: Vec<FilteredVelocity>,
     /// Nodes of the trade-off curve, in order of falling chi2.
     pub tradeoff: Vec<Node>,
     /// The numbers.
     pub summary: FitSummary,
+    /// Whether what is left over looks like noise.
+    pub checks: Checks,
+}
+
+/// What is left over in one bin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Residual {
+    /// Depth of the model.
+    depth: f64,
+    /// Observed minus modelled intensity.
+    difference: f64,
+    /// The same over its standard error.
+    scaled: f64,
 }
 
 /// The first moment of one profile, observed and modelled.
@@ -65,8 +86,11 @@ pub struct FitSummary {
     pub alpha: f64,
     /// Entropy.
     pub entropy: f64,
-    /// Fractional spot coverage.
+    /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
     pub spottedness: f64,
+    /// Of an image of bright and dark pixels, what is darker and what is brighter than the photosphere.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<Deviation>,
     /// Skilling & Bryan's TEST, 0 at a maximum-entropy image.
     pub test: f64,
     /// Applications of the response or its transpose, those for the trade-off curve included.
@@ -99,22 +123,67 @@ pub struct FitSummary {
     pub sigma_rms: f64,
 }
 
+/// Deviation from the brightness of the photosphere, means over the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Deviation {
+    /// Mean of what pixels lack in brightness, 0 for bright ones.
+    pub darkness: f64,
+    /// Mean of what they have too much, 0 for dark ones.
+    pub brightness_excess: f64,
+}
+
+impl Deviation {
+    /// Of a map of brightnesses; `None` if maps hold something else.
+    fn of(imager: &Imager, map: &[f64]) -> Option<Self> {
+        let mean = |part: fn(f64) -> f64| map.iter().zip(&imager.grid.area).map(|(b, a)| a * part(b - 1.0)).sum();
+        match imager.entropy {
+            Entropy::Spots { .. } => None,
+            Entropy::BrightAndDark => {
+                Some(Deviation { darkness: mean(|x| (-x).max(0.0)), brightness_excess: mean(|x| x.max(0.0)) })
+            }
+        }
+    }
+}
+
 impl Fit {
     /// Holds `reference` against the `observations` that `imager` was made for.
     pub fn new(imager: &Imager, observations: &Observations, reference: &Reference) -> Self {
         let solution = &reference.solution;
-        let mut spot_filling = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&solution.image.logit, &mut spot_filling);
+        let mut map = vec![0.0; imager.grid.len()];
+        imager.entropy.image(&solution.image.coordinates, &mut map);
         let mut problem = imager.problem(reference.response.clone());
-        let test = parallelism(&mut problem, imager.entropy, &solution.image.logit);
-        problem.linearise(&spot_filling);
-        let depths: Vec<&[f64]> =
-            (0..observations.profiles.len()).map(|k| &problem.model()[reference.response.bins(k)]).collect();
+        let test = parallelism(&mut problem, imager.entropy, &solution.image.coordinates);
+        problem.linearise(&map);
+        let mut depth = problem.model().to_vec();
+        let bins = (0..observations.profiles.len()).map(|k| reference.response.bins(k));
+        let estimate = |bins| imager.data.nuisances.estimate(bins, problem.weighted_residual(), &mut depth);
+        let nuisances = match imager.data.nuisances.is_empty() {
+            true => Vec::new(),
+            false => bins.clone().map(estimate).collect(),
+        };
+        let depths: Vec<&[f64]> = bins.map(|bins| &depth[bins]).collect();
         let velocities = velocities(imager, observations, reference, &depths);
-        let summary = FitSummary { test, ..summarise(imager, observations, reference, &depths, &velocities) };
+        let deviation = Deviation::of(imager, &map);
+        let residuals = residuals(observations, &depths);
+        let summary =
+            FitSummary { test, deviation, ..summarise(imager, observations, reference, &residuals, &velocities) };
+        let checks = Checks::of(&residuals);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
-        Fit { spot_filling, model, velocities, tradeoff: reference.tradeoff.nodes().to_vec(), summary }
+        let tradeoff = reference.tradeoff.nodes().to_vec();
+        Fit { map, model, nuisances, velocities, tradeoff, summary, checks }
     }
+}
+
+/// Residuals of every profile, with its time.
+fn residuals(observations: &Observations, depths: &[&[f64]]) -> Vec<(f64, Vec<Residual>)> {
+    let of = |(profile, depths): (&crate::observation::Profile, &&[f64])| {
+        let residual = |((intensity, sigma), depth): ((&f64, &f64), &f64)| {
+            let difference = intensity - (1.0 - depth);
+            Residual { depth: *depth, difference, scaled: difference / sigma }
+        };
+        (profile.time_d, profile.intensity.iter().zip(&profile.sigma).zip(depths.iter()).map(residual).collect())
+    };
+    observations.profiles.iter().zip(depths).map(of).collect()
 }
 
 fn velocities(
@@ -137,21 +206,20 @@ fn velocities(
     observations.profiles.iter().zip(depths).map(velocity).collect()
 }
 
-/// All numbers but `test`.
+/// All numbers but `test` and `deviation`.
 fn summarise(
     imager: &Imager,
     observations: &Observations,
     reference: &Reference,
-    depths: &[&[f64]],
+    residuals: &[(f64, Vec<Residual>)],
     velocities: &[FilteredVelocity],
 ) -> FitSummary {
     let solution = &reference.solution;
+    let star = imager.star.with(&reference.values.state().surface);
     let data = observations.len();
-    let deepest = depths.iter().flat_map(|d| d.iter()).copied().fold(0.0, f64::max);
-    let observed = observations.profiles.iter().flat_map(|p| &p.intensity);
-    let modelled = depths.iter().flat_map(|d| d.iter());
-    let residuals: Vec<(f64, f64)> = observed.zip(modelled).map(|(i, depth)| (*depth, i - (1.0 - depth))).collect();
-    let core = residuals.iter().filter(|(depth, _)| *depth > 0.5 * deepest);
+    let all = || residuals.iter().flat_map(|(_, residuals)| residuals);
+    let deepest = all().map(|r| r.depth).fold(0.0, f64::max);
+    let core = || all().filter(|r| r.depth > 0.5 * deepest);
     FitSummary {
         status: match solution.termination {
             Termination::Converged => Status::Converged,
@@ -166,20 +234,21 @@ fn summarise(
         alpha: 1.0 / solution.image.lambda,
         entropy: solution.entropy,
         spottedness: solution.spottedness,
+        deviation: None,
         test: f64::NAN,
         passes: reference.passes,
         newton_steps: solution.newton_steps,
         profiles: observations.profiles.len(),
         data,
         pixels: imager.grid.len(),
-        equivalent_width_kms: imager.star.line.equivalent_width_kms,
-        contrast: imager.star.contrast,
+        equivalent_width_kms: star.line.equivalent_width_kms,
+        contrast: star.contrast,
         parameters: reference.values,
         observed_rv_rms_kms: scatter(velocities.iter().map(|v| v.observed.value_kms)),
         filtered_rv_rms_kms: scatter(velocities.iter().map(FilteredVelocity::filtered_kms)),
         photon_rv_error_kms: rms(velocities.iter().map(|v| v.observed.sigma_kms)),
-        residual_rms: rms(residuals.iter().map(|(_, r)| *r)),
-        residual_rms_core: rms(core.map(|(_, r)| *r)),
+        residual_rms: rms(all().map(|r| r.difference)),
+        residual_rms_core: rms(core().map(|r| r.difference)),
         sigma_rms: rms(observations.profiles.iter().flat_map(|p| p.sigma.iter().copied())),
     }
 }

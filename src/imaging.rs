@@ -1,39 +1,25 @@
-//! Star and maximum entropy meet: the misfit of a map of spot filling factors to observed profiles, and the Doppler image.
+//! Star and maximum entropy meet: the misfit of a map to observed profiles, and the Doppler image.
 //!
-//! The map s gives the brightness `B = 1 - (1 - c) s`; the model is `D = line(B) / continuum(B)` (method section 1), whose
-//! second derivative is kept, so that the solver's Newton steps are exact. Left out: which parameters are tried, and why.
+//! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is
+//! `D = line(B) / continuum(B)` (method section 1), whose second derivative is kept, so that the solver's Newton steps are exact.
+//! Left out: which parameters are tried, and why.
+
+mod data;
 
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Curvature, Problem};
+use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
-use crate::star::{Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use crate::star::{Brightness, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
 
-/// Data in the form that the misfit needs.
-#[derive(Clone, Debug)]
-pub struct Data {
-    /// Observed depth `1 - I` of every bin.
-    pub depth: Vec<f64>,
-    /// `1 / sigma^2` of every bin.
-    pub inverse_variance: Vec<f64>,
-}
-
-impl Data {
-    /// Depths and weights of all profiles, one after the other.
-    pub fn of(observations: &Observations) -> Self {
-        let profiles = || observations.profiles.iter();
-        Data {
-            depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
-            inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
-        }
-    }
-}
+pub use data::Data;
 
 /// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
 #[derive(Clone, Debug)]
 pub struct Imager {
     /// Pixels of the map.
     pub grid: SurfaceGrid,
-    /// The star, but for the eight parameters.
+    /// The star, but for the parameters.
     pub star: StarSettings,
     /// Times and velocity bins.
     pub sampling: Sampling,
@@ -44,15 +30,49 @@ pub struct Imager {
 }
 
 impl Imager {
-    /// For `observations` of `star`, on about `pixels` pixels, with the entropy's default filling factor `default_spot`.
-    pub fn new(star: StarSettings, observations: &Observations, pixels: usize, default_spot: f64) -> Self {
+    /// For `observations` of `star`, on about `pixels` pixels, with maps of the given `entropy`.
+    pub fn new(star: StarSettings, observations: &Observations, pixels: usize, entropy: Entropy) -> Self {
         Imager {
             grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
             star,
             sampling: Sampling::of(observations),
             data: Data::of(observations),
-            entropy: Entropy::new(default_spot),
+            entropy,
         }
+    }
+
+    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard deviations.
+    pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
+        self.data.nuisances = Nuisances::new(priors, observations);
+        self
+    }
+
+    /// The same without some of the profiles.
+    pub fn without(&self, profiles: &[usize]) -> Self {
+        let (mut rest, mut kept) = (Vec::new(), Vec::new());
+        for (k, (profile, bins)) in self.sampling.profiles.iter().zip(self.bins()).enumerate() {
+            if !profiles.contains(&k) {
+                rest.push(*profile);
+                kept.push(bins);
+            }
+        }
+        let sampling = Sampling { profiles: rest, ..self.sampling };
+        Imager { sampling, data: self.data.of_profiles(&kept, 1.0), ..self.clone() }
+    }
+
+    /// The same with all errors multiplied by `factor`.
+    pub fn with_errors(&self, factor: f64) -> Self {
+        Imager { data: self.data.of_profiles(&self.bins(), factor), ..self.clone() }
+    }
+
+    /// Bins of every profile within the data.
+    fn bins(&self) -> Vec<std::ops::Range<usize>> {
+        let mut end = 0;
+        let next = |profile: &(f64, f64, usize)| {
+            end += profile.2;
+            end - profile.2..end
+        };
+        self.sampling.profiles.iter().map(next).collect()
     }
 
     /// The response at one state of star and planet.
@@ -62,7 +82,11 @@ impl Imager {
 
     /// The misfit of maps seen through `response`.
     pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
-        ImagingProblem::new(&self.grid.area, &self.data, response, self.star.contrast)
+        let brightness = match self.entropy {
+            Entropy::Spots { .. } => Brightness::of_spots(response.contrast()),
+            Entropy::BrightAndDark => Brightness::ITSELF,
+        };
+        ImagingProblem::of_brightness(&self.grid.area, &self.data, response, brightness)
     }
 
     /// Rotation cycle of each profile.
@@ -88,39 +112,46 @@ impl Imager {
     }
 }
 
-/// The misfit of spot maps to profiles, for one response.
+/// The misfit of maps to profiles, for one response.
 pub struct ImagingProblem<'a> {
     area: &'a [f64],
     data: &'a Data,
     response: Response,
-    /// `1 - c`: what a wholly spotted pixel lacks in brightness.
-    darkness: f64,
+    brightness_of: Brightness,
     passes: u32,
     /// Model depth of every bin at the current map.
     model: Vec<f64>,
-    /// `(model - data) / sigma^2`.
+    /// `W (model - data)`, without nuisances `(model - data) / sigma^2`.
     weighted_residual: Vec<f64>,
     continuum: Vec<f64>,
     brightness: Vec<f64>,
     bins: Vec<f64>,
+    /// Residuals or changes of the model, before they are weighed.
+    differences: Vec<f64>,
     constants: Vec<f64>,
 }
 
 impl<'a> ImagingProblem<'a> {
     /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness `contrast`.
     pub fn new(area: &'a [f64], data: &'a Data, response: Response, contrast: f64) -> Self {
+        ImagingProblem::of_brightness(area, data, response, Brightness::of_spots(contrast))
+    }
+
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the `brightness`.
+    fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Brightness) -> Self {
         let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
         ImagingProblem {
             area,
             data,
             response,
-            darkness: 1.0 - contrast,
+            brightness_of,
             passes: 0,
             model: vec![0.0; bins],
             weighted_residual: vec![0.0; bins],
             continuum: vec![0.0; profiles],
             brightness: vec![0.0; pixels],
             bins: vec![0.0; bins],
+            differences: vec![0.0; bins],
             constants: vec![0.0; profiles],
         }
     }
@@ -128,6 +159,11 @@ impl<'a> ImagingProblem<'a> {
     /// Model depth `1 - I` of every bin at the current map.
     pub fn model(&self) -> &[f64] {
         &self.model
+    }
+
+    /// Weights times what the model is above the data, at the current map.
+    pub fn weighted_residual(&self) -> &[f64] {
+        &self.weighted_residual
     }
 
     /// The response that the problem was made with.
@@ -146,7 +182,7 @@ impl<'a> ImagingProblem<'a> {
 
     /// What profile `k` hands to the transpose for the gradient: its bins, and the constant that comes with them.
     fn pull(&self, k: usize, bins: &mut [f64]) -> f64 {
-        let scale = -self.darkness / self.continuum[k];
+        let scale = self.brightness_of.slope / self.continuum[k];
         let mut constant = 0.0;
         for j in self.response.bins(k) {
             bins[j] = scale * self.weighted_residual[j];
@@ -160,7 +196,7 @@ impl<'a> ImagingProblem<'a> {
         self.passes += 1;
         self.response.apply(v, out, &mut self.constants);
         for k in 0..self.response.profiles() {
-            let scale = -self.darkness / self.continuum[k];
+            let scale = self.brightness_of.slope / self.continuum[k];
             for j in self.response.bins(k) {
                 out[j] = scale * (out[j] - self.model[j] * self.constants[k]);
             }
@@ -184,15 +220,19 @@ impl Problem for ImagingProblem<'_> {
 
     fn linearise(&mut self, s: &[f64]) -> f64 {
         self.passes += 1;
-        self.brightness.iter_mut().zip(s).for_each(|(b, s)| *b = 1.0 - self.darkness * s);
+        self.brightness.iter_mut().zip(s).for_each(|(b, s)| *b = self.brightness_of.at(*s));
         self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
         let mut chi2 = 0.0;
         for k in 0..self.response.profiles() {
-            for j in self.response.bins(k) {
-                self.model[j] /= self.continuum[k];
-                let residual = self.model[j] - self.data.depth[j];
-                self.weighted_residual[j] = residual * self.data.inverse_variance[j];
-                chi2 += residual * self.weighted_residual[j];
+            let (bins, continuum) = (self.response.bins(k), self.continuum[k]);
+            let residuals = self.differences[bins.clone()].iter_mut().zip(&self.data.depth[bins.clone()]);
+            for (model, (residual, depth)) in self.model[bins.clone()].iter_mut().zip(residuals) {
+                *model /= continuum;
+                *residual = *model - depth;
+            }
+            self.data.weigh(bins.clone(), &self.differences, &mut self.weighted_residual);
+            for (residual, weighted) in self.differences[bins.clone()].iter().zip(&self.weighted_residual[bins]) {
+                chi2 += residual * weighted;
             }
         }
         chi2
@@ -215,15 +255,21 @@ impl Problem for ImagingProblem<'_> {
         let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
         self.response.apply(v, &mut self.bins, &mut self.constants);
         for k in 0..self.response.profiles() {
-            let scale = -self.darkness / self.continuum[k];
+            let scale = self.brightness_of.slope / self.continuum[k];
             let d_continuum = self.constants[k] * scale;
+            let bins = self.response.bins(k);
+            let model = &self.model[bins.clone()];
+            let d_model = self.differences[bins.clone()].iter_mut().zip(&self.bins[bins.clone()]);
+            for ((d_model, line), model) in d_model.zip(model) {
+                *d_model = scale * line - model * d_continuum;
+            }
+            self.data.weigh(bins.clone(), &self.differences, &mut self.bins);
             let mut constant = 0.0;
-            for j in self.response.bins(k) {
-                let d_model = scale * self.bins[j] - self.model[j] * d_continuum;
-                let residual = second_order * self.weighted_residual[j];
-                let back = scale * (self.data.inverse_variance[j] * d_model - residual * d_continuum);
-                constant -= back * self.model[j] + scale * residual * d_model;
-                self.bins[j] = back;
+            let changes = self.differences[bins.clone()].iter().zip(&self.weighted_residual[bins.clone()]);
+            for ((back, model), (d_model, residual)) in self.bins[bins].iter_mut().zip(model).zip(changes) {
+                let residual = second_order * residual;
+                *back = scale * (*back - residual * d_continuum);
+                constant -= *back * model + scale * residual * d_model;
             }
             self.constants[k] = constant;
         }

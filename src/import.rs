@@ -8,6 +8,7 @@
 use crate::config::EquivalentWidth;
 use crate::io::zdipy::{BrightnessEntropy, Field, Input, LocalLineFile, Target};
 use crate::proposal::{Given, Known};
+use crate::star::BrightnessModel;
 use crate::text::{Align, columns};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -83,6 +84,13 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
         pixels: Some(Given {
             value: pixels(input.rings.value),
             by: format!("{}, {} rings", here(input.rings.line), input.rings.value),
+        }),
+        brightness: Some(Given {
+            value: match input.entropy.value {
+                BrightnessEntropy::Image => BrightnessModel::BrightAndDark,
+                BrightnessEntropy::FillingFactor => BrightnessModel::Spots,
+            },
+            by: here(input.entropy.line),
         }),
         chi2_target,
         sigma_scale,
@@ -173,16 +181,14 @@ fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
         let what = format!("entropy scaling {}", input.entropy_scale);
         row(input.brightness.line, what, "chi2 alone decides how far a map goes here");
     }
-    match input.entropy.value {
-        BrightnessEntropy::Image => {
-            let why = "here spots are dark, by their temperature, and fill a pixel from 0 to 1";
-            row(input.entropy.line, "bright and dark surface".into(), why);
-        }
+    let (what, why) = match input.entropy.value {
+        BrightnessEntropy::Image => ("default brightness", "here it is 1: profiles say nothing of the scale"),
         BrightnessEntropy::FillingFactor => {
             let why = "here the default is a filling factor of spots, imaging.default_spot";
-            row(input.entropy.line, "default and limiting brightness".into(), why);
+            ("default and limiting brightness", why)
         }
-    }
+    };
+    row(input.entropy.line, what.into(), why);
     if input.brightness.value && input.brightness_start.value {
         row(
             input.brightness_start.line,

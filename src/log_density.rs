@@ -35,7 +35,7 @@ impl Status {
 pub struct Evaluation {
     /// ln(likelihood) + ln(prior) in the coordinates of the parameters as named; minus infinity where not allowed.
     pub log_prob: f64,
-    /// Fractional spot coverage of the reconstruction, as [`Likelihood::spottedness`].
+    /// Spottedness of the reconstruction, as [`Likelihood::spottedness`].
     pub spottedness: f64,
     /// chi2 of the reconstruction, as [`Likelihood::chi2`].
     pub chi2: f64,
@@ -57,7 +57,7 @@ impl Evaluation {
 pub struct Likelihood {
     /// ln(likelihood); only differences mean something.
     pub log_likelihood: f64,
-    /// Fractional spot coverage of the image; where the target chi2 is reached, what a first-order forecast says that it
+    /// Spottedness of the image, such as its fractional spot coverage; where the target chi2 is reached, what a first-order forecast says that it
     /// is at the target, of which the log-likelihood is made.
     pub spottedness: f64,
     /// Entropy of the image at which the solver stopped.

@@ -54,7 +54,8 @@ impl Manifest {
         let line = |rival: &OptimumRecord| {
             format!("another maximum, not much lower, where walkers started too: {}", place(rival))
         };
-        self.origin.rivals.iter().map(line).chain(self.origin.reference.warning()).collect()
+        let measured = self.origin.measured.lines().into_iter().map(|(label, text)| format!("{label}: {text}"));
+        self.origin.rivals.iter().map(line).chain(self.origin.reference.warning()).chain(measured).collect()
     }
 
     /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an orbit

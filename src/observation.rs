@@ -78,6 +78,16 @@ impl Profile {
         self.first_velocity_kms + j as f64 * step_kms
     }
 
+    /// Intensity (linear between bins) at a velocity (km/s) within the profile, which has two bins or more.
+    pub fn intensity_at(&self, velocity_kms: f64, step_kms: f64) -> f64 {
+        let position = (velocity_kms - self.first_velocity_kms) / step_kms;
+        let below = (position.floor().max(0.0) as usize).min(self.intensity.len() - 2);
+        let part = (position - below as f64).clamp(0.0, 1.0);
+        // rounding of VRAD does not mix neighbours
+        let part = if part < 1e-6 { 0.0 } else { part };
+        self.intensity[below] + part * (self.intensity[below + 1] - self.intensity[below])
+    }
+
     /// Radial velocity `sum v (1-I) / sum (1-I)` over all bins, and its error from those of the bins,
     /// `sqrt(sum sigma^2 (v - RV)^2) / |sum (1-I)|`. Not finite where the profile has no area.
     pub fn first_moment(&self, step_kms: f64) -> RadialVelocity {

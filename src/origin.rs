@@ -4,7 +4,7 @@
 //! other data, and the reference is rebuilt to the same bits. Left out: the results (`run`, `survey`).
 
 use crate::config::{self, ConfigError};
-use crate::io::provenance::Provenance;
+use crate::io::provenance::{Measured, Provenance};
 use crate::objective::{Parameter, ParameterSpace, ParameterValues, Posterior, Reference, ReferenceError};
 use crate::optimise::Optimum;
 use crate::scene::Scene;
@@ -25,6 +25,9 @@ pub struct Origin {
     pub data_sha256: String,
     /// The config with all defaults filled in.
     pub config: serde_json::Value,
+    /// What the config leaves to the observations.
+    #[serde(default, skip_serializing_if = "Measured::is_empty")]
+    pub measured: Measured,
     /// Injected values of all parameters, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
     /// The image that every evaluation starts from.
@@ -123,13 +126,14 @@ pub enum OriginError {
 impl Origin {
     /// What begins in `scene` with what the search `found`.
     pub fn of(scene: &Scene, found: &Found) -> Self {
-        let Provenance { version, data_sha256, config_sha256, config } = scene.provenance();
+        let Provenance { version, data_sha256, config_sha256, config, measured } = scene.provenance();
         let names = found.posterior.space().names();
         Origin {
             version: version.to_string(),
             config_sha256,
             data_sha256,
             config,
+            measured,
             truth: scene.truth.map(|values| by_name(&values)),
             reference: ReferenceRecord::of(found.posterior.reference()),
             optimum: OptimumRecord::of(names, &found.optimum),
@@ -160,7 +164,7 @@ impl Origin {
     /// [`OriginError::Irreproducible`], [`OriginError::Reference`].
     pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Posterior, OriginError> {
         let values = self.reference.values(&scene.settings.values);
-        let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target)?;
+        let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target.value())?;
         let (then, now) = (self.reference.lambda, reference.solution.image.lambda);
         if then.to_bits() != now.to_bits() {
             return Err(OriginError::Irreproducible { folder: folder.into(), then, now });
@@ -214,7 +218,7 @@ impl ReferenceRecord {
         })
     }
 
-    /// All eight parameters; those missing in the record are taken from `others`.
+    /// All parameters; those missing in the record are taken from `others`.
     pub fn values(&self, others: &ParameterValues) -> ParameterValues {
         let mut values = *others;
         for p in Parameter::ALL {
@@ -236,7 +240,7 @@ impl OptimumRecord {
     }
 }
 
-/// All eight values by name.
+/// The values that are given, by name.
 pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
-    Parameter::ALL.iter().map(|&p| (p.name().to_string(), values[p])).collect()
+    Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.given(p)?))).collect()
 }

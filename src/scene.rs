@@ -2,15 +2,17 @@
 //!
 //! Left out: anything that takes a reconstruction.
 
-use crate::config::{self, ConfigError, ObservationSource, Settings};
+use crate::config::{self, Automatic, ConfigError, ObservationSource, Settings};
 use crate::imaging::Imager;
-use crate::io::lsd::{self, LsdError};
-use crate::io::provenance::Provenance;
+use crate::injection::inject;
+use crate::io::lsd::{self, Label, LsdError, ReadOptions};
+use crate::io::provenance::{Measured, Provenance};
 use crate::io::truth::Truth;
-use crate::objective::{FreeParameter, ParameterSpace, ParameterValues};
+use crate::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
+use crate::objective::{FreeParameter, ParameterSpace, ParameterValues, ReferenceError, target};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
-use crate::star::{Quadrature, SurfaceGrid};
+use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -25,6 +27,8 @@ pub struct Scene {
     pub data_sha256: String,
     /// The parameters that were simulated; `None` for observations from files.
     pub truth: Option<ParameterValues>,
+    /// What the config leaves to the observations: errors, target chi2. In `settings` the target is a number.
+    pub measured: Measured,
     /// What the observations are imaged with.
     pub imager: Imager,
     /// The free parameters, starting at the config's values; its dimension may be 0.
@@ -56,10 +60,19 @@ impl Scene {
     /// # Errors
     /// Observations that cannot be read or make no sense.
     pub fn new(settings: Settings) -> Result<Self, SceneError> {
+        let mut errors = None;
         let (observations, data_sha256, truth) = match &settings.source {
-            ObservationSource::Files { path, options } => {
+            ObservationSource::Files { path, options, errors: wanted } => {
                 let data = lsd::read(path, options)?;
-                (data.observations, data.sha256, None)
+                if *wanted == ErrorSettings::default() {
+                    (data.observations, data.sha256, None)
+                } else {
+                    let whole = lsd::read(path, &ReadOptions::default())?.observations;
+                    let (observations, measured) = with_errors(&settings, *wanted, &whole, data.observations)?;
+                    errors = Some(measured);
+                    let sha256 = fingerprint(&observations);
+                    (observations, sha256, None)
+                }
             }
             ObservationSource::Simulate(simulation) => {
                 settings.check_velocity_grid(&simulation.truth, simulation.step_kms)?;
@@ -68,20 +81,72 @@ impl Scene {
                 (observations, sha256, Some(simulation.truth))
             }
         };
-        Ok(Scene { data_sha256, truth, ..Scene::of(settings, observations)? })
+        Ok(Scene { data_sha256, truth, ..Scene::with_noise(settings, observations, errors)? })
     }
 
-    /// The scene of observations at hand, whatever `settings` say of where they come from.
+    /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left to them
+    /// is chosen.
     ///
     /// # Errors
     /// Settings that make no sense with these observations.
     pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
-        settings.check_velocity_grid(&settings.values, observations.step_kms)?;
-        let star = settings.star_for(&observations)?;
-        let imager = Imager::new(star, &observations, settings.imaging.pixels, settings.imaging.default_spot);
+        Scene::with_noise(settings, observations, None)
+    }
+
+    /// The same where the errors were measured: a target chi2 is then that of independent data.
+    fn with_noise(
+        mut settings: Settings,
+        observations: Observations,
+        errors: Option<MeasuredErrors>,
+    ) -> Result<Self, ConfigError> {
+        let imager = imager(&settings, &observations)?;
+        let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        let mut measured = Measured { errors, chi2_target: None };
+        settings.imaging.chi2_target = match settings.imaging.chi2_target {
+            Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
+            Automatic::Auto => {
+                let fault = |e: ReferenceError| settings.fault("imaging.chi2_target", &e.to_string());
+                let chosen = target::choose(&imager, settings.values, correlated_bins).map_err(fault)?;
+                measured.chi2_target = Some(chosen);
+                Automatic::Fixed(chosen.value)
+            }
+        };
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
-        Ok(Scene { settings, observations, data_sha256, truth: None, imager, space })
+        Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
+    }
+
+    /// The profiles in their whole width, errors as quoted, with what the list says of each: what is injected into.
+    ///
+    /// # Errors
+    /// Files that are no longer what they were.
+    pub fn whole(&self) -> Result<(Observations, Vec<Label>), LsdError> {
+        match &self.settings.source {
+            ObservationSource::Files { path, .. } => {
+                Ok((lsd::read(path, &ReadOptions::default())?.observations, lsd::labels(path)?))
+            }
+            ObservationSource::Simulate(_) => {
+                let name = |k: usize| Label { file: format!("simulated profile {k}"), vrad_kms: 0.0 };
+                let profiles = self.observations.profiles.len();
+                Ok((self.observations.clone(), (0..profiles).map(name).collect()))
+            }
+        }
+    }
+
+    /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors stay.
+    ///
+    /// # Errors
+    /// Profiles that no longer make sense.
+    pub fn injected(&self, whole: &Observations, orbits: &[Orbit]) -> Result<Self, ConfigError> {
+        let mut observations = self.observations.clone();
+        let injected = inject(whole, &self.imager.star, orbits);
+        for (cut, whole) in observations.profiles.iter_mut().zip(&injected.profiles) {
+            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / injected.step_kms).round() as usize;
+            for (intensity, shifted) in cut.intensity.iter_mut().zip(whole.intensity.iter().skip(first)) {
+                *intensity = *shifted;
+            }
+        }
+        Scene::of(self.settings.clone(), observations)
     }
 
     /// The space of the parameters in `free`, starting at the config's values, all others fixed there.
@@ -91,8 +156,22 @@ impl Scene {
 
     /// The true spot map on the pixels of the image, if the observations are simulated.
     pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
+        self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
+    }
+
+    /// What the image should hold on its pixels, if the observations are simulated.
+    pub fn true_map(&self) -> Option<Vec<f64>> {
+        match self.settings.imaging.brightness {
+            BrightnessModel::Spots => self.true_spot_filling(),
+            BrightnessModel::BrightAndDark => self
+                .simulation()
+                .map(|simulation| simulation.brightness(&self.imager.grid, simulation.contrast(&self.imager.star))),
+        }
+    }
+
+    fn simulation(&self) -> Option<&Simulation> {
         match &self.settings.source {
-            ObservationSource::Simulate(simulation) => Some(simulation.spot_filling(&self.imager.grid)),
+            ObservationSource::Simulate(simulation) => Some(simulation),
             ObservationSource::Files { .. } => None,
         }
     }
@@ -107,6 +186,9 @@ impl Scene {
             parameters: simulation.truth,
             // as the user wrote them: degrees of radians of degrees are not
             spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
+            faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
+            contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
+            continuum: simulation.nuisances(),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
             sigma: simulation.sigma(),
@@ -125,8 +207,41 @@ impl Scene {
             data_sha256: self.data_sha256.clone(),
             config_sha256: self.settings.sha256.clone(),
             config: self.settings.resolved.clone(),
+            measured: self.measured.clone(),
         }
     }
+}
+
+/// What `observations` are imaged with.
+fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
+    settings.check_velocity_grid(&settings.values, observations.step_kms)?;
+    let star = settings.star_for(observations)?;
+    let imager = Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy());
+    Ok(match settings.imaging.nuisances {
+        Some(priors) => imager.with_nuisances(priors, observations),
+        None => imager,
+    })
+}
+
+/// The observations, cut as they are used, with the errors that they and the `whole` profiles ask for.
+fn with_errors(
+    settings: &Settings,
+    wanted: ErrorSettings,
+    whole: &Observations,
+    cut: Observations,
+) -> Result<(Observations, MeasuredErrors), ConfigError> {
+    let fault = |e: NoiseError| settings.fault(e.key(), &e.to_string());
+    let scaled = |measured: &MeasuredErrors| {
+        let mut observations = cut.clone();
+        measured.apply(&mut observations);
+        observations
+    };
+    let mut measured = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
+    if wanted.measured {
+        let imager = imager(settings, &scaled(&measured))?;
+        measured.count_residuals(&imager, settings.values).map_err(fault)?;
+    }
+    Ok((scaled(&measured), measured))
 }
 
 fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {

@@ -33,7 +33,12 @@ impl SearchSettings {
     /// The search that a config asks for.
     pub fn new(settings: &Settings) -> Self {
         let ImagingSettings { chi2_target, objective, .. } = settings.imaging;
-        SearchSettings { chi2_target, objective, other_starts: OTHER_STARTS, seed: settings.sampler.seed }
+        SearchSettings {
+            chi2_target: chi2_target.value(),
+            objective,
+            other_starts: OTHER_STARTS,
+            seed: settings.sampler.seed,
+        }
     }
 }
 

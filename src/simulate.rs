@@ -1,13 +1,16 @@
 //! Synthetic observations: a spotted star with its planet through the forward model, and photon noise (Petit et al. 2015,
 //! section 2).
 //!
-//! The spots are hard-edged discs, each pixel of the star holding the fraction of it that they cover. The same simulation gives
+//! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of filling
+//! factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the largest s and the
+//! largest excess e of the discs that overlap. The same simulation gives
 //! the same numbers on every machine and with any number of threads. Left out: where the settings come from (`config`).
 
+use crate::nuisances::{LineAndContinuum, templates};
 use crate::objective::ParameterValues;
 use crate::observation::{Observations, Profile};
-use crate::star::spots::filling_at;
-use crate::star::{Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use crate::star::spots::{excess_at, filling_at};
+use crate::star::{Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -23,7 +26,9 @@ const COVERAGE_POINTS: usize = 8;
 pub struct Simulation {
     /// The spots (radians).
     pub spots: Vec<Spot>,
-    /// All eight parameters as simulated: those of the config, but for `truth`.
+    /// The faculae (radians).
+    pub faculae: Vec<Facula>,
+    /// All parameters as simulated: those of the config, but for `truth`.
     pub truth: ParameterValues,
     /// Times of the profiles (d).
     pub times_d: Vec<f64>,
@@ -39,7 +44,12 @@ pub struct Simulation {
     pub seed: u64,
     /// Pixels of the star.
     pub pixels: usize,
+    /// Standard deviations of what is wrong with each profile by itself, in line and continuum.
+    pub continuum: LineAndContinuum,
 }
+
+/// Stream of the random numbers of line and continuum; noise is drawn from stream 0.
+const CONTINUUM_STREAM: u64 = 1;
 
 impl Simulation {
     /// Standard error of each bin, in units of the continuum.
@@ -50,11 +60,17 @@ impl Simulation {
     /// The observations of `star`.
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
-        let filling = self.spot_filling(&grid);
-        let brightness: Vec<f64> = filling.iter().map(|s| 1.0 - (1.0 - star.contrast) * s).collect();
+        let state = self.truth.state();
+        let brightness = self.brightness(&grid, self.contrast(star));
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
-        let depths = Response::new(&grid, star, &self.truth.state(), &sampling).depths(&brightness);
+        let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
+        for (depths, nuisances) in depths.chunks_exact_mut(self.bins).zip(self.nuisances()) {
+            for (j, depth) in depths.iter_mut().enumerate() {
+                let changes = templates(j, self.bins, *depth).into_iter().zip(nuisances.numbers());
+                *depth += changes.map(|(template, number)| template * number).sum::<f64>();
+            }
+        }
         let noise = self.noise(depths.len());
         let intensity: Vec<f64> = depths.iter().zip(noise).map(|(depth, noise)| 1.0 - depth + noise).collect();
         let profile = |(intensity, time_d): (&[f64], &f64)| Profile {
@@ -70,6 +86,38 @@ impl Simulation {
     /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own filling.
     pub fn spot_filling(&self, grid: &SurfaceGrid) -> Vec<f64> {
         grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
+    }
+
+    /// What is wrong with each profile by itself; empty if nothing is.
+    pub fn nuisances(&self) -> Vec<LineAndContinuum> {
+        if self.continuum == LineAndContinuum::default() {
+            return Vec::new();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(CONTINUUM_STREAM);
+        let mut draw = || {
+            LineAndContinuum::of_numbers(self.continuum.numbers().map(|sd| {
+                let normal: f64 = StandardNormal.sample(&mut rng);
+                sd * normal
+            }))
+        };
+        self.times_d.iter().map(|_| draw()).collect()
+    }
+
+    /// Brightness of spots on `star` over that of the photosphere.
+    pub fn contrast(&self, star: &StarSettings) -> f64 {
+        star.with(&self.truth.state().surface).contrast
+    }
+
+    /// The true brightness of each pixel of `grid`, that of the photosphere being 1 and that of spots `contrast`.
+    pub fn brightness(&self, grid: &SurfaceGrid, contrast: f64) -> Vec<f64> {
+        let of_spots = Brightness::of_spots(contrast);
+        let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
+        if !self.faculae.is_empty() {
+            let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);
+            brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
+        }
+        brightness
     }
 
     /// Gaussian noise of `n` bins, all profiles one after the other.

@@ -91,7 +91,7 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 fn lo_peg_resolves() {
     let settings = config::load(&shipped("lopeg.json")).unwrap();
     assert_eq!(settings.equivalent_width, EquivalentWidth::Auto);
-    let ObservationSource::Files { path, options } = &settings.source else { panic!() };
+    let ObservationSource::Files { path, options, .. } = &settings.source else { panic!() };
     assert!(path.ends_with("configs/../../shared/data/lopeg/observations.txt"));
     assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 0.3));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
@@ -276,6 +276,13 @@ fn senseless_values_name_their_key() {
         ("/star/line/equivalent_width_kms", json!("Auto"), "star.line.equivalent_width_kms"),
         ("/star/limb_darkening/coefficients", json!([0.3, 0.3]), "star.limb_darkening.coefficients"),
         ("/star/limb_darkening/coefficients", json!([1.2]), "star.limb_darkening.coefficients"),
+        ("/star/line/gamma_kms", json!(1), "star.line.gamma_kms"),
+        ("/star/line/shape", json!("voigt"), "star.line.gamma_kms"),
+        (
+            "/star/line",
+            json!({ "shape": "voigt", "sigma_kms": 2, "gamma_kms": 0, "equivalent_width_kms": 5 }),
+            "star.line.gamma_kms",
+        ),
         ("/star/limb_darkening/law", json!("linea"), "star.limb_darkening.law"),
         ("/instrument/resolving_power", json!(0), "instrument.resolving_power"),
         ("/planet/k_kms", json!(-0.1), "planet.k_kms"),
@@ -284,6 +291,24 @@ fn senseless_values_name_their_key() {
         ("/imaging/pixels", json!(3_000_000), "imaging.pixels"),
         ("/imaging/default_spot", json!(0.5), "imaging.default_spot"),
         ("/imaging/chi2_target", json!(0), "imaging.chi2_target"),
+        ("/imaging/brightness", json!("bright"), "imaging.brightness"),
+        ("/observations/simulate/faculae", json!([[0, 91, 5, 0.1]]), "observations.simulate.faculae[0]"),
+        ("/observations/simulate/faculae", json!([[0, 9, 5, 0.1], [0, 9, 0, 0.1]]), "observations.simulate.faculae[1]"),
+        ("/observations/simulate/faculae", json!([[0, 9, 5, 0]]), "observations.simulate.faculae[0]"),
+        ("/observations/simulate/faculae", json!([[0, 9, 5, 1e9]]), "observations.simulate.faculae[0]"),
+        ("/imaging/nuisances", json!({ "continuum_offset": -1e-3 }), "imaging.nuisances.continuum_offset"),
+        ("/imaging/nuisances", json!({ "equivalent_width": 11 }), "imaging.nuisances.equivalent_width"),
+        ("/parameters/contrast", json!({ "prior": "uniform", "min": 0, "max": 1.5 }), "parameters.contrast.max"),
+        (
+            "/parameters/limb_darkening",
+            json!({ "prior": "uniform", "min": 0.7, "max": 1 }),
+            "star.limb_darkening.coefficients",
+        ),
+        (
+            "/parameters/line_sigma_kms",
+            json!({ "prior": "uniform", "min": -1, "max": 5 }),
+            "parameters.line_sigma_kms.min",
+        ),
         ("/parameters/k_kms/min", json!(0.3), "parameters.k_kms.min"),
         ("/parameters/k_kms/min", json!(0.5), "parameters.k_kms.min"),
         ("/parameters/k_kms/prior", json!("periodic"), "parameters.k_kms.prior"),
@@ -322,11 +347,16 @@ fn senseless_values_name_their_key() {
         ("/observations/simulate/velocity_kms/min", json!(60), "observations.simulate.velocity_kms.min"),
         ("/observations/simulate/velocity_kms/step", json!(90), "observations.simulate.velocity_kms.step"),
         ("/observations/simulate/truth", json!({ "vsini_kms": -1 }), "observations.simulate.truth.vsini_kms"),
+        ("/observations/simulate/truth", json!({ "contrast": 1 }), "observations.simulate.truth.contrast"),
+        ("/observations/simulate/continuum", json!({ "slope": -1 }), "observations.simulate.continuum.slope"),
     ];
     for (pointer, value, key) in cases {
         let message = message(&with(demo(), pointer, value));
         assert!(message.starts_with(&format!(": {key}: ")), "{pointer}: {message}");
     }
+    let brightness = with(demo(), "/imaging/brightness", json!("bright-and-dark"));
+    let contrast = json!({ "prior": "uniform", "min": 0, "max": 1 });
+    assert!(message(&with(brightness, "/parameters/contrast", contrast)).starts_with(": parameters.contrast: "));
     for (pointer, value, key) in [
         ("/observations/velocity_range_kms", json!([90, -90]), "observations.velocity_range_kms"),
         ("/observations/sigma_scale", json!(0), "observations.sigma_scale"),

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 /// The order in which examples run: a command comes after those whose results its example reads.
 const ORDER: &[&str] = &[
     "simulate",
+    "inject",
     "init",
     "import",
     "schema",
@@ -22,6 +23,7 @@ const ORDER: &[&str] = &[
     "man",
     "map",
     "periodogram",
+    "limits",
     "optimise",
     "grid",
     "sample",

@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{Oracle, imager, json, numbers, oracle, truth};
+use common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
 use dimcmc::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
 use dimcmc::imaging::Imager;
 use dimcmc::maxent::SolverSettings;
+use dimcmc::maxent::entropy::Entropy;
 use dimcmc::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
@@ -40,15 +41,22 @@ fn wide(parameter: Parameter) -> Prior {
         Parameter::Inclination => Prior::Uniform { min: 20.0, max: 60.0 },
         Parameter::Vsini => Prior::Uniform { min: 35.0, max: 45.0 },
         Parameter::Vsys => Prior::Uniform { min: -1.0, max: 1.0 },
+        Parameter::LimbDarkening | Parameter::Contrast => Prior::Uniform { min: 0.0, max: 1.0 },
+        Parameter::LineSigma | Parameter::EquivalentWidth => Prior::Uniform { min: 1.0, max: 9.0 },
     }
 }
 
 /// ln L by full reconstructions to rounding error, at the lambda of `reference`.
 fn exact(imager: &Imager, reference: &Reference) -> impl Fn(&ParameterValues) -> f64 {
-    let space = space(imager, reference.values, &Parameter::ALL);
+    let given = |p: &Parameter| reference.values.given(*p).is_some();
+    let free: Vec<Parameter> = Parameter::ALL.into_iter().filter(given).collect();
+    let space = space(imager, reference.values, &free);
     let posterior = Posterior::new(imager.clone(), space, ObjectiveKind::RegularisedLikelihood, reference.clone());
     let posterior = posterior.with_settings(SolverSettings::exact());
-    move |values| posterior.likelihood(&values.0).likelihood.unwrap().log_likelihood
+    move |values| {
+        let theta = posterior.space().theta_of(values);
+        posterior.likelihood(&theta).likelihood.unwrap().log_likelihood
+    }
 }
 
 /// chi2 per datum at lambda = 1e-3, where `posterior.json` was made.
@@ -61,9 +69,14 @@ fn oracle_chi2(oracle: &Oracle) -> f64 {
 fn orbits_of_up_to_150_metres_per_second() {
     let oracle = oracle();
     let imager = imager(&oracle, oracle.grid.clone());
-    let (reference, alone) = planet_free(&oracle, &imager);
-    let expansion = Expansion::of(&imager, &reference, &[]);
-    let exact = exact(&imager, &reference);
+    orbits(&oracle, &imager);
+    orbits(&oracle, &Imager { entropy: Entropy::BrightAndDark, ..imager });
+}
+
+fn orbits(oracle: &Oracle, imager: &Imager) {
+    let (reference, alone) = planet_free(oracle, imager);
+    let expansion = Expansion::of(imager, &reference, &[]);
+    let exact = exact(imager, &reference);
     let none = exact(&alone);
     assert!((expansion.log_likelihood - none).abs() < 1e-4);
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -90,7 +103,7 @@ fn stellar_parameters_one_sigma_off() {
     let oracle = oracle();
     // pixels with an extent: those of the oracle's table are points, and come into sight one by one
     let imager = imager(&oracle, SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2));
-    let reference = Reference::provisional(&imager, truth(&oracle), 0.97).unwrap();
+    let reference = Reference::provisional(&imager, whole_truth(&oracle), 0.97).unwrap();
     let expansion = Expansion::of(&imager, &reference, &STELLAR);
     let exact = exact(&imager, &reference);
     let here = exact(&reference.values);
@@ -107,7 +120,15 @@ fn stellar_parameters_one_sigma_off() {
         Parameter::DOmega => 1.5e-3,
         Parameter::Inclination => 0.4,
         Parameter::Vsini => 0.015,
+        Parameter::LimbDarkening => 0.003,
+        Parameter::LineSigma => 0.025,
+        Parameter::EquivalentWidth => 0.002,
+        Parameter::Contrast => 0.02,
     };
+    for (s, &p) in STELLAR.iter().enumerate() {
+        let i = expansion.profiles() + s;
+        println!("{}: {} with all else fixed", p.name(), expansion.information[(i, i)].powf(-0.5));
+    }
     for (i, &a) in Parameter::ALL.iter().enumerate() {
         for &b in &Parameter::ALL[i..] {
             for sign in [-1.0, 1.0] {
@@ -150,7 +171,7 @@ fn posterior_of_the_orbit() {
 fn marginalised_velocities() {
     let oracle = oracle();
     let imager = imager(&oracle, SurfaceGrid::equal_area(800, Quadrature::Gauss2x2));
-    let reference = Reference::provisional(&imager, truth(&oracle), 0.97).unwrap();
+    let reference = Reference::provisional(&imager, whole_truth(&oracle), 0.97).unwrap();
     let expansion = Expansion::of(&imager, &reference, &STELLAR);
     let orbit = |cycle: f64| reference.values.state().orbit.velocity_kms(cycle);
     let nuisance = |parameter: Parameter, sd: f64| Nuisance { parameter, mean: reference.values[parameter], sd };
@@ -212,9 +233,9 @@ fn co_rotation_hides_a_planet() {
     assert!(eigen.min() > -1e-2 * quadratic.information.diagonal().max());
 }
 
-/// Spots left over counted in the posterior: the same at the reference; near it the quadratic with their covariance;
-/// everywhere a fall, not faster than without them, and one that goes on where the quadratics would have
-/// turned the sum of exact ln L and their difference upwards.
+/// Spots left over counted in the posterior: the same at the reference; near it ln of the density of the gradient, its size
+/// integrated over by a sum of its own; everywhere a fall, not faster than without them, and one that goes on where the
+/// quadratics would have turned the sum of exact ln L and their difference upwards.
 #[test]
 fn a_posterior_that_counts_spots_left_over() {
     let oracle = oracle();
@@ -231,9 +252,21 @@ fn a_posterior_that_counts_spots_left_over() {
     };
     let here = exact(&at);
     assert!((counted.log_likelihood(&at, here) - here).abs() < 1e-9);
-    let quadratic = |values: &ParameterValues| {
-        counted.expansion().log_likelihood_at(values) - counted.expansion().log_likelihood_at(&at)
+    // finer and by plain algebra: determinants and inverses of S = noise + f (information - noise)
+    let expansion = Expansion::of(posterior.imager(), posterior.reference(), &[]);
+    let ln_density = |values: &ParameterValues| {
+        let left = &expansion.gradient - &expansion.information * (expansion.coordinates(values) - &expansion.centre);
+        let term = |f: f64| {
+            let covariance = &expansion.noise + f * (&expansion.information - &expansion.noise);
+            let inverse = covariance.clone().try_inverse().unwrap();
+            let eigen = covariance.symmetric_eigenvalues();
+            -0.5 * eigen.iter().map(|e| e.abs().ln()).sum::<f64>() - 0.5 * left.dot(&(inverse * &left))
+        };
+        let terms: Vec<f64> = (0..=120).map(|k| term(10f64.powf(f64::from(k) / 20.0))).collect();
+        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        largest + terms.iter().map(|t| (t - largest).exp()).sum::<f64>().ln()
     };
+    let quadratic = |values: &ParameterValues| ln_density(values) - ln_density(&at);
     let with_k = |k_kms: f64| {
         let mut values = at;
         values[Parameter::K] = k_kms;

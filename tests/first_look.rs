@@ -30,9 +30,9 @@ fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) 
         epoch_d: 0.0,
         limb_darkening: LimbDarkening::Linear(0.65),
         contrast: 0.08,
-        line: LocalLine { sigma_kms: LINE.sigma_kms, equivalent_width_kms: 5.8 },
+        line: LocalLine::gaussian(LINE.sigma_kms, 5.8),
     };
-    let mut truth = ParameterValues([0.0; 8]);
+    let mut truth = ParameterValues::of_eight([0.0; 8]);
     truth[Parameter::PorbOverProt] = 2.0;
     truth[Parameter::OmegaEq] = std::f64::consts::TAU / 3.0;
     truth[Parameter::Inclination] = rng.random_range(25.0..85.0);
@@ -41,6 +41,7 @@ fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) 
     let reach = vsini_kms + beyond_kms;
     let simulation = Simulation {
         spots,
+        faculae: Vec::new(),
         truth,
         times_d: (0..20).map(|_| rng.random_range(0.0..12.0)).collect(),
         first_velocity_kms: -reach,
@@ -49,6 +50,7 @@ fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) 
         snr: Some(700.0),
         seed: 1,
         pixels: 3000,
+        continuum: Default::default(),
     };
     simulation.observe(&star)
 }

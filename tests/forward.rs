@@ -3,7 +3,7 @@
 mod common;
 
 use common::{oracle, values};
-use dimcmc::star::{LimbDarkening, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid};
+use dimcmc::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid};
 
 fn state() -> StarState {
     StarState {
@@ -12,6 +12,7 @@ fn state() -> StarState {
         vsini_kms: 40.0,
         vsys_kms: 0.0,
         orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.7, phi: 0.5 },
+        surface: Default::default(),
     }
 }
 
@@ -171,4 +172,90 @@ fn the_transpose_is_the_transpose() {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let (there, here) = (dot(&line, &y) + dot(&continuum, &z), dot(&x, &back));
     assert!((there / here - 1.0).abs() < 1e-11, "{there} {here}");
+}
+
+/// The profile of an unspotted star with a Voigt line, against strips of the disc of which each shows its Voigt profile, itself
+/// the sum of Lorentzians over a Gaussian; far into the wings, which reach beyond the star and all bins.
+#[test]
+fn voigt_profile_of_the_whole_disc() {
+    let grid = SurfaceGrid::equal_area(20_000, Quadrature::Gauss2x2);
+    let sampling = Sampling { step_kms: 1.8, profiles: vec![(0.0, -149.4, 167)] };
+    for (sigma_kms, gamma_kms) in [(3.2, 1.5), (2.0, 6.0)] {
+        let mut star = oracle().star;
+        star.line = LocalLine { gamma_kms, ..LocalLine::gaussian(sigma_kms, 5.8) };
+        let depth = Response::new(&grid, &star, &state(), &sampling).depths(&vec![1.0; grid.len()]);
+        // midpoints in angle, so that the limb is resolved
+        let angle = |i: usize, n: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * std::f64::consts::PI;
+        let strips: Vec<(f64, f64)> = (0..600)
+            .map(|i| {
+                let (sin, cos) = angle(i, 600).sin_cos();
+                let along = |j: usize| (cos * angle(j, 100).cos(), angle(j, 100).cos());
+                let strip: f64 = (0..100).map(|j| along(j).1 * LINEAR.at(along(j).0)).sum();
+                (40.0 * sin, cos * cos * strip)
+            })
+            .collect();
+        let continuum: f64 = strips.iter().map(|(_, weight)| weight).sum();
+        for (j, depth) in depth.iter().enumerate().step_by(7) {
+            let v = -149.4 + 1.8 * j as f64;
+            let voigt = |x: f64| {
+                // eight standard deviations in steps far below the Lorentzian's width
+                let step = 0.02 * sigma_kms;
+                let lorentzian = |x: f64| gamma_kms / (std::f64::consts::PI * (x * x + gamma_kms * gamma_kms));
+                let terms = (-400..=400).map(|k| f64::from(k) * step);
+                terms.map(|t| gaussian(t, sigma_kms) * lorentzian(x - t)).sum::<f64>() * step
+            };
+            let wanted = 5.8 * strips.iter().map(|(x, weight)| weight * voigt(v - x)).sum::<f64>() / continuum;
+            // pixels and aliasing, as for a Gaussian
+            assert!((depth - wanted).abs() < 3e-6, "{sigma_kms} {gamma_kms} {v}: {depth} instead of {wanted}");
+        }
+    }
+}
+
+fn gaussian(x: f64, sigma: f64) -> f64 {
+    (-0.5 * (x / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
+}
+
+/// Nothing of the equivalent width is lost but what lies beyond the bins: `(gamma/pi) / v` on either side, to first order.
+#[test]
+fn voigt_wings_hold_their_share_of_the_equivalent_width() {
+    let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
+    let mut star = oracle().star;
+    star.line = LocalLine { gamma_kms: 1.5, ..LocalLine::gaussian(3.2, 5.8) };
+    let mut last = 0.0;
+    for reach in [200.0, 800.0, 3200.0] {
+        let bins = (2.0 * reach / 1.8) as usize;
+        let sampling = Sampling { step_kms: 1.8, profiles: vec![(0.0, -0.9 * (bins - 1) as f64, bins)] };
+        let depths = Response::new(&grid, &star, &state(), &sampling).depths(&vec![1.0; grid.len()]);
+        let area = depths.iter().sum::<f64>() * 1.8 / 5.8;
+        let beyond = 2.0 * 1.5 / (std::f64::consts::PI * 0.9 * bins as f64);
+        // the star's rotation and the line's width change the share by (v/reach)^2
+        assert!((1.0 - area - beyond).abs() < beyond * 2.0 * (40.0f64 / reach).powi(2) + 1e-7, "{reach}: {area}");
+        assert!(area > last);
+        last = area;
+    }
+}
+
+/// A surface that the state gives is that of a star with such settings.
+#[test]
+fn surface_parameters_stand_in_place_of_settings() {
+    let grid = SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2);
+    let sampling = sampling(&[0.0, 1.1]);
+    let mut other = oracle().star;
+    other.limb_darkening = LimbDarkening::Linear(0.4);
+    other.contrast = 0.3;
+    other.line.sigma_kms = 4.0f64.hypot(other.line.instrumental_sigma_kms);
+    other.line.equivalent_width_kms = 7.0;
+    let surface = dimcmc::star::Surface {
+        limb_darkening: Some(0.4),
+        line_sigma_kms: Some(4.0),
+        equivalent_width_kms: Some(7.0),
+        contrast: Some(0.3),
+    };
+    let map: Vec<f64> = (0..grid.len()).map(|p| 1.0 + 0.3 * (p as f64).sin()).collect();
+    let direct = Response::new(&grid, &other, &state(), &sampling);
+    let state = StarState { surface, ..state() };
+    let response = Response::new(&grid, &oracle().star, &state, &sampling);
+    assert_eq!(response.depths(&map), direct.depths(&map));
+    assert_eq!(response.with_velocities(&oracle().star, &state, &sampling).depths(&map), direct.depths(&map));
+    assert_eq!((response.contrast(), direct.contrast()), (0.3, 0.3));
 }

@@ -96,10 +96,10 @@ fn the_solution_meets_its_optimality_conditions() {
     assert!((solution.chi2 - target).abs() < 1e-5);
     let n = imager.grid.len();
     let (mut s, mut misfit, mut order) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    imager.entropy.image(&solution.image.logit, &mut s);
+    imager.entropy.image(&solution.image.coordinates, &mut s);
     problem.linearise(&s);
     problem.gradient(&mut misfit);
-    imager.entropy.gradient(&solution.image.logit, &imager.grid.area, &mut order);
+    imager.entropy.gradient(&solution.image.coordinates, &imager.grid.area, &mut order);
     // the gradient of -S + (lambda/2) chi2 vanishes, in the entropy's metric, against either of its terms
     let norm = |g: &[f64]| g.iter().zip(&s).map(|(g, s)| g * g * s * (1.0 - s)).sum::<f64>().sqrt();
     let sum: Vec<f64> = order.iter().zip(&misfit).map(|(a, b)| a + solution.image.lambda * b).collect();

@@ -129,6 +129,23 @@ fn targets_become_errors_and_flags_decide() {
 }
 
 #[test]
+fn bright_and_dark_maps_stay_what_they_are() {
+    let desk = desk();
+    desk.edit("zdi/inzdi.dat", |text| with_line(&text, 20, "1 1.0 1.01"));
+    let table = desk.succeed(&["import", "zdi/inzdi.dat"]);
+    says(
+        &table,
+        &[
+            "imaging.brightness",
+            "bright-and-dark",
+            "inzdi.dat:20            default brightness",
+            "% rms fits the profiles",
+        ],
+    );
+    assert_eq!(desk.json("star.json")["imaging"]["brightness"], "bright-and-dark");
+}
+
+#[test]
 fn other_layouts_and_no_line_file() {
     let desk = desk();
     // older ZDIpy has no mass and radius

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{oracle, values};
+use common::{oracle, values, whole_truth};
 use dimcmc::imaging::Imager;
 use dimcmc::log_density::{Gradient, LogDensity};
 use dimcmc::maxent::SolverSettings;
@@ -13,15 +13,15 @@ use dimcmc::star::{Quadrature, SurfaceGrid};
 const KINDS: [ObjectiveKind; 3] =
     [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];
 
-/// All eight parameters free, with the reference near the optimum of the oracle's data.
-fn setup() -> (Imager, ParameterSpace, Reference) {
+/// All eight parameters free, with the reference near the optimum of the oracle's data; maps of spots, or of the given entropy.
+fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
     let oracle = oracle();
     let imager = Imager {
         grid: SurfaceGrid::equal_area(1200, Quadrature::Gauss2x2),
         star: oracle.star.clone(),
         sampling: oracle.sampling.clone(),
         data: oracle.data.clone(),
-        entropy: Entropy::new(oracle.default_spot),
+        entropy: entropy.unwrap_or(Entropy::new(oracle.default_spot)),
     };
     let mut values = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
     (values[Parameter::K], values[Parameter::PorbOverProt], values[Parameter::Phi]) = (0.088, 1.763, 0.486);
@@ -41,10 +41,13 @@ fn setup() -> (Imager, ParameterSpace, Reference) {
     (imager, space, reference)
 }
 
-fn posteriors() -> Vec<Posterior> {
-    let (imager, space, reference) = setup();
+fn posteriors(entropy: Option<Entropy>) -> Vec<Posterior> {
+    let (imager, space, reference) = setup(entropy);
     KINDS.map(|kind| Posterior::new(imager.clone(), space.clone(), kind, reference.clone())).to_vec()
 }
+
+/// What maps may hold.
+const MAPS: [Option<Entropy>; 2] = [None, Some(Entropy::BrightAndDark)];
 
 /// Offsets of all parameters by about one standard deviation each, in varying directions.
 fn nearby(start: &[f64], i: usize) -> Vec<f64> {
@@ -54,7 +57,7 @@ fn nearby(start: &[f64], i: usize) -> Vec<f64> {
 
 #[test]
 fn gradients_match_differences_of_reconstructions() {
-    for posterior in posteriors() {
+    for posterior in MAPS.into_iter().flat_map(posteriors) {
         let exact = posterior.with_settings(SolverSettings::exact());
         let theta = nearby(&exact.space().start(), 1);
         let (_, gradient) = exact.evaluate_with_gradient(&theta);
@@ -74,9 +77,47 @@ fn gradients_match_differences_of_reconstructions() {
     }
 }
 
+/// The same for the parameters of the star's surface.
+#[test]
+fn gradients_along_the_surface_match_differences_of_reconstructions() {
+    let (imager, ..) = setup(None);
+    let values = whole_truth(&oracle());
+    let reference = Reference::build(&imager, values, 0.97).unwrap();
+    let uniform = |parameter, min, max| FreeParameter { parameter, prior: Prior::Uniform { min, max } };
+    let free = vec![
+        uniform(Parameter::LimbDarkening, 0.0, 1.0),
+        uniform(Parameter::LineSigma, 1.0, 9.0),
+        uniform(Parameter::EquivalentWidth, 1.0, 9.0),
+        uniform(Parameter::Contrast, 0.0, 1.0),
+    ];
+    let space = ParameterSpace::new(free, values, imager.mid_cycle(), imager.time_base_cycles(), 3.0);
+    for kind in KINDS {
+        let exact = Posterior::new(imager.clone(), space.clone(), kind, reference.clone());
+        let exact = exact.with_settings(SolverSettings::exact());
+        let sigma = [0.003, 0.01, 0.002, 0.01];
+        let theta: Vec<f64> = space.start().iter().zip(sigma).map(|(x, sigma)| x + 0.7 * sigma).collect();
+        let (_, gradient) = exact.evaluate_with_gradient(&theta);
+        for (j, scale) in exact.scales().iter().enumerate() {
+            let h = 0.05 * scale;
+            let at = |h: f64| {
+                let mut y = theta.clone();
+                y[j] += h;
+                exact.evaluate(&y).log_prob
+            };
+            let difference = (at(h) - at(-h)) / (2.0 * h);
+            let size = difference.abs() + 0.3 / scale;
+            println!("{kind:?} {j}: {} {difference}", gradient[j]);
+            assert!((gradient[j] - difference).abs() < 0.01 * size, "{kind:?} {j}: {} {difference}", gradient[j]);
+        }
+    }
+}
+
 #[test]
 fn objectives_agree_near_the_optimum_and_are_precise() {
-    let posteriors = posteriors();
+    MAPS.into_iter().for_each(|map| agree_and_are_precise(&posteriors(map)));
+}
+
+fn agree_and_are_precise(posteriors: &[Posterior]) {
     let start = posteriors[0].space().start();
     let at_start: Vec<f64> = posteriors.iter().map(|p| p.evaluate(&start).log_prob).collect();
     for i in 0..6 {
@@ -93,6 +134,39 @@ fn objectives_agree_near_the_optimum_and_are_precise() {
     }
 }
 
+/// A solver that takes whatever it starts from leaves the prediction as it is: its error is of second order, in image and lambda.
+#[test]
+fn predictions_are_right_to_first_order() {
+    for entropy in MAPS {
+        let posterior = posteriors(entropy).swap_remove(0);
+        let careless = SolverSettings { tolerance: f64::INFINITY, ..SolverSettings::default() };
+        let predicted = posterior.clone().with_settings(careless);
+        let exact = posterior.with_settings(SolverSettings::exact());
+        let (imager, start) = (exact.imager(), exact.space().start());
+        let map = |posterior: &Posterior, theta: &[f64]| {
+            let image = posterior.reconstruct(theta).0.image;
+            let mut map = vec![0.0; imager.grid.len()];
+            imager.entropy.image(&image.coordinates, &mut map);
+            (map, image.lambda.ln())
+        };
+        let mut scale = vec![0.0; imager.grid.len()];
+        imager.entropy.metric(&map(&exact, &start).0, &imager.grid.area, &mut scale);
+        // K and systemic velocity by 0.4 standard errors, in which no pixels come into sight
+        for (j, step) in [(0, 0.004), (7, 0.003)] {
+            let errors = [1.0, 2.0].map(|steps| {
+                let mut theta = start.clone();
+                theta[j] += steps * step;
+                let ((a, lambda_a), (b, lambda_b)) = (map(&predicted, &theta), map(&exact, &theta));
+                let image = (0..a.len()).map(|p| ((a[p] - b[p]) / scale[p]).powi(2)).sum::<f64>().sqrt();
+                [image, (lambda_a - lambda_b).abs()]
+            });
+            println!("{j}: {errors:?}");
+            // twice the step, four times the error: an error of first order would double, those of third order are smaller
+            assert!((0..2).all(|i| (errors[1][i] / errors[0][i] - 4.0).abs() < 0.6), "{j}: {errors:?}");
+        }
+    }
+}
+
 #[test]
 fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
     let walks = [
@@ -103,7 +177,7 @@ fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
         (Parameter::Inclination, vec![0.0, 5.0, 15.0, 40.0]),
         (Parameter::OmegaEq, vec![0.0, 0.01, 0.05, 0.3]),
     ];
-    for posterior in posteriors() {
+    for posterior in MAPS.into_iter().flat_map(posteriors) {
         for (parameter, offsets) in &walks {
             let at = |offset: &f64| {
                 let mut theta = posterior.space().start();
@@ -120,7 +194,7 @@ fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
 
 #[test]
 fn evaluations_are_as_precise_as_they_say() {
-    for posterior in posteriors() {
+    for posterior in MAPS.into_iter().flat_map(posteriors) {
         let exact = posterior.clone().with_settings(SolverSettings::exact());
         let start = posterior.space().start();
         // around the reference, errors of 1e-3 at most; far below it, half a per cent of the distance
@@ -141,7 +215,7 @@ fn evaluations_are_as_precise_as_they_say() {
 
 #[test]
 fn lambda_stays_within_its_bound() {
-    let (imager, space, mut reference) = setup();
+    let (imager, space, mut reference) = setup(None);
     // so tight that the way to almost every solution would lead beyond it
     reference.largest_lambda = 1.02 * reference.solution.image.lambda;
     let largest = reference.largest_lambda;
@@ -176,7 +250,7 @@ fn lambda_stays_within_its_bound() {
 
 #[test]
 fn absurd_parameters_are_refused_not_computed() {
-    let posterior = &posteriors()[0];
+    let posterior = &posteriors(None)[0];
     for (parameter, value) in [(Parameter::K, f64::NAN), (Parameter::K, -0.1), (Parameter::Vsini, 1e9)] {
         let mut theta = posterior.space().start();
         theta[parameter as usize] = value;

@@ -31,6 +31,8 @@ fn the_commands_of_the_readme_exist() {
         "completions",
         "man",
         "simulate",
+        "inject",
+        "limits",
         "map",
         "periodogram",
         "optimise",

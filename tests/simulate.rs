@@ -7,6 +7,7 @@ use dimcmc::config;
 use dimcmc::observation::{Observations, Profile};
 use dimcmc::scene::{Scene, fingerprint};
 use dimcmc::simulate::{SIGMA_WITHOUT_NOISE, Simulation};
+use dimcmc::star::{Disc, Facula, Quadrature, Spot, SurfaceGrid};
 use std::path::Path;
 
 /// The demo's star, which is the oracle's, with `change` made to its simulation.
@@ -104,6 +105,40 @@ fn a_shifted_line_has_a_shifted_first_moment() {
         // a sampled Gaussian has the moments of the Gaussian; what its tail of 6.7 sigma lacks is below 1e-8
         assert!((line(shift).first_moment(1.0).value_kms - shift).abs() < 1e-8);
     }
+}
+
+/// Faculae brighten what spots leave free; without them nothing changes.
+#[test]
+fn brightness_of_spots_and_faculae() {
+    let disc = |longitude: f64| Disc { longitude, latitude: 0.3, radius: 0.4 };
+    let spot = |longitude: f64, filling: f64| Spot { longitude, latitude: 0.3, radius: 0.4, filling };
+    let facula = |longitude: f64, excess: f64| Facula { disc: disc(longitude), excess };
+    let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
+    let config::ObservationSource::Simulate(mut simulation) = settings.source else { panic!() };
+    let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
+    simulation.spots = vec![spot(1.0, 0.6), spot(3.0, 1.0)];
+    let spots_alone = simulation.brightness(&grid, 0.1);
+    let wanted = simulation.spot_filling(&grid);
+    assert!(spots_alone.iter().zip(wanted).all(|(b, s)| *b == 1.0 - (1.0 - 0.1) * s));
+    simulation.faculae = vec![facula(1.0, 0.2), facula(3.0, 0.2), facula(5.0, 0.2), facula(5.1, 0.3)];
+    let brightness = simulation.brightness(&grid, 0.1);
+    let at = |longitude: f64| {
+        let near = |&p: &usize| (grid.longitude[p] - longitude).abs() < 0.1 && (grid.latitude[p] - 0.3).abs() < 0.1;
+        let inside: Vec<f64> = (0..grid.len()).filter(near).map(|p| brightness[p]).collect();
+        inside.iter().for_each(|b| assert!((b - inside[0]).abs() < 1e-12));
+        inside[0]
+    };
+    // half filled, filled, the larger of two excesses, photosphere
+    for (longitude, wanted) in [(1.0, 0.6 * 0.1 + 0.4 * 1.2), (3.0, 0.1), (5.05, 1.3), (2.0, 1.0)] {
+        assert!((at(longitude) - wanted).abs() < 1e-12, "{longitude}: {} {wanted}", at(longitude));
+    }
+    // the excess of light over the whole star is that of the area
+    simulation.spots.clear();
+    simulation.faculae = vec![facula(2.0, 0.5)];
+    let light: f64 = simulation.brightness(&grid, 0.1).iter().zip(&grid.area).map(|(b, a)| a * (b - 1.0)).sum();
+    let cap = 0.5 * (1.0 - 0.4f64.cos());
+    // 8 x 8 points a pixel: a few hundred of them on the edge
+    assert!((light / (0.5 * cap) - 1.0).abs() < 5e-3, "{light} {}", 0.5 * cap);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
-use dimcmc::fit::{Fit, FitSummary};
+use dimcmc::fit::{Deviation, Fit, FitSummary};
 use dimcmc::io::map::{FILES, MapResult};
 use dimcmc::objective::Reference;
 use dimcmc::scene::Scene;
@@ -27,34 +27,57 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     let spinner = progress::bar(global, None, "reconstructing");
-    let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target);
+    let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target.value());
     spinner.finish_and_clear();
     let reference = reference.map_err(|e| Failure::reference(&args.config, e))?;
     let fit = Fit::new(&scene.imager, &scene.observations, &reference);
-    let true_spot_filling = scene.true_spot_filling();
+    let true_map = scene.true_map();
     let result = MapResult {
         imager: &scene.imager,
         observations: &scene.observations,
         fit: &fit,
-        true_spot_filling: true_spot_filling.as_deref(),
+        true_map: true_map.as_deref(),
         truth: scene.truth,
         provenance: &scene.provenance(),
     };
     let folder = args.output.create()?;
     result.write(folder)?;
-    report(&fit.summary).written(folder, FILES.join(", ")).print();
+    let mut report = report(&fit);
+    for (label, text) in scene.measured.lines() {
+        report = report.line(label, text);
+    }
+    for warning in &fit.checks.warnings {
+        report = report.line("warning", warning);
+    }
+    report.written(folder, FILES.join(", ")).print();
     Ok(())
 }
 
-fn report(fit: &FitSummary) -> Report {
+fn report(Fit { summary: fit, nuisances, .. }: &Fit) -> Report {
     let FitSummary { chi2, chi2_per_datum, data, profiles, .. } = fit;
-    Report::default()
-        .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"))
-        .line("spottedness", format!("{:.5}", fit.spottedness))
+    let report = Report::default()
+        .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"));
+    let report = match fit.deviation {
+        None => report.line("spottedness", format!("{:.5}", fit.spottedness)),
+        Some(Deviation { darkness, brightness_excess }) => report.line(
+            "spottedness",
+            format!("{:.5} rms: {darkness:.5} dark, {brightness_excess:.5} bright", fit.spottedness),
+        ),
+    };
+    let report = report
         .line("entropy", format!("{:.5} at lambda = {:.4e}", fit.entropy, fit.lambda))
         .line("TEST", format!("{:.1e}", fit.test))
         .line("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core))
         .line("RV observed", format!("{:.4} km/s rms", fit.observed_rv_rms_kms))
         .line("RV filtered", format!("{:.4} km/s rms", fit.filtered_rv_rms_kms))
-        .line("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms))
+        .line("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms));
+    if nuisances.is_empty() {
+        return report;
+    }
+    let [offset, slope, width] = [0, 1, 2].map(|i| {
+        let squares: f64 = nuisances.iter().map(|n| n.numbers()[i].powi(2)).sum();
+        (squares / nuisances.len() as f64).sqrt()
+    });
+    let rms = format!("offset {offset:.1e}, slope {slope:.1e}, equivalent width {:.2} % rms", 100.0 * width);
+    report.line("continuum", rms)
 }

@@ -14,6 +14,8 @@ mod grid;
 mod groups;
 mod import;
 mod init;
+mod inject;
+mod limits;
 mod man;
 mod map;
 mod merge;
@@ -68,8 +70,10 @@ enum Command {
     Init(init::Args),
     Import(import::Args),
     Simulate(simulate::Args),
+    Inject(inject::Args),
     Map(map::Args),
     Periodogram(periodogram::Args),
+    Limits(limits::Args),
     #[command(alias = "optimize")]
     Optimise(optimise::Args),
     Grid(grid::Args),
@@ -107,8 +111,10 @@ pub fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Init(args) => init::run(args, &cli.global),
         Command::Import(args) => import::run(args, &cli.global),
         Command::Simulate(args) => simulate::run(args),
+        Command::Inject(args) => inject::run(args),
         Command::Map(args) => map::run(args, &cli.global),
         Command::Periodogram(args) => periodogram::run(args, &cli.global),
+        Command::Limits(args) => limits::run(args, &cli.global),
         Command::Optimise(args) => optimise::run(args, &cli.global),
         Command::Grid(args) => grid::run(args, &cli.global),
         Command::Sample(args) => sample::run(args, &cli.global),

@@ -2,7 +2,7 @@
 
 use super::output::Output;
 use super::{Failure, Global, progress};
-use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Stage};
+use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Stage, robustness};
 use dimcmc::expansion::nuisances;
 use dimcmc::fit::Fit;
 use dimcmc::io::periodogram::PeriodogramResult;
@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// Search for a planet at every period, the star's spots marginalised out
 ///
 /// The star is imaged without a planet, and how much better the profiles fit with an orbit of each period follows in closed
-/// form, together with radial velocities that are free of spots. Other parameters are those of the config. Writes rv.csv and
+/// form, together with radial velocities that are free of spots. K at the best period is given for a target chi2 3 % lower and
+/// higher, too, and without each night. Other parameters are those of the config. Writes rv.csv and
 /// covariance.csv (velocities for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, false alarms).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc periodogram configs/demo.json --out runs/demo_periodogram")]
@@ -58,12 +59,18 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let spinner = progress::bar(global, None, "reconstructing");
     let report = |stage| spinner.set_message(message(stage));
     let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &report);
+    let choices = found.as_ref().map(|found| {
+        spinner.set_message("other targets, without each night");
+        robustness(&scene.imager, scene.settings.values, &settings, &found.best)
+    });
     spinner.finish_and_clear();
+    let choices = choices.map_err(|e| failure(&args.config, *e))?;
     let detection = found.map_err(|e| failure(&args.config, e))?;
     let fit = Fit::new(&scene.imager, &scene.observations, &detection.planet_free.reference);
     let result = PeriodogramResult {
         imager: &scene.imager,
         detection: &detection,
+        robustness: &choices,
         settings: &settings,
         fit: &fit,
         truth: scene.truth,
@@ -72,7 +79,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let folder = args.output.create()?;
     result.write(folder)?;
     let (table, files) = (result.table(), result.files().join(", "));
-    let _ = writeln!(std::io::stdout(), "{table}written: {}: {files}", folder.display());
+    let measured: String = scene.measured.lines().iter().map(|(label, text)| format!("{label}: {text}\n")).collect();
+    let _ = writeln!(std::io::stdout(), "{table}{measured}written: {}: {files}", folder.display());
     Ok(())
 }
 
@@ -88,7 +96,7 @@ fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
 
 fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
     DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target,
+        chi2_target: scene.settings.imaging.chi2_target.value(),
         nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
         search: SearchSettings { draws: args.draws as usize, seed: args.seed },
         eccentric: args.eccentric,

@@ -120,9 +120,9 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
         return Some(format!("{name} is an axis of the landscape and not sampled in the run"));
     }
     let fixed = |p: &Parameter| !manifest.names.iter().any(|name| name == p.name());
-    let values = |p: Parameter| (settings.values[p], grid_settings.values[p]);
-    if let Some(p) = Parameter::ALL.into_iter().filter(fixed).find(|p| values(*p).0 != values(*p).1) {
-        let (first, second) = values(p);
+    let differ = |p: &Parameter| !settings.values.agrees(&grid_settings.values, *p);
+    if let Some(p) = Parameter::ALL.into_iter().filter(fixed).find(differ) {
+        let (first, second) = (settings.values[p], grid_settings.values[p]);
         return Some(format!("{} is fixed at {first} in the run and at {second} in the landscape", p.name()));
     }
     (run.data_sha256 != grid.data_sha256).then(|| {

@@ -1,4 +1,4 @@
-//! Which values and which priors each of the eight parameters may have.
+//! Which values and which priors each of the parameters may have.
 
 use super::error::Fault;
 use super::raw_parts::{PriorKind, PriorSection};
@@ -6,11 +6,13 @@ use crate::objective::{Parameter, Prior};
 
 /// Where a value of the parameter stands in the config.
 pub(super) fn key(parameter: Parameter) -> String {
-    let section = match parameter {
-        Parameter::K | Parameter::PorbOverProt | Parameter::Phi => "planet",
-        _ => "star",
-    };
-    format!("{section}.{}", parameter.name())
+    match parameter {
+        Parameter::K | Parameter::PorbOverProt | Parameter::Phi => format!("planet.{}", parameter.name()),
+        Parameter::LimbDarkening => "star.limb_darkening.coefficients".into(),
+        Parameter::LineSigma => "star.line.sigma_kms".into(),
+        Parameter::EquivalentWidth => "star.line.equivalent_width_kms".into(),
+        _ => format!("star.{}", parameter.name()),
+    }
 }
 
 /// Beyond this a rotation velocity is a mistake, and velocity axes grow absurdly long.
@@ -21,6 +23,9 @@ pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result
     let (fine, allowed) = match parameter {
         Parameter::K => (value >= 0.0, "0 or more"),
         Parameter::PorbOverProt | Parameter::OmegaEq => (value > 0.0, "above 0"),
+        Parameter::LineSigma | Parameter::EquivalentWidth => (value > 0.0, "above 0"),
+        Parameter::LimbDarkening => ((0.0..=1.0).contains(&value), "from 0 to 1"),
+        Parameter::Contrast => ((0.0..1.0).contains(&value), "0 or more and below 1"),
         Parameter::Vsini => (value > 0.0 && value <= LARGEST_VELOCITY_KMS, "above 0 and up to 2000"),
         Parameter::Inclination => (value > 0.0 && value <= 90.0, "above 0 and up to 90"),
         Parameter::Phi | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
@@ -33,7 +38,8 @@ fn domain(parameter: Parameter, phi_free: bool) -> (f64, f64) {
     match parameter {
         Parameter::K if !phi_free => (f64::NEG_INFINITY, f64::INFINITY),
         Parameter::K | Parameter::PorbOverProt | Parameter::OmegaEq | Parameter::Vsini => (0.0, f64::INFINITY),
-        Parameter::Phi => (0.0, 1.0),
+        Parameter::LineSigma | Parameter::EquivalentWidth => (0.0, f64::INFINITY),
+        Parameter::Phi | Parameter::LimbDarkening | Parameter::Contrast => (0.0, 1.0),
         Parameter::Inclination => (0.0, 90.0),
         Parameter::DOmega | Parameter::Vsys => (f64::NEG_INFINITY, f64::INFINITY),
     }

@@ -3,9 +3,10 @@
 //!
 //! Left out: where the values come from (`proposal`).
 
-use super::ImagingSettings;
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Planet, Star};
-use super::raw_parts::{EquivalentWidth, ObservationsSection, PerParameter, PriorKind, PriorSection};
+use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
+use super::{Automatic, EquivalentWidth, ImagingSettings};
+use crate::noise::Weights;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -92,7 +93,8 @@ impl Draft {
             observations: ObservationsSection {
                 path: Some(self.observations.clone()),
                 velocity_range_kms: Some(self.velocity_range_kms.into()),
-                sigma_scale: Some(self.sigma_scale),
+                sigma_scale: Some(Automatic::Fixed(self.sigma_scale)),
+                weights: Weights::default(),
                 simulate: None,
             },
             imaging: self.imaging.clone(),
@@ -124,6 +126,7 @@ impl Draft {
             line: Line {
                 shape: LineShape::Gaussian,
                 sigma_kms: self.line_sigma_kms,
+                gamma_kms: None,
                 equivalent_width_kms: self.equivalent_width,
             },
         }
@@ -135,7 +138,7 @@ fn bounded(prior: PriorKind, (min, max): (f64, f64)) -> PriorSection {
 }
 
 /// Indented JSON with every object and list that fits on one line put on one line, but for the outermost.
-fn compact(pretty: &str) -> String {
+pub(super) fn compact(pretty: &str) -> String {
     let lines: Vec<&str> = pretty.lines().collect();
     let indent = |line: &str| line.len() - line.trim_start().len();
     let (mut text, mut k) = (String::new(), 0);

@@ -41,7 +41,8 @@ pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<D
         let mut section = resolved.get(name).cloned().unwrap_or(Value::Null);
         if let Some(map) = section.as_object_mut() {
             // a landscape has spots left over as the entropy has them, whatever the chain does
-            map.retain(|key, _| Parameter::from_name(key).is_none() && key != "spots_left");
+            let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_surface());
+            map.retain(|key, _| !free(key) && key != "spots_left");
         }
         section
     };

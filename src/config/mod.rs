@@ -3,6 +3,7 @@
 //! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for), and every
 //! error names the file and the key. Left out: reading the observations (`io::lsd`), and anything done with the settings.
 
+mod automatic;
 mod domain;
 mod draft;
 mod error;
@@ -17,13 +18,16 @@ mod settings;
 mod suggest;
 
 pub use crate::ensemble::SamplerSettings;
+pub use automatic::Automatic;
 pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, model_difference, section_difference};
-pub use raw_parts::EquivalentWidth;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;
+
+/// Equivalent width of the local line; automatic: the mean area of the observed profiles.
+pub type EquivalentWidth = Automatic;
 
 /// Reads and resolves the config at `path`. Paths in it start from its folder.
 ///
@@ -57,6 +61,11 @@ pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
     let raw = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
     deserializer.end().map_err(|e| ConfigError::json(path, &e))?;
     resolve::resolve(raw, path).map_err(|fault| fault.within(path))
+}
+
+/// A config as text, laid out for people.
+pub fn to_text(config: &serde_json::Value) -> String {
+    draft::compact(&format!("{config:#}"))
 }
 
 /// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.

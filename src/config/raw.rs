@@ -2,7 +2,8 @@
 //!
 //! Left out: whether the values make sense (`resolve`). Fields of `PerParameter` and the observations are in `raw_parts`.
 
-use super::raw_parts::{EquivalentWidth, Grid, ObservationsSection, PerParameter, PriorSection};
+use super::EquivalentWidth;
+use super::raw_parts::{Grid, ObservationsSection, PerParameter, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -91,9 +92,12 @@ pub(super) struct Line {
     /// Shape of the line.
     #[serde(default)]
     pub shape: LineShape,
-    /// Standard deviation (km/s), above 0.
+    /// Standard deviation (km/s) of the Gaussian, above 0.
     pub sigma_kms: f64,
-    /// Equivalent width (km/s), above 0, or "auto": the mean area of the observed profiles, for observations from files.
+    /// Of a Voigt profile: half width at half depth (km/s) of the Lorentzian, above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gamma_kms: Option<f64>,
+    /// Equivalent width (km/s), wings and all, above 0, or "auto": the mean area of the observed profiles, for observations from files.
     pub equivalent_width_kms: EquivalentWidth,
 }
 
@@ -104,6 +108,8 @@ pub(super) enum LineShape {
     /// A Gaussian.
     #[default]
     Gaussian,
+    /// A Gaussian convolved with a Lorentzian, whose wings reach through the whole velocity range.
+    Voigt,
 }
 
 /// Limb darkening. The intensity must stay positive on the whole disc.

@@ -1,9 +1,10 @@
 //! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
 
+use super::automatic::Automatic;
+use crate::noise::Weights;
 use crate::objective::Parameter;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-use std::borrow::Cow;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// One optional entry for each parameter that may be free.
@@ -35,6 +36,20 @@ pub(super) struct PerParameter<T> {
     /// Systemic radial velocity (km/s).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vsys_kms: Option<T>,
+    /// First coefficient of the limb darkening, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limb_darkening: Option<T>,
+    /// Standard deviation of the local line (km/s), before the spectrograph.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_sigma_kms: Option<T>,
+    /// Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a nuisance of each profile's
+    /// own by the priors alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equivalent_width_kms: Option<T>,
+    /// Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter than some value: the
+    /// darker they are, the fewer a map needs, so that a flat prior ends at 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<T>,
 }
 
 impl<T> Default for PerParameter<T> {
@@ -48,6 +63,10 @@ impl<T> Default for PerParameter<T> {
             inclination_deg: None,
             vsini_kms: None,
             vsys_kms: None,
+            limb_darkening: None,
+            line_sigma_kms: None,
+            equivalent_width_kms: None,
+            contrast: None,
         }
     }
 }
@@ -64,6 +83,10 @@ impl<T> PerParameter<T> {
             Parameter::Inclination => &mut self.inclination_deg,
             Parameter::Vsini => &mut self.vsini_kms,
             Parameter::Vsys => &mut self.vsys_kms,
+            Parameter::LimbDarkening => &mut self.limb_darkening,
+            Parameter::LineSigma => &mut self.line_sigma_kms,
+            Parameter::EquivalentWidth => &mut self.equivalent_width_kms,
+            Parameter::Contrast => &mut self.contrast,
         }
     }
 }
@@ -112,7 +135,7 @@ pub(super) enum PriorKind {
     Periodic,
 }
 
-/// The line profiles: either `path` (with its two options), or `simulate`.
+/// The line profiles: either `path` (with its options), or `simulate`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObservationsSection {
@@ -122,9 +145,13 @@ pub(super) struct ObservationsSection {
     /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_range_kms: Option<[f64; 2]>,
-    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given.
+    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given. "auto": the larger of what the
+    /// scatter of the continuum says and what a map at the config's values leaves over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sigma_scale: Option<f64>,
+    pub sigma_scale: Option<Automatic>,
+    /// With `path`: how the profiles are weighted against each other.
+    #[serde(default, skip_serializing_if = "Weights::is_default")]
+    pub weights: Weights,
     /// Simulated profiles of the star and planet of this config.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateSection>,
@@ -138,6 +165,11 @@ pub(super) struct SimulateSection {
     /// larger filling counts where they overlap.
     #[serde(default)]
     pub spots: Vec<[f64; 4]>,
+    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter than the
+    /// photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of filling s overlaps,
+    /// the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faculae: Vec<[f64; 4]>,
     /// Rotation cycles of the profiles, counted from `epoch_d`.
     pub cycles: Vec<f64>,
     /// Velocity bins.
@@ -151,6 +183,9 @@ pub(super) struct SimulateSection {
     /// Pixels of the star that is simulated, 100 to 2,000,000; more than of the image, for honesty.
     #[serde(default = "default_simulation_pixels")]
     pub pixels: usize,
+    /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuum: Option<ContinuumSection>,
     /// Values of parameters that are simulated in place of those under `star` and `planet`, so that the start of an
     /// inference may be wrong.
     #[serde(default)]
@@ -167,6 +202,18 @@ fn default_seed() -> u64 {
 
 fn default_simulation_pixels() -> usize {
     20_000
+}
+
+/// Wandering line and continuum: standard deviations, from 0 to 10, of one Gaussian number a profile.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ContinuumSection {
+    /// Level of the continuum, in its own units.
+    pub offset: f64,
+    /// Slope of the continuum: by how much it is higher at the last bin than in the middle.
+    pub slope: f64,
+    /// Equivalent width of the line, relative.
+    pub equivalent_width: f64,
 }
 
 /// Centres of the velocity bins: `min`, `min + step`, ... up to `max` (km/s).
@@ -190,70 +237,4 @@ pub(super) struct Grid {
     /// An axis of `phi` may wrap around 0 or 1 (nodes are written in [0, 1)); where it spans a whole period, as [0, 1, n],
     /// max is the same place as min and is left out.
     pub axes: PerParameter<(f64, f64, usize)>,
-}
-
-/// Equivalent width of the local line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum EquivalentWidth {
-    /// A number (km/s).
-    Fixed(f64),
-    /// The mean area of the observed profiles.
-    Auto,
-}
-
-impl Serialize for EquivalentWidth {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            EquivalentWidth::Fixed(width) => serializer.serialize_f64(*width),
-            EquivalentWidth::Auto => serializer.serialize_str("auto"),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for EquivalentWidth {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(EquivalentWidthVisitor)
-    }
-}
-
-struct EquivalentWidthVisitor;
-
-impl de::Visitor<'_> for EquivalentWidthVisitor {
-    type Value = EquivalentWidth;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str("a number or \"auto\"")
-    }
-
-    fn visit_f64<E: de::Error>(self, value: f64) -> Result<EquivalentWidth, E> {
-        Ok(EquivalentWidth::Fixed(value))
-    }
-
-    fn visit_i64<E: de::Error>(self, value: i64) -> Result<EquivalentWidth, E> {
-        Ok(EquivalentWidth::Fixed(value as f64))
-    }
-
-    fn visit_u64<E: de::Error>(self, value: u64) -> Result<EquivalentWidth, E> {
-        Ok(EquivalentWidth::Fixed(value as f64))
-    }
-
-    fn visit_str<E: de::Error>(self, value: &str) -> Result<EquivalentWidth, E> {
-        match value {
-            "auto" => Ok(EquivalentWidth::Auto),
-            _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
-        }
-    }
-}
-
-impl JsonSchema for EquivalentWidth {
-    fn schema_name() -> Cow<'static, str> {
-        "EquivalentWidth".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({
-            "description": "A number (km/s), above 0, or \"auto\": the mean area of the observed profiles.",
-            "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "const": "auto" }]
-        })
-    }
 }

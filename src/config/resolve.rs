@@ -10,8 +10,10 @@ use super::raw::Config;
 use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
-use super::{ImagingSettings, SamplerSettings, Settings};
+use super::{Automatic, ImagingSettings, SamplerSettings, Settings};
+use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use crate::star::{BrightnessModel, StarSettings};
 use std::path::Path;
 
 /// Fewest and most pixels of an image or a simulated star.
@@ -19,12 +21,22 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
-    let mut values = values(&raw)?;
+    let mut values = values(&mut raw, &star)?;
     let source = resolve_observations(&mut raw, &star, &values, path)?;
     check_imaging(&raw.imaging)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
+        return Err(Fault::new(
+            "parameters.contrast",
+            "has no effect on a bright-and-dark map, which holds the brightness itself",
+        ));
+    }
     let grid = raw.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && raw.parameters.contrast.is_some() {
+        let problem = "an image of bright and dark pixels knows no spots: contrast has no effect";
+        return Err(Fault::new("parameters.contrast", problem));
+    }
     let resolved = serde_json::to_value(&raw).map_err(|e| Fault::new("config", e.to_string()))?;
     Ok(Settings {
         path: path.into(),
@@ -41,11 +53,18 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     })
 }
 
-/// The eight parameters as the config gives them.
-fn values(raw: &Config) -> Result<ParameterValues, Fault> {
+/// The parameters as the config gives them; those of the surface where they are free or on an axis.
+fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, Fault> {
+    let free = Parameter::ALL.map(|p| {
+        let axis = raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(p).is_some());
+        axis || raw.parameters.slot(p).is_some()
+    });
     let (star, planet) = (&raw.star, &raw.planet);
-    let mut values = ParameterValues([0.0; 8]);
+    let mut values = ParameterValues::of_eight([0.0; 8]);
     for parameter in Parameter::ALL {
+        if parameter.is_surface() && !free[parameter as usize] {
+            continue;
+        }
         values[parameter] = match parameter {
             Parameter::K => planet.k_kms,
             Parameter::PorbOverProt => planet.porb_over_prot,
@@ -56,6 +75,13 @@ fn values(raw: &Config) -> Result<ParameterValues, Fault> {
             Parameter::Inclination => star.inclination_deg,
             Parameter::Vsini => star.vsini_kms,
             Parameter::Vsys => star.vsys_kms,
+            Parameter::LimbDarkening => resolved.limb_darkening.coefficients().0,
+            Parameter::LineSigma => star.line.sigma_kms,
+            Parameter::EquivalentWidth if resolved.line.equivalent_width_kms.is_nan() => {
+                return Err(Fault::new(key(parameter), "auto is no start of a free parameter, give a number"));
+            }
+            Parameter::EquivalentWidth => resolved.line.equivalent_width_kms,
+            Parameter::Contrast => resolved.contrast,
         };
         check_value(parameter, values[parameter], &key(parameter))?;
     }
@@ -107,7 +133,21 @@ fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));
     }
-    positive("imaging.chi2_target", imaging.chi2_target)
+    if let Some(priors) = &imaging.nuisances {
+        check_nuisances(
+            priors,
+            ["continuum_offset", "continuum_slope", "equivalent_width"].map(|n| format!("imaging.nuisances.{n}")),
+        )?;
+    }
+    automatic("imaging.chi2_target", imaging.chi2_target)
+}
+
+/// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
+pub(super) fn check_nuisances(priors: &LineAndContinuum, keys: [String; 3]) -> Result<(), Fault> {
+    match keys.iter().zip(priors.numbers()).find(|(_, sd)| !(0.0..=10.0).contains(sd)) {
+        Some((key, sd)) => Err(Fault::new(key, format!("{sd} must be from 0 to 10"))),
+        None => Ok(()),
+    }
 }
 
 pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
@@ -119,6 +159,14 @@ pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
 
 pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
+}
+
+/// Positive, or left to the observations.
+pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
+    match value {
+        Automatic::Fixed(value) => positive(key, value),
+        Automatic::Auto => Ok(()),
+    }
 }
 
 fn check_sampler(sampler: &SamplerSettings, free: usize) -> Result<(), Fault> {

@@ -1,15 +1,17 @@
 //! Where the profiles come from: files, or a simulation of the config's own star and planet.
 
-use super::ObservationSource;
 use super::domain::check_value;
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
-use super::resolve::{check_pixels, positive};
+use super::resolve::{automatic, check_nuisances, check_pixels, positive};
+use super::{Automatic, ObservationSource};
 use crate::io::lsd::ReadOptions;
+use crate::noise::ErrorSettings;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use crate::simulate::Simulation;
-use crate::star::{Spot, StarSettings};
+use crate::star::{Disc, Facula, Spot, StarSettings};
 use std::path::Path;
 
 /// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start from.
@@ -26,6 +28,7 @@ pub(super) fn resolve_observations(
             let file_only = [
                 ("velocity_range_kms", section.velocity_range_kms.is_some()),
                 ("sigma_scale", section.sigma_scale.is_some()),
+                ("weights", !section.weights.is_default()),
             ];
             if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
                 return Err(Fault::new(format!("observations.{name}"), "for observations from files only"));
@@ -41,8 +44,10 @@ pub(super) fn resolve_observations(
     if path.as_os_str().is_empty() {
         return Err(Fault::new("observations.path", "is empty"));
     }
-    let sigma_scale = *section.sigma_scale.get_or_insert(ReadOptions::default().sigma_scale);
-    positive("observations.sigma_scale", sigma_scale)?;
+    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Fixed(ReadOptions::default().sigma_scale));
+    automatic("observations.sigma_scale", sigma_scale)?;
+    let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
+    let sigma_scale = if errors.measured { 1.0 } else { sigma_scale.value() };
     if let Some([min, max]) = section.velocity_range_kms
         && min >= max
     {
@@ -50,12 +55,13 @@ pub(super) fn resolve_observations(
         return Err(Fault::new("observations.velocity_range_kms", problem));
     }
     let options = ReadOptions { velocity_range_kms: section.velocity_range_kms.map(Into::into), sigma_scale };
-    Ok(ObservationSource::Files { path: config.parent().unwrap_or(Path::new("")).join(path), options })
+    Ok(ObservationSource::Files { path: config.parent().unwrap_or(Path::new("")).join(path), options, errors })
 }
 
 fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {
     let at = |field: &str| format!("observations.simulate.{field}");
     let spots = section.spots.iter().enumerate().map(|(k, s)| spot(s, &at(&format!("spots[{k}]"))));
+    let faculae = section.faculae.iter().enumerate().map(|(k, f)| facula(f, &at(&format!("faculae[{k}]"))));
     if section.cycles.is_empty() {
         return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
     }
@@ -67,6 +73,10 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         positive(&at("snr"), snr)?;
     }
     check_pixels(&at("pixels"), section.pixels)?;
+    let continuum = section
+        .continuum
+        .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
+    check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
     let mut truth = *values;
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
@@ -74,6 +84,7 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
     }
     Ok(Simulation {
         spots: spots.collect::<Result<_, _>>()?,
+        faculae: faculae.collect::<Result<_, _>>()?,
         truth,
         times_d,
         first_velocity_kms: section.velocity_kms.min,
@@ -82,17 +93,37 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         snr: section.snr,
         seed: section.seed,
         pixels: section.pixels,
+        continuum,
     })
 }
 
+/// Most brightness that a facula may add, in units of the photosphere's.
+const LARGEST_EXCESS: f64 = 10.0;
+
 fn spot(&[longitude, latitude, radius, filling]: &[f64; 4], key: &str) -> Result<Spot, Fault> {
+    let Disc { longitude, latitude, radius } = disc([longitude, latitude, radius], key)?;
+    match (0.0..=1.0).contains(&filling) {
+        true => Ok(Spot { longitude, latitude, radius, filling }),
+        false => Err(Fault::new(key, format!("filling {filling} must be from 0 to 1"))),
+    }
+}
+
+fn facula(&[longitude, latitude, radius, excess]: &[f64; 4], key: &str) -> Result<Facula, Fault> {
+    let disc = disc([longitude, latitude, radius], key)?;
+    match excess > 0.0 && excess <= LARGEST_EXCESS {
+        true => Ok(Facula { disc, excess }),
+        false => Err(Fault::new(key, format!("excess {excess} must be above 0 and up to {LARGEST_EXCESS}"))),
+    }
+}
+
+/// A circle given in degrees.
+fn disc([longitude, latitude, radius]: [f64; 3], key: &str) -> Result<Disc, Fault> {
     let problem = match () {
         _ if latitude.abs() > 90.0 => format!("latitude {latitude} must be from -90 to 90"),
         _ if !(radius > 0.0 && radius <= 180.0) => format!("radius {radius} must be above 0 and up to 180"),
-        _ if !(0.0..=1.0).contains(&filling) => format!("filling {filling} must be from 0 to 1"),
         _ => {
             let [longitude, latitude, radius] = [longitude, latitude, radius].map(f64::to_radians);
-            return Ok(Spot { longitude, latitude, radius, filling });
+            return Ok(Disc { longitude, latitude, radius });
         }
     };
     Err(Fault::new(key, problem))

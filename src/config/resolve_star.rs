@@ -1,8 +1,8 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
+use super::EquivalentWidth;
 use super::error::Fault;
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
-use super::raw_parts::EquivalentWidth;
 use super::resolve::positive;
 use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use crate::units::{instrumental_sigma_kms, planck_contrast};
@@ -32,21 +32,12 @@ fn limb_darkening(section: &LimbDarkeningSection) -> Result<LimbDarkening, Fault
         (LimbLaw::Linear, &[u]) if (0.0..=1.0).contains(&u) => Ok(LimbDarkening::Linear(u)),
         (LimbLaw::Linear, &[u]) => fault(format!("{u} must be from 0 to 1")),
         (LimbLaw::Linear, other) => fault(format!("the linear law has 1 coefficient, not {}", other.len())),
-        (LimbLaw::Quadratic, &[a, b]) => match positive_on_the_disc(a, b) {
+        (LimbLaw::Quadratic, &[a, b]) => match LimbDarkening::Quadratic(a, b).is_positive() {
             true => Ok(LimbDarkening::Quadratic(a, b)),
             false => fault(format!("[{a}, {b}] make the intensity negative somewhere on the disc")),
         },
         (LimbLaw::Quadratic, other) => fault(format!("the quadratic law has 2 coefficients, not {}", other.len())),
     }
-}
-
-/// Whether `1 - a x - b x^2` is positive for `x = 1 - mu` from 0 to the limb (where it may be 0).
-fn positive_on_the_disc(a: f64, b: f64) -> bool {
-    let limb = 1.0 - a - b;
-    let turning = -a / (2.0 * b);
-    let has_minimum_inside = b < 0.0 && turning > 0.0 && turning < 1.0;
-    // The rounding of 1 - a - b where they should add up to 1.
-    limb >= -1e-12 && (!has_minimum_inside || 1.0 + a * a / (4.0 * b) > 0.0)
 }
 
 fn contrast(star: &Star) -> Result<f64, Fault> {
@@ -81,8 +72,15 @@ fn contrast(star: &Star) -> Result<f64, Fault> {
 }
 
 fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> {
-    // Other shapes will need settings of their own.
-    let LineShape::Gaussian = line.shape;
+    let gamma_kms = match (line.shape, line.gamma_kms) {
+        (LineShape::Gaussian, None) => 0.0,
+        (LineShape::Gaussian, Some(_)) => return Err(Fault::new("star.line.gamma_kms", "not for a gaussian line")),
+        (LineShape::Voigt, None) => return Err(Fault::new("star.line.gamma_kms", "missing, a voigt line needs it")),
+        (LineShape::Voigt, Some(gamma)) => {
+            positive("star.line.gamma_kms", gamma)?;
+            gamma
+        }
+    };
     positive("star.line.sigma_kms", line.sigma_kms)?;
     let instrumental = match instrument.resolving_power {
         Some(power) => {
@@ -102,29 +100,5 @@ fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> 
         }
         EquivalentWidth::Auto => f64::NAN,
     };
-    Ok(LocalLine { sigma_kms, equivalent_width_kms })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::positive_on_the_disc;
-
-    #[test]
-    fn limb_darkening_is_positive_where_it_should_be() {
-        for (a, b, fine) in [
-            (0.4, 0.3, true),
-            (0.7, 0.3, true),
-            (0.8, 0.3, false),
-            (1.5, -0.5, true),
-            (2.5, -1.5, false),
-            (-0.2, 0.0, true),
-            (0.0, 0.0, true),
-            (3.0, -2.9, true),
-            (3.5, -2.9, false),
-        ] {
-            assert_eq!(positive_on_the_disc(a, b), fine, "{a} {b}");
-            let least = (0..1000).map(|k| k as f64 / 1000.0).map(|x| 1.0 - a * x - b * x * x).fold(f64::MAX, f64::min);
-            assert_eq!(least > 0.0, fine, "{a} {b}: {least}");
-        }
-    }
+    Ok(LocalLine { sigma_kms, instrumental_sigma_kms: instrumental, gamma_kms, equivalent_width_kms })
 }

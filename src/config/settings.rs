@@ -1,14 +1,16 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
-use super::raw_parts::EquivalentWidth;
-use super::{ConfigError, SamplerSettings};
+use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings};
 use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
+use crate::maxent::entropy::Entropy;
+use crate::noise::ErrorSettings;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, SpotsLeft};
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
-use crate::star::{Response, StarSettings};
+use crate::star::{BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -22,7 +24,7 @@ pub struct Settings {
     pub star: StarSettings,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
-    /// All eight parameters as the config gives them: the fixed ones, and the start of the free ones.
+    /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
     pub values: ParameterValues,
     /// Where the profiles come from.
     pub source: ObservationSource,
@@ -48,8 +50,10 @@ pub enum ObservationSource {
     Files {
         /// The list, relative to the working directory.
         path: PathBuf,
-        /// Cut and scaling.
+        /// Cut and scaling, by 1 where that is left to the observations.
         options: ReadOptions,
+        /// What the observations are to say of their errors.
+        errors: ErrorSettings,
     },
     /// A simulation.
     Simulate(Simulation),
@@ -61,25 +65,46 @@ pub enum ObservationSource {
 pub struct ImagingSettings {
     /// Pixels of the image, 100 to 2,000,000 (approximately: rings hold whole numbers of pixels).
     pub pixels: usize,
-    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5.
+    /// What the pixels of the image hold.
+    #[serde(skip_serializing_if = "BrightnessModel::is_default")]
+    pub brightness: BrightnessModel,
+    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5; an image of bright and dark pixels
+    /// has no use for it.
     pub default_spot: f64,
-    /// Target chi2 per datum, above 0.
-    pub chi2_target: f64,
+    /// Target chi2 per datum, above 0. "auto": the highest value below which the radial velocities that are left over, observed
+    /// minus modelled, stop shrinking, at the config's values.
+    pub chi2_target: Automatic,
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
     /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
     #[serde(skip_serializing_if = "SpotsLeft::is_default")]
     pub spots_left: SpotsLeft,
+    /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors around 0, from
+    /// 0 (no nuisance) to 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nuisances: Option<LineAndContinuum>,
 }
 
 impl Default for ImagingSettings {
     fn default() -> Self {
         ImagingSettings {
             pixels: 2000,
+            brightness: BrightnessModel::default(),
             default_spot: 1e-4,
-            chi2_target: 0.97,
+            chi2_target: Automatic::Fixed(0.97),
             objective: ObjectiveKind::default(),
             spots_left: SpotsLeft::default(),
+            nuisances: None,
+        }
+    }
+}
+
+impl ImagingSettings {
+    /// Entropy of the image.
+    pub fn entropy(&self) -> Entropy {
+        match self.brightness {
+            BrightnessModel::Spots => Entropy::new(self.default_spot),
+            BrightnessModel::BrightAndDark => Entropy::BrightAndDark,
         }
     }
 }
@@ -128,6 +153,10 @@ impl Settings {
                 return Err(self.fault("star.line.equivalent_width_kms", &problem));
             }
             star.line.equivalent_width_kms = width;
+            if star.line.gamma_kms > 0.0 {
+                // wings beyond the profiles count too
+                star.line.equivalent_width_kms = width / share_observed(&star, &self.values, observations);
+            }
         }
         Ok(star)
     }
@@ -154,7 +183,34 @@ impl Settings {
         Ok(())
     }
 
-    fn fault(&self, key: &str, problem: &str) -> ConfigError {
+    /// The config with other observations in place of its own, those of a list at `path`; cut and errors of observed ones stay.
+    pub fn with_observations(&self, path: &str) -> serde_json::Value {
+        let mut config = self.resolved.clone();
+        if let Some(top) = config.as_object_mut() {
+            top.remove("$schema");
+        }
+        let section = &mut config["observations"];
+        match section.as_object_mut().filter(|section| !section.contains_key("simulate")) {
+            Some(section) => {
+                section.insert("path".into(), path.into());
+            }
+            None => *section = serde_json::json!({ "path": path }),
+        }
+        config
+    }
+
+    /// That something is wrong with a key.
+    pub fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }
+}
+
+/// How much of its line an unspotted star shows within the velocities of `observations`.
+fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
+    const PIXELS: usize = 2000;
+    let grid = SurfaceGrid::equal_area(PIXELS, Quadrature::Gauss2x2);
+    let depths =
+        Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()]);
+    let areas = depths.iter().sum::<f64>() * observations.step_kms / observations.profiles.len() as f64;
+    areas / star.line.equivalent_width_kms
 }

@@ -1,17 +1,27 @@
-//! The posterior with the spots that the map leaves over counted as noise.
+//! What a posterior becomes where the spots that the map leaves over are counted as noise, their size unknown.
 //!
-//! Where the quadratic holds, what they change is the difference of two quadratics: with spots left over as large as the data
-//! say at the reference (`spots`), and with spots as the entropy has them. Far from the reference, where ln L is not the
-//! quadratic any more, it falls in the same proportion: `ln L' = q' + rho (ln L - q)` with q and q' the two quadratics' changes
-//! from the reference and `rho` the ratio of their drops, softened where these are nothing: 1 at the reference, and at most 1 where
-//! spots left over make the data less certain. Left out: where the reference is.
+//! With x the coordinates of an expansion relative to its centre, its gradient g there scatters around `I x` with the covariance
+//! `S = noise + f (I - noise)`, f the size of spots left over in variance (`spots`). Close to the rotation period, an orbit can
+//! stand for spots left over and they for an orbit: which of them it is is not settled by the size that is most probable with
+//! one or the other, so that the size is integrated over, uniform in its logarithm:
+//! `p(x) = sum_f |S_f|^-1/2 exp(-(g - I x) S_f^-1 (g - I x) / 2)`.
+//!
+//! Where the quadratic holds, that changes ln L by `ln p(x) - q(x)`, q the expansion's own. Far from the reference, where ln L is
+//! not the quadratic any more, it falls in the same proportion: `ln L' = ln p + rho (ln L - q)` with all changes from the
+//! reference and `rho` the ratio of the drops of ln p and q, softened where these are nothing: 1 at the reference, and at most 1
+//! where spots left over make the data less certain. Left out: where the reference is.
 
+use super::spots::SPOTS_LEFT;
 use super::{Expansion, STELLAR, nuisances};
 use crate::log_density::{Evaluation, Status};
 use crate::objective::{Parameter, ParameterSpace, ParameterValues, Posterior};
+use nalgebra::{DMatrix, DVector};
 
 /// Drops of ln L below this are nothing.
 const SOFT: f64 = 0.1;
+
+/// Sizes that are integrated over, for each factor of ten.
+const SIZES_PER_DECADE: f64 = 4.0;
 
 /// What a posterior becomes where spots left over count as noise.
 #[derive(Clone, Debug)]
@@ -19,33 +29,61 @@ pub struct SpotsCounted {
     /// ln L as the objective has it at the reference.
     at_reference: f64,
     entropy: Expansion,
-    fitted: Expansion,
+    cautious: Expansion,
+    sizes: Vec<Size>,
+}
+
+/// The density of the gradient for one size of the spots left over: with `S = L L^t`, `L^-1 I`, `L^-1 g` and `ln |S|^-1/2`.
+#[derive(Clone, Debug)]
+struct Size {
+    information: DMatrix<f64>,
+    gradient: DVector<f64>,
+    ln_norm: f64,
 }
 
 impl SpotsCounted {
-    /// Of `posterior`, spots left over as large as they are at its reference; `None` where there is no such size.
+    /// Of `posterior`, to second order around its reference; `None` where there is no such size.
     pub fn new(posterior: &Posterior) -> Option<Self> {
         let free = posterior.space().free();
         let stellar: Vec<Parameter> = STELLAR.into_iter().filter(|&p| free.iter().any(|f| f.parameter == p)).collect();
         let reference = posterior.reference();
         let entropy = Expansion::of(posterior.imager(), reference, &stellar);
-        let fitted = entropy.with_spots_left(entropy.spots_left(&nuisances(free))?)?;
+        let mut without_planet = reference.values;
+        without_planet[Parameter::K] = 0.0;
+        // an orbit that stands for spots left over makes them look small
+        let size = [reference.values, without_planet]
+            .iter()
+            .filter_map(|values| entropy.recentred(values).spots_left(&nuisances(free)))
+            .reduce(f64::max)?;
+        let cautious = entropy.with_spots_left(size)?;
+        let places = (SIZES_PER_DECADE * (SPOTS_LEFT.1 / SPOTS_LEFT.0).log10()).ceil() as i32;
+        let factor = |place: i32| SPOTS_LEFT.0 * 10f64.powf(f64::from(place) / SIZES_PER_DECADE);
+        let sizes = (0..=places).filter_map(|place| Size::new(&entropy, factor(place))).collect();
         let theta = posterior.space().theta_of(&reference.values);
         let at_reference = posterior.likelihood(&theta).likelihood?.log_likelihood;
-        Some(SpotsCounted { at_reference, entropy, fitted })
+        Some(SpotsCounted { at_reference, entropy, cautious, sizes })
     }
 
-    /// ln L at the reference to second order, spots left over counted: what a surrogate is made of.
+    /// ln L at the reference to second order, with spots left over of the larger of the sizes that are most probable with the
+    /// reference's orbit and without a planet: what a surrogate is made of.
     pub fn expansion(&self) -> &Expansion {
-        &self.fitted
+        &self.cautious
     }
 
     /// ln L with spots left over counted, where it is `log_likelihood` with spots as the entropy has them.
     pub fn log_likelihood(&self, values: &ParameterValues, log_likelihood: f64) -> f64 {
-        let change = |expansion: &Expansion| expansion.log_likelihood_at(values) - expansion.log_likelihood;
-        let (entropy, fitted) = (change(&self.entropy), change(&self.fitted));
+        let step = self.entropy.coordinates(values) - &self.entropy.centre;
+        let counted = self.ln_density(&step) - self.ln_density(&DVector::zeros(step.len()));
+        let entropy = self.entropy.log_likelihood_at(values) - self.entropy.log_likelihood;
         let drop = |change: f64| SOFT + (-change).max(0.0);
-        self.at_reference + fitted + drop(fitted) / drop(entropy) * (log_likelihood - self.at_reference - entropy)
+        self.at_reference + counted + drop(counted) / drop(entropy) * (log_likelihood - self.at_reference - entropy)
+    }
+
+    /// ln of the density of the gradient, the size integrated over.
+    fn ln_density(&self, step: &DVector<f64>) -> f64 {
+        let terms: Vec<f64> = self.sizes.iter().map(|size| size.ln_density(step)).collect();
+        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
     }
 
     /// The posterior's `evaluation` at `theta`, spots left over counted.
@@ -59,5 +97,21 @@ impl SpotsCounted {
             return Evaluation { passes: evaluation.passes, ..Evaluation::rejected(Status::NonFinite) };
         }
         Evaluation { log_prob: log_prior + log_likelihood, ..evaluation }
+    }
+}
+
+impl Size {
+    /// Of spots left over `factor` times as large in variance as the entropy expects; `None` where that is no covariance.
+    fn new(expansion: &Expansion, factor: f64) -> Option<Self> {
+        let lower = expansion.covariance_with_spots_left(factor).cholesky()?.unpack();
+        Some(Size {
+            information: lower.solve_lower_triangular(&expansion.information)?,
+            gradient: lower.solve_lower_triangular(&expansion.gradient)?,
+            ln_norm: -lower.diagonal().iter().map(|l| l.ln()).sum::<f64>(),
+        })
+    }
+
+    fn ln_density(&self, step: &DVector<f64>) -> f64 {
+        self.ln_norm - 0.5 * (&self.gradient - &self.information * step).norm_squared()
     }
 }

@@ -22,7 +22,16 @@ pub use marginal::{Nuisance, nuisances};
 pub use spots::SPOTS_LEFT;
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
-pub const STELLAR: [Parameter; 4] = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination, Parameter::Vsini];
+pub const STELLAR: [Parameter; 8] = [
+    Parameter::OmegaEq,
+    Parameter::DOmega,
+    Parameter::Inclination,
+    Parameter::Vsini,
+    Parameter::LimbDarkening,
+    Parameter::LineSigma,
+    Parameter::EquivalentWidth,
+    Parameter::Contrast,
+];
 
 /// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic velocity
 /// together), then the stellar parameters in the units of their names.
@@ -87,13 +96,11 @@ impl Expansion {
                 information[(y, x)] -= share;
             }
         }
-        let root_weight: Vec<f64> = imager.data.inverse_variance.iter().map(|w| w.sqrt()).collect();
         let mut unanswered = model.tangents();
         for (mut column, (_, depths)) in unanswered.column_iter_mut().zip(&answers) {
-            for ((c, d), w) in column.iter_mut().zip(depths).zip(&root_weight) {
-                *c = (*c - d) * w;
-            }
+            column.iter_mut().zip(depths).for_each(|(c, d)| *c -= d);
         }
+        let unanswered = model.weigh_root(&unanswered);
         let solution = &reference.solution;
         Expansion {
             values: reference.values,
@@ -128,6 +135,13 @@ impl Expansion {
             }
         }
         direction
+    }
+
+    /// The same quadratic, written around other values.
+    pub fn recentred(&self, values: &ParameterValues) -> Self {
+        let centre = self.coordinates(values);
+        let gradient = &self.gradient - &self.information * (&centre - &self.centre);
+        Expansion { values: *values, log_likelihood: self.log_likelihood_at(values), centre, gradient, ..self.clone() }
     }
 
     /// ln L there, to second order.

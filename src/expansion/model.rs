@@ -22,6 +22,9 @@ fn step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64
         Parameter::OmegaEq => turn,
         Parameter::DOmega => 3.0 * turn,
         Parameter::Inclination => 0.5,
+        // the model is smooth in these, but for 1e-7 of it where a narrower line needs another velocity grid
+        Parameter::LimbDarkening | Parameter::Contrast => 0.02,
+        Parameter::LineSigma | Parameter::EquivalentWidth => 0.02 * values[parameter],
         _ => 1e-3 * values[parameter],
     }
 }
@@ -44,7 +47,7 @@ pub(super) struct DisplacedModel<'a> {
 impl<'a> DisplacedModel<'a> {
     pub fn new(imager: &'a Imager, reference: &'a Reference, stellar: &[Parameter]) -> Self {
         let mut map = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&reference.solution.image.logit, &mut map);
+        imager.entropy.image(&reference.solution.image.coordinates, &mut map);
         let base = imager.time_base_cycles() * imager.star.rotation_period_d;
         let steps: Vec<f64> = stellar.iter().map(|&p| step(p, &reference.values, base)).collect();
         let at = |response: Response| displaced(imager, response, &map);
@@ -111,19 +114,16 @@ impl<'a> DisplacedModel<'a> {
 
     /// `-r W D_x`: the derivative of ln L.
     pub fn slope(&self) -> DVector<f64> {
-        let residual = DVector::from_vec(self.weighted_residual());
+        let residual = DVector::from_column_slice(self.here.weighted_residual());
         -self.tangents().tr_mul(&residual)
     }
 
     /// `D_x W D_y + r W D_xy`: the curvature of chi2/2 at a fixed map.
     pub fn curvature(&self) -> DMatrix<f64> {
         let (profiles, stellar) = (self.profiles(), self.stellar.len());
-        let mut weighted = self.tangents();
-        for (mut row, w) in weighted.row_iter_mut().zip(&self.imager.data.inverse_variance) {
-            row *= w.sqrt();
-        }
+        let weighted = self.weigh_root(&self.tangents());
         let mut curvature = weighted.tr_mul(&weighted);
-        let residual = self.weighted_residual();
+        let residual = self.here.weighted_residual();
         let bent = |second: &[f64], bins: Range<usize>| bins.map(|j| residual[j] * second[j]).sum::<f64>();
         let velocity = second(&self.shifted, &self.here, VELOCITY_STEP_KMS);
         for k in 0..profiles {
@@ -159,10 +159,15 @@ impl<'a> DisplacedModel<'a> {
         (0..d[0].len()).map(|j| (d[0][j] - d[1][j] - d[2][j] + d[3][j]) / (4.0 * step_a * step_b)).collect()
     }
 
-    fn weighted_residual(&self) -> Vec<f64> {
-        let data = &self.imager.data;
-        let both = self.here.model().iter().zip(&data.depth).zip(&data.inverse_variance);
-        both.map(|((model, observed), w)| (model - observed) * w).collect()
+    /// The root of the weights times every column.
+    pub fn weigh_root(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut weighted = columns.clone();
+        for (column, mut weighted) in columns.column_iter().zip(weighted.column_iter_mut()) {
+            for k in 0..self.profiles() {
+                self.imager.data.weigh_root(self.bins(k), column.as_slice(), weighted.as_mut_slice());
+            }
+        }
+        weighted
     }
 
     fn bins(&self, profile: usize) -> Range<usize> {

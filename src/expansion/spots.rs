@@ -42,11 +42,15 @@ impl Expansion {
     /// With `S = noise + factor (information - noise)` the covariance of the gradient, the best coordinates `centre + I^-1 g`
     /// stay, and their covariance is `I^-1 S I^-1`: the new information is `I S^-1 I`, the new gradient `I S^-1 g`.
     pub fn with_spots_left(&self, factor: f64) -> Option<Self> {
-        let covariance = &self.noise + factor * self.spots();
-        let answer = covariance.cholesky()?.solve(&self.information);
+        let answer = self.covariance_with_spots_left(factor).cholesky()?.solve(&self.information);
         let information = symmetric(self.information.tr_mul(&answer));
         let gradient = answer.tr_mul(&self.gradient);
         Some(Expansion { gradient, noise: information.clone(), information, ..self.clone() })
+    }
+
+    /// Covariance of the gradient with spots left over, `factor` times as large as the entropy expects in variance.
+    pub(super) fn covariance_with_spots_left(&self, factor: f64) -> DMatrix<f64> {
+        &self.noise + factor * self.spots()
     }
 
     /// What spots add to the covariance of the gradient, as the entropy has it: positive, whatever rounding and the curvature of
@@ -115,7 +119,7 @@ mod tests {
             let shift = &information * DMatrix::from_element(n, 1, 0.3) * normal(1, 1);
             let gradient = 2.0 * normal(n, 1) + (30.0f64 * 0.05).sqrt() * &waves * normal(12, 1) + shift;
             let expansion = Expansion {
-                values: ParameterValues([0.0, 1.7, 0.0, 2.0, 0.0, 40.0, 40.0, 0.0]),
+                values: ParameterValues::of_eight([0.0, 1.7, 0.0, 2.0, 0.0, 40.0, 40.0, 0.0]),
                 cycles: (0..n).map(|k| k as f64).collect(),
                 stellar: Vec::new(),
                 log_likelihood: 0.0,

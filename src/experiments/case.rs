@@ -105,7 +105,7 @@ impl Case {
         let ends = found.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok());
         let mut outcome = Outcome {
             truth: scene.truth.map(|values| by_name(&values)).unwrap_or_default(),
-            chi2_target: scene.settings.imaging.chi2_target,
+            chi2_target: scene.settings.imaging.chi2_target.value(),
             lambda_data: reference.solution.image.lambda * data,
             spottedness: reference.solution.spottedness,
             search_reconstructions: ends.map(|end| end.evaluations).sum::<usize>() + found.optimum.evaluations,
@@ -170,7 +170,7 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
         return Err(last.into());
     }
     let first = scene(config, path)?;
-    let reached = attained(&first, first.settings.imaging.chi2_target)?;
+    let reached = attained(&first, first.settings.imaging.chi2_target.value())?;
     for factor in ABOVE_REACHED {
         if pool.stopped() {
             return Err(ExperimentError::Interrupted);
@@ -265,7 +265,7 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentEr
     let imager = &scene.imager;
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target,
+        chi2_target: scene.settings.imaging.chi2_target.value(),
         nuisances: Vec::new(),
         search: PeriodSearch { draws, seed: 1 },
         eccentric: false,

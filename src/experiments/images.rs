@@ -95,7 +95,7 @@ pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         (laboratory.report)(&format!("R2, {name}"));
         let scene = scene(laboratory, &changes)?;
         let settings = &scene.settings;
-        let target = settings.imaging.chi2_target;
+        let target = settings.imaging.chi2_target.value();
         // without its planet a star may not be fitted that well: then as well as it can be without turning noise into spots
         let reference = Reference::build(&scene.imager, settings.values, target)
             .or_else(|_| Reference::provisional(&scene.imager, settings.values, target))?;

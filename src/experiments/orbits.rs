@@ -90,8 +90,11 @@ const WAYS: [&str; 3] = ["equatorial_velocity_kept", "rotation_fitted", SPOTS_LE
 /// The way in which the chain counts what maps leave over of spots.
 const SPOTS_LEFT_FITTED: &str = "spots_left_fitted";
 
-/// Both ways of taking what maps leave over of spots: what is varied, and the change of the config that it takes.
-fn ways_with_spots_left() -> [((&'static str, f64), Option<(&'static str, Value)>); 2] {
+/// What is varied, and the change of the config that it takes.
+type Way = ((&'static str, f64), Option<(&'static str, Value)>);
+
+/// Both ways of taking what maps leave over of spots.
+fn ways_with_spots_left() -> [Way; 2] {
     [((SPOTS_LEFT_FITTED, 0.0), None), ((SPOTS_LEFT_FITTED, 1.0), Some(("/imaging/spots_left", json!("fitted"))))]
 }
 

@@ -65,7 +65,8 @@ const STELLAR: [Stellar; 4] = [
 
 /// R12.
 pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
-    let names: Vec<&str> = Parameter::ALL.iter().filter(|&&p| p != Parameter::Vsys).map(|p| p.name()).collect();
+    let names: Vec<&str> =
+        Parameter::ALL.iter().filter(|&&p| p != Parameter::Vsys && !p.is_surface()).map(|p| p.name()).collect();
     let ends = ["true", "median", "low68", "high68", "low95", "high95"];
     let of_one = |name: &&str| ends.map(|end| format!("{name}_{end}"));
     let mut report = Report::new(["dimensions".to_owned()].into_iter().chain(names.iter().flat_map(of_one)));

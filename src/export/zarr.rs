@@ -122,7 +122,7 @@ fn sample_stats(contents: &Contents, draws: &Draws) -> Group {
     let move_words = std::iter::once("start").chain(MoveKind::ALL.map(MoveKind::name)).collect();
     let arrays = vec![
         floats("lp", "ln of the posterior density", "1", |record| record.log_prob),
-        floats("spottedness", "fractional spot coverage", "1", |record| record.spottedness),
+        floats("spottedness", "spottedness of the image", "1", |record| record.spottedness),
         floats("chi2", "chi2 of the reconstruction", "1", |record| record.chi2),
         codes("status", "how the evaluation of the draw ended", status_words(), |record| status(record.status)),
         variable("accepted", draws, accepted, about("whether the draw is new at its step")),

@@ -52,6 +52,8 @@ pub enum ColourMap {
     Cividis,
     /// Pale yellow to black: from photosphere to spot.
     Spots,
+    /// Black over pale yellow in the middle to dark blue: darker and brighter than the photosphere.
+    Brightness,
 }
 
 impl ColourMap {
@@ -76,7 +78,21 @@ impl ColourMap {
             Colour::hex(0x663322),
             Colour::hex(0x1e1014),
         ];
+        const BRIGHTNESS: [Colour; 11] = [
+            SPOTS[5],
+            SPOTS[4],
+            SPOTS[3],
+            SPOTS[2],
+            SPOTS[1],
+            SPOTS[0],
+            Colour::hex(0xb9dcea),
+            Colour::hex(0x6fb1d6),
+            Colour::hex(0x307eb8),
+            Colour::hex(0x124c86),
+            Colour::hex(0x08234f),
+        ];
         match self {
+            ColourMap::Brightness => &BRIGHTNESS,
             ColourMap::Cividis => &CIVIDIS,
             ColourMap::Spots => &SPOTS,
         }
@@ -107,5 +123,9 @@ mod tests {
             let greys: Vec<f64> = (0..=20).map(|k| sign * luminance(map.at(f64::from(k) / 20.0))).collect();
             assert!(greys.windows(2).all(|w| w[1] > w[0] + 2.0), "{map:?}: {greys:?}");
         }
+        // either side of the photosphere by itself
+        let greys: Vec<f64> = (0..=20).map(|k| luminance(ColourMap::Brightness.at(f64::from(k) / 20.0))).collect();
+        assert!(greys[..=10].windows(2).all(|w| w[1] > w[0] + 2.0), "{greys:?}");
+        assert!(greys[10..].windows(2).all(|w| w[1] < w[0] - 2.0), "{greys:?}");
     }
 }

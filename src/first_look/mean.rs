@@ -64,7 +64,7 @@ impl MeanProfile {
         }
         let count = profiles.len() as f64;
         let velocities = (0..=bins as usize).map(|j| first + j as f64 * step);
-        let depth = velocities.map(|v| profiles.iter().map(|p| 1.0 - intensity_at(p, step, v)).sum::<f64>() / count);
+        let depth = velocities.map(|v| profiles.iter().map(|p| 1.0 - p.intensity_at(v, step)).sum::<f64>() / count);
         let variance: f64 = profiles.iter().map(|p| super::median(p.sigma.clone()).powi(2)).sum();
         Ok(MeanProfile {
             first_velocity_kms: first,
@@ -129,14 +129,4 @@ impl MeanProfile {
         };
         Ok(HalfDepth { blue_kms: crossing(blue, blue + 1), red_kms: crossing(red, red - 1) })
     }
-}
-
-/// Intensity of a profile at a velocity within its range, linear between bins.
-fn intensity_at(profile: &Profile, step_kms: f64, velocity_kms: f64) -> f64 {
-    let position = (velocity_kms - profile.first_velocity_kms) / step_kms;
-    let below = (position.floor().max(0.0) as usize).min(profile.intensity.len() - 2);
-    let part = (position - below as f64).clamp(0.0, 1.0);
-    // rounding of VRAD does not mix neighbours
-    let part = if part < 1e-6 { 0.0 } else { part };
-    profile.intensity[below] + part * (profile.intensity[below + 1] - profile.intensity[below])
 }

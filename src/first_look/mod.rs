@@ -9,7 +9,7 @@ mod noise;
 mod unspotted;
 
 pub use mean::{HalfDepth, MeanProfile};
-pub use noise::Noise;
+pub use noise::{Noise, Scatter};
 pub use unspotted::Unspotted;
 
 use crate::observation::Observations;

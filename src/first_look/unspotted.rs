@@ -107,7 +107,7 @@ impl Model {
                 epoch_d: 0.0,
                 limb_darkening: line.law(),
                 contrast: 0.0,
-                line: LocalLine { sigma_kms: line.sigma_kms, equivalent_width_kms: 1.0 },
+                line: LocalLine::gaussian(line.sigma_kms, 1.0),
             },
         }
     }
@@ -121,6 +121,7 @@ impl Model {
             vsini_kms,
             vsys_kms: centre_kms,
             orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 },
+            surface: Default::default(),
         };
         let bins = (0.0, profile.first_velocity_kms, profile.depth.len());
         let sampling = Sampling { step_kms: profile.step_kms, profiles: vec![bins] };

@@ -5,13 +5,13 @@
 
 mod error;
 mod text;
+mod writing;
 
 pub use error::LsdError;
+pub use writing::{write, write_as};
 
-use super::atomic;
 use crate::observation::{Observations, Profile};
 use sha2::{Digest, Sha256};
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use text::{Axis, MIN_BINS, RawProfile, shown};
 
@@ -39,9 +39,19 @@ pub struct DataSet {
     pub sha256: String,
 }
 
+/// What a list says of a profile beside its time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Label {
+    /// Its file, as the list names it.
+    pub file: String,
+    /// Velocity that is subtracted from its axis (km/s).
+    pub vrad_kms: f64,
+}
+
 /// One line of the list.
 struct Entry {
     line: usize,
+    file: String,
     path: PathBuf,
     time_d: f64,
     vrad_kms: f64,
@@ -94,6 +104,16 @@ pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<D
     }
 }
 
+/// What the list at `list` says of its profiles, in its order.
+///
+/// # Errors
+/// A list that cannot be read or makes no sense.
+pub fn labels(list: &Path) -> Result<Vec<Label>, LsdError> {
+    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
+    let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
+    Ok(entries.into_iter().map(|Entry { file, vrad_kms, .. }| Label { file, vrad_kms }).collect())
+}
+
 fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {
     std::fs::read(&entry.path).map_err(|source| LsdError::Profile {
         list: list.into(),
@@ -119,7 +139,7 @@ fn parse_list(list: &Path, text: &str) -> Result<Vec<Entry>, LsdError> {
             [file, time, vrad] => (file, number("time", time)?, number("radial velocity", vrad)?),
             _ => return Err(fail(format!("{} columns where FILE TIME_DAYS [VRAD_KMS] is due", fields.len()))),
         };
-        entries.push(Entry { line, path: folder.join(file), time_d, vrad_kms });
+        entries.push(Entry { line, file: file.to_owned(), path: folder.join(file), time_d, vrad_kms });
     }
     Ok(entries)
 }
@@ -160,35 +180,4 @@ fn too_few(entry: &Entry, axis: &Axis, (lo, hi): (f64, f64), bins: usize) -> Lsd
     let problem =
         format!("velocity range [{lo}, {hi}] km/s {what}; the data reach from {from:.3} to {to:.3} km/s after VRAD");
     LsdError::File { path: entry.path.clone(), problem }
-}
-
-/// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The list
-/// comes last, so that where it is the profiles are; files of these names are replaced.
-///
-/// Times are exact, intensities good to 5e-13. Profiles that do not share one velocity axis can be written, but not read back.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
-    let mut list = String::from("# file  time_d\n");
-    for (k, profile) in observations.profiles.iter().enumerate() {
-        let name = format!("p{k:03}.prof");
-        save(&folder.join(&name), &profile_text(k, profile, observations.step_kms))?;
-        // Writing to a String cannot fail.
-        let _ = writeln!(list, "{name} {}", profile.time_d);
-    }
-    save(&folder.join("observations.txt"), &list)
-}
-
-fn profile_text(k: usize, profile: &Profile, step_kms: f64) -> String {
-    let mut text = format!("*** Synthetic Stokes I profile {k}\n {} 2\n", profile.intensity.len());
-    for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
-        let velocity = profile.velocity_kms(j, step_kms);
-        let _ = writeln!(text, "{velocity:16.9} {intensity:.12} {sigma:.12e}");
-    }
-    text
-}
-
-fn save(path: &Path, text: &str) -> Result<(), LsdError> {
-    Ok(atomic::write(path, text.as_bytes())?)
 }

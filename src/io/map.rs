@@ -5,8 +5,10 @@
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::provenance::Provenance;
-use crate::fit::{Fit, FitSummary};
+use crate::fit::{Checks, Fit, FitSummary};
 use crate::imaging::Imager;
+use crate::maxent::entropy::Entropy;
+use crate::nuisances::LineAndContinuum;
 use crate::objective::ParameterValues;
 use crate::observation::Observations;
 use crate::star::SurfaceGrid;
@@ -22,8 +24,8 @@ pub struct MapResult<'a> {
     pub observations: &'a Observations,
     /// The reconstruction.
     pub fit: &'a Fit,
-    /// The true map on the imager's pixels, for simulated data.
-    pub true_spot_filling: Option<&'a [f64]>,
+    /// The true map on the imager's pixels, of the same kind, for simulated data.
+    pub true_map: Option<&'a [f64]>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
     /// Config, data and program.
@@ -55,8 +57,23 @@ struct MapFile<'a> {
     longitude_deg: Vec<f64>,
     latitude_deg: Vec<f64>,
     area_fraction: &'a [f64],
-    spot_filling: &'a [f64],
-    true_spot_filling: Option<&'a [f64]>,
+    #[serde(flatten)]
+    map: MapColumns<'a>,
+}
+
+/// What the pixels hold.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum MapColumns<'a> {
+    Spots {
+        spot_filling: &'a [f64],
+        true_spot_filling: Option<&'a [f64]>,
+    },
+    /// Relative to the photosphere. Profiles say nothing of the scale; the entropy has it near 1.
+    BrightAndDark {
+        brightness: &'a [f64],
+        true_brightness: Option<&'a [f64]>,
+    },
 }
 
 /// The content of `fit.json`.
@@ -64,7 +81,11 @@ struct MapFile<'a> {
 struct FitFile<'a> {
     #[serde(flatten)]
     summary: &'a FitSummary,
+    /// One entry a profile, in the order of the list.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    nuisances: &'a [LineAndContinuum],
     truth: Option<ParameterValues>,
+    checks: &'a Checks,
     trade_off: Vec<TradeOffNode>,
     #[serde(flatten)]
     provenance: &'a Provenance,
@@ -95,22 +116,32 @@ impl MapResult<'_> {
     fn map(&self) -> MapFile<'_> {
         let SurfaceGrid { longitude, latitude, area, rings, .. } = &self.imager.grid;
         let degrees = |angles: &[f64]| angles.iter().map(|x| x.to_degrees()).collect();
-        let mean = |map: &[f64]| map.iter().zip(area).map(|(s, a)| s * a).sum();
+        let (map, true_map) = (&self.fit.map[..], self.true_map);
+        let coverage = |map: &[f64]| map.iter().zip(area).map(|(s, a)| s * a).sum();
+        let entropy = self.imager.entropy;
+        let (true_spottedness, map) = match entropy {
+            Entropy::Spots { .. } => {
+                (true_map.map(coverage), MapColumns::Spots { spot_filling: map, true_spot_filling: true_map })
+            }
+            Entropy::BrightAndDark => {
+                let deviation = true_map.map(|map| entropy.spottedness(map, area));
+                (deviation, MapColumns::BrightAndDark { brightness: map, true_brightness: true_map })
+            }
+        };
         MapFile {
             conventions: CONVENTIONS,
             rotation_period_d: self.imager.star.rotation_period_d,
             epoch_d: self.imager.star.epoch_d,
             parameters: self.fit.summary.parameters,
-            contrast: self.imager.star.contrast,
+            contrast: self.fit.summary.contrast,
             spottedness: self.fit.summary.spottedness,
-            true_spottedness: self.true_spot_filling.map(mean),
+            true_spottedness,
             pixels: self.imager.grid.len(),
             ring_pixels: rings.iter().map(|ring| ring.pixels.len()).collect(),
             longitude_deg: degrees(longitude),
             latitude_deg: degrees(latitude),
             area_fraction: area,
-            spot_filling: &self.fit.spot_filling,
-            true_spot_filling: self.true_spot_filling,
+            map,
         }
     }
 
@@ -149,7 +180,9 @@ impl MapResult<'_> {
         };
         FitFile {
             summary: &self.fit.summary,
+            nuisances: &self.fit.nuisances,
             truth: self.truth,
+            checks: &self.fit.checks,
             trade_off: self.fit.tradeoff.iter().map(node).collect(),
             provenance: self.provenance,
         }

@@ -1,6 +1,8 @@
 //! What every result says of where it came from.
 
-use serde::Serialize;
+use crate::noise::MeasuredErrors;
+use crate::objective::target::ChosenTarget;
+use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -13,4 +15,32 @@ pub struct Provenance {
     pub config_sha256: String,
     /// The config with all defaults filled in.
     pub config: serde_json::Value,
+    /// What the config leaves to the observations.
+    #[serde(skip_serializing_if = "Measured::is_empty")]
+    pub measured: Measured,
+}
+
+/// Settings that were taken from the observations before anything else.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// `observations.sigma_scale` and `.weights`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors: Option<MeasuredErrors>,
+    /// `imaging.chi2_target`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chi2_target: Option<ChosenTarget>,
+}
+
+impl Measured {
+    /// Whether the config leaves nothing to the observations.
+    pub fn is_empty(&self) -> bool {
+        *self == Measured::default()
+    }
+
+    /// It in words, label and text a line.
+    pub fn lines(&self) -> Vec<(&'static str, String)> {
+        let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
+        let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
+        errors.into_iter().chain(target).collect()
+    }
 }

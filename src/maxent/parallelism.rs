@@ -3,18 +3,18 @@
 use super::entropy::Entropy;
 use super::problem::Problem;
 
-/// `1/2 |grad S / |grad S| - grad C / |grad C||^2` at the image of the given logits, lengths by the entropy's metric: 0 where the
+/// `1/2 |grad S / |grad S| - grad C / |grad C||^2` at the image of the given coordinates, lengths by the entropy's metric: 0 where the
 /// gradients are parallel, as at every maximum-entropy image, 1 where they are perpendicular; NaN where one of them vanishes.
 ///
 /// Moves `problem` to the image.
-pub fn parallelism(problem: &mut impl Problem, entropy: Entropy, logit: &[f64]) -> f64 {
-    let n = logit.len();
+pub fn parallelism(problem: &mut impl Problem, entropy: Entropy, coordinates: &[f64]) -> f64 {
+    let n = coordinates.len();
     let [mut image, mut scale, mut towards_default, mut misfit] = [(); 4].map(|()| vec![0.0; n]);
-    entropy.image(logit, &mut image);
+    entropy.image(coordinates, &mut image);
     entropy.metric(&image, problem.area(), &mut scale);
     problem.linearise(&image);
     problem.gradient(&mut misfit);
-    entropy.gradient(logit, problem.area(), &mut towards_default);
+    entropy.gradient(coordinates, problem.area(), &mut towards_default);
     // the gradient of -S, so that the sum is what vanishes
     let product = |a: &[f64], b: &[f64]| -> f64 { (0..n).map(|p| a[p] * b[p] * scale[p] * scale[p]).sum() };
     let (s, c) = (product(&towards_default, &towards_default).sqrt(), product(&misfit, &misfit).sqrt());

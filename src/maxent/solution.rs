@@ -76,11 +76,11 @@ pub enum Termination {
     NonFinite,
 }
 
-/// An image where the solver starts or stops: logits of the spot filling factors and the Lagrange multiplier.
+/// An image where the solver starts or stops: coordinates of its pixels and the Lagrange multiplier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
-    /// logit of the filling factor of every pixel.
-    pub logit: Vec<f64>,
+    /// Coordinate of every pixel, as its entropy has it.
+    pub coordinates: Vec<f64>,
     /// Lagrange multiplier of chi2/2.
     pub lambda: f64,
 }
@@ -115,7 +115,7 @@ impl Start {
     /// An image without data: every pixel at the default, and a lambda for which data begin to matter.
     pub fn blank(entropy: &Entropy, pixels: usize, lambda: f64) -> Self {
         Start {
-            image: Image { logit: vec![entropy.default_logit(); pixels], lambda },
+            image: Image { coordinates: vec![entropy.default_coordinate(); pixels], lambda },
             path: Vec::new(),
             chi2_slope: 0.0,
             adjoint: Vec::new(),
@@ -135,7 +135,7 @@ pub struct Solution {
     pub chi2: f64,
     /// Entropy of the image.
     pub entropy: f64,
-    /// Spottedness `sum a s`.
+    /// Spottedness, as its entropy has it.
     pub spottedness: f64,
     /// First-order forecast of what spottedness has still to change at this chi2, from the start's adjoint.
     pub spottedness_left: f64,

@@ -13,8 +13,8 @@ use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing, lambda_step};
 
-/// Largest change of a logit in one step.
-const LOGIT_CAP: f64 = 2.0;
+/// Largest change of a coordinate in one step.
+const STEP_CAP: f64 = 2.0;
 
 /// Largest change of ln(lambda) that is made before the first Newton step.
 const RESTORE_REACH: f64 = 0.3;
@@ -58,7 +58,7 @@ struct Newton {
 impl Solver<'_> {
     /// Solves `problem` for `goal` from `start`.
     pub fn solve(&self, problem: &mut impl Problem, goal: Goal, start: &Start) -> Solution {
-        let mut at = self.arrive(problem, start.image.logit.clone(), start.image.lambda);
+        let mut at = self.arrive(problem, start.image.coordinates.clone(), start.image.lambda);
         if let Goal::Lambda(lambda) = goal {
             at.lambda = lambda;
         }
@@ -70,17 +70,17 @@ impl Solver<'_> {
         let mut curvature = Curvature::GaussNewton;
         for newton_steps in 0.. {
             if !(at.chi2.is_finite() && at.entropy.is_finite()) {
-                return self.finish(problem, at, None, Vec::new(), Termination::NonFinite, newton_steps);
+                return self.finish(at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
             let guide = Guide { preconditioner: self.preconditioner, path: &path, adjoint: &start.adjoint };
             let standing = Standing::of(problem, self.entropy, &at, goal, guide);
-            let drop = start.best.map_or(0.0, |best| standing.below(&best, problem.area(), &at, goal));
+            let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal));
             if standing.error < self.settings.tolerance_at(drop).max(ROUNDING * at.chi2) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
-                return self.finish(problem, at, Some(standing), path, why, newton_steps);
+                return self.finish(at, Some(standing), path, why, newton_steps);
             }
             if newton_steps == self.settings.newton_steps {
-                return self.finish(problem, at, Some(standing), path, Termination::StepLimit, newton_steps);
+                return self.finish(at, Some(standing), path, Termination::StepLimit, newton_steps);
             }
             let newton = self.newton(problem, &at, &standing, goal, path, curvature);
             let move_lambda = lambda_step(&at, newton.chi2_path, newton.chi2_step, goal);
@@ -98,7 +98,7 @@ impl Solver<'_> {
     pub fn apply_inverse(&self, problem: &mut impl Problem, image: &Image, right: &[f64]) -> Vec<f64> {
         let n = right.len();
         let (mut s, mut scale) = (vec![0.0; n], vec![0.0; n]);
-        self.entropy.image(&image.logit, &mut s);
+        self.entropy.image(&image.coordinates, &mut s);
         self.entropy.metric(&s, problem.area(), &mut scale);
         let scaled: Vec<f64> = right.iter().zip(&scale).map(|(r, d)| r * d).collect();
         let mut z = vec![0.0; n];
@@ -111,7 +111,8 @@ impl Solver<'_> {
         let mut s = vec![0.0; u.len()];
         let entropy = self.entropy.value(&u, problem.area(), &mut s);
         let chi2 = problem.linearise(&s);
-        Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy }
+        let spottedness = self.entropy.spottedness(&s, problem.area());
+        Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy, spottedness }
     }
 
     /// Moves along the start's path to where its slope says that chi2 meets the goal: one pass that spares a Newton step.
@@ -126,7 +127,7 @@ impl Solver<'_> {
         self.entropy.metric(&at.s, problem.area(), &mut ds);
         ds.iter_mut().zip(&start.path).for_each(|(d, z)| *d *= z);
         let mut u = vec![0.0; at.u.len()];
-        self.entropy.step(&at.u, &at.s, &ds, move_lambda, LOGIT_CAP, &mut u);
+        self.entropy.step(&at.u, &at.s, &ds, move_lambda, STEP_CAP, &mut u);
         self.arrive(problem, u, at.lambda * move_lambda.exp())
     }
 
@@ -194,7 +195,7 @@ impl Solver<'_> {
         let mut length = 1.0;
         loop {
             let mut u = vec![0.0; at.u.len()];
-            self.entropy.step(&at.u, &at.s, &ds, length, LOGIT_CAP, &mut u);
+            self.entropy.step(&at.u, &at.s, &ds, length, STEP_CAP, &mut u);
             let next = self.arrive(problem, u, lambda);
             let small = 1e-9 * before.abs() + self.settings.tolerance * lambda;
             if merit(&next) <= before + small || length < 1e-4 {
@@ -206,14 +207,12 @@ impl Solver<'_> {
 
     fn finish(
         &self,
-        problem: &mut impl Problem,
         at: Point,
         standing: Option<Standing>,
         path: Vec<f64>,
         termination: Termination,
         newton_steps: usize,
     ) -> Solution {
-        let area = problem.area();
         let finite = at.chi2.is_finite() && at.entropy.is_finite() && at.lambda.is_finite();
         let (chi2_slope, spottedness_slope, spottedness_left) =
             standing.map_or((0.0, 0.0, 0.0), |s| (s.chi2_path, s.spottedness_path, s.spottedness_left));
@@ -221,9 +220,9 @@ impl Solver<'_> {
             termination: if finite { termination } else { Termination::NonFinite },
             chi2: at.chi2,
             entropy: at.entropy,
-            spottedness: dot(&at.s, area),
+            spottedness: at.spottedness,
             spottedness_left,
-            image: Image { logit: at.u, lambda: at.lambda },
+            image: Image { coordinates: at.u, lambda: at.lambda },
             chi2_slope,
             spottedness_slope,
             path,

@@ -35,13 +35,14 @@ const REST_ERROR: f64 = 40.0;
 
 /// An image with what has been computed there.
 pub(super) struct Point {
-    /// Logits of the image.
+    /// Coordinates of the image.
     pub u: Vec<f64>,
     /// The image.
     pub s: Vec<f64>,
     pub lambda: f64,
     pub chi2: f64,
     pub entropy: f64,
+    pub spottedness: f64,
 }
 
 /// What the gradient at a point says.
@@ -94,18 +95,22 @@ impl Standing {
                 let (spanned, rest) = guide.preconditioner.norms(at.lambda, &standing.right);
                 standing.error = 0.5 * (spanned + rest) / at.lambda;
             }
-            Goal::Chi2 { .. } if guide.path.len() == n => standing.forecast(problem.area(), at, goal, guide),
+            Goal::Chi2 { .. } if guide.path.len() == n => {
+                let weights = entropy.spottedness_gradient(&at.s, problem.area());
+                standing.forecast(&weights, at, goal, guide, entropy.lowest_coordinate());
+            }
             // without a path there is no telling how far chi2 is from its target
             Goal::Chi2 { .. } => {}
         }
         standing
     }
 
-    fn forecast(&mut self, area: &[f64], at: &Point, goal: Goal, guide: Guide) {
+    /// `weights` is the gradient of spottedness with respect to the image, `lowest` the bound of the coordinates.
+    fn forecast(&mut self, weights: &[f64], at: &Point, goal: Goal, guide: Guide, lowest: f64) {
         let Guide { preconditioner, path, adjoint } = guide;
         let (g, right) = (&self.chi2_gradient, &self.right);
         self.chi2_path = 2.0 * dot(g, path);
-        self.spottedness_path = self.scale.iter().zip(area).zip(path).map(|((d, a), z)| d * a * z).sum();
+        self.spottedness_path = self.scale.iter().zip(weights).zip(path).map(|((d, a), z)| d * a * z).sum();
         let chi2_step = -2.0 * dot(path, right) / at.lambda;
         let move_lambda = lambda_step(at, self.chi2_path, chi2_step, goal);
         if let Goal::Chi2 { target, largest_lambda } = goal {
@@ -114,6 +119,12 @@ impl Standing {
         }
         let mut left = right.clone();
         axpy(-move_lambda * at.lambda, g, &mut left);
+        // a pixel at its bound that would go beyond stays where it is, whatever the steps: no error that they could make smaller
+        for (left, u) in left.iter_mut().zip(&at.u) {
+            if *u <= lowest && *left < 0.0 {
+                *left = 0.0;
+            }
+        }
         let (spanned, rest) = preconditioner.norms(at.lambda, &left);
         let (spanned, rest) = (0.5 * spanned / at.lambda, 0.5 * rest / at.lambda);
         self.error = spanned + rest;
@@ -142,12 +153,12 @@ impl Standing {
     }
 
     /// About how far the solution at hand is below `best` in log-likelihood.
-    pub fn below(&self, best: &Best, area: &[f64], at: &Point, goal: Goal) -> f64 {
+    pub fn below(&self, best: &Best, at: &Point, goal: Goal) -> f64 {
         match goal {
             Goal::Lambda(lambda) => best.merit - (at.entropy / lambda - 0.5 * at.chi2),
             Goal::Chi2 { target, .. } => {
                 let misfit = 0.5 * (at.chi2 - target);
-                let more = dot(&at.s, area) - best.spottedness;
+                let more = at.spottedness - best.spottedness;
                 // along the path a misfit of chi2 is worth as much spottedness
                 misfit - more * self.worth()
             }

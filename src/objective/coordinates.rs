@@ -21,7 +21,7 @@ pub struct FreeParameter {
 pub struct ParameterSpace {
     /// The free parameters in the order of [`Parameter::ALL`].
     free: Vec<FreeParameter>,
-    /// Values of all eight; those of the free ones are where a search starts.
+    /// Values of all; those of the free ones are where a search starts.
     values: ParameterValues,
     names: Vec<String>,
     /// Rotation cycle in the middle of the time base, and its length.
@@ -66,7 +66,7 @@ impl ParameterSpace {
         &self.free
     }
 
-    /// Values of all eight parameters at `theta`.
+    /// Values of all parameters at `theta`.
     pub fn values_at(&self, theta: &[f64]) -> ParameterValues {
         let mut values = self.values;
         for (f, &x) in self.free.iter().zip(theta) {
@@ -157,6 +157,10 @@ impl ParameterSpace {
             Parameter::DOmega => 3.0 * omega,
             Parameter::Inclination => 0.5,
             Parameter::Vsini => 5e-4 * self.values[Parameter::Vsini],
+            Parameter::LimbDarkening => 0.01,
+            Parameter::LineSigma => 0.01 * self.values[Parameter::LineSigma],
+            Parameter::EquivalentWidth => 2e-3 * self.values[Parameter::EquivalentWidth],
+            Parameter::Contrast => 0.02,
         };
         self.free.iter().map(scale).collect()
     }
@@ -174,7 +178,13 @@ mod tests {
             uniform(Parameter::K, 0.0, 0.3),
             uniform(Parameter::PorbOverProt, 0.5, 4.0),
         ];
-        ParameterSpace::new(free, ParameterValues([0.1, 1.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]), 1.47, 2.94, 3.0)
+        ParameterSpace::new(
+            free,
+            ParameterValues::of_eight([0.1, 1.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]),
+            1.47,
+            2.94,
+            3.0,
+        )
     }
 
     #[test]

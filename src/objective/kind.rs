@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObjectiveKind {
-    /// Spottedness at the target chi2, turned into a log-probability by the trade-off curve.
+    /// Spottedness at the target chi2 (coverage by spots; rms of brightness minus 1 of bright and dark images), turned into a log-probability by the trade-off curve.
     #[default]
     Spottedness,
     /// Entropy at the target chi2, turned into a log-probability in the same way.
@@ -36,7 +36,7 @@ pub enum SpotsLeft {
     /// Porb = Prot.
     #[default]
     Entropy,
-    /// Their size is fitted to the data, as a jitter's would be, and the chain counts them as noise.
+    /// The chain counts them as noise, of a size that the data tell, as a jitter's, and that is integrated over.
     Fitted,
 }
 

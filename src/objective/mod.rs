@@ -8,6 +8,7 @@ pub mod posterior;
 mod prediction;
 pub mod prior;
 pub mod reference;
+pub mod target;
 pub mod tradeoff;
 
 pub use coordinates::{FreeParameter, ParameterSpace};

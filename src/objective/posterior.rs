@@ -12,7 +12,7 @@ use crate::imaging::{Imager, ImagingProblem};
 use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
 use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Termination};
 use crate::star::Response;
-use crate::star::response::MOST_NODES;
+use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
 
 /// The posterior of the free parameters.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ impl Posterior {
     pub fn new(imager: Imager, space: ParameterSpace, kind: ObjectiveKind, reference: Reference) -> Self {
         // the reference's pixels serve only if its fixed parameters are those of the space
         let here = space.values_at(&space.theta_of(&reference.values));
-        let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here[p] == reference.values[p])
+        let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.agrees(&reference.values, p))
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
         let mut posterior = Posterior { imager, space, kind, reference, settings, prediction: None, velocities_only };
@@ -90,11 +90,14 @@ impl Posterior {
         let values = self.space.values_at(theta);
         let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
         let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
-        if !values.0.iter().all(|x| x.is_finite()) {
+        if !Parameter::ALL.iter().filter_map(|&p| values.given(p)).chain(theta.iter().copied()).all(f64::is_finite) {
             return false;
         }
-        let (_, nodes) = Response::velocity_grid(&self.imager.star, &values.state(), self.imager.sampling.step_kms);
+        let state = values.state();
+        let (steps, nodes) = Response::velocity_grid(&self.imager.star, &state, self.imager.sampling.step_kms);
         nodes <= MOST_NODES
+            && steps <= MOST_STEPS_PER_BIN
+            && self.imager.star.with(&state.surface).is_possible()
             && fastest.is_finite()
             && fastest <= LARGEST_VSINI_KMS
             && values[Parameter::Vsini] > 0.0
@@ -155,7 +158,7 @@ impl Posterior {
     /// What changes of the forward model at a fixed map do to ln L: `weight_chi2 * chi2 + slope along direction`.
     ///
     /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem). Spottedness
-    /// is not: with `A' = a` and the constraint chi2 = target, the adjoint system `H y = a - 2 mu g`, `g y = 0` (g the
+    /// is not: with `A'` the gradient of spottedness and the constraint chi2 = target, the adjoint system `H y = A' - 2 mu g`, `g y = 0` (g the
     /// gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`.
     fn sensitivity(&self, solution: &Solution, problem: &mut ImagingProblem) -> (f64, Option<Vec<f64>>) {
         let curve_slope = self.log_likelihood(solution).1;
@@ -168,15 +171,17 @@ impl Posterior {
             // beyond the reach of the target: the leading term of its misfit
             _ if unreachable => (-0.5, None),
             _ => {
-                let area = self.imager.grid.area.clone();
+                let (entropy, area) = (self.imager.entropy, &self.imager.grid.area);
+                let [mut image, mut scale] = [(); 2].map(|()| vec![0.0; area.len()]);
+                entropy.image(&solution.image.coordinates, &mut image);
+                entropy.metric(&image, area, &mut scale);
                 let exact = Solver { settings: SolverSettings::exact(), ..self.solver() };
-                let inverse = exact.apply_inverse(problem, &solution.image, &area);
+                let inverse =
+                    exact.apply_inverse(problem, &solution.image, &entropy.spottedness_gradient(&image, area));
                 let mu = solution.spottedness_slope / solution.chi2_slope;
-                let mut image = vec![0.0; area.len()];
-                self.imager.entropy.image(&solution.image.logit, &mut image);
-                let path = |p: usize| solution.path[p] * (image[p] * (1.0 - image[p]) / area[p]).sqrt();
                 let weight = -0.5 * curve_slope * lambda;
-                let adjoint = |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * path(p)) };
+                let adjoint =
+                    |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * (solution.path[p] * scale[p])) };
                 let direction = inverse.iter().enumerate().map(adjoint).collect();
                 (-0.5 * curve_slope * mu, Some(direction))
             }
@@ -225,7 +230,7 @@ impl Gradient for Posterior {
         }
         let (weight, direction) = self.sensitivity(&solution, &mut problem);
         let mut image = vec![0.0; self.imager.grid.len()];
-        self.imager.entropy.image(&solution.image.logit, &mut image);
+        self.imager.entropy.image(&solution.image.coordinates, &mut image);
         let internal = self.space.to_internal(theta);
         let response = problem.response().clone();
         let at_fixed_map = |i: usize, h: f64| {

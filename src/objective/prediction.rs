@@ -54,7 +54,7 @@ impl Prediction {
         let solution = &reference.solution;
         let n = imager.grid.len();
         let mut map = vec![0.0; n];
-        imager.entropy.image(&solution.image.logit, &mut map);
+        imager.entropy.image(&solution.image.coordinates, &mut map);
         let mut scale = vec![0.0; n];
         imager.entropy.metric(&map, &imager.grid.area, &mut scale);
         let mut problem = imager.problem(reference.response.clone());
@@ -65,7 +65,8 @@ impl Prediction {
         let adjoint = match kind {
             ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => Vec::new(),
             ObjectiveKind::Spottedness => {
-                let inverse = solver.apply_inverse(&mut problem, &solution.image, &imager.grid.area);
+                let weights = imager.entropy.spottedness_gradient(&map, &imager.grid.area);
+                let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
                 let adjoint = inverse.iter().zip(&scale).zip(&solution.path);
                 adjoint.map(|((y, scale), path)| (y / scale + along_path * path) / scale).collect()
@@ -107,7 +108,7 @@ impl Prediction {
         let shifts: Vec<f64> = x.iter().zip(&self.origin).map(|(x, x0)| x - x0).collect();
         let farthest = shifts.iter().zip(&self.scales).map(|(d, s)| (d / s).abs()).fold(0.0, f64::max);
         let shrink = (REACH / farthest).min(1.0);
-        let n = start.image.logit.len();
+        let n = start.image.coordinates.len();
         let (mut ds, mut ln_lambda) = (vec![0.0; n], 0.0);
         for ((shift, image), along) in shifts.iter().zip(&self.image).zip(&self.ln_lambda) {
             let shift = shift * shrink;
@@ -115,9 +116,9 @@ impl Prediction {
             ds.iter_mut().zip(image).for_each(|(ds, step)| *ds += shift * step);
         }
         let mut map = vec![0.0; n];
-        imager.entropy.image(&start.image.logit, &mut map);
-        let logit = start.image.logit.clone();
-        imager.entropy.step(&logit, &map, &ds, 1.0, 1.0, &mut start.image.logit);
+        imager.entropy.image(&start.image.coordinates, &mut map);
+        let here = start.image.coordinates.clone();
+        imager.entropy.step(&here, &map, &ds, 1.0, 1.0, &mut start.image.coordinates);
         start.image.lambda *= ln_lambda.clamp(-LN_LAMBDA_REACH, LN_LAMBDA_REACH).exp();
         start
     }

@@ -24,20 +24,27 @@ const CURVE_STEP: f64 = 0.25;
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
 const CURVE_REACH: (f64, f64) = (1.1, 0.8);
 
-/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2.
+/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2. This
+/// and the lambdas below are in the entropy's unit.
 const BLANK_LAMBDA: f64 = 3e-3;
 
 /// A first preconditioner is built at this many times the target chi2, where images are cheap.
 const FIRST_CHI2: f64 = 1.5;
 
+/// chi2 per datum, all of them independent, that a map fits to: the paper's.
+const USUAL_CHI2: f64 = 0.97;
+
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
 const HOPELESS_LAMBDA: f64 = 40.0;
+
+/// chi2 per datum that no map of noisy data comes down to.
+const OUT_OF_REACH: f64 = 1e-6;
 
 /// A chi2 within this factor of the target is not the floor, wherever the solver stopped.
 const ABOVE_TARGET: f64 = 1.001;
 
-/// A provisional reference takes what it gets at lambda = this over the number of data.
-const PROVISIONAL_LAMBDA: f64 = 3.0;
+/// A provisional reference takes what it gets at lambda = this over the number of data: beyond, noise is turned into spots.
+pub const PROVISIONAL_LAMBDA: f64 = 3.0;
 
 /// The reference image and what belongs to it.
 #[derive(Clone, Debug)]
@@ -100,6 +107,8 @@ impl Reference {
         let mut reference = Reference::approach(imager, values, chi2_per_datum, HOPELESS_LAMBDA)?;
         match reference.solution.termination {
             Termination::Converged => {}
+            // out of steps on the doorstep: the exact solution is a few more away
+            Termination::StepLimit if reference.solution.chi2 <= ABOVE_TARGET * reference.chi2_target => {}
             // a search for the floor that runs out of steps far from the target has found it to within what a message needs
             Termination::Unreachable | Termination::StepLimit
                 if reference.solution.chi2 > ABOVE_TARGET * reference.chi2_target =>
@@ -133,10 +142,24 @@ impl Reference {
     /// # Errors
     /// If a blank star is below the target already, or the solver fails.
     pub fn provisional(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
-        let reference = Reference::approach(imager, values, chi2_per_datum, PROVISIONAL_LAMBDA)?;
+        // a lower target is that of data of which fewer are independent, which bear the larger weight
+        let largest_lambda = PROVISIONAL_LAMBDA / (chi2_per_datum / USUAL_CHI2).min(1.0);
+        let reference = Reference::approach(imager, values, chi2_per_datum, largest_lambda)?;
         match reference.solution.termination {
             Termination::NonFinite => Err(ReferenceError::Solver(Termination::NonFinite)),
             _ => Ok(reference),
+        }
+    }
+
+    /// The image at `lambda` over the number of data, whatever its chi2.
+    ///
+    /// # Errors
+    /// If the solver fails.
+    pub fn at_lambda(imager: &Imager, values: ParameterValues, lambda: f64) -> Result<Self, ReferenceError> {
+        let reference = Reference::approach(imager, values, OUT_OF_REACH, lambda)?;
+        match reference.solution.termination {
+            Termination::Unreachable => Ok(reference),
+            other => Err(ReferenceError::Solver(other)),
         }
     }
 
@@ -148,7 +171,8 @@ impl Reference {
         largest_lambda: f64,
     ) -> Result<Self, ReferenceError> {
         let data = imager.data.depth.len() as f64;
-        let (chi2_target, largest_lambda) = (chi2_per_datum * data, largest_lambda / data);
+        let unit = imager.entropy.lambda_unit();
+        let (chi2_target, largest_lambda) = (chi2_per_datum * data, unit * largest_lambda / data);
         let response = imager.response(&values.state());
         let mut problem = imager.problem(response.clone());
         let none = Preconditioner::identity();
@@ -157,9 +181,9 @@ impl Reference {
             preconditioner: &none,
             settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::patient() },
         };
-        let blank = Start::blank(&imager.entropy, imager.grid.len(), BLANK_LAMBDA / data);
+        let blank = Start::blank(&imager.entropy, imager.grid.len(), unit * BLANK_LAMBDA / data);
         let mut unspotted = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&blank.image.logit, &mut unspotted);
+        imager.entropy.image(&blank.image.coordinates, &mut unspotted);
         let blank_chi2 = problem.linearise(&unspotted);
         if blank_chi2 <= chi2_target {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
@@ -188,7 +212,7 @@ impl Reference {
 
     /// A blank star, where an evaluation far from the reference starts.
     pub fn blank(&self, imager: &Imager) -> Start {
-        let lambda = BLANK_LAMBDA / imager.data.depth.len() as f64;
+        let lambda = imager.entropy.lambda_unit() * BLANK_LAMBDA / imager.data.depth.len() as f64;
         Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.grid.len(), lambda) }
     }
 
@@ -211,9 +235,9 @@ fn start(solution: &Solution) -> Start {
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.
 fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
-    let n = at.image.logit.len();
+    let n = at.image.coordinates.len();
     let (mut s, mut scale, mut scaled) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    imager.entropy.image(&at.image.logit, &mut s);
+    imager.entropy.image(&at.image.coordinates, &mut s);
     imager.entropy.metric(&s, problem.area(), &mut scale);
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {

@@ -11,7 +11,7 @@ pub mod false_alarm;
 pub mod frequencies;
 pub mod kepler;
 pub mod limits;
-mod normal;
+pub mod normal;
 pub mod offset;
 pub mod orbits;
 pub mod peaks;

@@ -1,14 +1,17 @@
 //! Figures of what a folder holds, from its files alone; nothing is computed anew.
 //!
-//! Which figures there are goes by the files: those of `simulate`, `map`, `periodogram`, `optimise`, `grid`, `sample`,
+//! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`, `optimise`, `grid`, `sample`,
 //! `compare` and `reproduce`. Left out: how a figure is drawn (`figure`).
 
 mod comparison;
+mod content;
 mod corner;
 mod density;
 mod dynamic;
 mod experiment;
+mod injected;
 mod landscape;
+mod limits;
 mod optimum;
 mod paraboloid;
 mod periodogram;
@@ -76,9 +79,10 @@ pub enum PlotError {
 type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 
 /// The files by which a folder is known, with what draws it.
-const KINDS: [(&str, Draw); 8] = [
+const KINDS: [(&str, Draw); 9] = [
     (star_map::FILE, star_map_figures),
     (periodogram::FILE, |folder, _| periodogram::figures(folder)),
+    (limits::FILE, |folder, _| limits::figures(folder)),
     (manifest::FILE, |folder, _| chain_figures(folder)),
     (survey::HEADER, landscape::figures),
     (optimum::FILE, |folder, _| optimum::figures(folder)),
@@ -136,8 +140,9 @@ fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, Plot
 }
 
 fn simulation_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
-    let map = star_map::injected(folder)?;
-    Ok(vec![map, profiles::figure(&profiles::simulated(folder)?)])
+    let mut figures: Vec<Figure> = star_map::injected(folder)?.into_iter().collect();
+    figures.push(profiles::figure(&profiles::simulated(folder)?));
+    Ok(figures)
 }
 
 fn chain_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {

@@ -1,14 +1,15 @@
 //! The map of the star: flattened polar projection and Mollweide's, beside it the injected map where it is known.
 
+use super::content::Content;
+use super::injected::{Injected, TruthFile};
 use super::projection::Projection;
-use super::surface::{PixelMap, graticule, outline_spots, paint_spots, photosphere};
+use super::surface::{PixelMap, Scale, graticule, outline, paint_discs, photosphere};
 use super::{PlotError, velocities};
-use crate::figure::colour::{BLACK, BLUE, ColourMap, WHITE};
-use crate::figure::panel::Shade;
+use crate::figure::colour::{BLACK, BLUE, VERMILION, WHITE};
 use crate::figure::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, Stroke, open, width_pt};
 use crate::io::csv::Columns;
 use crate::origin;
-use crate::star::Spot;
+use crate::star::{Brightness, Disc};
 use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
@@ -23,72 +24,82 @@ pub(super) const TRUTH: &str = "truth.json";
 #[derive(Deserialize)]
 struct MapFile {
     ring_pixels: Vec<usize>,
-    spot_filling: Vec<f64>,
+    /// One of the two.
+    spot_filling: Option<Vec<f64>>,
+    brightness: Option<Vec<f64>>,
+    contrast: f64,
     spottedness: f64,
     true_spottedness: Option<f64>,
-}
-
-/// What is used of `truth.json`.
-#[derive(Deserialize)]
-struct TruthFile {
-    spots: Value,
-    spottedness: f64,
-    times_d: Vec<f64>,
-    config: Value,
-}
-
-/// What was injected.
-struct Injected {
-    spots: Vec<Spot>,
-    /// Share of the surface, where the file says so.
-    spottedness: Option<f64>,
 }
 
 /// One star on the page.
 struct Star {
     title: String,
-    /// Its pixels; `None` if it is the list of spots itself.
-    pixels: Option<PixelMap>,
-    /// Injected spots: drawn as they are, or their rims over the pixels.
-    spots: Vec<Spot>,
+    /// Its pixels, or the discs on it.
+    surface: Surface,
+    /// What was injected: its rims are drawn over pixels.
+    rims: Injected,
+}
+
+enum Surface {
+    Pixels(PixelMap),
+    /// Each with what a map holds inside it.
+    Discs(Vec<(Disc, f64)>),
 }
 
 /// The map in `folder`.
 pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
     let map: MapFile = origin::read(folder, FILE)?;
-    let pixels = PixelMap { ring_pixels: map.ring_pixels, spot_filling: map.spot_filling };
+    let (content, values) = match (map.spot_filling, map.brightness) {
+        (None, Some(brightness)) => (Content::Brightness(Brightness::of_spots(map.contrast)), brightness),
+        (filling, _) => (Content::Spots, filling.unwrap_or_default()),
+    };
+    let pixels = PixelMap { ring_pixels: map.ring_pixels, values };
     if !pixels.is_whole() {
-        let problem = "ring_pixels and spot_filling do not belong together".to_owned();
+        let what = if content == Content::Spots { "spot_filling" } else { "brightness" };
+        let problem = format!("ring_pixels and {what} do not belong together");
         return Err(PlotError::Content { path: folder.join(FILE), problem });
     }
-    let known = known_spots(folder)?;
+    let known = Injected::of(folder)?;
     let cycles = match folder.join(velocities::FILE) {
         table if table.is_file() => Columns::read(&table)?.column("cycle")?.to_vec(),
         _ => Vec::new(),
     };
-    let title = title("reconstructed", Some(map.spottedness));
-    let mut stars = vec![Star { title, pixels: Some(pixels), spots: Vec::new() }];
-    if let Some(Injected { spots, spottedness }) = known {
-        stars[0].spots.clone_from(&spots);
-        stars.push(Star { title: self::title("injected", spottedness.or(map.true_spottedness)), pixels: None, spots });
+    let title = content.title("reconstructed", Some(map.spottedness));
+    let mut stars = vec![Star { title, surface: Surface::Pixels(pixels), rims: Injected::default() }];
+    let mut compared = "";
+    if let Some(injected) = known {
+        compared = match injected.faculae.is_empty() {
+            true => "; rims of injected spots are outlined",
+            false => "; rims of injected spots are outlined in blue, those of faculae in red",
+        };
+        let spottedness = match content {
+            Content::Spots => injected.coverage.or(map.true_spottedness),
+            Content::Brightness(_) => map.true_spottedness,
+        };
+        stars.push(Star::injected(content, spottedness, &injected));
+        stars[0].rims = injected;
     }
-    let compared = if stars.len() > 1 { "; rims of injected spots are outlined" } else { "" };
-    let caption = format!("Map of the spots at cycle 0{compared}. {HOW_TO_READ}");
-    Ok(draw(&stars, &cycles, caption))
+    let what = if content == Content::Spots { "spots" } else { "brightness" };
+    Ok(draw(&stars, content, &cycles, format!("Map of the {what} at cycle 0{compared}. {HOW_TO_READ}")))
 }
 
 /// The injected map of the simulation in `folder`.
-pub(super) fn injected(folder: &Path) -> Result<Figure, PlotError> {
+///
+/// `None` of observed profiles that an orbit was put into.
+pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     let truth: TruthFile = origin::read(folder, TRUTH)?;
+    let Some(injected) = Injected::of_truth(&truth) else { return Ok(None) };
     let number = |key: &str| truth.config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
     let (period, epoch) = (number("rotation_period_d").unwrap_or(f64::NAN), number("epoch_d").unwrap_or(0.0));
     let cycles: Vec<f64> = truth.times_d.iter().map(|t| (t - epoch) / period).filter(|c| c.is_finite()).collect();
-    let star = Star { title: title("injected", Some(truth.spottedness)), pixels: None, spots: spots(&truth.spots) };
-    Ok(draw(&[star], &cycles, format!("Map of the injected spots at cycle 0. {HOW_TO_READ}")))
-}
-
-fn title(what: &str, spottedness: Option<f64>) -> String {
-    spottedness.map_or_else(|| what.to_owned(), |s| format!("{what}: {:.1} % spotted", 100.0 * s))
+    let (content, what) = match (injected.faculae.is_empty(), truth.contrast) {
+        (false, Some(contrast)) => (Content::Brightness(Brightness::of_spots(contrast)), "spots and faculae"),
+        _ => (Content::Spots, "spots"),
+    };
+    let mut star = Star::injected(content, None, &injected);
+    star.title = Content::Spots.title("injected", injected.coverage);
+    Ok(Some(draw(&[star], content, &cycles, format!("Map of the injected {what} at cycle 0. {HOW_TO_READ}"))))
 }
 
 /// How phases and longitudes are to be read.
@@ -97,85 +108,66 @@ const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above th
                            a meridian faces the observer, ticks the observed phases. Ellipses: Mollweide projection; \
                            longitude = 360 (1 - phase) degrees.";
 
-/// The injected spots and their share of the surface, where the folder knows them: of `truth.json`, or of the config that made
-/// the map.
-fn known_spots(folder: &Path) -> Result<Option<Injected>, PlotError> {
-    if folder.join(TRUTH).is_file() {
-        let truth: TruthFile = origin::read(folder, TRUTH)?;
-        return Ok(Some(Injected { spots: spots(&truth.spots), spottedness: Some(truth.spottedness) }));
-    }
-    if !folder.join(velocities::FIT).is_file() {
-        return Ok(None);
-    }
-    let fit: Value = origin::read(folder, velocities::FIT)?;
-    Ok(fit
-        .pointer("/config/observations/simulate/spots")
-        .map(|written| Injected { spots: spots(written), spottedness: None }))
-}
-
-/// Spots as they are written, `[longitude, latitude, radius, filling]` in degrees; others are left out.
-fn spots(written: &Value) -> Vec<Spot> {
-    let spot = |value: &Value| {
-        let number = |k: usize| value.get(k).and_then(Value::as_f64);
-        let [longitude, latitude, radius] = [number(0)?, number(1)?, number(2)?].map(f64::to_radians);
-        Some(Spot { longitude, latitude, radius, filling: number(3)? })
-    };
-    written.as_array().map(|spots| spots.iter().filter_map(spot).collect()).unwrap_or_default()
-}
-
 /// Radius of the polar projection (pt).
 const RADIUS: f64 = 84.0;
 /// Half the height of Mollweide's.
 const HALF_HEIGHT: f64 = 56.0;
 
 impl Star {
-    fn highest(&self) -> f64 {
-        let pixels = self.pixels.iter().flat_map(|map| map.spot_filling.iter().copied());
-        pixels.chain(self.spots.iter().map(|spot| spot.filling)).fold(0.0, f64::max)
+    fn injected(content: Content, spottedness: Option<f64>, injected: &Injected) -> Self {
+        let title = content.title("injected", spottedness);
+        Star { title, surface: Surface::Discs(content.discs(injected)), rims: Injected::default() }
     }
 
-    fn paint(&self, figure: &mut Figure, projection: Projection, shade: Shade) {
-        photosphere(figure, projection, shade);
-        match &self.pixels {
-            Some(pixels) => pixels.paint(figure, projection, shade),
-            None => paint_spots(figure, projection, &self.spots, shade),
+    fn values(&self) -> Vec<f64> {
+        match &self.surface {
+            Surface::Pixels(map) => map.values.clone(),
+            Surface::Discs(discs) => discs.iter().map(|(_, value)| *value).collect(),
+        }
+    }
+
+    fn paint(&self, figure: &mut Figure, projection: Projection, scale: Scale) {
+        photosphere(figure, projection, scale);
+        match &self.surface {
+            Surface::Pixels(map) => map.paint(figure, projection, scale),
+            Surface::Discs(discs) => paint_discs(figure, projection, discs, scale),
         }
         graticule(figure, projection);
-        if self.pixels.is_some() {
-            outline_spots(figure, projection, &self.spots, Stroke::new(BLUE, 0.6));
+        for facula in &self.rims.faculae {
+            outline(figure, "injected-facula", projection, &facula.disc, Stroke::new(VERMILION, 0.6));
+        }
+        for spot in &self.rims.spots {
+            outline(figure, "injected-spot", projection, &spot.disc(), Stroke::new(BLUE, 0.6));
         }
     }
 }
 
 /// One star: the projections side by side; two stars: a column each.
-fn draw(stars: &[Star], cycles: &[f64], caption: String) -> Figure {
+fn draw(stars: &[Star], content: Content, cycles: &[f64], caption: String) -> Figure {
     let two = stars.len() > 1;
     let mut figure = Figure::new("map", PAGE_MM, if two { 136.0 } else { 92.0 });
     figure.caption = caption;
-    let highest = stars.iter().map(Star::highest).fold(0.0, f64::max);
-    // a map of faint spots has a scale of its own
-    let high = if highest > 0.5 { 1.0 } else { ((10.0 * highest).ceil() / 10.0).max(0.1) };
-    let shade = Shade { map: ColourMap::Spots, low: 0.0, high };
+    let scale = content.scale(stars.iter().flat_map(Star::values));
     let half = 0.5 * figure.width;
     let middle = 28.0 + RADIUS + 8.0;
     for (k, star) in stars.iter().enumerate() {
         let x = half * (0.5 + k as f64);
         let mollweide =
             if two { [x + 6.0, middle + RADIUS + 26.0 + HALF_HEIGHT] } else { [1.5 * half - 4.0, middle - 8.0] };
-        polar(&mut figure, star, [x, middle], cycles, shade);
-        flat(&mut figure, star, mollweide, HALF_HEIGHT, shade);
+        polar(&mut figure, star, [x, middle], cycles, scale);
+        flat(&mut figure, star, mollweide, HALF_HEIGHT, scale);
         figure.text(&star.title, [if two { x } else { half }, 10.0], Font::LABEL, Align::Centre, 0.0);
     }
     let bar = Rect { left: half - 70.0, top: figure.height - 30.0, width: 140.0, height: 6.0 };
-    shade.lying_bar(&mut figure, bar, "spot filling factor");
+    scale.shade.lying_bar(&mut figure, bar, content.label());
     figure
 }
 
 const TINY: Font = Font { size: 6.0, colour: BLACK };
 
-fn polar(figure: &mut Figure, star: &Star, centre: Point, cycles: &[f64], shade: Shade) {
+fn polar(figure: &mut Figure, star: &Star, centre: Point, cycles: &[f64], scale: Scale) {
     let projection = Projection::Polar { centre, radius: RADIUS };
-    star.paint(figure, projection, shade);
+    star.paint(figure, projection, scale);
     // the meridian that faces the observer at a phase
     let toward = |phase: f64, distance: f64| {
         let (sin, cos) = (-360.0 * phase).to_radians().sin_cos();
@@ -229,9 +221,9 @@ fn rotation_arrow(figure: &mut Figure, at: Point) {
     figure.text("rotation", [at[0], at[1] + radius + 8.0], TINY, Align::Centre, 0.0);
 }
 
-fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, shade: Shade) {
+fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, scale: Scale) {
     let projection = Projection::Mollweide { centre, radius };
-    star.paint(figure, projection, shade);
+    star.paint(figure, projection, scale);
     for latitude in [-60.0, -30.0, 0.0, 30.0, 60.0_f64] {
         let at = projection.place(0.0, latitude);
         // clear of the edge, which leans where it is far from the equator

@@ -1,17 +1,30 @@
-//! What is on the star and how it is painted: a map of pixels, or a list of spots.
+//! What is on the star and how it is painted: a map of pixels, or discs.
 
 use super::projection::{Projection, SOUTHERNMOST_DEG};
 use crate::figure::colour::{BLACK, GREY};
 use crate::figure::panel::Shade;
 use crate::figure::{Colour, Figure, Paint, Point, Segment, Stroke, closed, ellipse, open};
-use crate::star::Spot;
+use crate::star::Disc;
 use std::collections::BTreeMap;
 
-/// Spot filling factors of pixels of equal area in rings of constant latitude, south to north.
+/// Colours of what a map holds, and what it holds where there is nothing but photosphere.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scale {
+    pub shade: Shade,
+    pub photosphere: f64,
+}
+
+impl Scale {
+    fn ground(&self) -> Colour {
+        self.shade.colour(self.photosphere).expect("a number")
+    }
+}
+
+/// What pixels of equal area hold, in rings of constant latitude, south to north.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PixelMap {
     pub ring_pixels: Vec<usize>,
-    pub spot_filling: Vec<f64>,
+    pub values: Vec<f64>,
 }
 
 /// Latitude (degrees) by which rings overlap on the page, lest the ground shows between them.
@@ -20,19 +33,19 @@ const OVERLAP_DEG: f64 = 0.15;
 impl PixelMap {
     /// Whether the rings hold all pixels.
     pub fn is_whole(&self) -> bool {
-        !self.spot_filling.is_empty() && self.ring_pixels.iter().sum::<usize>() == self.spot_filling.len()
+        !self.values.is_empty() && self.ring_pixels.iter().sum::<usize>() == self.values.len()
     }
 
     /// Paints the map; neighbours of one colour are one patch, and the colour of the photosphere is the ground.
-    pub fn paint(&self, figure: &mut Figure, projection: Projection, shade: Shade) {
-        let photosphere = shade.map.at(0.0);
-        let total = self.spot_filling.len() as f64;
+    pub fn paint(&self, figure: &mut Figure, projection: Projection, scale: Scale) {
+        let (shade, photosphere) = (scale.shade, scale.ground());
+        let total = self.values.len() as f64;
         let latitude = |below: usize| (2.0 * below as f64 / total - 1.0).clamp(-1.0, 1.0).asin().to_degrees();
         let mut of_colour: BTreeMap<[u8; 4], Vec<Segment>> = BTreeMap::new();
         let mut below = 0;
         for &count in &self.ring_pixels {
             let latitudes = [latitude(below), (latitude(below + count) + OVERLAP_DEG).min(90.0)];
-            let ring = &self.spot_filling[below..below + count];
+            let ring = &self.values[below..below + count];
             below += count;
             if !projection.shows(latitudes[1]) {
                 continue;
@@ -57,42 +70,38 @@ impl PixelMap {
     }
 }
 
-/// Paints spots; where they overlap, the larger filling factor counts.
-pub(super) fn paint_spots(figure: &mut Figure, projection: Projection, spots: &[Spot], shade: Shade) {
-    let mut rising: Vec<&Spot> = spots.iter().collect();
-    rising.sort_by(|a, b| a.filling.total_cmp(&b.filling));
-    for spot in rising {
-        let paint = Paint::fill(shade.map.at((spot.filling - shade.low) / (shade.high - shade.low)));
-        rims(figure, "spot", projection, spot, paint);
+/// Paints discs with what a map holds inside them, one over the other.
+pub(super) fn paint_discs(figure: &mut Figure, projection: Projection, discs: &[(Disc, f64)], scale: Scale) {
+    for (disc, value) in discs {
+        let paint = Paint::fill(scale.shade.colour(*value).unwrap_or(scale.ground()));
+        rims(figure, "spot", projection, disc, paint);
     }
 }
 
-/// Draws the rims of spots.
-pub(super) fn outline_spots(figure: &mut Figure, projection: Projection, spots: &[Spot], stroke: Stroke) {
-    for spot in spots {
-        rims(figure, "injected-spot", projection, spot, Paint::stroke(stroke));
-    }
+/// Draws the rim of a disc that was injected.
+pub(super) fn outline(figure: &mut Figure, class: &'static str, projection: Projection, disc: &Disc, stroke: Stroke) {
+    rims(figure, class, projection, disc, Paint::stroke(stroke));
 }
 
-/// A spot as closed lines: in Mollweide's projection once more to either side, for what goes around behind the star.
-fn rims(figure: &mut Figure, class: &'static str, projection: Projection, spot: &Spot, paint: Paint) {
-    let around: Vec<[f64; 2]> = (0..=120).map(|k| rim(spot, 3.0 * f64::from(k))).collect();
+/// A disc as closed lines: in Mollweide's projection once more to either side, for what goes around behind the star.
+fn rims(figure: &mut Figure, class: &'static str, projection: Projection, disc: &Disc, paint: Paint) {
+    let around: Vec<[f64; 2]> = (0..=120).map(|k| rim(disc, 3.0 * f64::from(k))).collect();
     let places = |turn: f64, around: &[[f64; 2]]| -> Vec<Point> {
         around.iter().map(|[longitude, latitude]| projection.place(longitude + turn, *latitude)).collect()
     };
     match projection {
         Projection::Polar { .. } => {
-            figure.clipped(outline(projection), |figure| figure.polygon(class, &places(0.0, &around), paint));
+            figure.clipped(edge(projection), |figure| figure.polygon(class, &places(0.0, &around), paint));
         }
         Projection::Mollweide { .. } => {
             let mut whole = unrolled(&around);
             let turned = whole[whole.len() - 1][0] - whole[0][0];
             if turned.abs() > 180.0 {
                 // around a pole: the area reaches up to it
-                let pole = 90.0_f64.copysign(spot.latitude);
+                let pole = 90.0_f64.copysign(disc.latitude);
                 whole.extend([[whole[whole.len() - 1][0], pole], [whole[0][0], pole]]);
             }
-            figure.clipped(outline(projection), |figure| {
+            figure.clipped(edge(projection), |figure| {
                 for turn in [-360.0, 0.0, 360.0] {
                     figure.polygon(class, &places(turn, &whole), paint);
                 }
@@ -111,18 +120,18 @@ fn unrolled(around: &[[f64; 2]]) -> Vec<[f64; 2]> {
     whole
 }
 
-/// The point of a spot's rim in a direction from its centre: longitude and latitude (degrees).
-fn rim(spot: &Spot, direction_deg: f64) -> [f64; 2] {
+/// The point of a disc's rim in a direction from its centre: longitude and latitude (degrees).
+fn rim(disc: &Disc, direction_deg: f64) -> [f64; 2] {
     let (sin_d, cos_d) = direction_deg.to_radians().sin_cos();
-    let (sin_r, cos_r) = spot.radius.sin_cos();
-    let (sin_b, cos_b) = spot.latitude.sin_cos();
+    let (sin_r, cos_r) = disc.radius.sin_cos();
+    let (sin_b, cos_b) = disc.latitude.sin_cos();
     let sin_latitude = (sin_b * cos_r + cos_b * sin_r * cos_d).clamp(-1.0, 1.0);
     let turn = (sin_d * sin_r * cos_b).atan2(cos_r - sin_b * sin_latitude);
-    [(spot.longitude + turn).to_degrees().rem_euclid(360.0), sin_latitude.asin().to_degrees()]
+    [(disc.longitude + turn).to_degrees().rem_euclid(360.0), sin_latitude.asin().to_degrees()]
 }
 
 /// The edge of the picture.
-fn outline(projection: Projection) -> Vec<Segment> {
+fn edge(projection: Projection) -> Vec<Segment> {
     match projection {
         Projection::Polar { centre, radius } => ellipse(centre, [radius, radius]),
         Projection::Mollweide { centre, radius } => ellipse(centre, [2.0 * radius, radius]),
@@ -130,8 +139,8 @@ fn outline(projection: Projection) -> Vec<Segment> {
 }
 
 /// A star without spots.
-pub(super) fn photosphere(figure: &mut Figure, projection: Projection, shade: Shade) {
-    figure.path("star", outline(projection), Paint::fill(shade.map.at(0.0)));
+pub(super) fn photosphere(figure: &mut Figure, projection: Projection, scale: Scale) {
+    figure.path("star", edge(projection), Paint::fill(scale.ground()));
 }
 
 /// Meridians, parallels and the edge: the equator bold, others dashed.
@@ -154,5 +163,5 @@ pub(super) fn graticule(figure: &mut Figure, projection: Projection) {
     }
     let equator = if flat { open(&parallel(0.0)) } else { closed(&parallel(0.0)) };
     figure.path("equator", equator, Paint::stroke(Stroke::new(BLACK, 0.9)));
-    figure.path("edge", outline(projection), Paint::stroke(Stroke::new(BLACK, 0.6)));
+    figure.path("edge", edge(projection), Paint::stroke(Stroke::new(BLACK, 0.6)));
 }

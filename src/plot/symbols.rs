@@ -13,6 +13,10 @@ pub fn symbol(name: &str) -> (&str, &'static str) {
         Some(Parameter::Inclination) => ("*i*", "°"),
         Some(Parameter::Vsini) => ("*v* sin *i*", "km/s"),
         Some(Parameter::Vsys) => ("*v*_{sys}", "km/s"),
+        Some(Parameter::LimbDarkening) => ("*u*", ""),
+        Some(Parameter::LineSigma) => ("*σ*_{line}", "km/s"),
+        Some(Parameter::EquivalentWidth) => ("*W*_{line}", "km/s"),
+        Some(Parameter::Contrast) => ("*c*", ""),
         None => (name, ""),
     }
 }

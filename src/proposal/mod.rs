@@ -15,6 +15,7 @@ pub use ledger::{Entry, Source};
 use crate::config::{ConfigError, Draft, EquivalentWidth};
 use crate::first_look::LookError;
 use crate::io::lsd::{self, LsdError, ReadOptions};
+use crate::star::BrightnessModel;
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
 use values::Values;
@@ -49,6 +50,7 @@ pub struct Known {
     pub resolving_power: Option<Given<f64>>,
     pub velocity_range_kms: Option<Given<(f64, f64)>>,
     pub sigma_scale: Option<Given<f64>>,
+    pub brightness: Option<Given<BrightnessModel>>,
     pub pixels: Option<Given<usize>>,
     pub chi2_target: Option<Given<f64>>,
 }

@@ -9,6 +9,7 @@ use crate::objective::{Parameter, Reference, ReferenceError};
 use crate::observation::Observations;
 use crate::scene::Scene;
 use crate::search::{self, SearchError, SearchSettings};
+use crate::star::BrightnessModel;
 use std::path::Path;
 
 /// Stands in for a rotation period that is still to be given, so that everything else is checked (d).
@@ -44,7 +45,7 @@ pub(super) enum End {
     Untried,
     /// A map reaches the target.
     Reached {
-        /// How much of the star is spotted then.
+        /// How spotted the star is then.
         spottedness: f64,
     },
     /// None does, and none will: why.
@@ -126,7 +127,7 @@ fn scene(draft: &Draft, config: &Path, cut: &Observations) -> Result<Scene, Prop
 /// Spottedness of the map at the draft's values.
 fn reach(draft: &Draft, config: &Path, cut: &Observations) -> Result<Result<f64, ReferenceError>, ProposalError> {
     let Scene { settings, imager, .. } = scene(draft, config, cut)?;
-    let reference = Reference::build(&imager, settings.values, settings.imaging.chi2_target);
+    let reference = Reference::build(&imager, settings.values, settings.imaging.chi2_target.value());
     Ok(reference.map(|reference| reference.solution.spottedness))
 }
 
@@ -165,12 +166,16 @@ impl Trial {
             End::Reached { spottedness } => {
                 let orbit =
                     if self.orbit { ", but only with an orbit; `periodogram` says what it is worth" } else { "" };
-                let many = if *spottedness > MANY_SPOTS {
-                    "; that is a lot: are vsini, inclination and line right?"
-                } else {
-                    ""
+                let (percent, spots) = (100.0 * spottedness, draft.imaging.brightness == BrightnessModel::Spots);
+                let many = match spots && *spottedness > MANY_SPOTS {
+                    true => "; that is a lot: are vsini, inclination and line right?",
+                    false => "",
                 };
-                format!("tried out: spots on {:.1} % of the star fit the profiles{orbit}{many}", 100.0 * spottedness)
+                let what = match spots {
+                    true => format!("spots on {percent:.1} % of the star fit"),
+                    false => format!("a brightness that varies by {percent:.1} % rms fits"),
+                };
+                format!("tried out: {what} the profiles{orbit}{many}")
             }
             End::Failed(error) => format!("no command takes the config as it is: {error}"),
         };

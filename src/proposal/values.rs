@@ -3,7 +3,7 @@
 use super::digits::{rounded, significant};
 use super::ledger::{Ledger, Source};
 use super::{Given, Known};
-use crate::config::{Draft, EquivalentWidth, ImagingSettings};
+use crate::config::{Automatic, Draft, EquivalentWidth, ImagingSettings};
 use crate::first_look::{FirstLook, LineModel, LookError};
 use crate::observation::Observations;
 use crate::periodogram::{Frequencies, FrequencySettings};
@@ -265,12 +265,16 @@ fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> E
 
 fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
     let mut imaging = ImagingSettings::default();
+    if let Some(given) = &known.brightness {
+        imaging.brightness = given.value;
+        ledger.note("imaging.brightness", given.value.name(), "", Source::Given, given.by.as_str());
+    }
     if let Some(given) = &known.pixels {
         imaging.pixels = given.value;
         ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());
     }
     if let Some(given) = &known.chi2_target {
-        imaging.chi2_target = given.value;
+        imaging.chi2_target = Automatic::Fixed(given.value);
         ledger.note("imaging.chi2_target", given.value, "", Source::Given, given.by.as_str());
     }
     imaging

@@ -1,6 +1,6 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, Table, run};
+use super::{Chapter, Table, injection, run};
 use crate::manifest;
 use crate::objective::Parameter;
 use crate::origin;
@@ -27,21 +27,23 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<(Chapter, Value), 
         }
         "optimum.json" => (optimum(&whole), whole),
         "comparison.json" => (comparison(&whole), whole),
+        "limits.json" => (injection::limits(&whole), whole),
+        _ if whole.get("injected").is_some() => (injection::injection(&whole), whole),
         _ => (simulation(&whole), whole),
     })
 }
 
 /// A number of a file with so many decimals; a dash where there is none.
-fn number(file: &Value, pointer: &str, digits: usize) -> String {
+pub(super) fn number(file: &Value, pointer: &str, digits: usize) -> String {
     file.pointer(pointer).and_then(Value::as_f64).map_or_else(|| "–".into(), |x| format!("{x:.digits$}"))
 }
 
-fn texts(file: &Value, key: &str) -> Vec<String> {
+pub(super) fn texts(file: &Value, key: &str) -> Vec<String> {
     let list = file.get(key).and_then(Value::as_array);
     list.into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
 }
 
-fn pairs(rows: &[(&str, String)]) -> Table {
+pub(super) fn pairs(rows: &[(&str, String)]) -> Table {
     Table { head: Vec::new(), rows: rows.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
 }
 
@@ -55,10 +57,14 @@ fn map(fit: &Value) -> Chapter {
         true => "The map reaches the target chi2 and is the one of greatest entropy that does.",
         false => "The reconstruction did not converge: this map is not the one of greatest entropy at the target chi2.",
     };
+    let spottedness = match fit.get("darkness") {
+        None => ("spot coverage", number(fit, "/spottedness", 4)),
+        Some(_) => ("brightness minus 1, rms (mean of dark, of bright parts)", deviation(fit)),
+    };
     let rows = [
         ("chi2 per datum", number(fit, "/chi2_per_datum", 4)),
         ("data in profiles", format!("{} in {}", number(fit, "/data", 0), number(fit, "/profiles", 0))),
-        ("spot coverage", number(fit, "/spottedness", 4)),
+        spottedness,
         ("entropy", number(fit, "/entropy", 4)),
         ("scatter of the radial velocities (km/s)", number(fit, "/observed_rv_rms_kms", 4)),
         ("the same with the model taken out (km/s)", number(fit, "/filtered_rv_rms_kms", 4)),
@@ -72,6 +78,12 @@ fn map(fit: &Value) -> Chapter {
         tables: vec![("The fit.".into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters(fit))],
         notes: Vec::new(),
     }
+}
+
+/// How far the brightness is from that of the photosphere.
+fn deviation(fit: &Value) -> String {
+    let [rms, dark, bright] = ["/spottedness", "/darkness", "/brightness_excess"].map(|key| number(fit, key, 4));
+    format!("{rms} ({dark}, {bright})")
 }
 
 /// The parameters of a file, and the injected ones where it has them.

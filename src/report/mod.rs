@@ -6,6 +6,7 @@
 mod chapters;
 mod citation;
 mod html;
+mod injection;
 mod run;
 
 use crate::figure::Figure;

@@ -1,8 +1,9 @@
-//! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots, and the response
-//! that turns a brightness map into line profiles (method section 1; Petit et al. 2015, section 2).
+//! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots and faculae, and the
+//! response that turns a brightness map into line profiles (method section 1; Petit et al. 2015, section 2).
 //!
 //! Left out: priors, chi2, chains, files. Angles are radians here, velocities km/s, times days.
 
+pub mod brightness;
 mod convolution;
 mod correlate;
 mod deposit;
@@ -15,15 +16,17 @@ pub mod response;
 pub mod rotation;
 pub mod spots;
 mod view;
+mod voigt;
 
+pub use brightness::{Brightness, BrightnessModel};
 pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use orbit::Orbit;
 pub use response::{Response, Sampling};
 pub use rotation::Rotation;
-pub use spots::Spot;
+pub use spots::{Disc, Facula, Spot};
 
-/// Everything about the star that is not one of the eight parameters that may be sampled.
+/// The star. [`Surface`] may have other values for some of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StarSettings {
     /// Period (d) that rotation cycles and `Porb/Prot` refer to.
@@ -38,16 +41,62 @@ pub struct StarSettings {
     pub line: LocalLine,
 }
 
-/// A Gaussian local line.
+/// A local line: a Voigt profile, which without a Lorentzian is a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalLine {
-    /// Standard deviation (km/s), intrinsic and instrumental widths added in quadrature.
+    /// Standard deviation (km/s) of the Gaussian, intrinsic and instrumental widths added in quadrature.
     pub sigma_kms: f64,
-    /// Equivalent width (km/s).
+    /// The part of it that is the spectrograph's (km/s).
+    pub instrumental_sigma_kms: f64,
+    /// Half width at half depth (km/s) of the Lorentzian, 0 for none.
+    pub gamma_kms: f64,
+    /// Equivalent width (km/s), wings and all.
     pub equivalent_width_kms: f64,
 }
 
+impl LocalLine {
+    /// A Gaussian, all of it the star's own.
+    pub fn gaussian(sigma_kms: f64, equivalent_width_kms: f64) -> Self {
+        LocalLine { sigma_kms, instrumental_sigma_kms: 0.0, gamma_kms: 0.0, equivalent_width_kms }
+    }
+}
+
+/// Numbers of the star's surface that stand in place of those of [`StarSettings`], where they are given.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// First coefficient of the limb darkening.
+    pub limb_darkening: Option<f64>,
+    /// Standard deviation (km/s) of the local line, before the spectrograph.
+    pub line_sigma_kms: Option<f64>,
+    /// Equivalent width (km/s) of the local line.
+    pub equivalent_width_kms: Option<f64>,
+    /// Brightness of a wholly spotted pixel over that of the photosphere.
+    pub contrast: Option<f64>,
+}
+
 impl StarSettings {
+    /// The star with such a surface.
+    pub fn with(&self, surface: &Surface) -> Self {
+        let mut star = self.clone();
+        if let Some(coefficient) = surface.limb_darkening {
+            star.limb_darkening = star.limb_darkening.with_first(coefficient);
+        }
+        if let Some(sigma_kms) = surface.line_sigma_kms {
+            star.line.sigma_kms = sigma_kms.hypot(star.line.instrumental_sigma_kms);
+        }
+        star.line.equivalent_width_kms = surface.equivalent_width_kms.unwrap_or(star.line.equivalent_width_kms);
+        star.contrast = surface.contrast.unwrap_or(star.contrast);
+        star
+    }
+
+    /// Whether there can be such a star.
+    pub fn is_possible(&self) -> bool {
+        (0.0..1.0).contains(&self.contrast)
+            && self.line.sigma_kms > 0.0
+            && self.line.equivalent_width_kms > 0.0
+            && self.limb_darkening.is_positive()
+    }
+
     /// Rotation cycle `E = (t - epoch) / rotation_period` of a time (d).
     pub fn cycle(&self, time_d: f64) -> f64 {
         (time_d - self.epoch_d) / self.rotation_period_d
@@ -67,4 +116,6 @@ pub struct StarState {
     pub vsys_kms: f64,
     /// Orbit of the planet.
     pub orbit: Orbit,
+    /// What differs from the star's settings.
+    pub surface: Surface,
 }

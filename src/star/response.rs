@@ -50,11 +50,13 @@ pub struct Response {
     grid: VelocityGrid,
     /// First bin of each profile, and the end.
     starts: Vec<usize>,
+    contrast: f64,
 }
 
 impl Response {
     /// The response at one state of star and planet.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+        let star = &star.with(&state.surface);
         let steps_per_bin = LineKernel::steps_per_bin(star.line, sampling.step_kms);
         let since_epoch: Vec<f64> = sampling.profiles.iter().map(|p| p.0 - star.epoch_d).collect();
         let step = sampling.step_kms / steps_per_bin as f64;
@@ -65,13 +67,14 @@ impl Response {
     /// Size of the velocity grid that a response takes: grid steps a bin, and nodes. Refuse more than [`MOST_STEPS_PER_BIN`] or
     /// [`MOST_NODES`] before a response is asked for.
     pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
+        let star = star.with(&state.surface);
         let steps = LineKernel::steps_per_bin(star.line, step_kms) as f64;
         (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
     }
 
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        Response::shifted(Arc::clone(&self.deposit), star, state, sampling)
+        Response::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling)
     }
 
     fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
@@ -89,12 +92,17 @@ impl Response {
             convolutions.push(ProfileConvolution::new(&kernel, grid, first_bin, bins));
             starts.push(starts[starts.len() - 1] + bins);
         }
-        Response { deposit, convolutions, grid, starts }
+        Response { deposit, convolutions, grid, starts, contrast: star.contrast }
     }
 
     fn rows(&self) -> Rows {
         let bins = self.starts.windows(2).map(|s| s[1] - s[0]);
         Rows::new(self.grid, self.convolutions.iter().zip(bins))
+    }
+
+    /// Brightness of a spot over that of the photosphere in the state that it was made at.
+    pub fn contrast(&self) -> f64 {
+        self.contrast
     }
 
     /// Number of pixels.
@@ -229,7 +237,7 @@ mod tests {
             epoch_d: 0.0,
             limb_darkening: LimbDarkening::Linear(0.7),
             contrast: 0.5,
-            line: LocalLine { sigma_kms: 3.0, equivalent_width_kms: 5.8 },
+            line: LocalLine::gaussian(3.0, 5.8),
         };
         let state = StarState {
             rotation: Rotation { omega_eq_rad_d: 2.1, domega_rad_d: 0.05 },
@@ -237,6 +245,7 @@ mod tests {
             vsini_kms: 40.0,
             vsys_kms: 0.3,
             orbit: Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.4 },
+            surface: Default::default(),
         };
         let sampling = Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (0.7 * k as f64, -50.0, 57)).collect() };
         let grid = SurfaceGrid::equal_area(700, Quadrature::Gauss2x2);

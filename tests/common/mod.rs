@@ -42,7 +42,10 @@ pub fn oracle() -> Oracle {
         epoch_d: 0.0,
         limb_darkening: LimbDarkening::Linear(number("u")),
         contrast: planck_contrast(number("tspot"), number("tphot"), 1000.0 * number("wavelength_um")),
-        line: LocalLine { sigma_kms, equivalent_width_kms: number("ew") },
+        line: LocalLine {
+            instrumental_sigma_kms: instrumental_sigma_kms(number("R")),
+            ..LocalLine::gaussian(sigma_kms, number("ew"))
+        },
     };
     let pixels = &json["pixels"];
     let table = |key: &str| numbers(&pixels[key]);
@@ -55,7 +58,8 @@ pub fn oracle() -> Oracle {
     };
     let depth: Vec<f64> = json["depth"].as_array().unwrap().iter().flat_map(numbers).collect();
     let sigma = json["sigma"].as_f64().unwrap();
-    let data = Data { inverse_variance: vec![1.0 / (sigma * sigma); depth.len()], depth };
+    let inverse_variance = vec![1.0 / (sigma * sigma); depth.len()];
+    let data = Data { inverse_variance, depth, nuisances: Default::default() };
     let default_spot = number("default_spot");
     Oracle { json, star, grid, sampling, data, default_spot }
 }
@@ -76,11 +80,22 @@ pub fn truth(oracle: &Oracle) -> ParameterValues {
     values(&oracle.json["results"]["fixed_lambda"][0]["theta"], oracle.star.rotation_period_d)
 }
 
+/// The injected values, those of the surface too.
+pub fn whole_truth(oracle: &Oracle) -> ParameterValues {
+    let mut values = truth(oracle);
+    let LimbDarkening::Linear(u) = oracle.star.limb_darkening else { panic!() };
+    values[Parameter::LimbDarkening] = u;
+    values[Parameter::LineSigma] = oracle.json["spec"]["sigma_local"].as_f64().unwrap();
+    values[Parameter::EquivalentWidth] = oracle.star.line.equivalent_width_kms;
+    values[Parameter::Contrast] = oracle.star.contrast;
+    values
+}
+
 /// Parameter values of one of the oracle's `theta` objects.
 pub fn values(theta: &Value, rotation_period_d: f64) -> ParameterValues {
     let number = |key: &str| theta[key].as_f64().unwrap();
     let omega_eq = TAU / rotation_period_d * number("oeq");
-    let mut values = ParameterValues([0.0; 8]);
+    let mut values = ParameterValues::of_eight([0.0; 8]);
     values[Parameter::K] = number("K");
     values[Parameter::PorbOverProt] = number("P");
     values[Parameter::Phi] = number("phi");

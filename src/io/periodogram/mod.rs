@@ -7,11 +7,12 @@ mod alarm;
 mod record;
 mod remarks;
 mod report;
+mod robustness;
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::provenance::Provenance;
-use crate::detection::{Detection, DetectionSettings};
+use crate::detection::{Detection, DetectionSettings, Robustness};
 use crate::fit::Fit;
 use crate::imaging::Imager;
 use crate::objective::ParameterValues;
@@ -27,6 +28,8 @@ pub struct PeriodogramResult<'a> {
     pub imager: &'a Imager,
     /// What was found.
     pub detection: &'a Detection,
+    /// Whether that hangs on a choice.
+    pub robustness: &'a Robustness,
     /// How it was asked for.
     pub settings: &'a DetectionSettings,
     /// The planet-free image held against the data.

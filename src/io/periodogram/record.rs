@@ -3,6 +3,7 @@
 use super::super::provenance::Provenance;
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
+use super::robustness::RobustnessRecord;
 use crate::detection::View;
 use crate::objective::ParameterValues;
 use crate::periodogram::offset::Offset;
@@ -27,6 +28,8 @@ pub(super) struct Record<'a> {
     /// A constant velocity left free beside the orbit.
     pub offset: Option<Offset>,
     pub co_rotation: CoRotationRecord,
+    /// Whether the best orbit hangs on a choice.
+    pub robustness: RobustnessRecord,
     pub warnings: Vec<String>,
     #[serde(flatten)]
     pub provenance: &'a Provenance,
@@ -160,6 +163,7 @@ impl PeriodogramResult<'_> {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: self.co_rotation(),
             },
+            robustness: self.robustness_record(),
             warnings: self.warnings(),
             provenance: self.provenance,
         }

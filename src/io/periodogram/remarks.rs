@@ -3,6 +3,7 @@
 use super::PeriodogramResult;
 use crate::expansion::SPOTS_LEFT;
 use crate::objective::Parameter;
+use crate::periodogram::Peak;
 use crate::periodogram::offset::Offset;
 
 /// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
@@ -13,6 +14,9 @@ const FEW: usize = 12;
 
 /// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
 const OFFSET_GAIN: f64 = 12.5;
+
+/// An alias lower by less than this in ln L is as likely as one in twenty.
+const RIVAL: f64 = 3.0;
 
 impl PeriodogramResult<'_> {
     pub(super) fn co_rotation(&self) -> String {
@@ -27,14 +31,21 @@ impl PeriodogramResult<'_> {
         }
     }
 
+    /// Whether another peak is an alias that is not much lower than the highest.
+    fn rivals(&self, peak: &Peak) -> bool {
+        let highest = self.detection.search().best().orbit.delta_ln_l;
+        peak.alias.is_some() && highest - peak.orbit.delta_ln_l < RIVAL
+    }
+
     /// What may be wrong, a sentence each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let found = self.detection;
-        let data = self.imager.data.depth.len() as f64;
+        let correlated_bins = self.provenance.measured.errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        let data = self.imager.data.depth.len() as f64 / correlated_bins;
         let mut warnings = Vec::new();
         let view = found.last();
         let chi2 = self.per_datum(view);
-        let far = (chi2 - 1.0) / (2.0 / data).sqrt();
+        let far = (chi2 * correlated_bins - 1.0) / (2.0 / data).sqrt();
         if !view.on_target {
             let target = self.settings.chi2_target;
             warnings.push(format!(
@@ -74,6 +85,22 @@ impl PeriodogramResult<'_> {
                  believing it"
             ));
         }
+        if let Some((n, alias)) = found.alias_of_rotation().filter(|_| found.is_planet()) {
+            let rotation = if n == 1 { "Prot".to_owned() } else { format!("Prot/{n}") };
+            let per_d = alias.window.frequency / self.imager.star.rotation_period_d;
+            warnings.push(format!(
+                "with this sampling the best period is not told from {rotation} either (the window function peaks at {per_d:.3}/d): \
+                 spots imitate orbits there"
+            ));
+        }
+        if let Some(peak) =
+            found.search().peaks[1..].iter().find(|peak| self.rivals(peak)).filter(|_| found.is_planet())
+        {
+            let period_d = self.imager.star.rotation_period_d * peak.porb_over_prot;
+            warnings
+                .push(format!("the period is ambiguous: {period_d:.4} d, an alias by the sampling, is nearly as good"));
+        }
+        warnings.extend(self.robustness_warnings());
         if found.best.on_edge {
             warnings.push("the best period lies on the edge of the search: look beyond it before believing it".into());
         } else if !found.closed {

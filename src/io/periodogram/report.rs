@@ -35,6 +35,7 @@ impl PeriodogramResult<'_> {
                 None => text += &peaks(&self.peaks(&second.search)),
             }
         }
+        text += &self.robustness_table();
         text += &format!("{}\n", self.co_rotation());
         for warning in self.warnings() {
             text += &format!("warning: {warning}\n");

@@ -1,0 +1,161 @@
+//! `dimcmc limits`: which planets the profiles would show.
+
+use super::output::Output;
+use super::{Failure, Global, progress};
+use dimcmc::detection::{DetectionError, DetectionSettings};
+use dimcmc::expansion::nuisances;
+use dimcmc::limits::{self, CSV, JSON, LimitSettings, LimitsFile, Orbits, Shortcut};
+use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use dimcmc::scene::Scene;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// Find out which planets would be found: injection and recovery over period, K and phase
+///
+/// Orbits are put into the profiles, and `periodogram` looks for them: recovered is what has a false-alarm probability below 1 %
+/// and the right period. It takes the linear shortcut, in which an orbit is a shift of the velocities around the image without a
+/// planet; with --full, some orbits near the limit go the whole way: resampled profiles, a new image, a new search. Writes
+/// limits.csv (how many phases of each period and K are recovered) and limits.json (K at 50 and 95 %, the comparison); `plot`
+/// draws the map. A signal that the profiles hold already stays in them without --without-best.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc limits configs/demo.json --periods 12 --full 2 --out runs/demo_limits")]
+pub struct Args {
+    /// Config file (JSON)
+    config: PathBuf,
+    #[command(flatten)]
+    output: Output,
+    /// Shortest period put in and searched (d); by default that of `periodogram`
+    #[arg(long, value_name = "DAYS")]
+    min_period_d: Option<f64>,
+    /// Longest period put in and searched (d); by default twice the time base
+    #[arg(long, value_name = "DAYS")]
+    max_period_d: Option<f64>,
+    /// Number of periods put in, evenly in their logarithm
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u16).range(2..=1000))]
+    periods: u16,
+    /// Smallest K (km/s); by default a third of the lowest K that a search would find
+    #[arg(long, value_name = "KMS")]
+    min_k_kms: Option<f64>,
+    /// Largest K (km/s); by default four times what is found for certain at most periods
+    #[arg(long, value_name = "KMS")]
+    max_k_kms: Option<f64>,
+    /// Number of semi-amplitudes, evenly in their logarithm
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u16).range(2..=1000))]
+    amplitudes: u16,
+    /// Number of phases
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
+    phases: u16,
+    /// Orbits near the limit that go the whole way
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    full: u16,
+    /// Take the best orbit of the profiles as they are out of them first
+    #[arg(long)]
+    without_best: bool,
+    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors
+    #[arg(long, alias = "marginalize")]
+    marginalise: bool,
+    /// Number of stars without a planet that false alarms are taken from
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1000..=10_000_000))]
+    draws: u32,
+    /// Seed of the draws, and of the orbits that go the whole way
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    args.output.check()?;
+    let scene = Scene::load(&args.config)?;
+    let settings = settings(args, &scene)?;
+    let spinner = progress::bar(global, None, "reconstructing without a planet");
+    let shortcut = Shortcut::new(&scene.imager, scene.settings.values, &settings);
+    spinner.finish_and_clear();
+    let shortcut = shortcut.map_err(|e| failure(args, e))?;
+    let orbits = orbits(args, &shortcut)?;
+    let meter = Meter::new(global, orbits.count());
+    let cells = limits::survey(&shortcut, &orbits, &|done| meter.show(done));
+    meter.bar.finish_and_clear();
+    let found = limits::limits(&cells);
+    let full = usize::from(args.full);
+    let meter = Meter::new(global, full);
+    let comparisons = limits::compare(&scene, &shortcut, &found, full, &|| meter.show(1));
+    meter.bar.finish_and_clear();
+    let rotation_period_d = scene.imager.star.rotation_period_d;
+    let file = LimitsFile::new(&shortcut, &orbits, &found, &comparisons?, rotation_period_d, scene.provenance());
+    let folder = args.output.create()?;
+    file.write(&cells, rotation_period_d, folder)?;
+    let _ = writeln!(std::io::stdout(), "{}written: {}: {CSV}, {JSON}", file.table(), folder.display());
+    Ok(())
+}
+
+/// How orbits are looked for.
+fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
+    let Args { min_period_d, max_period_d, .. } = *args;
+    let wanted = FrequencySettings { min_period_d, max_period_d, oversampling: None };
+    let frequencies = Frequencies::new(&scene.imager.cycles(), scene.imager.star.rotation_period_d, wanted);
+    let frequencies = frequencies.map_err(|error| match error {
+        FrequencyError::TooFewTimes(_) => Failure::input(format!("{}: observations: {error}", args.config.display())),
+        error => Failure::input(error),
+    })?;
+    Ok(LimitSettings {
+        detection: DetectionSettings {
+            chi2_target: scene.settings.imaging.chi2_target.value(),
+            nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
+            search: SearchSettings { draws: args.draws as usize, seed: args.seed },
+            eccentric: false,
+            second_planet: false,
+        },
+        frequencies,
+        without_best: args.without_best,
+    })
+}
+
+/// The orbits that are put in.
+fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
+    let unbounded = || Failure::failed(format!("{}: {}", args.config.display(), dimcmc::periodogram::Unbounded));
+    let (least, most) = shortcut.k_range_kms().ok_or_else(unbounded)?;
+    let (min, max) = (args.min_k_kms.unwrap_or(least), args.max_k_kms.unwrap_or(most));
+    if !(min > 0.0 && min < max && max.is_finite()) {
+        return Err(Failure::input(format!(
+            "--min-k-kms, --max-k-kms: {min} to {max} km/s is no range, both must be above 0, the first below the second"
+        )));
+    }
+    let (low, high) = shortcut.settings.frequencies.range();
+    Ok(Orbits {
+        porb_over_prot: limits::even_in_logarithm(1.0 / high, 1.0 / low, usize::from(args.periods)),
+        k_kms: limits::even_in_logarithm(min, max, usize::from(args.amplitudes)),
+        phases: usize::from(args.phases),
+    })
+}
+
+fn failure(args: &Args, error: DetectionError) -> Failure {
+    match error {
+        DetectionError::Reference(error) => Failure::reference(&args.config, error),
+        DetectionError::Unbounded(error) => Failure::failed(format!("{}: {error}", args.config.display())),
+    }
+}
+
+/// What is shown while orbits are tried.
+struct Meter {
+    bar: indicatif::ProgressBar,
+    began: Instant,
+    total: usize,
+    done: AtomicUsize,
+}
+
+impl Meter {
+    fn new(global: &Global, total: usize) -> Self {
+        let bar = progress::bar(global, Some(total as u64), "first orbits");
+        Meter { bar, began: Instant::now(), total, done: AtomicUsize::new(0) }
+    }
+
+    fn show(&self, orbits: usize) {
+        let done = self.done.fetch_add(orbits, Relaxed) + orbits;
+        let rate = done as f64 / self.began.elapsed().as_secs_f64().max(1e-9);
+        let left = Duration::from_secs_f64(self.total.saturating_sub(done) as f64 / rate);
+        self.bar.set_position(done as u64);
+        self.bar.set_message(format!("{done}/{} orbits, {:#} left", self.total, indicatif::HumanDuration(left)));
+    }
+}

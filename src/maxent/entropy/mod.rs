@@ -1,0 +1,226 @@
+//! Entropies of images, by what an image holds (method section 2): filling factors of dark spots (`spots`), or brightnesses above
+//! and below that of the photosphere (`bright_and_dark`).
+//!
+//! The solver works in a coordinate u of each pixel that keeps the image inside its domain, and measures steps in the entropy's own
+//! metric, in which -S has the unit matrix as its second derivative. Left out: data.
+
+mod bright_and_dark;
+mod spots;
+
+use super::cg::dot;
+use crate::vector;
+use std::borrow::Cow;
+
+/// The entropy with its default image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entropy {
+    /// Of spot filling factors s; the coordinate is logit(s).
+    Spots {
+        /// logit of the default filling factor.
+        default_logit: f64,
+    },
+    /// Of brightnesses B, with the default 1; the coordinate is ln B.
+    BrightAndDark,
+}
+
+/// A step of the image, to be taken in the coordinates.
+struct Step<'a> {
+    u: &'a [f64],
+    image: &'a [f64],
+    step: &'a [f64],
+    scale: f64,
+    cap: f64,
+    out: &'a mut [f64],
+}
+
+impl Entropy {
+    /// Entropy of spots relative to the default filling factor m, in (0, 1).
+    pub fn new(default_spot: f64) -> Self {
+        Entropy::Spots { default_logit: (default_spot / (1.0 - default_spot)).ln() }
+    }
+
+    /// About how large the Lagrange multipliers of images of some data are, in units of those of spots: on the paper's star, with
+    /// and without faculae, at chi2 = 0.97 per datum.
+    pub fn lambda_unit(&self) -> f64 {
+        match self {
+            Entropy::Spots { .. } => 1.0,
+            Entropy::BrightAndDark => 0.045,
+        }
+    }
+
+    /// Coordinate of the default: the image without data.
+    pub fn default_coordinate(&self) -> f64 {
+        match *self {
+            Entropy::Spots { default_logit } => default_logit,
+            Entropy::BrightAndDark => 0.0,
+        }
+    }
+
+    /// Bound of the coordinates, below which no step leads: the image is as good as 0 there.
+    pub fn lowest_coordinate(&self) -> f64 {
+        match self {
+            Entropy::Spots { .. } => -spots::LOGIT_LIMIT,
+            Entropy::BrightAndDark => -bright_and_dark::LN_LIMIT,
+        }
+    }
+
+    /// Image of the coordinates u.
+    pub fn image(&self, u: &[f64], image: &mut [f64]) {
+        match self {
+            Entropy::Spots { .. } => spots::image(u, image),
+            Entropy::BrightAndDark => bright_and_dark::image(u, image),
+        }
+    }
+
+    /// Coordinates moved by `scale` times the image step `step`, none by more than `cap`; whether any reached the cap.
+    pub fn step(&self, u: &[f64], image: &[f64], step: &[f64], scale: f64, cap: f64, out: &mut [f64]) -> bool {
+        let step = Step { u, image, step, scale, cap, out };
+        match self {
+            Entropy::Spots { .. } => vector::run(spots::LogitStep(step)),
+            Entropy::BrightAndDark => vector::run(bright_and_dark::LogarithmStep(step)),
+        }
+    }
+
+    /// Entropy of the image with coordinates `u` (at most 0, and 0 at the default), and the image itself.
+    pub fn value(&self, u: &[f64], area: &[f64], image: &mut [f64]) -> f64 {
+        -match *self {
+            Entropy::Spots { default_logit } => vector::run(spots::NegativeValue { default_logit, u, area, s: image }),
+            Entropy::BrightAndDark => vector::run(bright_and_dark::NegativeValue { u, area, b: image }),
+        }
+    }
+
+    /// Gradient of -S with respect to the image.
+    pub fn gradient(&self, u: &[f64], area: &[f64], out: &mut [f64]) {
+        match *self {
+            Entropy::Spots { default_logit } => spots::gradient(default_logit, u, area, out),
+            Entropy::BrightAndDark => bright_and_dark::gradient(u, area, out),
+        }
+    }
+
+    /// Scale of the metric: a step z in it is the image step `scale * z`.
+    pub fn metric(&self, image: &[f64], area: &[f64], out: &mut [f64]) {
+        match self {
+            Entropy::Spots { .. } => spots::metric(image, area, out),
+            Entropy::BrightAndDark => bright_and_dark::metric(image, area, out),
+        }
+    }
+
+    /// Spottedness: how far the image is from one without spots.
+    pub fn spottedness(&self, image: &[f64], area: &[f64]) -> f64 {
+        match self {
+            Entropy::Spots { .. } => dot(image, area),
+            Entropy::BrightAndDark => bright_and_dark::spottedness(image, area),
+        }
+    }
+
+    /// Gradient of the spottedness with respect to the image.
+    pub fn spottedness_gradient<'a>(&self, image: &[f64], area: &'a [f64]) -> Cow<'a, [f64]> {
+        match self {
+            Entropy::Spots { .. } => Cow::Borrowed(area),
+            Entropy::BrightAndDark => Cow::Owned(bright_and_dark::spottedness_gradient(image, area)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AREA: [f64; 4] = [0.1, 0.2, 0.3, 0.4];
+    const MODELS: [(Entropy, [f64; 4]); 2] = [
+        // logit of 1e-3 is ln(1 / 999)
+        (Entropy::Spots { default_logit: -6.906_754_778_648_554 }, [-9.0, -2.0, 0.5, 3.0]),
+        (Entropy::BrightAndDark, [-2.5, -0.1, 0.2, 1.4]),
+    ];
+
+    /// `-S / a` of one pixel as the method has it.
+    fn formula(entropy: Entropy, x: f64) -> f64 {
+        let m = 1e-3;
+        match entropy {
+            Entropy::Spots { .. } => x * (x / m).ln() + (1.0 - x) * ((1.0 - x) / (1.0 - m)).ln(),
+            Entropy::BrightAndDark => x * x.ln() - x + 1.0,
+        }
+    }
+
+    fn image(entropy: Entropy, u: f64) -> f64 {
+        match entropy {
+            Entropy::Spots { .. } => 1.0 / (1.0 + (-u).exp()),
+            Entropy::BrightAndDark => u.exp(),
+        }
+    }
+
+    #[test]
+    fn value_is_the_formula() {
+        assert_eq!(Entropy::new(1e-3), MODELS[0].0);
+        for (entropy, u) in MODELS {
+            let (mut map, mut same) = ([0.0; 4], [0.0; 4]);
+            let value = entropy.value(&u, &AREA, &mut map);
+            let wanted: f64 = u.iter().zip(AREA).map(|(u, a)| a * formula(entropy, image(entropy, *u))).sum();
+            assert!((value + wanted).abs() < 1e-13, "{entropy:?}: {value} {wanted}");
+            entropy.image(&u, &mut same);
+            assert!(map.iter().zip(same).all(|(a, b)| (a / b - 1.0).abs() < 1e-14));
+            assert!(map.iter().zip(u).all(|(x, u)| (x / image(entropy, u) - 1.0).abs() < 1e-14));
+            assert!(entropy.value(&[entropy.default_coordinate(); 4], &AREA, &mut map).abs() < 1e-15);
+        }
+    }
+
+    /// Differences over a step of 1e-4 are good to its square over that of the pixel's value.
+    #[test]
+    fn gradient_and_metric_are_its_derivatives() {
+        for (entropy, u) in MODELS {
+            let (mut map, mut gradient, mut metric) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            entropy.image(&u, &mut map);
+            entropy.gradient(&u, &AREA, &mut gradient);
+            entropy.metric(&map, &AREA, &mut metric);
+            for p in 0..4 {
+                let h = 1e-4 * map[p].min((1.0 - map[p]).abs());
+                let [below, here, above] = [-h, 0.0, h].map(|h| AREA[p] * formula(entropy, map[p] + h));
+                let slope = (above - below) / (2.0 * h);
+                assert!((gradient[p] - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{entropy:?} {p}: {slope}");
+                let curvature = (above - 2.0 * here + below) / (h * h);
+                assert!((metric[p].powi(-2) / curvature - 1.0).abs() < 1e-5, "{entropy:?} {p}: {curvature}");
+            }
+        }
+    }
+
+    #[test]
+    fn gradient_of_spottedness_is_its_derivative() {
+        for (entropy, u) in MODELS {
+            let mut map = [0.0; 4];
+            entropy.image(&u, &mut map);
+            let gradient = entropy.spottedness_gradient(&map, &AREA);
+            for p in 0..4 {
+                let at = |h: f64| {
+                    let mut moved = map;
+                    moved[p] += h;
+                    entropy.spottedness(&moved, &AREA)
+                };
+                let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+                assert!((gradient[p] - slope).abs() < 1e-9, "{entropy:?} {p}: {} {slope}", gradient[p]);
+            }
+        }
+        let blank = Entropy::BrightAndDark.spottedness_gradient(&[1.0; 4], &AREA);
+        assert_eq!(blank[..], [0.0; 4]);
+    }
+
+    #[test]
+    fn steps_are_straight_in_the_image_as_long_as_they_are_small() {
+        for (entropy, u) in MODELS {
+            let (mut map, mut moved, mut there) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            entropy.image(&u, &mut map);
+            for part in [-0.45, 0.3] {
+                let step = map.map(|x| part * x.min((1.0 - x).abs()));
+                assert!(!entropy.step(&u, &map, &step, 1.0, 2.0, &mut moved));
+                entropy.image(&moved, &mut there);
+                assert!((0..4).all(|p| ((there[p] - map[p]) / step[p] - 1.0).abs() < 1e-9), "{entropy:?} {part}");
+            }
+            // what would lead out of the domain does not
+            for step in [-1e9, 1e9] {
+                assert!(entropy.step(&u, &map, &[step; 4], 1.0, 2.0, &mut moved));
+                assert!(
+                    (0..4).all(|p| ((moved[p] - u[p]).abs() - 2.0).abs() < 1e-12 && (moved[p] > u[p]) == (step > 0.0))
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Two-component entropy of an image of spot filling factors (method section 2, Collier Cameron 1992):
+//! `S(s) = - sum_p a_p [ s ln(s/m) + (1-s) ln((1-s)/(1-m)) ]` with default filling m.
+//!
+//! The coordinate is `u = logit(s)`, which keeps s inside (0, 1). Left out: which entropy an image has (`entropy`), data.
+
+use super::Step;
+use crate::maxent::cg::dot;
+use crate::maxent::elementary::{exp_minus, ln_1p};
+use crate::vector::{Instructions, Task};
+
+/// Largest |u|: beyond it s (1-s) would lose its precision.
+pub(super) const LOGIT_LIMIT: f64 = 30.0;
+
+/// The image s.
+pub(super) fn image(u: &[f64], s: &mut [f64]) {
+    for (s, u) in s.iter_mut().zip(u) {
+        *s = 1.0 / (1.0 + (-u).exp());
+    }
+}
+
+/// Gradient of -S with respect to s.
+pub(super) fn gradient(default_logit: f64, u: &[f64], area: &[f64], out: &mut [f64]) {
+    for ((out, u), a) in out.iter_mut().zip(u).zip(area) {
+        *out = a * (u - default_logit);
+    }
+}
+
+/// Scale of the metric, `sqrt(s (1-s) / a)`.
+pub(super) fn metric(s: &[f64], area: &[f64], out: &mut [f64]) {
+    for ((out, s), a) in out.iter_mut().zip(s).zip(area) {
+        *out = (s * (1.0 - s) / a).sqrt();
+    }
+}
+
+/// Logits moved by an image step.
+pub(super) struct LogitStep<'a>(pub Step<'a>);
+
+impl Task for LogitStep<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, i: I) -> bool {
+        let Step { u, image, step, scale, cap, out } = self.0;
+        let mut capped = false;
+        for (((out, u), s), ds) in out.iter_mut().zip(u).zip(image).zip(step) {
+            let du = logit_step(i, *s, scale * ds);
+            capped |= du.abs() > cap;
+            *out = (u + du.clamp(-cap, cap)).clamp(-LOGIT_LIMIT, LOGIT_LIMIT);
+        }
+        capped
+    }
+}
+
+/// `-S` of the image with logits `u`, and the image s itself.
+pub(super) struct NegativeValue<'a> {
+    pub default_logit: f64,
+    pub u: &'a [f64],
+    pub area: &'a [f64],
+    pub s: &'a mut [f64],
+}
+
+impl Task for NegativeValue<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, i: I) -> f64 {
+        let NegativeValue { default_logit, u, area, s } = self;
+        // s u - ln(1 + e^u) is s ln s + (1-s) ln(1-s); both parts from one exponential
+        let at_default = softplus(i, default_logit, exp_minus(i, default_logit.abs()));
+        let mut terms = vec![0.0; u.len()];
+        for ((s, &u), term) in s.iter_mut().zip(u).zip(&mut terms) {
+            let small = exp_minus(i, u.abs());
+            *s = if u > 0.0 { 1.0 } else { small } / (1.0 + small);
+            *term = *s * (u - default_logit) - softplus(i, u, small) + at_default;
+        }
+        dot(area, &terms)
+    }
+}
+
+/// Change of the logit that moves s by `ds`: exact up to half way to 0 or 1, beyond that along the tangent.
+///
+/// Data are nearly linear in s, so that a step straight in s keeps what the stiff directions have gained; a step straight in
+/// the logit, equal to first order, would undo it to second order.
+#[inline(always)]
+fn logit_step(i: impl Instructions, s: f64, ds: f64) -> f64 {
+    let room = if ds < 0.0 { s } else { 1.0 - s };
+    let straight = ds.abs().min(0.5 * room) * ds.signum();
+    let (there, rest) = (s + straight, ds - straight);
+    let left = 1.0 - there;
+    ln_1p(i, straight / (s * left)) + rest / (there * left)
+}
+
+/// `ln(1 + e^u)`, given `e^-|u|`.
+#[inline(always)]
+fn softplus(i: impl Instructions, u: f64, small: f64) -> f64 {
+    u.max(0.0) + ln_1p(i, small)
+}
