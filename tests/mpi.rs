@@ -30,7 +30,7 @@ const GRID: [&str; 3] = ["landscape.json", "landscape.jsonl", "paraboloid.json"]
 
 const CHECKS: [(&str, fn()); 11] = [
     ("a chain is the same on any number of ranks and threads", any_number_of_ranks),
-    ("spots left over are counted on every rank", spots_left_over),
+    ("so it is with other models of star and data", other_models),
     ("a landscape is the same", landscape),
     ("a killed rank ends the job, and another number of ranks resumes it", killed),
     ("SIGUSR1 ends the job with the code that says resume", warned),
@@ -139,12 +139,21 @@ fn any_number_of_ranks() {
     same(&desk, &RUN, "prior", "prior_3");
 }
 
-fn spots_left_over() {
-    let desk = Desk::new(config());
-    desk.set("/imaging/spots_left", json!("fitted"));
-    desk.succeed(&["sample", CONFIG, "--out", "a"]);
-    succeed(&desk, 3, &["sample", CONFIG, "--out", "b"]);
-    same(&desk, &RUN, "a", "b");
+/// What a rank makes of a config comes from the config alone, whatever it asks for.
+fn other_models() {
+    for (pointer, value) in [
+        ("/imaging/spots_left", json!("fitted")),
+        ("/imaging/brightness", json!("bright-and-dark")),
+        ("/imaging/chi2_target", json!("auto")),
+        ("/imaging/nuisances", json!({ "equivalent_width": 0.02 })),
+        ("/parameters/vsini_kms", json!({ "prior": "normal", "mean": 20.0, "sd": 0.3 })),
+    ] {
+        let desk = Desk::new(config());
+        desk.set(pointer, value);
+        desk.succeed(&["sample", CONFIG, "--out", "a"]);
+        succeed(&desk, 3, &["sample", CONFIG, "--out", "b"]);
+        same(&desk, &RUN, "a", "b");
+    }
 }
 
 fn landscape() {
