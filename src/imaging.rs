@@ -60,11 +60,6 @@ impl Imager {
         Imager { sampling, data: self.data.of_profiles(&kept, 1.0), ..self.clone() }
     }
 
-    /// The same with all errors multiplied by `factor`.
-    pub fn with_errors(&self, factor: f64) -> Self {
-        Imager { data: self.data.of_profiles(&self.bins(), factor), ..self.clone() }
-    }
-
     /// Bins of every profile within the data.
     fn bins(&self) -> Vec<std::ops::Range<usize>> {
         let mut end = 0;

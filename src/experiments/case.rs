@@ -170,7 +170,9 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
         return Err(last.into());
     }
     let first = scene(config, path)?;
-    let reached = attained(&first, first.settings.imaging.chi2_target.value())?;
+    let target = first.settings.imaging.chi2_target.value();
+    let reached = Reference::provisional(&first.imager, first.settings.values, target)?.solution.chi2;
+    let reached = reached / first.imager.data.depth.len() as f64;
     for factor in ABOVE_REACHED {
         if pool.stopped() {
             return Err(ExperimentError::Interrupted);
@@ -182,12 +184,6 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
         }
     }
     Err(last.into())
-}
-
-/// chi2 per datum of a provisional image at the config's values, no lower than `target`.
-pub(super) fn attained(scene: &Scene, target: f64) -> Result<f64, ExperimentError> {
-    let image = Reference::provisional(&scene.imager, scene.settings.values, target)?;
-    Ok(image.solution.chi2 / scene.imager.data.depth.len() as f64)
 }
 
 /// The star of a config that is kept at `path`.
