@@ -159,7 +159,7 @@ fn workers(queue: &Queue) {
     let mut table = Table::new(&format!("Ranks: {} of them, {workers} of which work", workers + 1), &columns);
     for (free, pixels) in CASES {
         let Case { posterior, task, points, .. } = Case::new(free, pixels);
-        let brief = Brief::Density(task).to_bytes();
+        let brief = Brief::Density(Box::new(task)).to_bytes();
         let questions: Vec<Vec<u8>> = points.iter().map(Question::to_bytes).collect();
         let ask = || queue.answers(&brief, &questions, &AtomicBool::new(false));
         let here: Vec<Vec<u8>> = points.iter().map(|theta| posterior.evaluate(theta).to_bytes()).collect();

@@ -118,7 +118,7 @@ impl Survey {
     /// Nodes that cannot be written.
     pub fn go(&mut self, pool: &Pool, mut on_batch: impl FnMut(&Landscape)) -> Result<bool, SurveyError> {
         let Survey { header: Header { grid, .. }, posterior, landscape, task, file } = self;
-        let brief = Brief::Density(task.clone()).to_bytes();
+        let brief = Brief::Density(Box::new(task.clone())).to_bytes();
         while !landscape.is_whole() {
             if pool.stopped() {
                 return Ok(false);

@@ -40,7 +40,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     bar.finish_and_clear();
     let rows = rows(&stars, &ends);
     write_json(&folder.join(FILE), &rows)?;
-    let _ = write!(std::io::stdout(), "{}written: {}: {FILE}\n", table(&rows), folder.display());
+    let _ = writeln!(std::io::stdout(), "{}written: {}: {FILE}", table(&rows), folder.display());
     let count = |is: &dyn Fn(&End) -> bool| ends.iter().filter(|end| is(end)).count();
     let (interrupted, failed) = (count(&|end| *end == End::Interrupted), count(&|end| matches!(end, End::Failed(_))));
     if interrupted > 0 {

@@ -110,7 +110,12 @@ pub struct Evaluations<'a> {
 impl<'a> Evaluations<'a> {
     /// Of `target`, which others know by `task`.
     pub fn new(pool: &'a Pool, target: &'a Target, task: &Task) -> Self {
-        Evaluations { pool, target, brief: Brief::Density(task.clone()).to_bytes(), count: AtomicUsize::new(0) }
+        Evaluations {
+            pool,
+            target,
+            brief: Brief::Density(Box::new(task.clone())).to_bytes(),
+            count: AtomicUsize::new(0),
+        }
     }
 
     /// How many there were.

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Brief {
     /// Questions are parameter vectors.
-    Density(Task),
+    Density(Box<Task>),
     /// Questions are stars of a batch.
     Stars,
 }
