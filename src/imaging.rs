@@ -57,7 +57,7 @@ impl Imager {
             }
         }
         let sampling = Sampling { profiles: rest, ..self.sampling };
-        Imager { sampling, data: self.data.of_profiles(&kept, 1.0), ..self.clone() }
+        Imager { sampling, data: self.data.of_profiles(&kept), ..self.clone() }
     }
 
     /// Bins of every profile within the data.

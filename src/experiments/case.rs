@@ -10,6 +10,7 @@ use crate::chain::{Summary, summarise};
 use crate::config::{self, GridSettings};
 use crate::detection::{Detection, DetectionSettings};
 use crate::ensemble::StopReason;
+use crate::expansion::nuisances;
 use crate::io::atomic::write_json;
 use crate::io::paraboloid::ParaboloidFile;
 use crate::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
@@ -262,7 +263,7 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentEr
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
         chi2_target: scene.settings.imaging.chi2_target.value(),
-        nuisances: Vec::new(),
+        nuisances: nuisances(&scene.settings.free),
         search: PeriodSearch { draws, seed: 1 },
         eccentric: false,
         second_planet: false,
