@@ -9,46 +9,57 @@ import heapq
 import math
 import random
 
-# a message over a network, s: latency of either direction, and what rank 0 works on a question with its answer
-LATENCY, SERVICE = 20e-6, 12e-6
+# s: a message one way, the nap of whoever waits for it included; what rank 0 works on a question and its answer
+LATENCY, SERVICE = 115e-6, 12e-6
 # what rank 0 does for each walker and step: propose, decide, write a line
-PROPOSAL = 60e-6
+PROPOSAL = 70e-6
 
 # name, median of an evaluation (s), spread of its logarithm
-CASES = [("3-D, 2,000 pixels", 3.3e-3, 0.15), ("3-D, 20,000 pixels", 40e-3, 0.15), ("7-D, 20,000 pixels", 150e-3, 0.25)]
-# a quarter slower: other machines' cores are not alike
+CASES = [("3-D, 2,000 pixels", 0.9e-3, 0.24), ("3-D, 20,000 pixels", 13e-3, 0.24), ("7-D, 20,000 pixels", 40e-3, 0.44)]
+# spread of the logarithm of the ranks' speeds: machines are not all alike
 UNEQUAL = 0.1
 
 
-def step_s(batch, ranks, median, spread, rng):
-    """Seconds of a half-step of `batch` questions with so many ranks, the first of which only hands out; and of work in it."""
-    workers = ranks - 1
-    speed = [math.exp(rng.gauss(0.0, UNEQUAL)) for _ in range(min(workers, batch))]
-    clock = PROPOSAL * batch
-    work, given, answers = 0.0, 0, []
-    for worker, factor in enumerate(speed):
-        clock += SERVICE / 2
-        work, given = work + send(answers, clock, worker, factor, median, spread, rng), given + 1
-    while answers:
-        arrival, worker = heapq.heappop(answers)
-        clock = max(clock, arrival) + SERVICE / 2
-        if given < batch:
-            clock += SERVICE / 2
-            work, given = work + send(answers, clock, worker, speed[worker], median, spread, rng), given + 1
-    return clock, work
+class Batch:
+    """One half of all walkers, handed out and taken back."""
+
+    def __init__(self, questions, workers, median, spread, rng):
+        self.left, self.clock, self.work = questions, PROPOSAL * questions, 0.0
+        self.median, self.spread, self.rng = median, spread, rng
+        self.speed = [math.exp(rng.gauss(0.0, UNEQUAL)) for _ in range(min(workers, questions))]
+        self.workers, self.until, self.open = workers, [0.0] * len(self.speed), [0] * len(self.speed)
+        self.answers = []
+
+    def send(self, worker):
+        """A question to a worker, which begins with it when it has done what it has."""
+        self.clock += SERVICE / 2
+        took = self.speed[worker] * self.median * math.exp(self.rng.gauss(0.0, self.spread))
+        self.until[worker] = max(self.until[worker], self.clock + LATENCY) + took
+        heapq.heappush(self.answers, (self.until[worker] + LATENCY, worker))
+        self.left, self.open[worker], self.work = self.left - 1, self.open[worker] + 1, self.work + took
+
+    def run(self):
+        """Seconds, and seconds of work, until all answers are back."""
+        for worker in range(len(self.speed)):
+            self.send(worker)
+        # one ahead for each, while there are more questions than all can take
+        for worker in range(len(self.speed)):
+            if self.left > self.workers:
+                self.send(worker)
+        while self.answers:
+            arrival, worker = heapq.heappop(self.answers)
+            self.clock = max(self.clock, arrival) + SERVICE / 2
+            self.open[worker] -= 1
+            if self.left > 0 and (self.open[worker] == 0 or self.left > self.workers):
+                self.send(worker)
+        return self.clock, self.work
 
 
-def send(answers, clock, worker, factor, median, spread, rng):
-    took = factor * median * math.exp(rng.gauss(0.0, spread))
-    heapq.heappush(answers, (clock + 2 * LATENCY + took, worker))
-    return took
-
-
-def throughput(walkers, ranks, case, steps=12):
+def throughput(walkers, ranks, case, steps):
     """Evaluations a second, and the share of the workers' time that is work."""
     _, median, spread = case
     rng = random.Random(1)
-    halves = [step_s(walkers // 2, ranks, median, spread, rng) for _ in range(2 * steps)]
+    halves = [Batch(walkers // 2, ranks - 1, median, spread, rng).run() for _ in range(2 * steps)]
     seconds, work = sum(h[0] for h in halves), sum(h[1] for h in halves)
     return walkers * steps / seconds, work / (seconds * (ranks - 1))
 
@@ -56,7 +67,7 @@ def throughput(walkers, ranks, case, steps=12):
 def main():
     ranks = [10, 30, 100, 300, 1000, 3000, 10000]
     for case in CASES:
-        print(f"\n{case[0]}, evaluations of {1e3 * case[1]:.1f} ms: evaluations a second (share of the workers' time that is work)\n")
+        print(f"\n{case[0]}, evaluations of {1e3 * case[1]:g} ms: evaluations a second (share of the workers' time that is work)\n")
         print("| walkers in all | " + " | ".join(f"{n:,} ranks" for n in ranks) + " |")
         print("|---" * (len(ranks) + 1) + "|")
         for walkers in [128, 512, 2048, 8192, 32768]:

@@ -49,18 +49,30 @@ impl Imager {
 
     /// The same without some of the profiles.
     pub fn without(&self, profiles: &[usize]) -> Self {
-        let mut kept = Vec::new();
-        let mut rest = Sampling { profiles: Vec::new(), ..self.sampling };
-        let mut first = 0;
-        for (k, profile) in self.sampling.profiles.iter().enumerate() {
-            let bins = first..first + profile.2;
-            first = bins.end;
+        let (mut rest, mut kept) = (Vec::new(), Vec::new());
+        for (k, (profile, bins)) in self.sampling.profiles.iter().zip(self.bins()).enumerate() {
             if !profiles.contains(&k) {
-                rest.profiles.push(*profile);
+                rest.push(*profile);
                 kept.push(bins);
             }
         }
-        Imager { sampling: rest, data: self.data.of_bins(&kept), ..self.clone() }
+        let sampling = Sampling { profiles: rest, ..self.sampling };
+        Imager { sampling, data: self.data.of_profiles(&kept, 1.0), ..self.clone() }
+    }
+
+    /// The same with all errors multiplied by `factor`.
+    pub fn with_errors(&self, factor: f64) -> Self {
+        Imager { data: self.data.of_profiles(&self.bins(), factor), ..self.clone() }
+    }
+
+    /// Bins of every profile within the data.
+    fn bins(&self) -> Vec<std::ops::Range<usize>> {
+        let mut end = 0;
+        let next = |profile: &(f64, f64, usize)| {
+            end += profile.2;
+            end - profile.2..end
+        };
+        self.sampling.profiles.iter().map(next).collect()
     }
 
     /// The response at one state of star and planet.
@@ -212,13 +224,15 @@ impl Problem for ImagingProblem<'_> {
         self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
         let mut chi2 = 0.0;
         for k in 0..self.response.profiles() {
-            for j in self.response.bins(k) {
-                self.model[j] /= self.continuum[k];
-                self.differences[j] = self.model[j] - self.data.depth[j];
+            let (bins, continuum) = (self.response.bins(k), self.continuum[k]);
+            let residuals = self.differences[bins.clone()].iter_mut().zip(&self.data.depth[bins.clone()]);
+            for (model, (residual, depth)) in self.model[bins.clone()].iter_mut().zip(residuals) {
+                *model /= continuum;
+                *residual = *model - depth;
             }
-            self.data.weigh(self.response.bins(k), &self.differences, &mut self.weighted_residual);
-            for j in self.response.bins(k) {
-                chi2 += self.differences[j] * self.weighted_residual[j];
+            self.data.weigh(bins.clone(), &self.differences, &mut self.weighted_residual);
+            for (residual, weighted) in self.differences[bins.clone()].iter().zip(&self.weighted_residual[bins]) {
+                chi2 += residual * weighted;
             }
         }
         chi2
@@ -243,16 +257,19 @@ impl Problem for ImagingProblem<'_> {
         for k in 0..self.response.profiles() {
             let scale = self.brightness_of.slope / self.continuum[k];
             let d_continuum = self.constants[k] * scale;
-            for j in self.response.bins(k) {
-                self.differences[j] = scale * self.bins[j] - self.model[j] * d_continuum;
+            let bins = self.response.bins(k);
+            let model = &self.model[bins.clone()];
+            let d_model = self.differences[bins.clone()].iter_mut().zip(&self.bins[bins.clone()]);
+            for ((d_model, line), model) in d_model.zip(model) {
+                *d_model = scale * line - model * d_continuum;
             }
-            self.data.weigh(self.response.bins(k), &self.differences, &mut self.bins);
+            self.data.weigh(bins.clone(), &self.differences, &mut self.bins);
             let mut constant = 0.0;
-            for j in self.response.bins(k) {
-                let residual = second_order * self.weighted_residual[j];
-                let back = scale * (self.bins[j] - residual * d_continuum);
-                constant -= back * self.model[j] + scale * residual * self.differences[j];
-                self.bins[j] = back;
+            let changes = self.differences[bins.clone()].iter().zip(&self.weighted_residual[bins.clone()]);
+            for ((back, model), (d_model, residual)) in self.bins[bins].iter_mut().zip(model).zip(changes) {
+                let residual = second_order * residual;
+                *back = scale * (*back - residual * d_continuum);
+                constant -= *back * model + scale * residual * d_model;
             }
             self.constants[k] = constant;
         }

@@ -67,32 +67,33 @@ struct Correction {
 impl Nuisances {
     /// Of `observations`, with priors of these standard deviations; a standard deviation of 0 fixes a nuisance at 0.
     pub fn new(priors: LineAndContinuum, observations: &Observations) -> Self {
-        let data = observations.len();
-        let free: Vec<usize> = (0..3).filter(|&i| priors.numbers()[i] > 0.0).collect();
-        let mut templates: Vec<(usize, Vec<f64>)> = free.iter().map(|&i| (i, Vec::with_capacity(data))).collect();
-        let empty = Correction { full: Vec::with_capacity(data), half: Vec::with_capacity(data) };
-        let mut corrections = vec![empty; free.len()];
-        for profile in &observations.profiles {
-            let of_profile = templates_of(profile, observations);
-            let columns = DMatrix::from_fn(profile.sigma.len(), free.len(), |j, column| {
-                of_profile[j][free[column]] * priors.numbers()[free[column]]
-            });
-            for (column, (_, template)) in templates.iter_mut().enumerate() {
-                template.extend(columns.column(column).iter());
-            }
-            correct(&columns, &profile.sigma, &mut corrections);
-        }
-        Nuisances { priors, templates, corrections }
+        let rows: Vec<[f64; 3]> = observations.profiles.iter().flat_map(|p| templates_of(p, observations)).collect();
+        let of_one = |(i, sd): (usize, f64)| (i, rows.iter().map(|row| row[i] * sd).collect());
+        let free = priors.numbers().into_iter().enumerate().filter(|(_, sd)| *sd > 0.0);
+        let templates = free.map(of_one).collect();
+        let mut end = 0;
+        let bins = observations.profiles.iter().map(|profile| {
+            end += profile.sigma.len();
+            end - profile.sigma.len()..end
+        });
+        let sigma: Vec<f64> = observations.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect();
+        Nuisances { priors, templates, corrections: Vec::new() }.of_profiles(&bins.collect::<Vec<_>>(), &sigma)
     }
 
-    /// Those of some of the profiles, whose bins `of_bins` picks out.
-    pub fn of_bins(&self, of_bins: impl Fn(&[f64]) -> Vec<f64>) -> Self {
-        let correction = |one: &Correction| Correction { full: of_bins(&one.full), half: of_bins(&one.half) };
-        Nuisances {
-            priors: self.priors,
-            templates: self.templates.iter().map(|(i, template)| (*i, of_bins(template))).collect(),
-            corrections: self.corrections.iter().map(correction).collect(),
+    /// Those of the profiles with these `bins` alone, whose bins have the errors `sigma`, one after the other.
+    pub fn of_profiles(&self, profiles: &[Range<usize>], sigma: &[f64]) -> Self {
+        let kept = |(i, template): &(usize, Vec<f64>)| {
+            (*i, profiles.iter().flat_map(|bins| template[bins.clone()].to_vec()).collect())
+        };
+        let templates: Vec<(usize, Vec<f64>)> = self.templates.iter().map(kept).collect();
+        let mut corrections = vec![Correction { full: Vec::new(), half: Vec::new() }; templates.len()];
+        let mut first = 0;
+        for bins in profiles {
+            let columns = DMatrix::from_fn(bins.len(), templates.len(), |j, column| templates[column].1[first + j]);
+            correct(&columns, &sigma[first..first + bins.len()], &mut corrections);
+            first += bins.len();
         }
+        Nuisances { priors: self.priors, templates, corrections }
     }
 
     /// Whether there is none.

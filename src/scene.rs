@@ -163,9 +163,9 @@ impl Scene {
     pub fn true_map(&self) -> Option<Vec<f64>> {
         match self.settings.imaging.brightness {
             BrightnessModel::Spots => self.true_spot_filling(),
-            BrightnessModel::BrightAndDark => {
-                self.simulation().map(|simulation| simulation.brightness(&self.imager.grid, self.imager.star.contrast))
-            }
+            BrightnessModel::BrightAndDark => self
+                .simulation()
+                .map(|simulation| simulation.brightness(&self.imager.grid, simulation.contrast(&self.imager.star))),
         }
     }
 
@@ -187,7 +187,7 @@ impl Scene {
             // as the user wrote them: degrees of radians of degrees are not
             spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
             faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
-            contrast: (!simulation.faculae.is_empty()).then_some(self.imager.star.contrast),
+            contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
             continuum: simulation.nuisances(),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
@@ -238,13 +238,8 @@ fn with_errors(
     };
     let mut measured = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
     if wanted.measured {
-        let before = scaled(&measured);
-        let with_factor = |factor: f64| {
-            let mut observations = before.clone();
-            observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
-            imager(settings, &observations)
-        };
-        measured.count_residuals(settings.values, with_factor)?.map_err(fault)?;
+        let imager = imager(settings, &scaled(&measured))?;
+        measured.count_residuals(&imager, settings.values).map_err(fault)?;
     }
     Ok((scaled(&measured), measured))
 }

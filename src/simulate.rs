@@ -61,7 +61,7 @@ impl Simulation {
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
         let state = self.truth.state();
-        let brightness = self.brightness(&grid, star.with(&state.surface).contrast);
+        let brightness = self.brightness(&grid, self.contrast(star));
         let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
         let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
@@ -88,17 +88,6 @@ impl Simulation {
         grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
     }
 
-    /// The true brightness of each pixel of `grid`, that of the photosphere being 1 and that of spots `contrast`.
-    pub fn brightness(&self, grid: &SurfaceGrid, contrast: f64) -> Vec<f64> {
-        let of_spots = Brightness::of_spots(contrast);
-        let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
-        if !self.faculae.is_empty() {
-            let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);
-            brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
-        }
-        brightness
-    }
-
     /// What is wrong with each profile by itself; empty if nothing is.
     pub fn nuisances(&self) -> Vec<LineAndContinuum> {
         if self.continuum == LineAndContinuum::default() {
@@ -113,6 +102,22 @@ impl Simulation {
             }))
         };
         self.times_d.iter().map(|_| draw()).collect()
+    }
+
+    /// Brightness of spots on `star` over that of the photosphere.
+    pub fn contrast(&self, star: &StarSettings) -> f64 {
+        star.with(&self.truth.state().surface).contrast
+    }
+
+    /// The true brightness of each pixel of `grid`, that of the photosphere being 1 and that of spots `contrast`.
+    pub fn brightness(&self, grid: &SurfaceGrid, contrast: f64) -> Vec<f64> {
+        let of_spots = Brightness::of_spots(contrast);
+        let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
+        if !self.faculae.is_empty() {
+            let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);
+            brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
+        }
+        brightness
     }
 
     /// Gaussian noise of `n` bins, all profiles one after the other.

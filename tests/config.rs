@@ -354,6 +354,9 @@ fn senseless_values_name_their_key() {
         let message = message(&with(demo(), pointer, value));
         assert!(message.starts_with(&format!(": {key}: ")), "{pointer}: {message}");
     }
+    let brightness = with(demo(), "/imaging/brightness", json!("bright-and-dark"));
+    let contrast = json!({ "prior": "uniform", "min": 0, "max": 1 });
+    assert!(message(&with(brightness, "/parameters/contrast", contrast)).starts_with(": parameters.contrast: "));
     for (pointer, value, key) in [
         ("/observations/velocity_range_kms", json!([90, -90]), "observations.velocity_range_kms"),
         ("/observations/sigma_scale", json!(0), "observations.sigma_scale"),

@@ -4,6 +4,7 @@
 //! A panic on any rank, on any thread, ends them all: without that the others would wait for it forever. Nobody burns a processor
 //! while waiting (`nap`). Left out: what is asked (`pool`), and what a failure looks like to the user.
 
+mod hands;
 mod message;
 mod nap;
 mod queue;

@@ -1,8 +1,9 @@
 //! Rank 0: questions out to whoever is free, answers back in order.
 //!
-//! Left out: the other side (`worker`).
+//! Left out: the other side (`worker`), and who is next (`hands`).
 
 use super::Ranks;
+use super::hands::Hands;
 use super::message::{ANSWER, BRIEF, DISMISS, HELLO, QUESTION, STOP, number, numbered, split};
 use super::nap::Nap;
 use mpi::Rank;
@@ -42,21 +43,16 @@ impl Queue {
     /// asked any more and those that were are waited for.
     pub fn answers(&self, brief: &[u8], questions: &[Vec<u8>], stop: &AtomicBool) -> Vec<Vec<u8>> {
         self.tell(brief);
-        // each as often as it answers at once, in turn, so that a batch that is short of questions is spread over all ranks
-        let most = self.at_once.iter().map(|(_, at_once)| *at_once).max().unwrap_or(0);
-        let turn = |turn| self.at_once.iter().filter(move |(_, at_once)| turn < *at_once).map(|(rank, _)| *rank);
-        let mut free: Vec<Rank> = (0..most).rev().flat_map(turn).collect();
+        let mut hands = Hands::new(&self.at_once);
         let mut answers: Vec<Option<Vec<u8>>> = vec![None; questions.len()];
         let mut left = questions.iter().enumerate();
         let (mut open, mut hurried, mut nap) = (0, false, Nap::new());
         loop {
             let stopped = stop.load(Relaxed);
-            while !stopped
-                && let Some(&rank) = free.last()
-                && let Some((place, question)) = left.next()
-            {
+            while !stopped && left.len() > 0 {
+                let Some(rank) = hands.take(left.len() > self.size()) else { break };
+                let (place, question) = left.next().expect("there are some left");
                 self.ranks.world.process_at_rank(rank).send_with_tag(&numbered(place, question)[..], QUESTION);
-                free.pop();
                 open += 1;
             }
             if open == 0 {
@@ -71,7 +67,7 @@ impl Queue {
                     let (bytes, status) = found.matched_receive_vec::<u8>();
                     let (place, answer) = split(&bytes);
                     answers[place] = Some(answer.to_vec());
-                    free.push(status.source_rank());
+                    hands.give_back(status.source_rank());
                     open -= 1;
                     nap = Nap::new();
                 }

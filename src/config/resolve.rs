@@ -26,6 +26,12 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     check_imaging(&raw.imaging)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
+        return Err(Fault::new(
+            "parameters.contrast",
+            "has no effect on a bright-and-dark map, which holds the brightness itself",
+        ));
+    }
     let grid = raw.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
     if raw.imaging.brightness == BrightnessModel::BrightAndDark && raw.parameters.contrast.is_some() {
         let problem = "an image of bright and dark pixels knows no spots: contrast has no effect";

@@ -28,21 +28,20 @@ impl Data {
         }
     }
 
-    /// Those of some of the bins, which are whole profiles.
-    pub fn of_bins(&self, kept: &[Range<usize>]) -> Self {
-        let of_bins = |all: &[f64]| kept.iter().flat_map(|bins| &all[bins.clone()]).copied().collect();
-        Data {
-            depth: of_bins(&self.depth),
-            inverse_variance: of_bins(&self.inverse_variance),
-            nuisances: self.nuisances.of_bins(of_bins),
-        }
+    /// That of the profiles with these `bins` alone, all errors multiplied by `factor`.
+    pub fn of_profiles(&self, profiles: &[Range<usize>], factor: f64) -> Self {
+        let of = |x: &[f64]| profiles.iter().flat_map(|bins| x[bins.clone()].to_vec()).collect::<Vec<f64>>();
+        let mut inverse_variance = of(&self.inverse_variance);
+        inverse_variance.iter_mut().for_each(|w| *w /= factor * factor);
+        let sigma: Vec<f64> = inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
+        let nuisances = self.nuisances.of_profiles(profiles, &sigma);
+        Data { depth: of(&self.depth), inverse_variance, nuisances }
     }
 
     /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
     pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
-        for j in bins.clone() {
-            out[j] = x[j] * self.inverse_variance[j];
-        }
+        let weights = x[bins.clone()].iter().zip(&self.inverse_variance[bins.clone()]);
+        out[bins.clone()].iter_mut().zip(weights).for_each(|(out, (x, weight))| *out = x * weight);
         self.nuisances.weigh(bins, x, out);
     }
 

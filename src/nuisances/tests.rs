@@ -86,3 +86,19 @@ fn the_line_is_the_mean_of_all_profiles_where_they_are() {
     assert!((rows[19][2] - (1.0 - second.intensity[19])).abs() < 1e-12);
     assert_eq!((rows[0][1], rows[19][1]), (1.0, -1.0));
 }
+
+#[test]
+fn fewer_profiles_or_larger_errors_are_as_if_made_so() {
+    let priors = LineAndContinuum::of_numbers([1e-3, 2e-3, 0.02]);
+    let all = Nuisances::new(priors, &observations());
+    let sigma: Vec<f64> = observations().profiles[1].sigma.iter().map(|s| 3.0 * s).collect();
+    let second = all.of_profiles(std::slice::from_ref(&(20..40)), &sigma);
+    let x: Vec<f64> = (0..20).map(|j| (j as f64).cos()).collect();
+    let mut weighted: Vec<f64> = x.iter().zip(&sigma).map(|(x, s)| x / (s * s)).collect();
+    second.weigh(0..20, &x, &mut weighted);
+    let noise = DMatrix::from_diagonal(&DVector::from_iterator(20, sigma.iter().map(|s| s * s)));
+    let quoted = observations().profiles[1].sigma.iter().map(|s| s * s).collect::<Vec<f64>>();
+    let dense = covariance(priors, 1) - DMatrix::from_diagonal(&DVector::from_vec(quoted)) + noise;
+    let wanted = dense.cholesky().unwrap().solve(&DVector::from_vec(x));
+    assert!((DVector::from_vec(weighted) - &wanted).amax() < 1e-9 * wanted.amax());
+}
