@@ -57,12 +57,7 @@ impl Imager {
             }
         }
         let sampling = Sampling { profiles: rest, ..self.sampling };
-        Imager { sampling, data: self.data.of_profiles(&kept, 1.0), ..self.clone() }
-    }
-
-    /// The same with all errors multiplied by `factor`.
-    pub fn with_errors(&self, factor: f64) -> Self {
-        Imager { data: self.data.of_profiles(&self.bins(), factor), ..self.clone() }
+        Imager { sampling, data: self.data.of_profiles(&kept), ..self.clone() }
     }
 
     /// Bins of every profile within the data.

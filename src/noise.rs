@@ -153,16 +153,24 @@ fn relative(scatter: &[Scatter]) -> Result<Vec<f64>, NoiseError> {
 }
 
 impl MeasuredErrors {
-    /// Takes the residuals of a map into account. `imager` is of profiles whose errors are scaled by what was measured so far.
+    /// Takes the residuals of a map into account. `imager` is of the profiles with errors scaled by what was measured so far, times a
+    /// factor.
     ///
     /// # Errors
-    /// If there is no map.
-    pub fn count_residuals(&mut self, imager: &Imager, values: ParameterValues) -> Result<(), NoiseError> {
+    /// The outer ones are those of `imager`, the inner ones say that there is no map.
+    pub fn count_residuals<E>(
+        &mut self,
+        values: ParameterValues,
+        imager: impl Fn(f64) -> Result<Imager, E>,
+    ) -> Result<Result<(), NoiseError>, E> {
         let before = self.sigma_scale.unwrap_or(1.0);
         let mut factor = 1.0;
         for _ in 0..MOST_MAPS {
-            let scaled = imager.with_errors(factor);
-            let map = Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA * self.correlated_bins)?;
+            let scaled = imager(factor)?;
+            let map = match Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA * self.correlated_bins) {
+                Ok(map) => map,
+                Err(error) => return Ok(Err(error.into())),
+            };
             let independent = scaled.data.depth.len() as f64 / self.correlated_bins;
             let next = factor * (map.solution.chi2 / (FITTED * independent)).sqrt();
             let stays = (next / factor - 1.0).abs() < STAYS;
@@ -172,10 +180,10 @@ impl MeasuredErrors {
                 let residual = rounded(before * factor / root);
                 self.residual = Some(residual);
                 self.sigma_scale = Some(rounded(root * self.continuum.unwrap_or(residual).max(residual)));
-                return Ok(());
+                return Ok(Ok(()));
             }
         }
-        Err(NoiseError::NoMap(before * factor))
+        Ok(Err(NoiseError::NoMap(before * factor)))
     }
 
     /// Multiplies the errors of `observations` by all that was measured.

@@ -238,8 +238,13 @@ fn with_errors(
     };
     let mut measured = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
     if wanted.measured {
-        let imager = imager(settings, &scaled(&measured))?;
-        measured.count_residuals(&imager, settings.values).map_err(fault)?;
+        let before = scaled(&measured);
+        let with_factor = |factor: f64| {
+            let mut observations = before.clone();
+            observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
+            imager(settings, &observations)
+        };
+        measured.count_residuals(settings.values, with_factor)?.map_err(fault)?;
     }
     Ok((scaled(&measured), measured))
 }

@@ -10,6 +10,7 @@ use crate::chain::{Summary, summarise};
 use crate::config::{self, GridSettings};
 use crate::detection::{Detection, DetectionSettings};
 use crate::ensemble::StopReason;
+use crate::expansion::nuisances;
 use crate::io::atomic::write_json;
 use crate::io::paraboloid::ParaboloidFile;
 use crate::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
@@ -170,7 +171,9 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
         return Err(last.into());
     }
     let first = scene(config, path)?;
-    let reached = attained(&first, first.settings.imaging.chi2_target.value())?;
+    let target = first.settings.imaging.chi2_target.value();
+    let reached = Reference::provisional(&first.imager, first.settings.values, target)?.solution.chi2;
+    let reached = reached / first.imager.data.depth.len() as f64;
     for factor in ABOVE_REACHED {
         if pool.stopped() {
             return Err(ExperimentError::Interrupted);
@@ -182,12 +185,6 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
         }
     }
     Err(last.into())
-}
-
-/// chi2 per datum of a provisional image at the config's values, no lower than `target`.
-pub(super) fn attained(scene: &Scene, target: f64) -> Result<f64, ExperimentError> {
-    let image = Reference::provisional(&scene.imager, scene.settings.values, target)?;
-    Ok(image.solution.chi2 / scene.imager.data.depth.len() as f64)
 }
 
 /// The star of a config that is kept at `path`.
@@ -266,7 +263,7 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentEr
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
         chi2_target: scene.settings.imaging.chi2_target.value(),
-        nuisances: Vec::new(),
+        nuisances: nuisances(&scene.settings.free),
         search: PeriodSearch { draws, seed: 1 },
         eccentric: false,
         second_planet: false,

@@ -9,6 +9,7 @@ use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::{Estimate, Outcome, share};
 use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
+use crate::objective::Reference;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -158,15 +159,15 @@ fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, Experimen
     attainable(laboratory, config)
 }
 
-/// A chi2 per datum that no image comes down to.
-const OUT_OF_REACH: f64 = 0.5;
+/// lambda of the image that has the target chi2, over the number of data; the paper's star at 0.97 has 1.6.
+const LAMBDA: f64 = 3.0;
 
-/// `config` with a target chi2 that its image attains: that of the image where lambda is three over the number of data (the
-/// paper's star at 0.97 has 1.6). How far down a noise realisation lets chi2 come is up to it, and a target near the floor would
+/// `config` with a target chi2 that its image attains: that of the image where lambda is [`LAMBDA`] over the number of data. How far down a noise realisation lets chi2 come is up to it, and a target near the floor would
 /// make noise of the spots.
 pub(super) fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, ExperimentError> {
     let scene = case::scene(&config, &laboratory.folder.join("config.json"))?;
-    let chi2 = (1e4 * case::attained(&scene, OUT_OF_REACH)?).round() / 1e4;
+    let image = Reference::at_lambda(&scene.imager, scene.settings.values, LAMBDA)?;
+    let chi2 = (1e4 * image.solution.chi2 / scene.imager.data.depth.len() as f64).round() / 1e4;
     Ok(with(config, &[("/imaging/chi2_target", json!(chi2))]))
 }
 

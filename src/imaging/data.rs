@@ -28,11 +28,10 @@ impl Data {
         }
     }
 
-    /// That of the profiles with these `bins` alone, all errors multiplied by `factor`.
-    pub fn of_profiles(&self, profiles: &[Range<usize>], factor: f64) -> Self {
+    /// That of the profiles with these `bins` alone.
+    pub fn of_profiles(&self, profiles: &[Range<usize>]) -> Self {
         let of = |x: &[f64]| profiles.iter().flat_map(|bins| x[bins.clone()].to_vec()).collect::<Vec<f64>>();
-        let mut inverse_variance = of(&self.inverse_variance);
-        inverse_variance.iter_mut().for_each(|w| *w /= factor * factor);
+        let inverse_variance = of(&self.inverse_variance);
         let sigma: Vec<f64> = inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
         let nuisances = self.nuisances.of_profiles(profiles, &sigma);
         Data { depth: of(&self.depth), inverse_variance, nuisances }
