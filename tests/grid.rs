@@ -255,9 +255,12 @@ fn what_is_no_landscape_is_not_resumed_and_nothing_is_overwritten() {
     broken(&|line| line.replace("\"chi2\"", "\"chi\""), "unknown key `chi`");
     broken(&|line| line.replace("\"converged\"", "\"non-finite\""), "status");
 
-    let before = desk.inventory();
+    // how long it took is not the same again
+    let results =
+        || desk.inventory().into_iter().filter(|(path, _)| !path.ends_with("whole/effort.json")).collect::<Vec<_>>();
+    let before = results();
     desk.succeed(&["grid", CONFIG, "--out", "whole", "--force"]);
-    assert!(desk.inventory() == before);
+    assert!(results() == before);
 }
 
 /// A parameter on an axis is free whether it has a prior or not; one with a prior and no axis is fixed.
