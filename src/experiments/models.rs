@@ -145,14 +145,14 @@ fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64),
     let [(_, k_kms), (_, period)] = ORBIT;
     let plain = [
         ("/planet", json!({ "k_kms": k_kms, "porb_over_prot": period, "phi": phi })),
-        ("/imaging/pixels", json!(laboratory.full_or_quick(5000, 1000))),
+        ("/imaging/pixels", json!(laboratory.full_or_quick(2000, 1000))),
         ("/imaging/spots_left", json!("fitted")),
         ("/parameters/k_kms/max", json!(0.4)),
         ("/parameters/porb_over_prot/min", json!(1.2)),
         ("/parameters/porb_over_prot/max", json!(2.4)),
         ("/sampler/walkers", json!(12)),
-        ("/sampler/ess", json!(laboratory.full_or_quick(400, 100))),
-        ("/sampler/rhat", json!(laboratory.full_or_quick(1.02, 1.1))),
+        ("/sampler/ess", json!(laboratory.full_or_quick(200, 100))),
+        ("/sampler/rhat", json!(laboratory.full_or_quick(1.05, 1.1))),
     ];
     let plain = with(paper(), &plain);
     let more = (kind.star)(&mut rng);
