@@ -6,6 +6,8 @@
 use crate::chain::{ParameterSummary, Summary, summarise};
 use crate::io::atomic::write_json;
 use crate::manifest::{Manifest, kinds_and_goals};
+#[cfg(feature = "mpi")]
+use crate::pool::orbit_from_bytes;
 use crate::pool::{Answer, Brief, Pool, Question};
 use crate::run::{Run, RunError, SUMMARY, StartFrom};
 use crate::scene::Scene;
@@ -206,6 +208,12 @@ pub fn learn(brief: &[u8]) -> Result<crate::cluster::Answer<'static>, crate::poo
         Brief::Density(task) => {
             let answer = task.answerer()?;
             Box::new(move |question, _| answer(question))
+        }
+        Brief::Injections(way) => {
+            let search = way.searcher()?;
+            Box::new(move |question, _| {
+                search(&orbit_from_bytes(question).expect("a rank of this very program asks")).to_bytes()
+            })
         }
         Brief::Stars => Box::new(|question, stop| {
             let star: Star = serde_json::from_slice(question).expect("a rank of this very program asks");

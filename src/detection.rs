@@ -26,6 +26,7 @@ use crate::periodogram::{
 use crate::star::Orbit;
 use crate::velocities::VelocityQuadratic;
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 /// Expansions around the best orbit at most.
 const MOST_ROUNDS: usize = 6;
@@ -34,7 +35,7 @@ const MOST_ROUNDS: usize = 6;
 const STAYS: f64 = 0.01;
 
 /// What to search for, and how.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DetectionSettings {
     /// Target of chi2, per datum.
     pub chi2_target: f64,

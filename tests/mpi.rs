@@ -28,10 +28,11 @@ const RUN: [&str; 3] = ["manifest.json", "chain.jsonl", "summary.json"];
 
 const GRID: [&str; 3] = ["landscape.json", "landscape.jsonl", "paraboloid.json"];
 
-const CHECKS: [(&str, fn()); 11] = [
+const CHECKS: [(&str, fn()); 12] = [
     ("a chain is the same on any number of ranks and threads", any_number_of_ranks),
     ("so it is with other models of star and data", other_models),
     ("a landscape is the same", landscape),
+    ("so are orbits put in and searched for", limits),
     ("a killed rank ends the job, and another number of ranks resumes it", killed),
     ("SIGUSR1 ends the job with the code that says resume", warned),
     ("a panic on a worker ends the job", || panics("panic-on-worker", "on purpose on rank 2")),
@@ -161,6 +162,16 @@ fn landscape() {
     desk.succeed(&["grid", CONFIG, "--out", "a", "--threads", "2"]);
     succeed(&desk, 3, &["grid", CONFIG, "--out", "b"]);
     same(&desk, &GRID, "a", "b");
+}
+
+fn limits() {
+    let desk = Desk::new(config());
+    let args =
+        ["limits", CONFIG, "--periods", "3", "--amplitudes", "4", "--phases", "2", "--draws", "1000", "--full", "5"];
+    desk.succeed(&[&args[..], &["--out", "a", "--threads", "2"]].concat());
+    succeed(&desk, 3, &[&args[..], &["--out", "b"]].concat());
+    assert_eq!(desk.json("a/limits.json")["agreement"]["orbits"], 5);
+    same(&desk, &["limits.csv", "limits.json"], "a", "b");
 }
 
 /// The process of a rank of a job.

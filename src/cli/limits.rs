@@ -1,12 +1,15 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
 use super::output::Output;
-use super::{Failure, Global, progress};
+use super::signals::Signals;
+use super::{Failure, Global, cluster, progress};
 use dimcmc::detection::{DetectionError, DetectionSettings};
 use dimcmc::expansion::nuisances;
-use dimcmc::limits::{self, CSV, JSON, LimitSettings, LimitsFile, Orbits, Shortcut};
+use dimcmc::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
 use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use dimcmc::pool::Brief;
 use dimcmc::scene::Scene;
+use dimcmc::star::Orbit;
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -78,16 +81,46 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let cells = limits::survey(&shortcut, &orbits, &|done| meter.show(done));
     meter.bar.finish_and_clear();
     let found = limits::limits(&cells);
-    let full = usize::from(args.full);
-    let meter = Meter::new(global, full);
-    let comparisons = limits::compare(&scene, &shortcut, &found, full, &|| meter.show(1));
-    meter.bar.finish_and_clear();
+    let drawn = limits::drawn(&shortcut, &found, usize::from(args.full));
+    let comparisons = whole_way(global, &scene, &shortcut, &drawn)?;
     let rotation_period_d = scene.imager.star.rotation_period_d;
-    let file = LimitsFile::new(&shortcut, &orbits, &found, &comparisons?, rotation_period_d, scene.provenance());
+    let file = LimitsFile::new(&shortcut, &orbits, &found, &comparisons, rotation_period_d, scene.provenance());
     let folder = args.output.create()?;
     file.write(&cells, rotation_period_d, folder)?;
     let _ = writeln!(std::io::stdout(), "{}written: {}: {CSV}, {JSON}", file.table(), folder.display());
     Ok(())
+}
+
+/// The orbits both ways.
+fn whole_way(
+    global: &Global,
+    scene: &Scene,
+    shortcut: &Shortcut,
+    orbits: &[Orbit],
+) -> Result<Vec<Comparison>, Failure> {
+    let signals = Signals::catch("orbit")?;
+    let pool = cluster::pool(global, &signals);
+    if orbits.is_empty() {
+        return Ok(Vec::new());
+    }
+    let way = WholeWay::new(scene, shortcut);
+    let search = way.searcher()?;
+    let brief = Brief::Injections(Box::new(way)).to_bytes();
+    let meter = Meter::new(global, orbits.len());
+    signals.defer();
+    let mut comparisons = Vec::with_capacity(orbits.len());
+    for some in orbits.chunks(pool.size().max(1)) {
+        let found = pool.answers(&brief, some, &search);
+        if found.len() < some.len() {
+            meter.bar.finish_and_clear();
+            return Err(signals.interrupted("interrupted, nothing is written"));
+        }
+        meter.show(some.len());
+        let both = |(orbit, full): (&Orbit, _)| Comparison { orbit: *orbit, shortcut: shortcut.search(orbit), full };
+        comparisons.extend(some.iter().zip(found).map(both));
+    }
+    meter.bar.finish_and_clear();
+    Ok(comparisons)
 }
 
 /// How orbits are looked for.

@@ -7,9 +7,10 @@ use super::{Expansion, STELLAR};
 use crate::objective::{FreeParameter, Parameter};
 use crate::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// A parameter that is integrated out, with the Gaussian that stands for its prior.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Nuisance {
     /// Systemic velocity, or one of [`STELLAR`].
     pub parameter: Parameter,

@@ -1,17 +1,18 @@
 //! The whole way, for a few orbits: profiles resampled with the orbit in them, imaged without a planet, and searched.
 
-use super::Limit;
 use super::shortcut::{Outcome, Shortcut};
+use super::{Limit, LimitSettings};
+use crate::config;
 use crate::detection::View;
-use crate::io::lsd::LsdError;
 use crate::objective::Parameter;
-use crate::observation::Observations;
 use crate::periodogram::{DETECTION_FAP, Search};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneError};
 use crate::star::Orbit;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::PathBuf;
 
 /// One orbit, both ways.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,47 +55,65 @@ impl Agreement {
 /// How far from the limit orbits are drawn, in powers of 2 of K.
 const REACH: f64 = 1.0;
 
-/// Tries `count` orbits around the `limits` both ways, where they are most likely to differ; `progress` is called after each.
-///
-/// # Errors
-/// Profiles that are no longer what they were.
-pub fn compare(
-    scene: &Scene,
-    shortcut: &Shortcut,
-    limits: &[Limit],
-    count: usize,
-    progress: &dyn Fn(),
-) -> Result<Vec<Comparison>, LsdError> {
-    let whole = if count > 0 { scene.whole()?.0 } else { scene.observations.clone() };
+/// `count` orbits around the `limits`, where both ways are most likely to differ.
+pub fn drawn(shortcut: &Shortcut, limits: &[Limit], count: usize) -> Vec<Orbit> {
     let mut rng = ChaCha8Rng::seed_from_u64(shortcut.settings.detection.search.seed);
     let (_, largest) = shortcut.k_range_kms().unwrap_or_default();
-    let mut comparisons = Vec::with_capacity(count);
-    for _ in 0..count {
+    let mut orbit = || {
         let limit = limits[rng.random_range(0..limits.len())];
         let factor = rng.random_range(-REACH..REACH).exp2();
-        let orbit = Orbit {
+        Orbit {
             k_kms: limit.k50_kms.map_or(largest, |k| k * factor),
             porb_over_prot: limit.porb_over_prot,
             phi: rng.random_range(0.0..1.0),
-        };
-        let full = search(scene, &whole, shortcut, &orbit);
-        comparisons.push(Comparison { orbit, shortcut: shortcut.search(&orbit), full });
-        progress();
-    }
-    Ok(comparisons)
+        }
+    };
+    (0..count).map(|_| orbit()).collect()
 }
 
-/// The blind search of profiles with `orbit` in them; `None` where they or their image make no sense any more.
-fn search(scene: &Scene, whole: &Observations, shortcut: &Shortcut, orbit: &Orbit) -> Option<Outcome> {
-    let settings = shortcut.settings;
-    let orbits: Vec<Orbit> = shortcut.removed.into_iter().chain([*orbit]).collect();
-    let star = scene.injected(whole, &orbits).ok()?;
-    let mut values = star.settings.values;
-    values[Parameter::K] = 0.0;
-    let view = View::new(&star.imager, values, &settings.detection).ok()?;
-    let search = Search::new(&view.quadratic, &settings.frequencies, settings.detection.search).ok()?;
-    let best = search.best();
-    let peak = (1.0 / best.porb_over_prot, best.orbit.delta_ln_l, best.orbit.k_kms);
-    let level = search.false_alarm.level(DETECTION_FAP);
-    Some(Outcome::of(peak, level, orbit, settings.frequencies.time_base_cycles))
+/// The whole way, by what another process must know to go it: it costs seconds an orbit.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct WholeWay {
+    /// The config file, which paths in the config start from.
+    pub config: PathBuf,
+    /// The config, resolved.
+    pub resolved: Value,
+    /// How orbits are looked for.
+    pub settings: LimitSettings,
+    /// What was taken out of the profiles.
+    pub removed: Option<Orbit>,
+}
+
+impl WholeWay {
+    /// That of the star in `scene`, searched as the `shortcut` is.
+    pub fn new(scene: &Scene, shortcut: &Shortcut) -> Self {
+        WholeWay {
+            config: scene.settings.path.clone(),
+            resolved: scene.settings.resolved.clone(),
+            settings: shortcut.settings.clone(),
+            removed: shortcut.removed,
+        }
+    }
+
+    /// The blind search of profiles with an orbit in them; `None` where they or their image make no sense any more.
+    ///
+    /// # Errors
+    /// A config or profiles that are no longer what they were.
+    pub fn searcher(&self) -> Result<impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<>, SceneError> {
+        let scene = Scene::new(config::from_json(self.resolved.to_string().as_bytes(), &self.config)?)?;
+        let (whole, _) = scene.whole()?;
+        let WholeWay { settings, removed, .. } = self.clone();
+        Ok(move |orbit: &Orbit| {
+            let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();
+            let star = scene.injected(&whole, &orbits).ok()?;
+            let mut values = star.settings.values;
+            values[Parameter::K] = 0.0;
+            let view = View::new(&star.imager, values, &settings.detection).ok()?;
+            let search = Search::new(&view.quadratic, &settings.frequencies, settings.detection.search).ok()?;
+            let best = search.best();
+            let peak = (1.0 / best.porb_over_prot, best.orbit.delta_ln_l, best.orbit.k_kms);
+            let level = search.false_alarm.level(DETECTION_FAP);
+            Some(Outcome::of(peak, level, orbit, settings.frequencies.time_base_cycles))
+        })
+    }
 }

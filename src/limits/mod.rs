@@ -11,16 +11,17 @@ mod full;
 mod shortcut;
 
 pub use file::{CSV, JSON, LimitsFile};
-pub use full::{Comparison, compare};
+pub use full::{Comparison, WholeWay, drawn};
 pub use shortcut::{Outcome, Shortcut};
 
 use crate::detection::DetectionSettings;
 use crate::periodogram::Frequencies;
 use crate::star::Orbit;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// How orbits are looked for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitSettings {
     /// The blind search.
     pub detection: DetectionSettings,

@@ -3,10 +3,10 @@
 //! Left out: priors (`prior`) and what a point is worth (`objective`).
 
 use crate::star::{Orbit, Rotation, StarState, Surface};
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 /// One of the parameters that may be free. The order is that of every table and chain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Parameter {
     /// Semi-amplitude of the planet's orbit (km/s).
     K,

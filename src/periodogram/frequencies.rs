@@ -8,6 +8,8 @@
 //!
 //! Left out: what is searched for (`orbits`).
 
+use serde::{Deserialize, Serialize};
+
 /// The shortest period is that of this many average Nyquist frequencies.
 const NYQUIST_FACTOR: f64 = 5.0;
 
@@ -32,7 +34,7 @@ pub struct FrequencySettings {
 }
 
 /// Trial frequencies, in orbits a rotation cycle, from low to high.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frequencies {
     /// The frequencies, `1 / (Porb/Prot)`.
     pub per_cycle: Vec<f64>,

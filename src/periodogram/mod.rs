@@ -31,6 +31,7 @@ pub use two_planets::TwoOrbits;
 use crate::velocities::VelocityQuadratic;
 use limits::{detection_limit_kms, upper_limit_kms};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use window::{window, window_peaks};
 
 /// Probability of the upper limit on K.
@@ -40,7 +41,7 @@ const CREDENCE: f64 = 0.95;
 pub const DETECTION_FAP: f64 = 0.01;
 
 /// How a search is judged.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchSettings {
     /// Number of such draws.
     pub draws: usize,

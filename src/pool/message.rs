@@ -2,7 +2,9 @@
 //!
 //! Left out: who sends them.
 
+use crate::limits::Outcome;
 use crate::log_density::{Evaluation, Likelihood, Reconstruction, Status};
+use crate::star::Orbit;
 
 /// What is asked, as bytes.
 pub trait Question: Sync {
@@ -24,6 +26,41 @@ pub trait Answer: Send + Sized {
 
     /// Back; `None` if they are not what `to_bytes` makes.
     fn from_bytes(bytes: &[u8]) -> Option<Self>;
+}
+
+/// An orbit to be put into profiles.
+impl Question for Orbit {
+    fn to_bytes(&self) -> Vec<u8> {
+        numbers_to_bytes(&[self.k_kms, self.porb_over_prot, self.phi])
+    }
+}
+
+/// The orbit of a question; `None` if it is none.
+#[cfg(feature = "mpi")]
+pub fn orbit_from_bytes(bytes: &[u8]) -> Option<Orbit> {
+    let [k_kms, porb_over_prot, phi] = *numbers_from_bytes(bytes).first_chunk()?;
+    Some(Orbit { k_kms, porb_over_prot, phi })
+}
+
+/// What became of it; nothing where it could not be searched for.
+impl Answer for Option<Outcome> {
+    fn to_bytes(&self) -> Vec<u8> {
+        let truth = |is: bool| f64::from(u8::from(is));
+        self.map_or_else(Vec::new, |one| {
+            let Outcome { delta_ln_l, porb_over_prot, k_kms, detected, recovered } = one;
+            numbers_to_bytes(&[delta_ln_l, porb_over_prot, k_kms, truth(detected), truth(recovered)])
+        })
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let numbers = numbers_from_bytes(bytes);
+        if numbers.is_empty() {
+            return Some(None);
+        }
+        let [delta_ln_l, porb_over_prot, k_kms, detected, recovered] = *numbers.first_chunk()?;
+        let (detected, recovered) = (detected == 1.0, recovered == 1.0);
+        Some(Some(Outcome { delta_ln_l, porb_over_prot, k_kms, detected, recovered }))
+    }
 }
 
 /// All of them; the place is the number on the way.
@@ -106,6 +143,11 @@ mod tests {
                     assert_eq!(Reconstruction::from_bytes(&one.to_bytes()), Some(one));
                 }
             }
+        }
+        let found =
+            Outcome { delta_ln_l: 7.0, porb_over_prot: 2.0 / 3.0, k_kms: 0.1, detected: true, recovered: false };
+        for outcome in [None, Some(found)] {
+            assert_eq!(Option::<Outcome>::from_bytes(&outcome.to_bytes()), Some(outcome));
         }
         assert_eq!(Evaluation::from_bytes(&numbers_to_bytes(&[1.0, 2.0, 3.0, 4.0])), None);
         assert_eq!(Reconstruction::from_bytes(&numbers_to_bytes(&[1.0, 9.0])), None);

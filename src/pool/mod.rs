@@ -8,6 +8,8 @@ mod message;
 mod target;
 mod task;
 
+#[cfg(feature = "mpi")]
+pub use message::orbit_from_bytes;
 pub use message::{Answer, Question};
 pub use target::{SpotsLeftError, Target};
 pub use task::{Asked, Brief, Task, TaskError};

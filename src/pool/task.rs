@@ -5,6 +5,7 @@
 use super::message::{Answer as _, numbers_from_bytes};
 use super::target::{SpotsLeftError, Target};
 use crate::config::{self, ConfigError};
+use crate::limits::WholeWay;
 use crate::log_density::LogDensity as _;
 use crate::objective::FreeParameter;
 use crate::origin::{Origin, OriginError};
@@ -19,6 +20,8 @@ pub enum Brief {
     Density(Box<Task>),
     /// Questions are stars of a batch.
     Stars,
+    /// Questions are orbits that are put into profiles.
+    Injections(Box<WholeWay>),
 }
 
 /// A density, by what it was begun with.

@@ -3,11 +3,11 @@
 //! `V(t) = K cos(2 pi (E / P - phi))` with `E` the rotation cycle and `P = Porb/Prot`; phi = 0 puts the largest receding
 //! velocity at E = 0. Left out: eccentric orbits and further planets.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A circular orbit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Orbit {
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
