@@ -174,10 +174,8 @@ fn recovered(laboratory: &Laboratory, base: &Value, orbit: Orbit) -> Result<Outc
         config,
         &[
             ("/observations/path", json!(list)),
-            (
-                "/planet",
-                json!({ "k_kms": orbit.k_kms.max(0.1), "porb_over_prot": orbit.porb_over_prot, "phi": orbit.phi }),
-            ),
+            // a start that knows the period alone
+            ("/planet/porb_over_prot", json!(orbit.porb_over_prot)),
             ("/parameters/k_kms/max", json!(2.5)),
         ],
     );

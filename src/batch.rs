@@ -5,11 +5,11 @@
 
 use crate::chain::{ParameterSummary, Summary, summarise};
 use crate::io::atomic::write_json;
-use crate::manifest::{Manifest, kinds_and_goals};
+use crate::manifest::{self, Manifest, kinds_and_goals};
 #[cfg(feature = "mpi")]
 use crate::pool::orbit_from_bytes;
 use crate::pool::{Answer, Brief, Pool, Question};
-use crate::run::{Run, RunError, SUMMARY, StartFrom};
+use crate::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
 use crate::scene::Scene;
 use crate::search::{self, SearchSettings};
 use serde::{Deserialize, Serialize};
@@ -104,7 +104,7 @@ pub fn sample_all(stars: &[Star], pool: &Pool, done: &(dyn Fn() + Sync)) -> Vec<
         done();
         end
     };
-    let mut ends = pool.answers(&Brief::Stars.to_bytes(), stars, here);
+    let mut ends = pool.answers_apart(&Brief::Stars.to_bytes(), stars, here);
     ends.resize(stars.len(), End::Interrupted);
     ends
 }
@@ -124,20 +124,20 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
     let scene = Scene::load(&star.config)?;
     scene.settings.require_free()?;
     let folder = &star.folder;
-    let begun = Manifest::read(folder);
-    if let Ok(manifest) = &begun {
+    // a chain without a line is one that was killed as it began
+    let has_lines = std::fs::metadata(folder.join(CHAIN)).is_ok_and(|chain| chain.len() > 0);
+    let is_begun = folder.join(manifest::FILE).exists() || has_lines;
+    let mut run = if is_begun {
+        let manifest = Manifest::read(folder)?;
         manifest.origin.check(&scene, folder)?;
         if folder.join(SUMMARY).exists() && manifest.origin.config == scene.settings.resolved {
             return Ok(End::Sampled);
         }
-    }
-    let mut run = match begun {
-        Ok(_) => Run::resume(&scene, folder, None, pool)?,
-        Err(_) => {
-            let settings = SearchSettings::new(&scene.settings);
-            let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
-            Run::begin(&scene, folder, found, StartFrom::Optimum, true, pool)?
-        }
+        Run::resume(&scene, folder, None, pool)?
+    } else {
+        let settings = SearchSettings::new(&scene.settings);
+        let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
+        Run::begin(&scene, folder, found, StartFrom::Optimum, true, pool)?
     };
     if run.go(pool, |_, _| ())? == crate::ensemble::StopReason::Interrupted {
         return Ok(End::Interrupted);

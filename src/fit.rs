@@ -167,7 +167,7 @@ impl Fit {
         let residuals = residuals(observations, &depths);
         let summary =
             FitSummary { test, deviation, ..summarise(imager, observations, reference, &residuals, &velocities) };
-        let checks = Checks::of(&residuals);
+        let checks = Checks::of(&residuals, imager.data.correlated_bins);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
         let tradeoff = reference.tradeoff.nodes().to_vec();
         Fit { map, model, nuisances, velocities, tradeoff, summary, checks }

@@ -13,6 +13,7 @@
 
 use crate::first_look::Scatter;
 use crate::imaging::Imager;
+use crate::maxent::Termination;
 use crate::objective::reference::PROVISIONAL_LAMBDA;
 use crate::objective::{Parameter, ParameterValues, Reference, ReferenceError};
 use crate::observation::Observations;
@@ -141,15 +142,23 @@ pub fn by_continuum(
     Ok(MeasuredErrors { sigma_scale, continuum, residual: None, correlated_bins, profiles })
 }
 
-/// The scatter of each profile over that of them all.
+/// The scatter of each profile over that of them all, as far as the continuum knows it: the logarithms of equal profiles scatter by
+/// `1 / (2 freedom)` in variance, and are drawn together by the share that this has in the scatter there is. Mean weights stay.
 fn relative(scatter: &[Scatter]) -> Result<Vec<f64>, NoiseError> {
     let ratio = |(k, s): (usize, &Scatter)| {
         let missing = NoiseError::NoContinuum { profile: k + 1, freedom: s.freedom, least: FEWEST.1 };
-        s.ratio(FEWEST.1).ok_or(missing)
+        s.ratio(FEWEST.1).map(f64::ln).ok_or(missing)
     };
-    let ratios = scatter.iter().enumerate().map(ratio).collect::<Result<Vec<f64>, _>>()?;
-    let mean = (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
-    Ok(ratios.into_iter().map(|r| rounded(r / mean)).collect())
+    let logarithms = scatter.iter().enumerate().map(ratio).collect::<Result<Vec<f64>, _>>()?;
+    let chance = |s: &Scatter| 0.5 / s.freedom as f64;
+    let n = scatter.len() as f64;
+    let mean = logarithms.iter().sum::<f64>() / n;
+    let variance = logarithms.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    let real = (variance - scatter.iter().map(chance).sum::<f64>() / n).max(0.0);
+    let drawn = |(l, s): (&f64, &Scatter)| ((l - mean) * real / (real + chance(s))).exp();
+    let factors: Vec<f64> = logarithms.iter().zip(scatter).map(drawn).collect();
+    let weight = factors.iter().map(|r| r.powi(-2)).sum::<f64>() / n;
+    Ok(factors.into_iter().map(|r| rounded(r * weight.sqrt())).collect())
 }
 
 impl MeasuredErrors {
@@ -169,6 +178,9 @@ impl MeasuredErrors {
             let scaled = imager(factor)?;
             let map = match Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA * self.correlated_bins) {
                 Ok(map) => map,
+                Err(ReferenceError::Solver(Termination::StepLimit)) => {
+                    return Ok(Err(NoiseError::NoMap(before * factor)));
+                }
                 Err(error) => return Ok(Err(error.into())),
             };
             let independent = scaled.data.depth.len() as f64 / self.correlated_bins;

@@ -99,8 +99,9 @@ impl Scene {
         observations: Observations,
         errors: Option<MeasuredErrors>,
     ) -> Result<Self, ConfigError> {
-        let imager = imager(&settings, &observations)?;
+        let mut imager = imager(&settings, &observations)?;
         let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        imager.data.correlated_bins = correlated_bins;
         let mut measured = Measured { errors, chi2_target: None };
         settings.imaging.chi2_target = match settings.imaging.chi2_target {
             Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),

@@ -254,10 +254,14 @@ fn a_posterior_that_counts_spots_left_over() {
     assert!((counted.log_likelihood(&at, here) - here).abs() < 1e-9);
     // finer and by plain algebra: determinants and inverses of S = noise + f (information - noise)
     let expansion = Expansion::of(posterior.imager(), posterior.reference(), &[]);
+    let mut eigen = (&expansion.information - &expansion.noise).symmetric_eigen();
+    // no covariance is negative
+    eigen.eigenvalues.apply(|e| *e = e.max(0.0));
+    let spots = eigen.recompose();
     let ln_density = |values: &ParameterValues| {
         let left = &expansion.gradient - &expansion.information * (expansion.coordinates(values) - &expansion.centre);
         let term = |f: f64| {
-            let covariance = &expansion.noise + f * (&expansion.information - &expansion.noise);
+            let covariance = &expansion.noise + f * &spots;
             let inverse = covariance.clone().try_inverse().unwrap();
             let eigen = covariance.symmetric_eigenvalues();
             -0.5 * eigen.iter().map(|e| e.abs().ln()).sum::<f64>() - 0.5 * left.dot(&(inverse * &left))

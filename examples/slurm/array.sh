@@ -17,7 +17,7 @@ resume=()
 [ -e "$run/manifest.json" ] && resume=(--resume)
 
 # the warning comes to this script, which hands it on
-dimcmc sample "$config" --out "$run" --seed "$seed" --threads "${SLURM_CPUS_PER_TASK:-1}" "${resume[@]}" &
+dimcmc sample "$config" --out "$run" --seed "$seed" --threads "${SLURM_CPUS_PER_TASK:-1}" ${resume[@]+"${resume[@]}"} &
 pid=$!
 trap 'kill -USR1 $pid' USR1
 wait $pid

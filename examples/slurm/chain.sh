@@ -17,7 +17,7 @@ resume=()
 [ -e "$run/manifest.json" ] && resume=(--resume)
 
 # the warning comes to this script, which hands it on
-${MPIRUN:-mpirun} dimcmc sample "$config" --out "$run" "${resume[@]}" &
+${MPIRUN:-mpirun} dimcmc sample "$config" --out "$run" ${resume[@]+"${resume[@]}"} &
 pid=$!
 trap 'kill -USR1 $pid' USR1
 wait $pid

@@ -104,7 +104,7 @@ fn whole_way(
         return Ok(Vec::new());
     }
     let way = WholeWay::new(scene, shortcut);
-    let search = way.searcher()?;
+    let search = way.searcher().map_err(Failure::input)?;
     let brief = Brief::Injections(Box::new(way)).to_bytes();
     let meter = Meter::new(global, orbits.len());
     signals.defer();
@@ -113,7 +113,7 @@ fn whole_way(
         let found = pool.answers(&brief, some, &search);
         if found.len() < some.len() {
             meter.bar.finish_and_clear();
-            return Err(signals.interrupted("interrupted, nothing is written"));
+            return Err(Failure::failed("interrupted, nothing is written"));
         }
         meter.show(some.len());
         let both = |(orbit, full): (&Orbit, _)| Comparison { orbit: *orbit, shortcut: shortcut.search(orbit), full };

@@ -64,12 +64,16 @@ fn report(Fit { summary: fit, nuisances, .. }: &Fit) -> Report {
             format!("{:.5} rms: {darkness:.5} dark, {brightness_excess:.5} bright", fit.spottedness),
         ),
     };
+    let filtered = match nuisances.is_empty() {
+        true => format!("{:.4} km/s rms", fit.filtered_rv_rms_kms),
+        false => "not told: first moments follow the continuum that was fitted".to_owned(),
+    };
     let report = report
         .line("entropy", format!("{:.5} at lambda = {:.4e}", fit.entropy, fit.lambda))
         .line("TEST", format!("{:.1e}", fit.test))
         .line("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core))
         .line("RV observed", format!("{:.4} km/s rms", fit.observed_rv_rms_kms))
-        .line("RV filtered", format!("{:.4} km/s rms", fit.filtered_rv_rms_kms))
+        .line("RV filtered", filtered)
         .line("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms));
     if nuisances.is_empty() {
         return report;

@@ -133,6 +133,11 @@ fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));
     }
+    if imaging.nuisances.is_some() && imaging.chi2_target == Automatic::Auto {
+        let problem =
+            "auto goes by velocities that nuisances of line and continuum take up: give a number, such as 0.97";
+        return Err(Fault::new("imaging.chi2_target", problem));
+    }
     if let Some(priors) = &imaging.nuisances {
         check_nuisances(
             priors,

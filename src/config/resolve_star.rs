@@ -71,6 +71,9 @@ fn contrast(star: &Star) -> Result<f64, Fault> {
     }
 }
 
+/// Widest Lorentzian (km/s).
+const WIDEST_GAMMA_KMS: f64 = 100.0;
+
 fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> {
     let gamma_kms = match (line.shape, line.gamma_kms) {
         (LineShape::Gaussian, None) => 0.0,
@@ -78,6 +81,10 @@ fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> 
         (LineShape::Voigt, None) => return Err(Fault::new("star.line.gamma_kms", "missing, a voigt line needs it")),
         (LineShape::Voigt, Some(gamma)) => {
             positive("star.line.gamma_kms", gamma)?;
+            if gamma > WIDEST_GAMMA_KMS {
+                let problem = format!("{gamma} must be at most {WIDEST_GAMMA_KMS}: a wider line is no line");
+                return Err(Fault::new("star.line.gamma_kms", problem));
+            }
             gamma
         }
     };

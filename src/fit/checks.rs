@@ -3,7 +3,7 @@
 //! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the profiles,
 //! between the core of the line and what lies outside, and whether neighbouring bins go together. In replicated data every
 //! profile has the same chi2 per datum, but for the scatter of a chi2 distribution, and neighbours have nothing to do with each
-//! other. What the map itself takes up is spread evenly here. Left out: what is wrong where it does not.
+//! other; noise of which several bins go together counts as so many fewer. What the map itself takes up is spread evenly here. Left out: what is wrong where it does not.
 
 use super::Residual;
 use crate::periodogram::normal::cumulative;
@@ -48,19 +48,24 @@ pub struct ProfileCheck {
 }
 
 impl Checks {
-    /// Of the `residuals` of every profile at its time.
-    pub(super) fn of(profiles: &[(f64, Vec<Residual>)]) -> Self {
+    /// Of the `residuals` of every profile at its time, where so many bins of noise go together: they count for one.
+    pub(super) fn of(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64) -> Self {
         let all = || profiles.iter().flat_map(|(_, residuals)| residuals);
         let per_datum = mean(all().map(|r| r.scaled * r.scaled));
         let profile = |(time_d, residuals): &(f64, Vec<Residual>)| {
             let chi2: f64 = residuals.iter().map(|r| r.scaled * r.scaled).sum();
             let data = residuals.len();
-            ProfileCheck { time_d: *time_d, chi2, data, p_value: chi2_exceeds(chi2 / per_datum, data) }
+            ProfileCheck {
+                time_d: *time_d,
+                chi2,
+                data,
+                p_value: chi2_exceeds(chi2 / per_datum / correlated_bins, data as f64 / correlated_bins),
+            }
         };
         let deepest = all().map(|r| r.depth).fold(0.0, f64::max);
         let share = |core: bool| {
             let part = || all().filter(move |r| (r.depth > 0.5 * deepest) == core);
-            (mean(part().map(|r| r.scaled * r.scaled)), part().count() as f64)
+            (mean(part().map(|r| r.scaled * r.scaled)), part().count() as f64 / correlated_bins)
         };
         let ((core, inside), (outside, beyond)) = (share(true), share(false));
         let pairs = || profiles.iter().flat_map(|(_, residuals)| residuals.windows(2));
@@ -73,11 +78,11 @@ impl Checks {
             sigma_neighbour_correlation: (pairs().count() as f64).sqrt().recip(),
             warnings: Vec::new(),
         };
-        checks.warnings = checks.doubts();
+        checks.warnings = checks.doubts(correlated_bins > 1.0);
         checks
     }
 
-    fn doubts(&self) -> Vec<String> {
+    fn doubts(&self, neighbours_go_together: bool) -> Vec<String> {
         let mut doubts = Vec::new();
         let rare = RARE / self.profiles.len() as f64;
         for (k, profile) in self.profiles.iter().enumerate().filter(|(_, profile)| profile.p_value < rare) {
@@ -96,7 +101,8 @@ impl Checks {
                 self.chi2_per_datum_core, self.chi2_per_datum_outside
             ));
         }
-        if self.neighbour_correlation.abs() > FAR * self.sigma_neighbour_correlation {
+        let correlated = self.neighbour_correlation.abs() > FAR * self.sigma_neighbour_correlation;
+        if correlated && !neighbours_go_together {
             doubts.push(format!(
                 "residuals of neighbouring bins correlate by {:.2}: what is left over is not only noise",
                 self.neighbour_correlation
@@ -113,9 +119,9 @@ fn mean(x: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Probability that chi2 of that many degrees of freedom is larger: its cube root is nearly normal (Wilson & Hilferty 1931).
-fn chi2_exceeds(chi2: f64, freedom: usize) -> f64 {
-    let spread = 2.0 / (9.0 * freedom as f64);
-    cumulative((1.0 - spread - (chi2 / freedom as f64).cbrt()) / spread.sqrt())
+fn chi2_exceeds(chi2: f64, freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    cumulative((1.0 - spread - (chi2 / freedom).cbrt()) / spread.sqrt())
 }
 
 #[cfg(test)]
@@ -128,7 +134,9 @@ mod tests {
     /// Table values of the chi2 distribution.
     #[test]
     fn known_quantiles() {
-        for (chi2, freedom, p) in [(18.307, 10, 0.05), (43.773, 30, 0.05), (50.892, 30, 0.01), (124.342, 100, 0.05)] {
+        for (chi2, freedom, p) in
+            [(18.307, 10.0, 0.05), (43.773, 30.0, 0.05), (50.892, 30.0, 0.01), (124.342, 100.0, 0.05)]
+        {
             assert!((chi2_exceeds(chi2, freedom) / p - 1.0_f64).abs() < 0.01, "{chi2} {freedom}");
         }
     }
@@ -143,7 +151,7 @@ mod tests {
             let residuals = (0..60).map(|j| residual(j, rng.sample(StandardNormal))).collect();
             (k as f64, residuals)
         };
-        Checks::of(&(0..40).map(&mut profile).collect::<Vec<_>>())
+        Checks::of(&(0..40).map(&mut profile).collect::<Vec<_>>(), 1.0)
     }
 
     #[test]

@@ -13,6 +13,8 @@ pub struct Data {
     pub depth: Vec<f64>,
     /// `1 / sigma^2` of every bin.
     pub inverse_variance: Vec<f64>,
+    /// Over how many bins their noise goes together, which the errors allow for; 1 for white noise.
+    pub correlated_bins: f64,
     /// What may be wrong with each profile by itself, integrated out.
     pub nuisances: Nuisances,
 }
@@ -24,6 +26,7 @@ impl Data {
         Data {
             depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
             inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
+            correlated_bins: 1.0,
             nuisances: Nuisances::default(),
         }
     }
@@ -34,7 +37,7 @@ impl Data {
         let inverse_variance = of(&self.inverse_variance);
         let sigma: Vec<f64> = inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
         let nuisances = self.nuisances.of_profiles(profiles, &sigma);
-        Data { depth: of(&self.depth), inverse_variance, nuisances }
+        Data { depth: of(&self.depth), inverse_variance, correlated_bins: self.correlated_bins, nuisances }
     }
 
     /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.

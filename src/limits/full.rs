@@ -78,10 +78,23 @@ pub struct WholeWay {
     pub config: PathBuf,
     /// The config, resolved.
     pub resolved: Value,
+    /// SHA-256 (hex) of the observations.
+    pub data_sha256: String,
     /// How orbits are looked for.
     pub settings: LimitSettings,
     /// What was taken out of the profiles.
     pub removed: Option<Orbit>,
+}
+
+/// Why it cannot be gone.
+#[derive(Debug, thiserror::Error)]
+pub enum WholeWayError {
+    /// The config or the observations are not to be had.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The observations are others.
+    #[error("{}: the observations are not those that the search began with", .0.display())]
+    Changed(PathBuf),
 }
 
 impl WholeWay {
@@ -90,6 +103,7 @@ impl WholeWay {
         WholeWay {
             config: scene.settings.path.clone(),
             resolved: scene.settings.resolved.clone(),
+            data_sha256: scene.data_sha256.clone(),
             settings: shortcut.settings.clone(),
             removed: shortcut.removed,
         }
@@ -99,9 +113,14 @@ impl WholeWay {
     ///
     /// # Errors
     /// A config or profiles that are no longer what they were.
-    pub fn searcher(&self) -> Result<impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<>, SceneError> {
-        let scene = Scene::new(config::from_json(self.resolved.to_string().as_bytes(), &self.config)?)?;
-        let (whole, _) = scene.whole()?;
+    pub fn searcher(&self) -> Result<impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<>, WholeWayError> {
+        let settings =
+            config::from_json(self.resolved.to_string().as_bytes(), &self.config).map_err(SceneError::from)?;
+        let scene = Scene::new(settings)?;
+        if scene.data_sha256 != self.data_sha256 {
+            return Err(WholeWayError::Changed(self.config.clone()));
+        }
+        let (whole, _) = scene.whole().map_err(SceneError::from)?;
         let WholeWay { settings, removed, .. } = self.clone();
         Ok(move |orbit: &Orbit| {
             let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();

@@ -11,7 +11,7 @@ mod full;
 mod shortcut;
 
 pub use file::{CSV, JSON, LimitsFile};
-pub use full::{Comparison, WholeWay, drawn};
+pub use full::{Comparison, WholeWay, WholeWayError, drawn};
 pub use shortcut::{Outcome, Shortcut};
 
 use crate::detection::DetectionSettings;

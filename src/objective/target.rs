@@ -33,6 +33,9 @@ pub struct ChosenTarget {
     pub left_by_doubling: f64,
     /// Whether it still shrinks there, because beyond noise is turned into spots.
     pub still_shrinking: bool,
+    /// Whether it never shrank: the target is then that of the largest lambda.
+    #[serde(default)]
+    pub never_shrinking: bool,
 }
 
 impl ChosenTarget {
@@ -40,9 +43,10 @@ impl ChosenTarget {
     pub fn line(&self) -> String {
         let left = 100.0 * (1.0 - self.left_by_doubling);
         let ChosenTarget { value, filtered_rv_rms_kms, .. } = self;
-        let still = match self.still_shrinking {
-            true => "; they still shrink there: errors are too large, or the model of the star lacks something",
-            false => "",
+        let still = match (self.still_shrinking, self.never_shrinking) {
+            (true, _) => "; they still shrink there: errors are too large, or the model of the star lacks something",
+            (false, true) => "; spots do not make them shrink at all, so that they tell no target: give a number",
+            (false, false) => "",
         };
         format!(
             "{value} per datum; velocities left over {filtered_rv_rms_kms:.4} km/s rms, {left:.0} % less with twice the weight of \
@@ -67,7 +71,8 @@ pub fn choose(imager: &Imager, values: ParameterValues, correlated_bins: f64) ->
     let left: Vec<f64> = path.windows(IMAGES + 1).map(|p| p[IMAGES].rms_kms / p[0].rms_kms).collect();
     let last = left.len() - 1;
     let (k, part) = match left.iter().rposition(|left| *left < STOPPED) {
-        None => (0, 0.0),
+        // what spots do not explain at all says nothing of them
+        None => (last, 0.0),
         Some(k) if k == last => (last, 0.0),
         // between the last image that still gains and the first that does not
         Some(k) => (k, (STOPPED - left[k]) / (left[k + 1] - left[k])),
@@ -79,6 +84,7 @@ pub fn choose(imager: &Imager, values: ParameterValues, correlated_bins: f64) ->
         filtered_rv_rms_kms: between(path[k].rms_kms, path[k + 1].rms_kms),
         left_by_doubling: between(left[k], left[next]),
         still_shrinking: left[last] < STOPPED,
+        never_shrinking: left.iter().all(|left| *left >= STOPPED),
     })
 }
 

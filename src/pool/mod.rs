@@ -18,8 +18,8 @@ pub use task::{Asked, Brief, Task, TaskError};
 use crate::cluster;
 use crate::log_density::{Evaluation, Evaluator, LogDensity as _};
 use rayon::prelude::*;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
 
 /// Who reconstructs, until they are told to stop: no reconstruction is begun after that, and those under way are finished.
 #[derive(Default)]
@@ -85,19 +85,51 @@ impl Pool {
         match &self.workers {
             Workers::Threads => {
                 let _ = brief;
-                let stop = self.stop();
-                let answer = |question| (!stop.load(Relaxed)).then(|| here(question));
+                let answer = |question| (!self.stopped()).then(|| here(question));
                 let all: Vec<Option<A>> = questions.par_iter().with_max_len(1).map(answer).collect();
                 all.into_iter().map_while(|answer| answer).collect()
             }
             #[cfg(feature = "mpi")]
-            Workers::Ranks(queue) => {
-                let questions: Vec<Vec<u8>> = questions.iter().map(Question::to_bytes).collect();
-                let answers = queue.answers(brief, &questions, &self.stop);
-                let read = |bytes: Vec<u8>| A::from_bytes(&bytes).expect("a rank of this very program answers");
-                answers.into_iter().map(read).collect()
-            }
+            Workers::Ranks(queue) => self.by_ranks(queue, brief, questions),
         }
+    }
+
+    /// The same for questions that take batches of their own to answer: one thread each, and no thread that waits for a batch
+    /// takes up another question meanwhile, as rayon's would.
+    pub fn answers_apart<Q: Question, A: Answer + Sync>(
+        &self,
+        brief: &[u8],
+        questions: &[Q],
+        here: impl Fn(&Q) -> A + Sync,
+    ) -> Vec<A> {
+        match &self.workers {
+            Workers::Threads => {
+                let _ = brief;
+                let next = AtomicUsize::new(0);
+                let answers: Vec<OnceLock<A>> = questions.iter().map(|_| OnceLock::new()).collect();
+                let work = || {
+                    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be begun");
+                    while !self.stopped() {
+                        let place = next.fetch_add(1, Relaxed);
+                        let Some(question) = questions.get(place) else { break };
+                        let _ = answers[place].set(alone.install(|| here(question)));
+                    }
+                };
+                std::thread::scope(|scope| {
+                    (0..self.size().min(questions.len())).for_each(|_| drop(scope.spawn(work)));
+                });
+                answers.into_iter().map_while(OnceLock::into_inner).collect()
+            }
+            #[cfg(feature = "mpi")]
+            Workers::Ranks(queue) => self.by_ranks(queue, brief, questions),
+        }
+    }
+
+    #[cfg(feature = "mpi")]
+    fn by_ranks<Q: Question, A: Answer>(&self, queue: &cluster::Queue, brief: &[u8], questions: &[Q]) -> Vec<A> {
+        let questions: Vec<Vec<u8>> = questions.iter().map(Question::to_bytes).collect();
+        let read = |bytes: Vec<u8>| A::from_bytes(&bytes).expect("a rank of this very program answers");
+        queue.answers(brief, &questions, &self.stop).into_iter().map(read).collect()
     }
 }
 

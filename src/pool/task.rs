@@ -5,7 +5,7 @@
 use super::message::{Answer as _, numbers_from_bytes};
 use super::target::{SpotsLeftError, Target};
 use crate::config::{self, ConfigError};
-use crate::limits::WholeWay;
+use crate::limits::{WholeWay, WholeWayError};
 use crate::log_density::LogDensity as _;
 use crate::objective::FreeParameter;
 use crate::origin::{Origin, OriginError};
@@ -58,6 +58,9 @@ pub enum TaskError {
     /// They are others, or the reference is.
     #[error(transparent)]
     Origin(#[from] OriginError),
+    /// Orbits cannot be put in there.
+    #[error(transparent)]
+    Injections(#[from] WholeWayError),
     /// Spots left over have no size there.
     #[error(transparent)]
     SpotsLeft(#[from] SpotsLeftError),

@@ -59,7 +59,7 @@ pub fn oracle() -> Oracle {
     let depth: Vec<f64> = json["depth"].as_array().unwrap().iter().flat_map(numbers).collect();
     let sigma = json["sigma"].as_f64().unwrap();
     let inverse_variance = vec![1.0 / (sigma * sigma); depth.len()];
-    let data = Data { inverse_variance, depth, nuisances: Default::default() };
+    let data = Data { inverse_variance, depth, correlated_bins: 1.0, nuisances: Default::default() };
     let default_spot = number("default_spot");
     Oracle { json, star, grid, sampling, data, default_spot }
 }
