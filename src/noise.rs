@@ -13,7 +13,6 @@
 
 use crate::first_look::Scatter;
 use crate::imaging::Imager;
-use crate::maxent::Termination;
 use crate::objective::reference::PROVISIONAL_LAMBDA;
 use crate::objective::{Parameter, ParameterValues, Reference, ReferenceError};
 use crate::observation::Observations;
@@ -178,9 +177,7 @@ impl MeasuredErrors {
             let scaled = imager(factor)?;
             let map = match Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA * self.correlated_bins) {
                 Ok(map) => map,
-                Err(ReferenceError::Solver(Termination::StepLimit)) => {
-                    return Ok(Err(NoiseError::NoMap(before * factor)));
-                }
+                Err(error) if error.ran_out_of_steps() => return Ok(Err(NoiseError::NoMap(before * factor))),
                 Err(error) => return Ok(Err(error.into())),
             };
             let independent = scaled.data.depth.len() as f64 / self.correlated_bins;

@@ -97,6 +97,13 @@ pub enum ReferenceError {
     Solver(Termination),
 }
 
+impl ReferenceError {
+    /// Whether the solver needed more steps than it may take, as it does where the model is far from the profiles.
+    pub fn ran_out_of_steps(&self) -> bool {
+        matches!(self, ReferenceError::Solver(Termination::StepLimit))
+    }
+}
+
 impl Reference {
     /// The reference at `values` for the target `chi2_per_datum`.
     ///
