@@ -85,7 +85,9 @@ impl Pool {
         match &self.workers {
             Workers::Threads => {
                 let _ = brief;
-                let answer = |question| (!self.stopped()).then(|| here(question));
+                // threads see the flag alone: what is MPI's stays on this one
+                let stop = self.stop();
+                let answer = |question| (!stop.load(Relaxed)).then(|| here(question));
                 let all: Vec<Option<A>> = questions.par_iter().with_max_len(1).map(answer).collect();
                 all.into_iter().map_while(|answer| answer).collect()
             }
@@ -105,11 +107,11 @@ impl Pool {
         match &self.workers {
             Workers::Threads => {
                 let _ = brief;
-                let next = AtomicUsize::new(0);
+                let (stop, next) = (self.stop(), AtomicUsize::new(0));
                 let answers: Vec<OnceLock<A>> = questions.iter().map(|_| OnceLock::new()).collect();
                 let work = || {
                     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be begun");
-                    while !self.stopped() {
+                    while !stop.load(Relaxed) {
                         let place = next.fetch_add(1, Relaxed);
                         let Some(question) = questions.get(place) else { break };
                         let _ = answers[place].set(alone.install(|| here(question)));
