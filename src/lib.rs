@@ -36,7 +36,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene = Scene::load("configs/demo.json".as_ref())?;
 //! let settings = &scene.settings;
-//! let reference = Reference::build(&scene.imager, settings.values, settings.imaging.chi2_target)?;
+//! let reference = Reference::build(&scene.imager, settings.values, settings.imaging.chi2_target.value())?;
 //! let fit = Fit::new(&scene.imager, &scene.observations, &reference);
 //! println!("spots cover {:.1} %", 100.0 * fit.summary.spottedness);
 //! # Ok(())
