@@ -10,8 +10,8 @@ const SHARE: u32 = 20;
 /// The shortest nap; the kernel adds some 50 us.
 const SHORTEST: Duration = Duration::from_micros(10);
 
-/// The longest, an eye to how long a rank takes to hear that it is wanted.
-const LONGEST: Duration = Duration::from_millis(5);
+/// The longest: so long does a rank that was idle take to hear that it is wanted. A look costs some 10 us, 1 % of the processor.
+const LONGEST: Duration = Duration::from_millis(1);
 
 /// A wait that began when this was made.
 pub(super) struct Nap(Instant);
