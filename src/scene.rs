@@ -13,6 +13,7 @@ use crate::objective::{FreeParameter, ParameterSpace, ParameterValues, Reference
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -53,6 +54,14 @@ impl Scene {
     /// A config or observations that cannot be read or make no sense.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         Scene::new(config::load(path)?)
+    }
+
+    /// Of a config at hand as if it were read from `path`.
+    ///
+    /// # Errors
+    /// A config or observations that cannot be read or make no sense.
+    pub fn of_config(config: &Value, path: &Path) -> Result<Self, SceneError> {
+        Scene::new(config::from_json(config.to_string().as_bytes(), path)?)
     }
 
     /// Reads or simulates the observations of `settings`.

@@ -3,29 +3,10 @@
 #[path = "common/desk.rs"]
 mod desk;
 
-use desk::{Desk, says, star};
+use desk::{Desk, says, tiny};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
-
-fn config() -> Value {
-    json!({
-        "star": star(),
-        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.5 },
-        "observations": { "simulate": {
-            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
-            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
-            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
-            "snr": 500, "seed": 7, "pixels": 1000
-        } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
-        "parameters": {
-            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
-            "phi": { "prior": "periodic" }
-        },
-        "sampler": { "ensembles": 2, "walkers": 6, "steps": 40, "seed": 3, "ess": 1e6 }
-    })
-}
 
 fn sample(desk: &Desk, out: &str, seed: &str) {
     desk.succeed(&["sample", CONFIG, "--out", out, "--seed", seed]);
@@ -44,7 +25,7 @@ fn renumbered(chain: &str, first: usize, steps: usize) -> Vec<String> {
 
 #[test]
 fn the_whole_is_its_parts() {
-    let desk = Desk::new(config());
+    let desk = Desk::new(tiny(40));
     // the seed of the config, given or not
     sample(&desk, "a", "3");
     desk.succeed(&["sample", CONFIG, "--out", "same"]);
@@ -88,7 +69,7 @@ fn the_whole_is_its_parts() {
 
 #[test]
 fn what_does_not_belong_together_is_not_merged() {
-    let desk = Desk::new(config());
+    let desk = Desk::new(tiny(40));
     sample(&desk, "a", "1");
     sample(&desk, "b", "2");
     let merge = |other: &str| desk.refusal(&["merge", "a", other, "--out", "all"]);
@@ -99,7 +80,7 @@ fn what_does_not_belong_together_is_not_merged() {
     says(&desk.refusal(&["merge", "a", "b", "--out", "joined"]), &["--out joined", "not empty", "--force"]);
     says(&merge("absent"), &["absent: no manifest.json"]);
 
-    let mut other = config();
+    let mut other = tiny(40);
     other["parameters"]["k_kms"]["max"] = json!(0.9);
     desk.write("prior.json", &other.to_string());
     desk.succeed(&["sample", "prior.json", "--out", "prior", "--seed", "5"]);

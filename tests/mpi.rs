@@ -10,7 +10,7 @@ mod desk;
 #[path = "common/ranks.rs"]
 mod ranks;
 
-use desk::{Desk, says, star, text};
+use desk::{Desk, says, text, tiny};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Output, Stdio};
@@ -65,23 +65,10 @@ fn main() -> ExitCode {
 }
 
 fn config() -> Value {
-    json!({
-        "star": star(),
-        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.5 },
-        "observations": { "simulate": {
-            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
-            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
-            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
-            "snr": 500, "seed": 7, "pixels": 1000
-        } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
-        "parameters": {
-            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
-            "phi": { "prior": "periodic" }
-        },
-        "sampler": { "ensembles": 2, "walkers": 6, "steps": 60, "seed": 3, "ess": 1e6 },
-        "grid": { "axes": { "k_kms": [0.11, 0.26, 6], "porb_over_prot": [1.62, 1.92, 4], "phi": [0.49, 0.55, 3] } }
-    })
+    let mut config = tiny(60);
+    config["grid"] =
+        json!({ "axes": { "k_kms": [0.11, 0.26, 6], "porb_over_prot": [1.62, 1.92, 4], "phi": [0.49, 0.55, 3] } });
+    config
 }
 
 /// A program on so many ranks.

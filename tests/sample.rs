@@ -6,7 +6,7 @@ mod desk;
 
 #[cfg(unix)]
 use desk::interrupt;
-use desk::{Desk, dimcmc, kill, says, star, text};
+use desk::{Desk, dimcmc, kill, says, text, tiny};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -25,27 +25,8 @@ const FILES: [&str; 3] = ["manifest.json", "chain.jsonl", "summary.json"];
 
 const CONFIG: &str = "config.json";
 
-fn tiny() -> Value {
-    json!({
-        "star": star(),
-        "planet": { "k_kms": 0.2, "porb_over_prot": 1.7, "phi": 0.5 },
-        "observations": { "simulate": {
-            "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
-            "cycles": [0.0, 0.13, 0.29, 0.41, 0.58, 0.72, 0.87, 1.04, 1.21, 1.35, 1.52, 1.66],
-            "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
-            "snr": 500, "seed": 7, "pixels": 1000
-        } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
-        "parameters": {
-            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
-            "phi": { "prior": "periodic" }
-        },
-        "sampler": { "ensembles": 2, "walkers": 6, "steps": STEPS, "seed": 3, "ess": 1e6 }
-    })
-}
-
 fn desk() -> Desk {
-    Desk::new(tiny())
+    Desk::new(tiny(STEPS))
 }
 
 /// A desk with a finished run in `run`.
@@ -230,10 +211,10 @@ fn an_extension_adds_its_steps_and_survives_a_kill() {
 
 #[test]
 fn another_config_or_other_data_are_not_resumed() {
-    let mut config = tiny();
+    let mut config = tiny(STEPS);
     config["observations"] = json!({ "path": "data/observations.txt" });
     let desk = Desk::new(config);
-    desk.write("simulated.json", &tiny().to_string());
+    desk.write("simulated.json", &tiny(STEPS).to_string());
     desk.succeed(&["simulate", "simulated.json", "--out", "data"]);
     desk.succeed(&["sample", CONFIG, "--out", "run"]);
     let resume = ["sample", CONFIG, "--out", "run", "--resume"];
@@ -397,7 +378,7 @@ fn help_shows_an_example() {
 /// Half of the config's own amplitude is all that the prior allows: the chain begins there all the same.
 #[test]
 fn a_prior_that_excludes_the_best_orbit_is_no_obstacle() {
-    let mut config = tiny();
+    let mut config = tiny(STEPS);
     config["parameters"]["k_kms"]["max"] = json!(0.1);
     config["planet"]["k_kms"] = json!(0.05);
     config["observations"]["simulate"]["truth"] = json!({ "k_kms": 0.2 });
@@ -411,7 +392,7 @@ fn a_prior_that_excludes_the_best_orbit_is_no_obstacle() {
 /// Wherever the walkers start, and whichever moves they make, the posterior is the same.
 #[test]
 fn starts_and_moves_make_no_difference() {
-    let mut config = tiny();
+    let mut config = tiny(STEPS);
     config["sampler"]["ess"] = json!(600);
     config["sampler"]["rhat"] = json!(1.05);
     config["sampler"]["steps"] = json!(5000);

@@ -12,7 +12,7 @@
 //! where spots left over make the data less certain. Left out: where the reference is.
 
 use super::spots::SPOTS_LEFT;
-use super::{Expansion, STELLAR, nuisances};
+use super::{Expansion, free_stellar, nuisances};
 use crate::log_density::{Evaluation, Status};
 use crate::objective::{Parameter, ParameterSpace, ParameterValues, Posterior};
 use nalgebra::{DMatrix, DVector};
@@ -45,9 +45,8 @@ impl SpotsCounted {
     /// Of `posterior`, to second order around its reference; `None` where there is no such size.
     pub fn new(posterior: &Posterior) -> Option<Self> {
         let free = posterior.space().free();
-        let stellar: Vec<Parameter> = STELLAR.into_iter().filter(|&p| free.iter().any(|f| f.parameter == p)).collect();
         let reference = posterior.reference();
-        let entropy = Expansion::of(posterior.imager(), reference, &stellar);
+        let entropy = Expansion::of(posterior.imager(), reference, &free_stellar(free));
         let mut without_planet = reference.values;
         without_planet[Parameter::K] = 0.0;
         // an orbit that stands for spots left over makes them look small

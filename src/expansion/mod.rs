@@ -12,7 +12,7 @@ mod spots;
 
 use crate::imaging::Imager;
 use crate::maxent::{Solver, SolverSettings};
-use crate::objective::{Parameter, ParameterValues, Reference};
+use crate::objective::{FreeParameter, Parameter, ParameterValues, Reference};
 use model::DisplacedModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -32,6 +32,11 @@ pub const STELLAR: [Parameter; 8] = [
     Parameter::EquivalentWidth,
     Parameter::Contrast,
 ];
+
+/// Those of the star's own parameters that are free.
+pub fn free_stellar(free: &[FreeParameter]) -> Vec<Parameter> {
+    STELLAR.into_iter().filter(|p| free.iter().any(|f| f.parameter == *p)).collect()
+}
 
 /// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic velocity
 /// together), then the stellar parameters in the units of their names.

@@ -7,7 +7,7 @@ use super::laboratory::ExperimentError;
 use super::outcome::{Estimate, Outcome, Route};
 use super::star::with;
 use crate::chain::{Summary, summarise};
-use crate::config::{self, GridSettings};
+use crate::config::GridSettings;
 use crate::detection::{Detection, DetectionSettings};
 use crate::ensemble::StopReason;
 use crate::expansion::nuisances;
@@ -163,14 +163,14 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
             Err(SearchError::Reference(error)) => Ok(Err(error)),
             Err(error) => Err(error),
         };
-    let mut last = match found(scene(config, path)?)? {
+    let mut last = match found(Scene::of_config(config, path)?)? {
         Ok(found) => return Ok(found),
         Err(error) => error,
     };
     if matches!(last, ReferenceError::NothingToFit { .. }) {
         return Err(last.into());
     }
-    let first = scene(config, path)?;
+    let first = Scene::of_config(config, path)?;
     let target = first.settings.imaging.chi2_target.value();
     let reached = Reference::provisional(&first.imager, first.settings.values, target)?.solution.chi2;
     let reached = reached / first.imager.data.depth.len() as f64;
@@ -179,17 +179,12 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
             return Err(ExperimentError::Interrupted);
         }
         let target = json!((1e4 * factor * reached).round() / 1e4);
-        match found(scene(&with(config.clone(), &[("/imaging/chi2_target", target)]), path)?)? {
+        match found(Scene::of_config(&with(config.clone(), &[("/imaging/chi2_target", target)]), path)?)? {
             Ok(found) => return Ok(found),
             Err(error) => last = error,
         }
     }
     Err(last.into())
-}
-
-/// The star of a config that is kept at `path`.
-pub(super) fn scene(config: &Value, path: &Path) -> Result<Scene, ExperimentError> {
-    Ok(Scene::new(config::from_json(config.to_string().as_bytes(), path)?)?)
 }
 
 /// The landscape on `grid`, kept in `folder`, and its paraboloid.

@@ -4,12 +4,13 @@
 //! Orbits are drawn from the very prior that the chain has, so that an exact posterior covers just as often as it says. Left out:
 //! the periodogram's intervals (`examples/calibration.rs`).
 
-use super::case::{self, Case};
+use super::case::Case;
 use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::{Estimate, Outcome, share};
 use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
 use crate::objective::Reference;
+use crate::scene::Scene;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -165,7 +166,7 @@ const LAMBDA: f64 = 3.0;
 /// `config` with a target chi2 that its image attains: that of the image where lambda is [`LAMBDA`] over the number of data. How far down a noise realisation lets chi2 come is up to it, and a target near the floor would
 /// make noise of the spots.
 pub(super) fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, ExperimentError> {
-    let scene = case::scene(&config, &laboratory.folder.join("config.json"))?;
+    let scene = Scene::of_config(&config, &laboratory.folder.join("config.json"))?;
     let image = Reference::at_lambda(&scene.imager, scene.settings.values, LAMBDA)?;
     let chi2 = (1e4 * image.solution.chi2 / scene.imager.data.depth.len() as f64).round() / 1e4;
     Ok(with(config, &[("/imaging/chi2_target", json!(chi2))]))

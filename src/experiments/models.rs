@@ -4,14 +4,14 @@
 //! What a wrong model costs: bias of K and coverage of its intervals. Every noise seed has a spot map and a phase of its own.
 //! Left out: real stars, which are all of this and more (`results/lopeg.md`).
 
-use super::case::{self, Case};
+use super::case::Case;
 use super::coverage::{attainable, random_spots};
 use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::{Outcome, share};
 use super::report::Report;
 use super::star::{paper, with};
 use crate::io::lsd;
-use crate::scene::SceneError;
+use crate::scene::{Scene, SceneError};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -159,7 +159,7 @@ fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64),
     let seeded = [("/observations/simulate/spots", spots), ("/observations/simulate/seed", json!(1 + seed))];
     let simulated = with(with(plain.clone(), &seeded), &more);
     let folder = laboratory.folder(&format!("models/{}_data_{seed}", kind.name))?;
-    let observations = case::scene(&simulated, &folder.join("config.json"))?.observations;
+    let observations = Scene::of_config(&simulated, &folder.join("config.json"))?.observations;
     lsd::write(&folder, &observations).map_err(SceneError::from)?;
     // the same file for whoever reads the config from elsewhere
     let path = std::path::absolute(folder.join("observations.txt")).unwrap_or_else(|_| folder.join("observations.txt"));

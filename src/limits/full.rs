@@ -2,7 +2,6 @@
 
 use super::shortcut::{Outcome, Shortcut};
 use super::{Limit, LimitSettings};
-use crate::config;
 use crate::detection::View;
 use crate::objective::Parameter;
 use crate::periodogram::{DETECTION_FAP, Search};
@@ -114,9 +113,7 @@ impl WholeWay {
     /// # Errors
     /// A config or profiles that are no longer what they were.
     pub fn searcher(&self) -> Result<impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<>, WholeWayError> {
-        let settings =
-            config::from_json(self.resolved.to_string().as_bytes(), &self.config).map_err(SceneError::from)?;
-        let scene = Scene::new(settings)?;
+        let scene = Scene::of_config(&self.resolved, &self.config)?;
         if scene.data_sha256 != self.data_sha256 {
             return Err(WholeWayError::Changed(self.config.clone()));
         }

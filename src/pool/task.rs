@@ -4,7 +4,6 @@
 
 use super::message::{Answer as _, numbers_from_bytes};
 use super::target::{SpotsLeftError, Target};
-use crate::config::{self, ConfigError};
 use crate::limits::{WholeWay, WholeWayError};
 use crate::log_density::LogDensity as _;
 use crate::objective::FreeParameter;
@@ -49,10 +48,7 @@ pub enum Asked {
 /// Why a process cannot evaluate what it is asked to.
 #[derive(Debug, thiserror::Error)]
 pub enum TaskError {
-    /// The config does not resolve there.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The observations are not to be had there.
+    /// Config or observations are not to be had there.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// They are others, or the reference is.
@@ -92,7 +88,7 @@ impl Task {
     /// # Errors
     /// [`TaskError`]: data that are missing or others here, a reference that comes out differently.
     pub fn answerer(&self) -> Result<Answerer, TaskError> {
-        let scene = Scene::new(config::from_json(self.origin.config.to_string().as_bytes(), &self.config)?)?;
+        let scene = Scene::of_config(&self.origin.config, &self.config)?;
         let place = self.config.as_path();
         self.origin.check(&scene, place)?;
         let settings = &scene.settings;

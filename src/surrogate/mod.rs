@@ -10,7 +10,7 @@ mod correction;
 mod periods;
 mod proposal;
 
-use crate::expansion::{Expansion, STELLAR};
+use crate::expansion::{Expansion, free_stellar};
 use crate::imaging::Imager;
 use crate::objective::{Parameter, ParameterSpace, Reference};
 use conditional::{Conditional, LinearModel};
@@ -64,9 +64,7 @@ impl Surrogate {
         if !is_orbit_free(space) {
             return None;
         }
-        let is_free = |p: &Parameter| space.free().iter().any(|f| f.parameter == *p);
-        let stellar: Vec<Parameter> = STELLAR.into_iter().filter(is_free).collect();
-        Surrogate::of_expansion(&Expansion::of(imager, reference, &stellar), space, imager)
+        Surrogate::of_expansion(&Expansion::of(imager, reference, &free_stellar(space.free())), space, imager)
     }
 
     /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where K or phi is fixed, or the

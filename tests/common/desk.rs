@@ -40,6 +40,15 @@ pub fn two_spots(sampler: Value) -> Value {
     })
 }
 
+/// The same star in more noise, for chains of two ensembles of six walkers that go on to so many steps.
+pub fn tiny(steps: usize) -> Value {
+    let mut config = two_spots(json!({ "ensembles": 2, "walkers": 6, "steps": steps, "seed": 3, "ess": 1e6 }));
+    config["planet"]["phi"] = json!(0.5);
+    config["observations"]["simulate"]["snr"] = json!(500);
+    config["observations"]["simulate"]["pixels"] = json!(1000);
+    config
+}
+
 pub fn dimcmc(args: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dimcmc")).args(args).current_dir(folder).output().unwrap()
 }
