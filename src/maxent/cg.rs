@@ -61,16 +61,16 @@ pub(super) fn solve(
 
 /// Scalar product.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // four partial sums: a fixed order that the compiler may vectorise
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a4.zip(b4) {
-        for i in 0..4 {
+    // partial sums: a fixed order that the compiler may vectorise
+    let mut sums = [0.0; 16];
+    let (whole_a, rest_a) = a.as_chunks::<16>();
+    let (whole_b, rest_b) = b.as_chunks::<16>();
+    for (a, b) in whole_a.iter().zip(whole_b) {
+        for i in 0..16 {
             sums[i] += a[i] * b[i];
         }
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+    sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// `y += scale * x`.

@@ -161,8 +161,10 @@ impl Task for Components<'_> {
         for (rows, pixels) in self.basis.groups() {
             let r = pixels.map(|p| self.r[p as usize] as f32);
             for (k, sums) in components.iter_mut().enumerate() {
+                // values, not references: the compiler makes vectors of the lanes then
+                let rows = rows.map(|row| row[k]);
                 for lane in 0..LANES {
-                    let of_row = |j: usize| r[j] * rows[j][k][lane];
+                    let of_row = |j: usize| r[j] * rows[j][lane];
                     sums[lane] += (of_row(0) + of_row(1)) + (of_row(2) + of_row(3));
                 }
             }

@@ -10,7 +10,7 @@ use super::grid::SurfaceGrid;
 use super::kernel::{self, Block, LANES};
 use super::limb_darkening::LimbDarkening;
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
-use super::view::{Viewer, Views};
+use super::view::{PixelMoments, Viewer};
 use crate::vector::{self, Instructions, Task};
 
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.
@@ -78,10 +78,22 @@ impl Deposit {
         self.nodes - BEYOND
     }
 
+    /// Blocks of every cell of an observation.
     fn blocks_of(&self, observation: usize) -> impl Iterator<Item = &[Block]> {
         let first = observation * self.cells();
         let bounds = self.starts[first..first + self.cells() + 1].windows(2);
         bounds.map(|b| &self.blocks[b[0] as usize..b[1] as usize])
+    }
+
+    /// Empty blocks for the pixels of another observation, so many in each cell; turns their numbers into the first lane of each.
+    fn add_cells(&mut self, pixels: &mut [usize]) {
+        let mut end = self.blocks.len();
+        for cell in pixels {
+            let count = std::mem::replace(cell, LANES * end);
+            end += count.div_ceil(LANES);
+            self.starts.push(end as u32);
+        }
+        self.blocks.resize(end, Block::empty(0));
     }
 
     /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid (overwritten).
@@ -89,11 +101,11 @@ impl Deposit {
     #[allow(unsafe_code)]
     pub fn gather<I: Instructions>(&self, i: I, k: usize, x: &[f64], moments: &mut Moments, nodes: &mut [f64]) {
         assert_eq!(x.len(), self.pixels);
-        let mut powers = moments.powers.each_mut().map(|power| power[BEYOND..self.nodes].iter_mut());
-        for blocks in self.blocks_of(k) {
+        let mut powers = moments.powers.each_mut().map(|power| &mut power[BEYOND..self.nodes]);
+        for (cell, blocks) in self.blocks_of(k).enumerate() {
             // safe: blocks hold pixels of the grid alone
             let sums = unsafe { kernel::sum(i, blocks, x) };
-            powers.iter_mut().zip(sums).for_each(|(power, sum)| *power.next().expect("a cell") = sum);
+            powers.iter_mut().zip(sums).for_each(|(power, sum)| power[cell] = sum);
         }
         nodes.fill(0.0);
         for (power, moments) in moments.powers.iter().enumerate() {
@@ -159,42 +171,68 @@ impl Task for Build<'_> {
     #[inline(always)]
     fn run<I: Instructions>(self, instructions: I) {
         let Build { deposit, viewer, grid, since_epoch_d } = self;
-        let mut views = Views::new(grid.len());
-        let mut cells = vec![0; grid.len()];
-        let half_inverse_square = 0.5 / (deposit.step_kms * deposit.step_kms);
+        let mut views = viewer.of(grid);
+        let scale = Scale { origin_kms: deposit.origin_kms, steps_per_kms: 1.0 / deposit.step_kms };
+        let (mut places, mut lanes) = (Vec::new(), Vec::new());
         for &time in since_epoch_d {
-            viewer.look(instructions, grid, time, &mut views);
-            // from velocities to positions on the grid, with the cell that the first of its nodes counts
-            let mut next = vec![0; deposit.cells()];
-            for ((weight, velocity), cell) in views.weight.iter().zip(&mut views.velocity).zip(&mut cells) {
-                if *weight > 0.0 {
-                    *velocity = (*velocity - deposit.origin_kms) / deposit.step_kms;
-                    *cell = *velocity as u32 - 2;
-                    next[*cell as usize] += 1;
-                    deposit.pairs += 1;
-                }
-            }
-            let mut end = deposit.blocks.len();
-            for next in &mut next {
-                let count = std::mem::replace(next, LANES * end);
-                end += usize::div_ceil(count, LANES);
-                deposit.starts.push(end as u32);
-            }
-            deposit.blocks.resize(end, Block::empty(0));
-            for (p, (weight, cell)) in views.weight.iter().zip(&cells).enumerate() {
-                if *weight > 0.0 {
-                    let next = &mut next[*cell as usize];
-                    let (block, lane) = (&mut deposit.blocks[*next / LANES], *next % LANES);
-                    *next += 1;
-                    block.weight[lane] = *weight as f32;
-                    block.position[lane] = (views.velocity[p] - f64::from(*cell + 2)) as f32;
-                    block.spread[lane] = (views.variance[p] * half_inverse_square) as f32;
-                    block.pixel[lane] = p as u32;
-                }
+            let seen = views.look(instructions, time);
+            deposit.pairs += seen.pixel.len();
+            places.resize(seen.pixel.len(), Place::default());
+            scale.place(seen, &mut places);
+            lanes.clear();
+            lanes.resize(deposit.cells(), 0);
+            places.iter().for_each(|place| lanes[place.cell as usize] += 1);
+            deposit.add_cells(&mut lanes);
+            for (place, pixel) in places.iter().zip(&seen.pixel) {
+                let next = &mut lanes[place.cell as usize];
+                let (block, lane) = (&mut deposit.blocks[*next / LANES], *next % LANES);
+                *next += 1;
+                block.weight[lane] = place.weight;
+                block.position[lane] = place.position;
+                block.spread[lane] = place.spread;
+                block.pixel[lane] = *pixel;
             }
         }
     }
 }
+
+/// Where a pixel goes.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    cell: u32,
+    weight: f32,
+    position: f32,
+    spread: f32,
+}
+
+/// Velocities in steps of the grid.
+struct Scale {
+    origin_kms: f64,
+    steps_per_kms: f64,
+}
+
+impl Scale {
+    /// Cells are counted from the first of their nodes.
+    #[inline(always)]
+    fn place(&self, seen: &PixelMoments, places: &mut [Place]) {
+        let spread = 0.5 * self.steps_per_kms * self.steps_per_kms;
+        let moments = seen.weight.iter().zip(&seen.velocity).zip(&seen.variance);
+        for (((weight, velocity), variance), place) in moments.zip(places) {
+            let position = (velocity - self.origin_kms) * self.steps_per_kms;
+            // rounding half a step below gives the whole steps, in the last bits of the sum
+            let steps = (position - 0.5) + INTEGERS;
+            *place = Place {
+                cell: (steps.to_bits() as u32).wrapping_sub(2),
+                weight: *weight as f32,
+                position: (position - (steps - INTEGERS)) as f32,
+                spread: (variance * spread) as f32,
+            };
+        }
+    }
+}
+
+/// From here on neighbouring numbers are integers.
+const INTEGERS: f64 = 4_503_599_627_370_496.0;
 
 /// Nodes on either side of the line's centre.
 fn reach(viewer: &Viewer, step_kms: f64) -> f64 {

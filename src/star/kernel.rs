@@ -24,6 +24,9 @@ pub struct Block {
     pub pixel: [u32; LANES],
 }
 
+/// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to 5.
+const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
+
 impl Block {
     /// No pixel yet; the lanes may point to any pixel of the map, and this one stays in the cache.
     pub fn empty(pixel: u32) -> Self {
@@ -94,7 +97,7 @@ fn plain_spread(blocks: &[Block], coefficients: &[f64; DEPOSIT_NODES], out: &mut
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod avx2 {
-    use super::{Block, DEPOSIT_NODES, LANES};
+    use super::{Block, DEPOSIT_NODES, LANES, SPREAD_FACTORS};
     use std::arch::x86_64::*;
 
     /// As [`super::plain_sum`].
@@ -105,14 +108,22 @@ mod avx2 {
     #[target_feature(enable = "avx2,fma")]
     pub(super) unsafe fn sum(blocks: &[Block], x: &[f64]) -> [f64; DEPOSIT_NODES] {
         let mut sums = [_mm256_setzero_pd(); DEPOSIT_NODES];
+        let mut spread_sums = [_mm256_setzero_pd(); SPREAD_FACTORS.len()];
         for block in blocks {
             let at = |lane: usize| unsafe { *x.get_unchecked(block.pixel[lane] as usize) };
             let x = _mm256_set_pd(at(3), at(2), at(1), at(0));
-            let amount = _mm256_mul_pd(x, load(&block.weight));
-            sums[0] = _mm256_add_pd(sums[0], amount);
-            for (sum, power) in sums[1..].iter_mut().zip(powers(block)) {
-                *sum = _mm256_fmadd_pd(amount, power, *sum);
+            let (t, spread) = (load(&block.position), load(&block.spread));
+            let mut term = _mm256_mul_pd(x, load(&block.weight));
+            for (k, sum) in sums.iter_mut().enumerate() {
+                *sum = _mm256_add_pd(*sum, term);
+                if let Some(sum) = spread_sums.get_mut(k) {
+                    *sum = _mm256_fmadd_pd(term, spread, *sum);
+                }
+                term = _mm256_mul_pd(term, t);
             }
+        }
+        for ((sum, spread_sum), factor) in sums[2..].iter_mut().zip(spread_sums).zip(SPREAD_FACTORS) {
+            *sum = _mm256_fmadd_pd(_mm256_set1_pd(factor), spread_sum, *sum);
         }
         let mut totals = [0.0; DEPOSIT_NODES];
         for (totals, pair) in totals.chunks_exact_mut(2).zip(sums.chunks_exact(2)) {
@@ -131,12 +142,16 @@ mod avx2 {
     #[inline]
     #[target_feature(enable = "avx2,fma")]
     pub(super) unsafe fn spread(blocks: &[Block], coefficients: &[f64; DEPOSIT_NODES], out: &mut [f64]) {
+        let of_spread: [__m256d; SPREAD_FACTORS.len()] =
+            std::array::from_fn(|k| _mm256_set1_pd(SPREAD_FACTORS[k] * coefficients[k + 2]));
         let coefficients = coefficients.map(|c| _mm256_set1_pd(c));
         for block in blocks {
-            let mut polynomial = coefficients[0];
-            for (c, power) in coefficients[1..].iter().zip(powers(block)) {
-                polynomial = _mm256_fmadd_pd(*c, power, polynomial);
-            }
+            let (t, spread) = (load(&block.position), load(&block.spread));
+            let at_t = |coefficients: &[__m256d]| {
+                let (last, rest) = coefficients.split_last().expect("coefficients");
+                rest.iter().rev().fold(*last, |sum, c| _mm256_fmadd_pd(sum, t, *c))
+            };
+            let polynomial = _mm256_fmadd_pd(at_t(&of_spread), spread, at_t(&coefficients));
             let values = _mm256_mul_pd(polynomial, load(&block.weight));
             let (low, high) = (_mm256_castpd256_pd128(values), _mm256_extractf128_pd::<1>(values));
             let mut add = |lane: usize, value: f64| unsafe {
@@ -147,17 +162,6 @@ mod avx2 {
             add(2, _mm_cvtsd_f64(high));
             add(3, _mm_cvtsd_f64(_mm_unpackhi_pd(high, high)));
         }
-    }
-
-    /// Powers 1 to 5 of the four positions, as [`Block::powers`].
-    #[inline]
-    #[target_feature(enable = "avx2,fma")]
-    fn powers(block: &Block) -> [__m256d; DEPOSIT_NODES - 1] {
-        let (t, spread) = (load(&block.position), load(&block.spread));
-        let t2 = _mm256_mul_pd(t, t);
-        let plus = |factor: f64| _mm256_fmadd_pd(_mm256_set1_pd(factor), spread, t2);
-        let t3 = _mm256_mul_pd(t, t2);
-        [t, plus(2.0), _mm256_mul_pd(t, plus(6.0)), _mm256_mul_pd(t2, plus(12.0)), _mm256_mul_pd(t3, plus(20.0))]
     }
 
     #[inline]
