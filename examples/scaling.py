@@ -10,12 +10,15 @@ import math
 import random
 
 # s: a message one way, the nap of whoever waits for it included; what rank 0 works on a question and its answer
-LATENCY, SERVICE = 115e-6, 12e-6
+LATENCY, SERVICE = 125e-6, 12e-6
 # what rank 0 does for each walker and step: propose, decide, write a line
-PROPOSAL = 70e-6
+PROPOSAL = 42e-6
+
+# most questions ahead, and how long (s) they are to last
+AHEAD, BRIDGED = 8, 30e-3
 
 # name, median of an evaluation (s), spread of its logarithm
-CASES = [("3-D, 2,000 pixels", 0.9e-3, 0.24), ("3-D, 20,000 pixels", 13e-3, 0.24), ("7-D, 20,000 pixels", 40e-3, 0.44)]
+CASES = [("3-D, 2,000 pixels", 0.9e-3, 0.24), ("3-D, 20,000 pixels", 5.9e-3, 0.24), ("7-D, 20,000 pixels", 14e-3, 0.44)]
 # spread of the logarithm of the ranks' speeds: machines are not all alike
 UNEQUAL = 0.1
 
@@ -38,19 +41,25 @@ class Batch:
         heapq.heappush(self.answers, (self.until[worker] + LATENCY, worker))
         self.left, self.open[worker], self.work = self.left - 1, self.open[worker] + 1, self.work + took
 
+    def ahead(self):
+        """Questions that a worker may have ahead: fewer the longer they take, and the fewer are left."""
+        if self.left <= self.workers:
+            return 0
+        return max(1, min(AHEAD, int(BRIDGED / self.median), self.left // (2 * self.workers)))
+
     def run(self):
         """Seconds, and seconds of work, until all answers are back."""
         for worker in range(len(self.speed)):
             self.send(worker)
-        # one ahead for each, while there are more questions than all can take
-        for worker in range(len(self.speed)):
-            if self.left > self.workers:
-                self.send(worker)
+        for _ in range(AHEAD):
+            for worker in range(len(self.speed)):
+                if self.open[worker] <= self.ahead():
+                    self.send(worker)
         while self.answers:
             arrival, worker = heapq.heappop(self.answers)
             self.clock = max(self.clock, arrival) + SERVICE / 2
             self.open[worker] -= 1
-            if self.left > 0 and (self.open[worker] == 0 or self.left > self.workers):
+            while self.left > 0 and self.open[worker] <= self.ahead():
                 self.send(worker)
         return self.clock, self.work
 

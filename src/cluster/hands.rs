@@ -1,10 +1,20 @@
-//! Who is asked next: whoever is free; and where more questions are left than all can take, whoever has only what it is at, so that it
-//! need not wait for the next one.
+//! Who is asked next: whoever has least to do; and where more questions are left than all can take at once, some have questions ahead,
+//! so that nobody waits for the next one.
 //!
-//! A question and its answer take 0.2 ms on the way, mostly of naps on both sides, where an evaluation may take one
-//! (`results/scaling.md`). At the end of a batch nothing waits behind another question while somebody is idle. Left out: messages.
+//! A question and its answer take a fifth of a millisecond on the way, and some where rank 0 has to wait for a processor, while an
+//! evaluation may take one (`results/scaling.md`). Fewer are ahead the longer they take, and the fewer are left (guided
+//! self-scheduling, Polychronopoulos & Kuck 1987): at the end of a batch nothing waits behind another question while somebody is idle.
+//! Left out: messages.
 
 use mpi::Rank;
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// Most rounds ahead.
+const MOST_AHEAD: usize = 8;
+
+/// How long what is ahead is to last: several times what rank 0 waits for a processor that others are at (a tenth as much costs a tenth).
+const BRIDGED: Duration = Duration::from_millis(30);
 
 /// A rank with what it can do and has to do.
 struct Hand {
@@ -12,48 +22,54 @@ struct Hand {
     open: usize,
 }
 
+impl Hand {
+    /// Questions that every one of its threads has to answer before it begins with another.
+    fn rounds(&self) -> usize {
+        self.open / self.at_once
+    }
+}
+
 /// The ranks from 1 on.
 pub(super) struct Hands {
     ranks: Vec<Hand>,
-    /// Ranks, each as often as it can begin with a question now.
-    free: Vec<Rank>,
-    /// Ranks that may have no more than they are at; who has more is passed over.
-    ahead: Vec<Rank>,
+    /// All of them by the rounds that they have to do.
+    by_rounds: BTreeSet<(usize, Rank)>,
+    size: usize,
 }
 
 impl Hands {
-    /// All of them free. They are asked in turn, so that a batch that is short of questions is spread over all ranks.
+    /// All of them free.
     pub(super) fn new(at_once: &[(Rank, usize)]) -> Self {
-        let most = at_once.iter().map(|(_, at_once)| *at_once).max().unwrap_or(0);
-        let turn = |turn| at_once.iter().rev().filter(move |(_, at_once)| turn < *at_once).map(|(rank, _)| *rank);
-        let free = (0..most).rev().flat_map(turn).collect();
-        Hands { ranks: at_once.iter().map(|(_, n)| Hand { at_once: *n, open: 0 }).collect(), free, ahead: Vec::new() }
+        Hands {
+            ranks: at_once.iter().map(|(_, at_once)| Hand { at_once: *at_once, open: 0 }).collect(),
+            by_rounds: at_once.iter().map(|(rank, _)| (0, *rank)).collect(),
+            size: at_once.iter().map(|(_, at_once)| at_once).sum(),
+        }
     }
 
-    /// The next one to ask; one that is busy only if there are `many` questions.
-    pub(super) fn take(&mut self, many: bool) -> Option<Rank> {
-        let mut rank = self.free.pop();
-        while rank.is_none() && many {
-            let busy = self.ahead.pop()?;
-            rank = Some(busy).filter(|busy| self.hand(*busy).open == self.hand(*busy).at_once);
-        }
-        let hand = self.hand(rank?);
-        hand.open += 1;
-        if hand.open == hand.at_once {
-            self.ahead.extend(rank);
-        }
-        rank
+    /// The next one to ask when so many questions are left, each of which takes so long as far as it is known.
+    pub(super) fn take(&mut self, left: usize, each: Option<Duration>) -> Option<Rank> {
+        let &(rounds, rank) = self.by_rounds.first()?;
+        (rounds <= self.ahead(left, each)).then(|| self.change(rank, |open| open + 1))
+    }
+
+    /// Rounds that all may have ahead.
+    fn ahead(&self, left: usize, each: Option<Duration>) -> usize {
+        let bridged = each.map_or(0.0, |each| BRIDGED.div_duration_f64(each)) as usize;
+        if left > self.size { (left / (2 * self.size)).min(bridged).clamp(1, MOST_AHEAD) } else { 0 }
     }
 
     /// A rank has answered.
     pub(super) fn give_back(&mut self, rank: Rank) {
-        let hand = self.hand(rank);
-        hand.open -= 1;
-        if hand.open < hand.at_once { self.free.push(rank) } else { self.ahead.push(rank) }
+        self.change(rank, |open| open - 1);
     }
 
-    fn hand(&mut self, rank: Rank) -> &mut Hand {
-        &mut self.ranks[rank as usize - 1]
+    fn change(&mut self, rank: Rank, open: impl Fn(usize) -> usize) -> Rank {
+        let hand = &mut self.ranks[rank as usize - 1];
+        self.by_rounds.remove(&(hand.rounds(), rank));
+        hand.open = open(hand.open);
+        self.by_rounds.insert((hand.rounds(), rank));
+        rank
     }
 }
 
@@ -62,22 +78,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_free_ones_come_first_and_nobody_has_more_than_one_ahead() {
+    fn who_has_least_to_do_comes_first_and_fewer_are_ahead_the_fewer_are_left() {
         let mut hands = Hands::new(&[(1, 1), (2, 2)]);
-        let all: Vec<Option<Rank>> = (0..6).map(|_| hands.take(true)).collect();
-        // both, the second thread of 2, one ahead for each, and no more
-        assert_eq!(all[..3], [Some(1), Some(2), Some(2)]);
-        let mut ahead = [all[3], all[4]];
-        ahead.sort();
-        assert_eq!((ahead, all[5]), ([Some(1), Some(2)], None));
-        // it goes on with what it has ahead, and may have another only if there are many
+        // three at once; as many ahead again while there are more, and then none
+        let taken: Vec<Option<Rank>> = (0..7).map(|_| hands.take(4, None)).collect();
+        assert_eq!(taken, [1, 2, 2, 1, 2, 2, 0].map(|rank| (rank > 0).then_some(rank)));
+        assert_eq!(hands.take(3, None), None);
         hands.give_back(1);
-        assert_eq!(hands.take(false), None);
-        assert_eq!(hands.take(true), Some(1));
-        // 2 goes on with the one ahead, then has a thread free
-        hands.give_back(2);
-        hands.give_back(2);
-        assert_eq!(hands.take(false), Some(2));
-        assert_eq!(hands.take(false), None);
+        assert_eq!(hands.take(3, None), None);
+        hands.give_back(1);
+        assert_eq!(hands.take(3, None), Some(1));
+        // of a long batch, more
+        let mut ahead = |each| (0..100).filter_map(|_| hands.take(10_000, Some(each))).count();
+        assert_eq!(ahead(Duration::from_secs(1)), 1);
+        assert_eq!(ahead(BRIDGED / 3), 6);
+        assert_eq!(ahead(Duration::from_micros(1)), 3 * (MOST_AHEAD - 3));
     }
 }

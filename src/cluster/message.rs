@@ -7,20 +7,52 @@ use mpi::Tag;
 /// From a worker, once: how many questions it answers at once (8 bytes).
 pub(super) const HELLO: Tag = 1;
 
-/// To a worker: what the next questions are about follows as a broadcast of so many bytes (8 bytes).
-pub(super) const BRIEF: Tag = 2;
-
-/// To a worker: a question.
-pub(super) const QUESTION: Tag = 3;
+/// To a worker: an [`Order`].
+pub(super) const ORDER: Tag = 2;
 
 /// From a worker: an answer.
-pub(super) const ANSWER: Tag = 4;
+pub(super) const ANSWER: Tag = 3;
 
-/// To a worker: what is under way is wanted soon.
-pub(super) const STOP: Tag = 5;
+/// To a worker: a question about the brief of that number. Each has a tag of its own, so that threads that do not know yet that the one
+/// before is over leave them alone.
+pub(super) fn question(brief: usize) -> Tag {
+    const FIRST: usize = 4;
+    const TAGS: usize = 1000;
+    (FIRST + brief % TAGS) as Tag
+}
 
-/// To a worker: nothing more is asked.
-pub(super) const DISMISS: Tag = 6;
+/// What a worker is told.
+#[derive(Clone, Copy)]
+pub(super) enum Order {
+    /// What the next questions are about follows as a broadcast of so many bytes.
+    Brief(usize),
+    /// What is under way is wanted soon.
+    Stop,
+    /// Nothing more is asked.
+    Dismissed,
+}
+
+impl Order {
+    /// As two numbers.
+    pub(super) fn to_bytes(self) -> Vec<u8> {
+        let (kind, length) = match self {
+            Order::Brief(length) => (0, length),
+            Order::Stop => (1, 0),
+            Order::Dismissed => (2, 0),
+        };
+        numbered(kind, &number(length))
+    }
+
+    pub(super) fn from_bytes(bytes: &[u8]) -> Self {
+        let (kind, rest) = split(bytes);
+        match kind {
+            0 => Order::Brief(split(rest).0),
+            1 => Order::Stop,
+            2 => Order::Dismissed,
+            kind => unreachable!("rank 0 gives no order {kind}"),
+        }
+    }
+}
 
 /// Length of a number.
 const NUMBER: usize = 8;

@@ -14,7 +14,7 @@ pub use queue::Queue;
 pub use worker::{Answer, Worker};
 
 use mpi::environment::Universe;
-use mpi::topology::SimpleCommunicator;
+use mpi::topology::{Process, SimpleCommunicator};
 use mpi::traits::Communicator as _;
 use std::process::ExitCode;
 
@@ -80,6 +80,11 @@ fn abort_on_panic() {
         message(panic);
         abort(PANICKED);
     }));
+}
+
+/// Rank 0.
+fn first(world: &SimpleCommunicator) -> Process<'_> {
+    world.process_at_rank(0)
 }
 
 /// The ranks, and MPI itself until this is dropped.

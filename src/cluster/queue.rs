@@ -4,22 +4,23 @@
 
 use super::Ranks;
 use super::hands::Hands;
-use super::message::{ANSWER, BRIEF, DISMISS, HELLO, QUESTION, STOP, number, numbered, split};
-use super::nap::Nap;
+use super::message::{ANSWER, HELLO, ORDER, Order, numbered, question, split};
+use super::nap::{WHILE_BUSY, WHILE_IDLE, Wait, nap};
 use mpi::Rank;
 use mpi::environment::Universe;
 use mpi::point_to_point::MatchedReceiveVec as _;
 use mpi::traits::{Communicator as _, Destination as _, Root as _, Source as _};
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::Instant;
 
 /// The other ranks, as the first one sees them; dismissed when this is dropped.
 pub struct Queue {
     ranks: Ranks,
     /// How many questions each answers at once.
     at_once: Vec<(Rank, usize)>,
-    /// What they were told last.
-    brief: RefCell<Vec<u8>>,
+    /// What they were told last, and how often they were told something.
+    brief: RefCell<(Vec<u8>, usize)>,
 }
 
 impl Queue {
@@ -42,24 +43,26 @@ impl Queue {
     /// The answers to the first of the `questions` about `brief`: to all, unless `stop` is set meanwhile, after which none is
     /// asked any more and those that were are waited for.
     pub fn answers(&self, brief: &[u8], questions: &[Vec<u8>], stop: &AtomicBool) -> Vec<Vec<u8>> {
-        self.tell(brief);
+        let tag = question(self.tell(brief));
         let mut hands = Hands::new(&self.at_once);
         let mut answers: Vec<Option<Vec<u8>>> = vec![None; questions.len()];
         let mut left = questions.iter().enumerate();
-        let (mut open, mut hurried, mut nap) = (0, false, Nap::new());
+        let (mut open, mut answered, mut hurried, mut wait) = (0, 0, false, Wait::new());
+        let began = Instant::now();
         loop {
             let stopped = stop.load(Relaxed);
+            let each = (answered > 0).then(|| began.elapsed() * self.size() as u32 / answered);
             while !stopped && left.len() > 0 {
-                let Some(rank) = hands.take(left.len() > self.size()) else { break };
-                let (place, question) = left.next().expect("there are some left");
-                self.ranks.world.process_at_rank(rank).send_with_tag(&numbered(place, question)[..], QUESTION);
+                let Some(rank) = hands.take(left.len(), each) else { break };
+                let (place, bytes) = left.next().expect("there are some left");
+                self.ranks.world.process_at_rank(rank).send_with_tag(&numbered(place, bytes)[..], tag);
                 open += 1;
             }
             if open == 0 {
                 break;
             }
             if stopped && !hurried {
-                self.send_all(STOP, &[]);
+                self.order(Order::Stop);
                 hurried = true;
             }
             match self.ranks.world.any_process().immediate_matched_probe_with_tag(ANSWER) {
@@ -68,29 +71,31 @@ impl Queue {
                     let (place, answer) = split(&bytes);
                     answers[place] = Some(answer.to_vec());
                     hands.give_back(status.source_rank());
-                    open -= 1;
-                    nap = Nap::new();
+                    (open, answered) = (open - 1, answered + 1);
+                    wait = Wait::new();
                 }
-                None => nap.take(),
+                None if left.len() > 0 => nap(each.map_or(wait.nap(), |each| each / 8), WHILE_BUSY),
+                None => nap(wait.nap(), WHILE_IDLE),
             }
         }
         answers.into_iter().map_while(|answer| answer).collect()
     }
 
-    /// Tells all ranks what the next questions are about, unless they know.
-    fn tell(&self, brief: &[u8]) {
-        if *self.brief.borrow() == brief {
-            return;
+    /// Tells all ranks what the next questions are about, unless they know; gives the number of this brief.
+    fn tell(&self, brief: &[u8]) -> usize {
+        let (last, number) = &mut *self.brief.borrow_mut();
+        if last != brief {
+            *last = brief.to_vec();
+            *number += 1;
+            self.order(Order::Brief(last.len()));
+            self.ranks.world.process_at_rank(0).broadcast_into(&mut last[..]);
         }
-        let mut bytes = brief.to_vec();
-        self.send_all(BRIEF, &number(bytes.len()));
-        self.ranks.world.process_at_rank(0).broadcast_into(&mut bytes[..]);
-        self.brief.replace(bytes);
+        *number
     }
 
-    fn send_all(&self, tag: mpi::Tag, bytes: &[u8]) {
+    fn order(&self, order: Order) {
         for (rank, _) in &self.at_once {
-            self.ranks.world.process_at_rank(*rank).send_with_tag(bytes, tag);
+            self.ranks.world.process_at_rank(*rank).send_with_tag(&order.to_bytes()[..], ORDER);
         }
     }
 }
@@ -99,7 +104,7 @@ impl Drop for Queue {
     fn drop(&mut self) {
         // a job that panics is ended by the hook
         if !std::thread::panicking() {
-            self.send_all(DISMISS, &[]);
+            self.order(Order::Dismissed);
         }
     }
 }

@@ -1,16 +1,21 @@
 //! The other ranks: told what questions are about, they answer until they are dismissed.
 //!
-//! MPI is the main thread's; questions are answered by threads of their own. Left out: the other side (`queue`).
+//! Every thread takes its questions from MPI and sends its answers itself, so that nothing has to wake up for either while all are
+//! busy; the main thread hears orders. Left out: the other side (`queue`).
 
-use super::Ranks;
-use super::message::{ANSWER, BRIEF, DISMISS, HELLO, QUESTION, STOP, number, numbered, split};
-use super::nap::Nap;
+use super::message::{ANSWER, HELLO, ORDER, Order, number, numbered, question, split};
+use super::nap::{WHILE_IDLE, Wait, nap};
+use super::{Ranks, first};
 use mpi::environment::Universe;
 use mpi::point_to_point::MatchedReceiveVec as _;
+use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator as _, Destination as _, Root as _, Source as _};
-use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// How long it takes at most until an order is heard; questions do not wait for it.
+const UNHEARD: Duration = Duration::from_millis(5);
 
 /// Answers a question, from any thread; the flag is set when it is wanted soon.
 pub type Answer<'a> = Box<dyn Fn(&[u8], &Arc<AtomicBool>) -> Vec<u8> + Sync + 'a>;
@@ -19,12 +24,6 @@ pub type Answer<'a> = Box<dyn Fn(&[u8], &Arc<AtomicBool>) -> Vec<u8> + Sync + 'a
 pub struct Worker {
     ranks: Ranks,
     at_once: usize,
-}
-
-/// What ends the questions about one thing.
-enum Next {
-    Brief(Vec<u8>),
-    Dismissed,
 }
 
 impl Worker {
@@ -42,70 +41,69 @@ impl Worker {
     /// # Errors
     /// What `learn` says; the other ranks wait for this one then, and must be ended.
     pub fn serve<'a, E>(&self, learn: impl Fn(&[u8]) -> Result<Answer<'a>, E>) -> Result<(), E> {
-        self.first().send_with_tag(&number(self.at_once)[..], HELLO);
-        let idle: Answer = Box::new(|_, _| unreachable!("nothing is asked before a brief"));
-        let mut next = self.answer(&idle, 0);
-        while let Next::Brief(brief) = next {
-            next = self.answer(&learn(&brief)?, self.at_once);
+        first(&self.ranks.world).send_with_tag(&number(self.at_once)[..], HELLO);
+        let mut brief = self.wait(&AtomicBool::new(false));
+        for number in 1.. {
+            let Some(bytes) = brief else { break };
+            brief = self.answer(&learn(&bytes)?, number);
         }
         Ok(())
     }
 
-    /// Answers questions by so many threads until there is something else to do.
-    fn answer(&self, answer: &Answer, threads: usize) -> Next {
-        let stop = Arc::new(AtomicBool::new(false));
-        let (ask, asked) = mpsc::channel::<Vec<u8>>();
-        let (reply, replies) = mpsc::channel::<Vec<u8>>();
-        let asked = Mutex::new(asked);
+    /// Answers questions about the brief of this number until there is another; `None` when dismissed.
+    fn answer(&self, answer: &Answer, brief: usize) -> Option<Vec<u8>> {
+        let (stop, over, ear) = (Arc::new(AtomicBool::new(false)), AtomicBool::new(false), Mutex::new(()));
         std::thread::scope(|scope| {
-            for _ in 0..threads {
-                let (reply, asked, stop) = (reply.clone(), &asked, &stop);
-                scope.spawn(move || {
-                    loop {
-                        let Ok(message) = asked.lock().expect("a panic ends the program").recv() else { break };
+            for _ in 0..self.at_once {
+                scope.spawn(|| {
+                    while let Some(message) = next_question(brief, &ear, &over) {
                         let (place, question) = split(&message);
-                        // nobody listens any more only where the program ends
-                        let _ = reply.send(numbered(place, &answer(question, stop)));
+                        let message = numbered(place, &answer(question, &stop));
+                        first(&SimpleCommunicator::world()).send_with_tag(&message[..], ANSWER);
                     }
                 });
             }
-            let mut nap = Nap::new();
-            // dropped with this closure, whereupon the threads end
-            let ask = ask;
-            loop {
-                match self.hear(&ask, &stop) {
-                    Some(ControlFlow::Break(next)) => return next,
-                    Some(ControlFlow::Continue(())) => nap = Nap::new(),
-                    None => {
-                        // an answer ends the nap
-                        if let Ok(message) = replies.recv_timeout(nap.length()) {
-                            self.first().send_with_tag(&message[..], ANSWER);
-                            nap = Nap::new();
-                        }
-                    }
-                }
-            }
+            let next = self.wait(&stop);
+            over.store(true, Relaxed);
+            next
         })
     }
 
-    /// Takes the next message of rank 0, if there is one.
-    fn hear(&self, ask: &mpsc::Sender<Vec<u8>>, stop: &AtomicBool) -> Option<ControlFlow<Next>> {
-        let (bytes, status) = self.first().immediate_matched_probe()?.matched_receive_vec::<u8>();
-        match status.tag() {
-            QUESTION => ask.send(bytes).expect("the threads listen until the channel is closed"),
-            STOP => stop.store(true, Relaxed),
-            BRIEF => {
-                let mut brief = vec![0; split(&bytes).0];
-                self.first().broadcast_into(&mut brief[..]);
-                return Some(ControlFlow::Break(Next::Brief(brief)));
+    /// Waits for the next brief, and passes on that answers are wanted soon; `None` when dismissed.
+    fn wait(&self, stop: &AtomicBool) -> Option<Vec<u8>> {
+        loop {
+            match self.order() {
+                Order::Stop => stop.store(true, Relaxed),
+                Order::Brief(length) => {
+                    let mut brief = vec![0; length];
+                    first(&self.ranks.world).broadcast_into(&mut brief[..]);
+                    return Some(brief);
+                }
+                Order::Dismissed => return None,
             }
-            DISMISS => return Some(ControlFlow::Break(Next::Dismissed)),
-            tag => unreachable!("rank 0 sends no message with tag {tag}"),
         }
-        Some(ControlFlow::Continue(()))
     }
 
-    fn first(&self) -> mpi::topology::Process<'_> {
-        self.ranks.world.process_at_rank(0)
+    /// Waits for the next order of rank 0.
+    fn order(&self) -> Order {
+        loop {
+            match first(&self.ranks.world).immediate_matched_probe_with_tag(ORDER) {
+                Some(found) => return Order::from_bytes(&found.matched_receive_vec::<u8>().0),
+                None => std::thread::sleep(UNHEARD),
+            }
+        }
     }
+}
+
+/// Waits for the next question about a brief until it is `over`; one thread at a time has its `ear` at the door.
+fn next_question(brief: usize, ear: &Mutex<()>, over: &AtomicBool) -> Option<Vec<u8>> {
+    let _ear = ear.lock().unwrap_or_else(PoisonError::into_inner);
+    let wait = Wait::new();
+    while !over.load(Relaxed) {
+        match first(&SimpleCommunicator::world()).immediate_matched_probe_with_tag(question(brief)) {
+            Some(found) => return Some(found.matched_receive_vec::<u8>().0),
+            None => nap(wait.nap(), WHILE_IDLE),
+        }
+    }
+    None
 }
