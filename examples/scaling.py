@@ -1,6 +1,6 @@
 """A simulated cluster: how many evaluations a second a chain gets out of 10 to 10,000 ranks.
 
-Events are those of the program: rank 0 proposes for one half of all walkers, hands the vectors out one by one to whoever is free,
+Events are those of the program: rank 0 proposes for one half of all walkers, hands the vectors out, some ahead while there are many,
 takes the answers as they come, decides and writes; then the other half. What things take is measured by `cargo bench --bench ranks
 --features mpi` (the last tables and line). Prints the tables of results/scaling.md. Needs Python alone.
 """

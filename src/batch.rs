@@ -216,6 +216,9 @@ pub fn learn(brief: &[u8]) -> Result<crate::cluster::Answer<'static>, crate::poo
             })
         }
         Brief::Stars => Box::new(|question, stop| {
+            if stop.load(std::sync::atomic::Ordering::Relaxed) {
+                return End::Interrupted.to_bytes();
+            }
             let star: Star = serde_json::from_slice(question).expect("a rank of this very program asks");
             sample(&star, &Pool::threads(stop.clone())).to_bytes()
         }),

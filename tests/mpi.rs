@@ -28,7 +28,7 @@ const RUN: [&str; 3] = ["manifest.json", "chain.jsonl", "summary.json"];
 
 const GRID: [&str; 3] = ["landscape.json", "landscape.jsonl", "paraboloid.json"];
 
-const CHECKS: [(&str, fn()); 12] = [
+const CHECKS: [(&str, fn()); 13] = [
     ("a chain is the same on any number of ranks and threads", any_number_of_ranks),
     ("so it is with other models of star and data", other_models),
     ("a landscape is the same", landscape),
@@ -40,6 +40,7 @@ const CHECKS: [(&str, fn()); 12] = [
     ("a rank without the data ends the job and says so", without_data),
     ("bad input is one line and code 2", bad_input),
     ("stars of a batch are those of sample", batch),
+    ("every question is answered by its own brief", many_briefs),
     ("answers come in order, and nobody burns a processor while waiting", order_and_rest),
 ];
 
@@ -287,6 +288,12 @@ fn batch() {
     for star in ["config", "other"] {
         same(&desk, &RUN, star, &format!("stars/{star}"));
     }
+}
+
+fn many_briefs() {
+    let desk = Desk::new(json!(null));
+    let output = end(play(&desk, 3, &["many-briefs"]));
+    assert_eq!(text(&output.stdout).trim(), "right: 1100", "{}", text(&output.stderr));
 }
 
 fn order_and_rest() {

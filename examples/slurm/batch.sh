@@ -14,7 +14,7 @@ export OMPI_MCA_odls_base_sigkill_timeout=0
 # the warning comes to this script, which hands it on
 ${MPIRUN:-mpirun} dimcmc batch "$list" --out "$out" &
 pid=$!
-trap 'kill -USR1 $pid' USR1
+trap 'kill -USR1 $pid' USR1 TERM
 wait $pid
 code=$?
 while kill -0 $pid 2>/dev/null; do

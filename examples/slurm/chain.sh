@@ -19,7 +19,7 @@ resume=()
 # the warning comes to this script, which hands it on
 ${MPIRUN:-mpirun} dimcmc sample "$config" --out "$run" ${resume[@]+"${resume[@]}"} &
 pid=$!
-trap 'kill -USR1 $pid' USR1
+trap 'kill -USR1 $pid' USR1 TERM
 wait $pid
 code=$?
 while kill -0 $pid 2>/dev/null; do

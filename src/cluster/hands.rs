@@ -16,6 +16,9 @@ const MOST_AHEAD: usize = 8;
 /// How long what is ahead is to last: several times what rank 0 waits for a processor that others are at (a tenth as much costs a tenth).
 const BRIDGED: Duration = Duration::from_millis(30);
 
+/// Questions that take as long, a star say, wait for whoever is free first.
+const WORTH_A_WAIT: Duration = Duration::from_secs(1);
+
 /// A rank with what it can do and has to do.
 struct Hand {
     at_once: usize,
@@ -54,9 +57,14 @@ impl Hands {
     }
 
     /// Rounds that all may have ahead.
-    fn ahead(&self, left: usize, each: Option<Duration>) -> usize {
-        let bridged = each.map_or(0.0, |each| BRIDGED.div_duration_f64(each)) as usize;
-        if left > self.size { (left / (2 * self.size)).min(bridged).clamp(1, MOST_AHEAD) } else { 0 }
+    pub(super) fn ahead(&self, left: usize, each: Option<Duration>) -> usize {
+        match each {
+            Some(each) if left > self.size && each < WORTH_A_WAIT => {
+                let bridged = BRIDGED.div_duration_f64(each) as usize;
+                (left / (2 * self.size)).min(bridged).clamp(1, MOST_AHEAD)
+            }
+            _ => 0,
+        }
     }
 
     /// A rank has answered.
@@ -80,18 +88,19 @@ mod tests {
     #[test]
     fn who_has_least_to_do_comes_first_and_fewer_are_ahead_the_fewer_are_left() {
         let mut hands = Hands::new(&[(1, 1), (2, 2)]);
+        let slow = Some(WORTH_A_WAIT / 2);
         // three at once; as many ahead again while there are more, and then none
-        let taken: Vec<Option<Rank>> = (0..7).map(|_| hands.take(4, None)).collect();
+        let taken: Vec<Option<Rank>> = (0..7).map(|_| hands.take(4, slow)).collect();
         assert_eq!(taken, [1, 2, 2, 1, 2, 2, 0].map(|rank| (rank > 0).then_some(rank)));
-        assert_eq!(hands.take(3, None), None);
+        assert_eq!(hands.take(3, slow), None);
         hands.give_back(1);
-        assert_eq!(hands.take(3, None), None);
+        assert_eq!(hands.take(3, slow), None);
         hands.give_back(1);
-        assert_eq!(hands.take(3, None), Some(1));
-        // of a long batch, more
-        let mut ahead = |each| (0..100).filter_map(|_| hands.take(10_000, Some(each))).count();
-        assert_eq!(ahead(Duration::from_secs(1)), 1);
-        assert_eq!(ahead(BRIDGED / 3), 6);
-        assert_eq!(ahead(Duration::from_micros(1)), 3 * (MOST_AHEAD - 3));
+        assert_eq!(hands.take(3, slow), Some(1));
+        // of a long batch more the less each takes, but for long ones and as long as it is not known
+        let mut ahead = |each| (0..100).filter_map(|_| hands.take(10_000, each)).count();
+        assert_eq!([ahead(None), ahead(Some(WORTH_A_WAIT)), ahead(slow)], [0, 0, 1]);
+        assert_eq!(ahead(Some(BRIDGED / 3)), 6);
+        assert_eq!(ahead(Some(Duration::from_micros(1))), 3 * (MOST_AHEAD - 3));
     }
 }

@@ -59,11 +59,13 @@ pub fn join(at_once: usize) -> Result<Rank, ClusterError> {
     if provided < threading {
         return Err(ClusterError::Threads);
     }
-    abort_on_panic();
     let world = universe.world();
-    Ok(match (world.rank(), world.size()) {
-        (_, 1) => Rank::Only,
-        (0, _) => Rank::First(Queue::new(universe)),
+    if world.size() == 1 {
+        return Ok(Rank::Only);
+    }
+    abort_on_panic();
+    Ok(match world.rank() {
+        0 => Rank::First(Queue::new(universe)),
         _ => Rank::Other(Worker::new(universe, at_once)),
     })
 }

@@ -10,9 +10,9 @@ use mpi::Rank;
 use mpi::environment::Universe;
 use mpi::point_to_point::MatchedReceiveVec as _;
 use mpi::traits::{Communicator as _, Destination as _, Root as _, Source as _};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The other ranks, as the first one sees them; dismissed when this is dropped.
 pub struct Queue {
@@ -21,6 +21,8 @@ pub struct Queue {
     at_once: Vec<(Rank, usize)>,
     /// What they were told last, and how often they were told something.
     brief: RefCell<(Vec<u8>, usize)>,
+    /// How long a question about it takes, once it is known.
+    each: Cell<Option<Duration>>,
 }
 
 impl Queue {
@@ -32,7 +34,7 @@ impl Queue {
             (rank, split(&bytes).0)
         };
         let at_once = (1..ranks.world.size()).map(hello).collect();
-        Queue { ranks, at_once, brief: RefCell::default() }
+        Queue { ranks, at_once, brief: RefCell::default(), each: Cell::default() }
     }
 
     /// How many questions are answered at once.
@@ -48,10 +50,14 @@ impl Queue {
         let mut answers: Vec<Option<Vec<u8>>> = vec![None; questions.len()];
         let mut left = questions.iter().enumerate();
         let (mut open, mut answered, mut hurried, mut wait) = (0, 0, false, Wait::new());
-        let began = Instant::now();
+        let (began, size) = (Instant::now(), self.size() as u32);
         loop {
             let stopped = stop.load(Relaxed);
-            let each = (answered > 0).then(|| began.elapsed() * self.size() as u32 / answered);
+            if answered > 0 {
+                // all are half through another one on average
+                self.each.set(Some(began.elapsed() * size / (answered + size / 2)));
+            }
+            let each = self.each.get();
             while !stopped && left.len() > 0 {
                 let Some(rank) = hands.take(left.len(), each) else { break };
                 let (place, bytes) = left.next().expect("there are some left");
@@ -74,8 +80,10 @@ impl Queue {
                     (open, answered) = (open - 1, answered + 1);
                     wait = Wait::new();
                 }
-                None if left.len() > 0 => nap(each.map_or(wait.nap(), |each| each / 8), WHILE_BUSY),
-                None => nap(wait.nap(), WHILE_IDLE),
+                None => match each.filter(|_| hands.ahead(left.len(), each) > 0) {
+                    Some(each) => nap(each / 8, WHILE_BUSY),
+                    None => nap(wait.nap(), WHILE_IDLE),
+                },
             }
         }
         answers.into_iter().map_while(|answer| answer).collect()
@@ -87,6 +95,7 @@ impl Queue {
         if last != brief {
             *last = brief.to_vec();
             *number += 1;
+            self.each.set(None);
             self.order(Order::Brief(last.len()));
             self.ranks.world.process_at_rank(0).broadcast_into(&mut last[..]);
         }

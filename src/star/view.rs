@@ -7,6 +7,7 @@ use super::StarState;
 use super::grid::{Ring, RingPoint, SurfaceGrid};
 use super::limb_darkening::LimbDarkening;
 use crate::vector::Instructions;
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// The star's orientation, shared by all observations.
@@ -90,7 +91,7 @@ impl Viewer {
         let (sin_offset, cos_offset) = point.longitude_offset.sin_cos();
         let mu_pole = point.sin_latitude * self.cos_inclination;
         let mu_equator = point.cos_latitude * self.sin_inclination;
-        // mu = mu_pole + mu_equator cos(longitude) is positive
+        // mu = mu_pole + mu_equator cos(longitude) is positive; inclinations are between 0 and 180 deg
         let rises = -mu_pole / mu_equator;
         TurningPoint {
             angular_velocity: self.state.rotation.angular_velocity(point.sin_latitude),
@@ -129,7 +130,7 @@ impl Views<'_> {
         self.moments.clear();
         for (ring, points) in &self.rings {
             let visible = points.iter().filter_map(|q| q.visible(q.angular_velocity * since_epoch_d));
-            let Some((from, to)) = visible.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else { continue };
+            let Some((from, to)) = visible.reduce(joined) else { continue };
             let turn = |q: &TurningPoint| (q.angular_velocity * since_epoch_d).sin_cos();
             for pixels in ring.between(from, to) {
                 let seen = Seen {
@@ -153,6 +154,12 @@ impl Views<'_> {
         }
         &self.moments
     }
+}
+
+/// Two ranges of longitudes (rad) as one, the second moved by whole turns next to the first: latitudes drift apart.
+fn joined(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    let turns = TAU * ((a.0 + a.1 - b.0 - b.1) / (2.0 * TAU)).round();
+    (a.0.min(b.0 + turns), a.1.max(b.1 + turns))
 }
 
 impl PixelMoments {

@@ -17,8 +17,10 @@ pub fn play(role: &str, args: &[String]) -> ExitCode {
         Rank::First(queue) => first(role, args, &queue),
         Rank::Other(worker) => {
             let rank = worker.rank();
-            let learn =
-                |_: &[u8]| Ok::<Answer, Infallible>(Box::new(move |question, _| answer(role, args, rank, question)));
+            let learn = |brief: &[u8]| {
+                let brief = brief[0];
+                Ok::<Answer, Infallible>(Box::new(move |question, _| answer(role, args, rank, brief, question)))
+            };
             let Ok(()) = worker.serve(learn);
         }
     }
@@ -31,6 +33,9 @@ pub fn now_s() -> f64 {
 }
 
 fn first(role: &str, args: &[String], queue: &Queue) {
+    if role == "many-briefs" {
+        return many_briefs(queue);
+    }
     let questions: Vec<Vec<u8>> = (0..QUESTIONS).map(|k| vec![k]).collect();
     let (began, before) = (Instant::now(), processor_s());
     let answers = queue.answers(b"a brief", &questions, &AtomicBool::new(false));
@@ -42,11 +47,23 @@ fn first(role: &str, args: &[String], queue: &Queue) {
     println!("processor: {}", processor_s() - before);
 }
 
-fn answer(role: &str, args: &[String], rank: i32, question: &[u8]) -> Vec<u8> {
+/// More briefs than there are tags, each answered by itself.
+fn many_briefs(queue: &Queue) {
+    let questions: Vec<Vec<u8>> = (0..5).map(|k| vec![k]).collect();
+    let right = (0..1100_u16).filter(|k| {
+        let brief = (k % 100) as u8;
+        let answers = queue.answers(&[brief], &questions, &AtomicBool::new(false));
+        answers.iter().map(|answer| answer[0]).eq((0..5).map(|question| brief + question))
+    });
+    println!("right: {}", right.count());
+}
+
+fn answer(role: &str, args: &[String], rank: i32, brief: u8, question: &[u8]) -> Vec<u8> {
     match (role, question[0]) {
         ("panic-on-worker", 9..) if rank == 2 => panic_noted(&args[0], rank),
         // the other one is busy for longer than a test may take
         ("panic-on-worker", 9..) => std::thread::sleep(Duration::from_secs(100)),
+        ("many-briefs", question) => return vec![brief + question],
         ("order-and-rest", _) => std::thread::sleep(Duration::from_millis(50)),
         _ => {}
     }
