@@ -1,7 +1,7 @@
 //! Who is asked next: whoever has least to do; and where more questions are left than all can take at once, some have questions ahead,
 //! so that nobody waits for the next one.
 //!
-//! A question and its answer take a fifth of a millisecond on the way, and some where rank 0 has to wait for a processor, while an
+//! A question and its answer take a quarter of a millisecond on the way, and several where rank 0 has to wait for a processor, while an
 //! evaluation may take one (`results/scaling.md`). Fewer are ahead the longer they take, and the fewer are left (guided
 //! self-scheduling, Polychronopoulos & Kuck 1987): at the end of a batch nothing waits behind another question while somebody is idle.
 //! Left out: messages.
@@ -13,7 +13,8 @@ use std::time::Duration;
 /// Most rounds ahead.
 const MOST_AHEAD: usize = 8;
 
-/// How long what is ahead is to last: several times what rank 0 waits for a processor that others are at (a tenth as much costs a tenth).
+/// How long what is ahead is to last: several times what rank 0 waits for a processor that others are at (with
+/// a third of it, a tenth of the evaluations is lost).
 const BRIDGED: Duration = Duration::from_millis(30);
 
 /// Questions that take as long, a star say, wait for whoever is free first.
