@@ -57,7 +57,7 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
     let configs = stars.iter().map(|&(map, seed)| star(laboratory, map, seed));
     let configs: Vec<Value> = configs.collect::<Result<_, _>>()?;
     for judge in &JUDGES {
-        let judged = |((_, seed), _): &(&(u64, u64), &Value)| *seed < judge.seeds;
+        let judged = |star: &(&(u64, u64), &Value)| star.0.1 < judge.seeds;
         let case = |((map, seed), config): (&(u64, u64), &Value)| Case {
             name: format!("{}_map_{map}_seed_{seed}", judge.name),
             config: with(
@@ -71,12 +71,12 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         let cases: Vec<Case> = stars.iter().zip(&configs).filter(judged).map(case).collect();
         by_judge.push(laboratory.outcomes("coverage", &cases)?);
     }
+    let mut in_turn: Vec<_> = by_judge.iter().map(|outcomes| outcomes.iter()).collect();
     for (k, &(map, seed)) in stars.iter().enumerate() {
         let mut row = vec![map as f64, noise_seed(map, seed) as f64];
         row.extend(ORBIT.map(|name| injected(&by_judge[0][k], name)));
-        for (judge, outcomes) in JUDGES.iter().zip(&by_judge) {
-            let before = stars[..k].iter().filter(|(_, seed)| *seed < judge.seeds).count();
-            let outcome = outcomes.get(before).filter(|_| seed < judge.seeds);
+        for (judge, outcomes) in JUDGES.iter().zip(&mut in_turn) {
+            let outcome = if seed < judge.seeds { outcomes.next() } else { None };
             for name in ORBIT {
                 row.extend(match outcome.and_then(|outcome| estimate(outcome, name)) {
                     Some(one) => [one.value, one.ci68[0], one.ci68[1], one.ci95[0], one.ci95[1]],

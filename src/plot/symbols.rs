@@ -17,12 +17,17 @@ pub fn symbol(name: &str) -> (&str, &'static str) {
         Some(Parameter::LineSigma) => ("*σ*_{line}", "km/s"),
         Some(Parameter::EquivalentWidth) => ("*W*_{line}", "km/s"),
         Some(Parameter::Contrast) => ("*c*", ""),
+        // columns of the experiments' tables
+        None if name == "assumed_deg" => ("assumed *i*", "°"),
         None => (name, ""),
     }
 }
 
 /// Label of an axis: symbol and unit.
 pub fn label(name: &str) -> String {
+    if let Some(injected) = name.strip_prefix("true_") {
+        return format!("injected {}", label(injected));
+    }
     match symbol(name) {
         (symbol, "") => symbol.to_owned(),
         (symbol, unit) => format!("{symbol} ({unit})"),

@@ -82,18 +82,13 @@ impl Pool {
         questions: &[Q],
         here: impl Fn(&Q) -> A + Sync,
     ) -> Vec<A> {
-        match &self.workers {
-            Workers::Threads => {
-                let _ = brief;
-                // threads see the flag alone: what is MPI's stays on this one
-                let stop = self.stop();
-                let answer = |question| (!stop.load(Relaxed)).then(|| here(question));
-                let all: Vec<Option<A>> = questions.par_iter().with_max_len(1).map(answer).collect();
-                all.into_iter().map_while(|answer| answer).collect()
-            }
-            #[cfg(feature = "mpi")]
-            Workers::Ranks(queue) => self.by_ranks(queue, brief, questions),
-        }
+        self.by_ranks_or(brief, questions, || {
+            // threads see the flag alone: what is MPI's stays on this one
+            let stop = self.stop();
+            let answer = |question| (!stop.load(Relaxed)).then(|| here(question));
+            let all: Vec<Option<A>> = questions.par_iter().with_max_len(1).map(answer).collect();
+            all.into_iter().map_while(|answer| answer).collect()
+        })
     }
 
     /// The same for questions that take batches of their own to answer: one thread each, and no thread that waits for a batch
@@ -104,34 +99,41 @@ impl Pool {
         questions: &[Q],
         here: impl Fn(&Q) -> A + Sync,
     ) -> Vec<A> {
-        match &self.workers {
-            Workers::Threads => {
-                let _ = brief;
-                let (stop, next) = (self.stop(), AtomicUsize::new(0));
-                let answers: Vec<OnceLock<A>> = questions.iter().map(|_| OnceLock::new()).collect();
-                let work = || {
-                    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be begun");
-                    while !stop.load(Relaxed) {
-                        let place = next.fetch_add(1, Relaxed);
-                        let Some(question) = questions.get(place) else { break };
-                        let _ = answers[place].set(alone.install(|| here(question)));
-                    }
-                };
-                std::thread::scope(|scope| {
-                    (0..self.size().min(questions.len())).for_each(|_| drop(scope.spawn(work)));
-                });
-                answers.into_iter().map_while(OnceLock::into_inner).collect()
-            }
-            #[cfg(feature = "mpi")]
-            Workers::Ranks(queue) => self.by_ranks(queue, brief, questions),
-        }
+        self.by_ranks_or(brief, questions, || {
+            let (stop, next) = (self.stop(), AtomicUsize::new(0));
+            let answers: Vec<OnceLock<A>> = questions.iter().map(|_| OnceLock::new()).collect();
+            let work = || {
+                let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be begun");
+                while !stop.load(Relaxed) {
+                    let place = next.fetch_add(1, Relaxed);
+                    let Some(question) = questions.get(place) else { break };
+                    let _ = answers[place].set(alone.install(|| here(question)));
+                }
+            };
+            std::thread::scope(|scope| {
+                (0..self.size().min(questions.len())).for_each(|_| drop(scope.spawn(work)));
+            });
+            answers.into_iter().map_while(OnceLock::into_inner).collect()
+        })
     }
 
-    #[cfg(feature = "mpi")]
-    fn by_ranks<Q: Question, A: Answer>(&self, queue: &cluster::Queue, brief: &[u8], questions: &[Q]) -> Vec<A> {
-        let questions: Vec<Vec<u8>> = questions.iter().map(Question::to_bytes).collect();
-        let read = |bytes: Vec<u8>| A::from_bytes(&bytes).expect("a rank of this very program answers");
-        queue.answers(brief, &questions, &self.stop).into_iter().map(read).collect()
+    /// The answers of other processes or, where there are none, of `threads`.
+    #[cfg_attr(not(feature = "mpi"), allow(unused_variables))]
+    fn by_ranks_or<Q: Question, A: Answer>(
+        &self,
+        brief: &[u8],
+        questions: &[Q],
+        threads: impl FnOnce() -> Vec<A>,
+    ) -> Vec<A> {
+        match &self.workers {
+            Workers::Threads => threads(),
+            #[cfg(feature = "mpi")]
+            Workers::Ranks(queue) => {
+                let questions: Vec<Vec<u8>> = questions.iter().map(Question::to_bytes).collect();
+                let read = |bytes: Vec<u8>| A::from_bytes(&bytes).expect("a rank of this very program answers");
+                queue.answers(brief, &questions, &self.stop).into_iter().map(read).collect()
+            }
+        }
     }
 }
 
