@@ -48,6 +48,9 @@ const OTHER_STARTS: usize = 4;
 /// Peaks of the quadratic this much below its best in ln L are climbed too.
 const PEAK_DROP: f64 = 10.0;
 
+/// Evaluations of a climb, near its start for the most part.
+const CLIMB: usize = 15;
+
 /// One start of the search and where it led.
 #[derive(Clone, Debug)]
 pub struct Attempt {
@@ -141,7 +144,8 @@ pub fn find(
             evaluations.fetch_add(1, Relaxed);
             climbing();
         };
-        let end = climb(&smooth, &start, &tick);
+        let near = smooth.clone().with_footholds_for(std::slice::from_ref(&start), CLIMB);
+        let end = climb(&near, &start, &tick);
         done.fetch_add(1, Relaxed);
         climbing();
         Attempt { start, end }

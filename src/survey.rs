@@ -91,8 +91,7 @@ impl Survey {
             _ => {}
         }
         write_json(&folder.join(HEADER), &header)?;
-        let (landscape, task) = (Landscape::new(grid.clone()), task(scene, &header.origin, &found.posterior));
-        Ok(Survey { header, posterior: found.posterior, landscape, task, file })
+        Ok(Survey::new(scene, header, found.posterior, Landscape::new(grid.clone()), file))
     }
 
     /// Goes on with the landscape of `plan` in `folder`.
@@ -107,8 +106,20 @@ impl Survey {
         }
         let (file, landscape) = landscape::recover(&folder.join(NODES), plan.grid.clone())?;
         let posterior = header.origin.posterior(scene, scene.space_of(&plan.free), folder)?;
-        let task = task(scene, &header.origin, &posterior);
-        Ok(Survey { header, posterior, landscape, task, file })
+        Ok(Survey::new(scene, header, posterior, landscape, file))
+    }
+
+    /// With footholds where nodes far from the reference are worth them.
+    fn new(scene: &Scene, header: Header, posterior: Posterior, landscape: Landscape, file: LineFile) -> Self {
+        let grid = landscape.grid();
+        // all nodes, whatever is left of them: a landscape that goes on has the footholds that it began with
+        let nodes = if landscape.is_whole() { 0 } else { grid.len() };
+        let thetas: Vec<Vec<f64>> = (0..nodes).map(|index| grid.theta(index)).collect();
+        let posterior = posterior.with_footholds_for(&thetas, nodes);
+        let footholds = posterior.footholds().map(<[f64]>::to_vec).collect();
+        let names = posterior.space().names();
+        let task = Task::new(scene, &header.origin, names, Asked::Likelihood { footholds });
+        Survey { header, posterior, landscape, task, file }
     }
 
     /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one, and of the
@@ -135,10 +146,6 @@ impl Survey {
         }
         Ok(true)
     }
-}
-
-fn task(scene: &Scene, origin: &Origin, posterior: &Posterior) -> Task {
-    Task::new(scene, origin, posterior.space().names(), Asked::Likelihood)
 }
 
 /// The first axis that is not the same.

@@ -102,17 +102,20 @@ fn the_landscape_is_that_of_the_chain() {
 
     // every value is that of the posterior without its prior, parameters told apart by name
     let scene = Scene::load(&desk.path(CONFIG)).unwrap();
-    let posterior = sampled(&scene);
+    let place = |node: &Value| scene.space.names().iter().map(|name| node[name].as_f64().unwrap()).collect();
+    let thetas: Vec<Vec<f64>> = nodes.iter().map(place).collect();
+    let posterior = sampled(&scene).with_footholds_for(&thetas, COUNT);
+    assert!(posterior.footholds().count() > 0, "nodes far from the best one are worth an image there");
     for (index, node) in nodes.iter().enumerate() {
         assert_eq!(node["index"], index);
-        let theta: Vec<f64> = scene.space.names().iter().map(|name| node[name].as_f64().unwrap()).collect();
-        let evaluation = posterior.evaluate(&theta);
+        let theta = &thetas[index];
+        let evaluation = posterior.evaluate(theta);
         if node["k_kms"].as_f64().unwrap() > 0.25 {
             assert_eq!(evaluation.status, Status::OutsidePrior);
             continue;
         }
         // ln L and prior are added and taken apart again
-        let expected = evaluation.log_prob - scene.space.log_prior(&theta);
+        let expected = evaluation.log_prob - scene.space.log_prior(theta);
         assert!((log_likelihood[index] - expected).abs() <= 1e-12 * expected.abs().max(1.0), "{node}");
         assert_eq!((&node["spottedness"], &node["chi2"]), (&json!(evaluation.spottedness), &json!(evaluation.chi2)));
         assert_eq!((&node["status"], &node["passes"]), (&json!(evaluation.status), &json!(evaluation.passes)));

@@ -214,6 +214,40 @@ fn evaluations_are_as_precise_as_they_say() {
 }
 
 #[test]
+fn footholds_save_passes_and_change_nothing_else() {
+    for posterior in MAPS.into_iter().flat_map(posteriors) {
+        let start = posterior.space().start();
+        let other = |k: f64, phi: f64| {
+            let mut theta = start.clone();
+            (theta[0], theta[2]) = (k, phi);
+            theta
+        };
+        // two places in half a turn of the orbit, and one that is none
+        let thetas: Vec<Vec<f64>> = (0..8).map(|i| other(0.09, 0.3 + 0.01 * f64::from(i))).collect();
+        let absurd = other(f64::INFINITY, 0.3);
+        let placed = posterior.clone().with_footholds(&[thetas[2].clone(), absurd, thetas[6].clone()]);
+        assert_eq!(placed.footholds().collect::<Vec<_>>(), [&thetas[2], &thetas[6]]);
+        let best = posterior.evaluate(&start).log_prob;
+        assert_eq!(placed.evaluate(&start), posterior.evaluate(&start), "the reference is the nearest there");
+        let exact = posterior.clone().with_settings(SolverSettings::exact());
+        let (mut with, mut without) = (0, 0);
+        for theta in &thetas {
+            let (got, wanted) = (placed.evaluate(theta), exact.evaluate(theta).log_prob);
+            assert!((got.log_prob - wanted).abs() < 1e-3 + 0.005 * (best - wanted), "{theta:?}: {got:?} {wanted}");
+            with += got.passes;
+            without += posterior.evaluate(theta).passes;
+        }
+        println!("{:?}: {with} passes instead of {without}", posterior.kind());
+        assert!(3 * with < 2 * without, "{:?}: {with} passes instead of {without}", posterior.kind());
+        // as many as they are worth, and none where nothing is far
+        assert_eq!(posterior.clone().with_footholds_for(std::slice::from_ref(&start), 10_000).footholds().count(), 0);
+        let few = posterior.clone().with_footholds_for(&thetas, 1).footholds().count();
+        let many = posterior.with_footholds_for(&thetas, 100_000).footholds().count();
+        assert!(few == 0 && many > 0, "{few} {many}");
+    }
+}
+
+#[test]
 fn lambda_stays_within_its_bound() {
     let (imager, space, mut reference) = setup(None);
     // so tight that the way to almost every solution would lead beyond it

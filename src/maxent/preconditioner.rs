@@ -2,7 +2,7 @@
 //! system of every nearby problem.
 //!
 //! In the entropy's metric the system is `1 + lambda M`, and M has a few hundred eigenvalues above 0.01 whatever the number
-//! of pixels; the basis is found by subspace iteration from a fixed random start (Halko et al. 2011), and lives on the
+//! of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and lives on the
 //! pixels that carry it: the spotted part of the star. Left out: when to rebuild it.
 
 use super::cg::dot;
@@ -34,8 +34,11 @@ const GROUP: usize = 4;
 /// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
 const DROPPED_ENERGY: f64 = 1e-3;
 
-/// Columns beyond the wanted rank that the subspace iteration carries.
-const OVERSAMPLING: usize = 20;
+/// Vectors beyond the wanted rank that the Krylov space has.
+const OVERSAMPLING: usize = 60;
+
+/// Vectors that the operator is applied to before it is applied to what came out.
+const BLOCK: usize = 20;
 
 impl Preconditioner {
     /// No preconditioning: the identity.
@@ -46,24 +49,30 @@ impl Preconditioner {
     /// From the operator M (`apply(v, out)`) on vectors of length `n`: at most `rank` eigenvectors, those with eigenvalues
     /// above `smallest`.
     pub fn build(n: usize, rank: usize, smallest: f64, mut apply: impl FnMut(&[f64], &mut [f64])) -> Self {
-        let columns = (rank + OVERSAMPLING).min(n);
+        let width = BLOCK.min(n);
+        let columns = width * (rank + OVERSAMPLING).min(n).div_ceil(width).min(n / width);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0x5eed);
-        let mut basis = DMatrix::from_fn(n, columns, |_, _| -> f64 { StandardNormal.sample(&mut rng) });
-        let mut image = DMatrix::zeros(n, columns);
-        for _ in 0..3 {
-            basis = basis.qr().q();
-            for j in 0..columns {
-                apply(basis.column(j).as_slice(), image.column_mut(j).as_mut_slice());
+        let (mut basis, mut image) = (DMatrix::zeros(n, columns), DMatrix::zeros(n, columns));
+        let mut block = DMatrix::from_fn(n, width, |_, _| -> f64 { StandardNormal.sample(&mut rng) });
+        for first in (0..columns).step_by(width) {
+            let known = basis.columns(0, first);
+            // twice: once leaves rounding errors of a block that is nearly spanned already
+            for _ in 0..2 {
+                block -= known * (known.transpose() * &block);
+                block = block.qr().q();
             }
-            std::mem::swap(&mut basis, &mut image);
+            for j in 0..width {
+                apply(block.column(j).as_slice(), image.column_mut(first + j).as_mut_slice());
+            }
+            basis.columns_mut(first, width).copy_from(&block);
+            block.copy_from(&image.columns(first, width));
         }
-        // `image` now holds the last orthonormal basis, `basis` what M made of it
-        let projected = image.tr_mul(&basis);
+        let projected = basis.transpose() * image;
         let eigen = SymmetricEigen::new(0.5 * (&projected + projected.transpose()));
         let mut order: Vec<usize> = (0..columns).filter(|&i| eigen.eigenvalues[i] > smallest).collect();
         order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
         order.truncate(rank);
-        let vectors = image * eigen.eigenvectors.select_columns(&order);
+        let vectors = basis * eigen.eigenvectors.select_columns(&order);
         let eigenvalues: Vec<f64> = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
         Preconditioner::on_active_pixels(eigenvalues, &vectors)
     }
@@ -101,6 +110,11 @@ impl Preconditioner {
     /// Number of pixels on which they live.
     pub fn active_pixels(&self) -> usize {
         self.active
+    }
+
+    /// Bytes that it takes in memory, all but a few.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.rows[..])
     }
 
     /// Groups of components in a row.

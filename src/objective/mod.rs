@@ -1,6 +1,7 @@
 //! What a point of parameter space is worth: parameters, priors, trade-off curve, objectives (method section 3).
 
 pub mod coordinates;
+mod foothold;
 pub mod kind;
 mod likelihood;
 pub mod parameters;

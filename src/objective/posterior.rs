@@ -4,15 +4,18 @@
 //! Left out: what a reconstruction is worth (`likelihood`), how the reference was found, and who explores the posterior.
 
 use super::coordinates::ParameterSpace;
+use super::foothold::{Foothold, nearest, place, worthwhile};
 use super::kind::ObjectiveKind;
 use super::parameters::Parameter;
-use super::prediction::Prediction;
-use super::reference::Reference;
+use super::prediction::{Prediction, Solved};
+use super::reference::{Reference, precondition, start};
 use crate::imaging::{Imager, ImagingProblem};
 use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
-use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Termination};
+use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
 use crate::star::Response;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
+use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The posterior of the free parameters.
 #[derive(Clone, Debug)]
@@ -22,7 +25,8 @@ pub struct Posterior {
     kind: ObjectiveKind,
     reference: Reference,
     settings: SolverSettings,
-    prediction: Option<Prediction>,
+    /// Where evaluations start: the reference, and others.
+    footholds: Vec<Foothold>,
     /// Whether only orbit and systemic velocity are free, so that pixels are looked at once for all evaluations.
     velocities_only: bool,
 }
@@ -30,7 +34,7 @@ pub struct Posterior {
 /// Fastest velocity of any latitude (km/s, projected) that is tried; beyond it a parameter vector is absurd.
 const LARGEST_VSINI_KMS: f64 = 2000.0;
 
-/// Newton steps from the reference before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
+/// Newton steps from a foothold before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
 const NEWTON_STEPS: usize = 25;
 
 /// Numerical derivatives of forward models step by this share of a coordinate's natural scale.
@@ -44,11 +48,70 @@ impl Posterior {
         let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.agrees(&reference.values, p))
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
-        let mut posterior = Posterior { imager, space, kind, reference, settings, prediction: None, velocities_only };
-        let response = |theta: &[f64]| posterior.response(theta);
-        let Posterior { imager, space, reference, .. } = &posterior;
-        posterior.prediction = Some(Prediction::new(imager, space, reference, kind, response));
+        let footholds = Vec::new();
+        let mut posterior = Posterior { imager, space, kind, reference, settings, footholds, velocities_only };
+        let Posterior { space, reference, .. } = &posterior;
+        let (theta, solution) = (space.theta_of(&reference.values), &reference.solution);
+        let (response, preconditioner) = (&reference.response, reference.preconditioner.clone());
+        posterior.footholds = vec![posterior.foothold(theta, response, solution, preconditioner)];
         posterior
+    }
+
+    /// The same posterior with footholds at `thetas` (written coordinates) besides the reference, and no others: evaluations start
+    /// from the nearest. Places without an image get none.
+    pub fn with_footholds(mut self, thetas: &[Vec<f64>]) -> Self {
+        self.footholds.truncate(1);
+        let more = thetas.par_iter().with_max_len(1).filter_map(|theta| self.another_foothold(theta));
+        let more: Vec<Foothold> = more.collect();
+        self.footholds.extend(more);
+        self
+    }
+
+    /// Where its footholds are, but for the reference (written coordinates).
+    pub fn footholds(&self) -> impl Iterator<Item = &[f64]> {
+        self.footholds[1..].iter().map(|foothold| foothold.theta.as_slice())
+    }
+
+    /// The same posterior with the footholds that so many `evaluations`, spread like `thetas`, are worth.
+    pub fn with_footholds_for(self, thetas: &[Vec<f64>], evaluations: usize) -> Self {
+        let places: Vec<Vec<f64>> = thetas.iter().map(|theta| place(&self.imager, &self.space, theta)).collect();
+        let chosen = worthwhile(&self.footholds[0], &places, evaluations);
+        let chosen: Vec<Vec<f64>> = chosen.into_iter().map(|i| thetas[i].clone()).collect();
+        self.with_footholds(&chosen)
+    }
+
+    fn another_foothold(&self, theta: &[f64]) -> Option<Foothold> {
+        if !self.is_physical(theta) {
+            return None;
+        }
+        let (solution, mut problem) = self.reconstruct(theta);
+        let preconditioner = precondition(&self.imager, &mut problem, &solution);
+        // precise, even far below the best
+        let settings = SolverSettings { leniency: 0.0, ..SolverSettings::patient() };
+        let solver = Solver { entropy: self.imager.entropy, preconditioner: &preconditioner, settings };
+        let solution = solver.solve(&mut problem, self.goal(), &start(&solution));
+        let there = matches!(solution.termination, Termination::Converged | Termination::Unreachable);
+        there.then(|| self.foothold(theta.to_vec(), problem.response(), &solution, Arc::new(preconditioner)))
+    }
+
+    /// The foothold of a solution.
+    fn foothold(
+        &self,
+        theta: Vec<f64>,
+        response: &Response,
+        solution: &Solution,
+        preconditioner: Arc<Preconditioner>,
+    ) -> Foothold {
+        let Posterior { imager, space, kind, reference, .. } = self;
+        // at the bound of lambda the image moves at that lambda
+        let goal = match solution.termination {
+            Termination::Unreachable => Goal::Lambda(solution.image.lambda),
+            _ => self.goal(),
+        };
+        let solved = Solved { theta: &theta, response, goal, solution, preconditioner: &preconditioner };
+        let prediction = Prediction::new(imager, space, solved, *kind, |theta| self.response(theta));
+        let start = Start { best: Some(reference.best()), ..start(solution) };
+        Foothold { place: place(imager, space, &theta), theta, start, preconditioner, prediction }
     }
 
     /// The same posterior with other solver settings than those that a chain needs.
@@ -104,8 +167,8 @@ impl Posterior {
             && values[Parameter::PorbOverProt] > 0.0
     }
 
-    fn solver(&self) -> Solver<'_> {
-        Solver { entropy: self.imager.entropy, preconditioner: &self.reference.preconditioner, settings: self.settings }
+    fn nearest(&self, theta: &[f64]) -> &Foothold {
+        nearest(&self.footholds, &self.imager, &self.space, theta)
     }
 
     pub(super) fn goal(&self) -> Goal {
@@ -115,19 +178,19 @@ impl Posterior {
     /// The reconstruction at `theta`, whatever the prior says.
     pub fn reconstruct(&self, theta: &[f64]) -> (Solution, ImagingProblem<'_>) {
         let mut problem = self.imager.problem(self.response(theta));
-        let near = Solver { settings: SolverSettings { newton_steps: NEWTON_STEPS, ..self.settings }, ..self.solver() };
-        let start = match &self.prediction {
-            Some(prediction) => prediction.start(&self.imager, &self.reference, &self.space.to_internal(theta)),
-            None => self.reference.start(),
-        };
+        let foothold = self.nearest(theta);
+        let settings = SolverSettings { newton_steps: NEWTON_STEPS, ..self.settings };
+        let near = Solver { preconditioner: &foothold.preconditioner, settings, entropy: self.imager.entropy };
+        let internal = self.space.to_internal(theta);
+        let start = foothold.prediction.start(&self.imager, &foothold.start, &internal);
         let solution = near.solve(&mut problem, self.goal(), &start);
         if solution.termination != Termination::StepLimit {
             return (solution, problem);
         }
-        // so far from the reference that a blank star is the better start
+        // so far from all footholds that a blank star is the better start
         let none = Preconditioner::identity();
         let settings = SolverSettings { cg_iterations: SolverSettings::patient().cg_iterations, ..self.settings };
-        let far = Solver { preconditioner: &none, settings, ..self.solver() };
+        let far = Solver { preconditioner: &none, settings, ..near };
         let solution = far.solve(&mut problem, self.goal(), &self.reference.blank(&self.imager));
         (solution, problem)
     }
@@ -160,7 +223,7 @@ impl Posterior {
     /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem). Spottedness
     /// is not: with `A'` the gradient of spottedness and the constraint chi2 = target, the adjoint system `H y = A' - 2 mu g`, `g y = 0` (g the
     /// gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`.
-    fn sensitivity(&self, solution: &Solution, problem: &mut ImagingProblem) -> (f64, Option<Vec<f64>>) {
+    fn sensitivity(&self, theta: &[f64], solution: &Solution, problem: &mut ImagingProblem) -> (f64, Option<Vec<f64>>) {
         let curve_slope = self.log_likelihood(solution).1;
         let lambda = solution.image.lambda;
         let unreachable = solution.termination != Termination::Converged;
@@ -175,7 +238,8 @@ impl Posterior {
                 let [mut image, mut scale] = [(); 2].map(|()| vec![0.0; area.len()]);
                 entropy.image(&solution.image.coordinates, &mut image);
                 entropy.metric(&image, area, &mut scale);
-                let exact = Solver { settings: SolverSettings::exact(), ..self.solver() };
+                let preconditioner = &self.nearest(theta).preconditioner;
+                let exact = Solver { entropy, preconditioner, settings: SolverSettings::exact() };
                 let inverse =
                     exact.apply_inverse(problem, &solution.image, &entropy.spottedness_gradient(&image, area));
                 let mu = solution.spottedness_slope / solution.chi2_slope;
@@ -228,7 +292,7 @@ impl Gradient for Posterior {
         if evaluation.log_prob == f64::NEG_INFINITY {
             return (evaluation, Vec::new());
         }
-        let (weight, direction) = self.sensitivity(&solution, &mut problem);
+        let (weight, direction) = self.sensitivity(theta, &solution, &mut problem);
         let mut image = vec![0.0; self.imager.grid.len()];
         self.imager.entropy.image(&solution.image.coordinates, &mut image);
         let internal = self.space.to_internal(theta);

@@ -1,20 +1,19 @@
-//! A first-order prediction of image and lambda from the reference: how both change with each parameter (method section 2).
+//! A first-order prediction of image and lambda from a known solution: how both change with each parameter (method section 2).
 //!
-//! At the reference the solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term
+//! The solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term
 //! set so that chi2 stays at the target (or left out at a fixed lambda). It is where an evaluation starts, and saves it a
 //! Newton step or two; what it ends at does not depend on it beyond the solver's tolerance. Left out: the solver.
 
 use super::coordinates::ParameterSpace;
 use super::kind::ObjectiveKind;
-use super::reference::Reference;
 use crate::imaging::Imager;
-use crate::maxent::{Goal, Problem, Solver, SolverSettings, Start};
+use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start};
 use crate::star::Response;
 
-/// Derivatives of the reference solution with respect to internal coordinates.
+/// Derivatives of a solution with respect to internal coordinates.
 #[derive(Clone, Debug)]
 pub struct Prediction {
-    /// Internal coordinates of the reference.
+    /// Internal coordinates of the solution.
     origin: Vec<f64>,
     /// Natural scales of the coordinates.
     scales: Vec<f64>,
@@ -35,36 +34,47 @@ const REACH: f64 = 3.0;
 /// Largest change of ln(lambda) that is predicted.
 const LN_LAMBDA_REACH: f64 = 1.0;
 
+/// A solution, where it is, and what it was solved with.
+#[derive(Clone, Copy)]
+pub struct Solved<'a> {
+    /// Written coordinates.
+    pub theta: &'a [f64],
+    /// The response there.
+    pub response: &'a Response,
+    /// What was solved for; at the bound of lambda, the image at that lambda.
+    pub goal: Goal,
+    /// The solution.
+    pub solution: &'a Solution,
+    /// Approximate inverse of the Newton system there.
+    pub preconditioner: &'a Preconditioner,
+}
+
 impl Prediction {
-    /// Of the solutions around `reference` for the goal of `kind`, with `response(theta)` at points of `space` (written coordinates).
+    /// Of the solutions around `solved` for `kind`, with `response(theta)` at points of `space` (written coordinates).
     pub fn new(
         imager: &Imager,
         space: &ParameterSpace,
-        reference: &Reference,
+        solved: Solved,
         kind: ObjectiveKind,
         response: impl Fn(&[f64]) -> Response,
     ) -> Self {
-        let origin = space.to_internal(&space.theta_of(&reference.values));
+        let Solved { solution, goal, preconditioner, .. } = solved;
+        let origin = space.to_internal(solved.theta);
         let scales = space.scales();
-        let solver = Solver {
-            entropy: imager.entropy,
-            preconditioner: &reference.preconditioner,
-            settings: SolverSettings { cg_tolerance: 0.01, ..SolverSettings::patient() },
-        };
-        let solution = &reference.solution;
+        let settings = SolverSettings { cg_tolerance: 0.01, ..SolverSettings::patient() };
+        let solver = Solver { entropy: imager.entropy, preconditioner, settings };
         let n = imager.grid.len();
         let mut map = vec![0.0; n];
         imager.entropy.image(&solution.image.coordinates, &mut map);
         let mut scale = vec![0.0; n];
         imager.entropy.metric(&map, &imager.grid.area, &mut scale);
-        let mut problem = imager.problem(reference.response.clone());
+        let mut problem = imager.problem(solved.response.clone());
         problem.linearise(&map);
         let mut gradient = vec![0.0; n];
         problem.gradient(&mut gradient);
-        let goal = reference.goal(kind);
-        let adjoint = match kind {
-            ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => Vec::new(),
-            ObjectiveKind::Spottedness => {
+        let adjoint = match (kind, goal) {
+            (ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood, _) | (_, Goal::Lambda(_)) => Vec::new(),
+            (ObjectiveKind::Spottedness, Goal::Chi2 { .. }) => {
                 let weights = imager.entropy.spottedness_gradient(&map, &imager.grid.area);
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
@@ -102,9 +112,9 @@ impl Prediction {
         Prediction { origin, scales, image, ln_lambda, adjoint }
     }
 
-    /// Where an evaluation at the internal coordinates `x` starts.
-    pub fn start(&self, imager: &Imager, reference: &Reference, x: &[f64]) -> Start {
-        let mut start = Start { adjoint: self.adjoint.clone(), ..reference.start() };
+    /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
+    pub fn start(&self, imager: &Imager, known: &Start, x: &[f64]) -> Start {
+        let mut start = Start { adjoint: self.adjoint.clone(), ..known.clone() };
         let shifts: Vec<f64> = x.iter().zip(&self.origin).map(|(x, x0)| x - x0).collect();
         let farthest = shifts.iter().zip(&self.scales).map(|(d, s)| (d / s).abs()).fold(0.0, f64::max);
         let shrink = (REACH / farthest).min(1.0);

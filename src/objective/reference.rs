@@ -11,6 +11,7 @@ use crate::maxent::{
     Best, Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
 };
 use crate::star::Response;
+use std::sync::Arc;
 
 /// Rank of the preconditioner; directions beyond it have lambda x curvature below 1 on the paper's setup.
 const PRECONDITIONER_RANK: usize = 120;
@@ -56,7 +57,7 @@ pub struct Reference {
     /// The image at the target chi2.
     pub solution: Solution,
     /// Approximate inverse of the Newton systems around it.
-    pub preconditioner: Preconditioner,
+    pub preconditioner: Arc<Preconditioner>,
     /// How much chi2 its spottedness is worth.
     pub tradeoff: TradeOff,
     /// Target of chi2.
@@ -201,7 +202,7 @@ impl Reference {
         let fine =
             Solver { preconditioner: &preconditioner, settings: SolverSettings::patient(), entropy: imager.entropy };
         let solution = fine.solve(&mut problem, goal(chi2_target), &start(&easy));
-        let preconditioner = precondition(imager, &mut problem, &solution);
+        let preconditioner = Arc::new(precondition(imager, &mut problem, &solution));
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
         let passes = problem.passes();
         Ok(Reference { values, response, largest_lambda, solution, preconditioner, tradeoff, chi2_target, passes })
@@ -223,25 +224,26 @@ impl Reference {
         Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.grid.len(), lambda) }
     }
 
-    /// Where every evaluation starts.
+    /// Where an evaluation at the reference starts.
     pub fn start(&self) -> Start {
         Start { best: Some(self.best()), ..start(&self.solution) }
     }
 
-    fn best(&self) -> Best {
+    /// What evaluations elsewhere are compared with.
+    pub fn best(&self) -> Best {
         let Solution { spottedness, entropy, chi2, image, .. } = &self.solution;
         Best { spottedness: *spottedness, merit: entropy / image.lambda - 0.5 * chi2 }
     }
 }
 
 /// Where the next solution starts from this one.
-fn start(solution: &Solution) -> Start {
+pub(super) fn start(solution: &Solution) -> Start {
     let Solution { image, path, chi2_slope, .. } = solution;
     Start { image: image.clone(), path: path.clone(), chi2_slope: *chi2_slope, adjoint: Vec::new(), best: None }
 }
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.
-fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
+pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
     let n = at.image.coordinates.len();
     let (mut s, mut scale, mut scaled) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     imager.entropy.image(&at.image.coordinates, &mut s);

@@ -6,12 +6,22 @@ use crate::expansion::SpotsCounted;
 use crate::log_density::{Evaluation, Evaluator, LogDensity};
 use crate::objective::{Posterior, SpotsLeft};
 use crate::surrogate::Surrogate;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 /// The density that is sampled.
 pub struct Target {
     posterior: Posterior,
     counted: Option<SpotsCounted>,
+    /// Of the surrogates' kind, before it is fitted; none where there is none.
+    surrogate: Option<Surrogate>,
 }
+
+/// Draws of the surrogate that stand for where a chain goes.
+const DRAWS: usize = 200;
+
+/// Evaluations that a chain is expected to take at least.
+const EVALUATIONS: usize = 3000;
 
 /// The spots left over have no size that fits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -21,7 +31,8 @@ pub struct Target {
 pub struct SpotsLeftError;
 
 impl Target {
-    /// Of `posterior`, spots left over taken as the config says.
+    /// Of `posterior`, spots left over taken as the config says, with footholds where the surrogate says that a chain goes: a
+    /// function of posterior and config alone, so that a resumed run, or another process, has the same.
     ///
     /// # Errors
     /// [`SpotsLeftError`].
@@ -30,18 +41,22 @@ impl Target {
             SpotsLeft::Entropy => None,
             SpotsLeft::Fitted => Some(SpotsCounted::new(&posterior).ok_or(SpotsLeftError)?),
         };
-        Ok(Target { posterior, counted })
+        let (imager, space) = (posterior.imager(), posterior.space());
+        let surrogate = match &counted {
+            Some(counted) => Surrogate::of_expansion(counted.expansion(), space, imager),
+            None => Surrogate::new(imager, space, posterior.reference()),
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let draws = (0..DRAWS).filter_map(|_| surrogate.as_ref()?.draw(&mut rng));
+        let draws: Vec<Vec<f64>> = draws.map(|position| space.to_written(&position)).collect();
+        let posterior = posterior.with_footholds_for(&draws, EVALUATIONS);
+        Ok(Target { posterior, counted, surrogate })
     }
 
     /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density alone, so that
     /// a resumed run has the same.
     pub fn surrogate(&self, evaluator: &dyn Evaluator) -> Option<(Surrogate, f64)> {
-        let (imager, space) = (self.posterior.imager(), self.posterior.space());
-        let surrogate = match &self.counted {
-            Some(counted) => Surrogate::of_expansion(counted.expansion(), space, imager),
-            None => Surrogate::new(imager, space, self.posterior.reference()),
-        };
-        Some(surrogate?.fitted(self, evaluator))
+        Some(self.surrogate.clone()?.fitted(self, evaluator))
     }
 }
 

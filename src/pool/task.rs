@@ -37,12 +37,15 @@ pub struct Task {
 }
 
 /// What is asked for at a parameter vector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Asked {
     /// The log-probability that a chain samples.
     LogProbability,
     /// The likelihood of a landscape.
-    Likelihood,
+    Likelihood {
+        /// Where evaluations start, besides the reference.
+        footholds: Vec<Vec<f64>>,
+    },
 }
 
 /// Why a process cannot evaluate what it is asked to.
@@ -97,12 +100,13 @@ impl Task {
         let find = |name: &String| known.iter().copied().find(|f| f.parameter.name() == name).copied();
         let space = scene.space_of(&self.free.iter().filter_map(find).collect::<Vec<_>>());
         let posterior = self.origin.posterior(&scene, space, place)?;
-        Ok(match self.asked {
+        Ok(match &self.asked {
             Asked::LogProbability => {
                 let target = Target::new(posterior, settings.imaging.spots_left)?;
                 Box::new(move |question| target.evaluate(&numbers_from_bytes(question)).to_bytes())
             }
-            Asked::Likelihood => {
+            Asked::Likelihood { footholds } => {
+                let posterior = posterior.with_footholds(footholds);
                 Box::new(move |question| posterior.likelihood(&numbers_from_bytes(question)).to_bytes())
             }
         })

@@ -1,0 +1,95 @@
+//! Footholds: images that evaluations nearby start from, each with its preconditioner and what a first-order prediction needs.
+//!
+//! The reference is one. Far from it a Newton system is no longer close to the one that its preconditioner inverts, and an
+//! evaluation takes hundreds of passes instead of tens; another foothold there brings it down again, for the passes of about
+//! five such evaluations. What an evaluation ends at does not depend on where it started beyond the solver's tolerance. Left out:
+//! where footholds are worth it (`search`, `survey`).
+
+use super::coordinates::ParameterSpace;
+use super::prediction::Prediction;
+use crate::imaging::Imager;
+use crate::maxent::{Preconditioner, Start};
+use std::sync::Arc;
+
+/// An image, and what evaluations nearby need of it.
+#[derive(Clone, Debug)]
+pub struct Foothold {
+    /// Where it is (written coordinates).
+    pub theta: Vec<f64>,
+    /// The same as [`place`] has it.
+    pub place: Vec<f64>,
+    /// Where an evaluation there starts.
+    pub start: Start,
+    /// Approximate inverse of the Newton systems around it.
+    pub preconditioner: Arc<Preconditioner>,
+    /// How image and lambda move with the parameters.
+    pub prediction: Prediction,
+}
+
+/// Velocities that differ by this (km/s, in the root mean square over the profiles) are one unit apart in [`place`].
+const VELOCITY_KMS: f64 = 0.02;
+
+/// Where `theta` is as profiles have it: the velocities of all of them and the star's own free parameters, each in a unit that
+/// changes profiles as much, so that distances say how different the profiles are.
+pub fn place(imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> Vec<f64> {
+    let state = space.values_at(theta).state();
+    let cycles = imager.cycles();
+    let unit = VELOCITY_KMS * (cycles.len() as f64).sqrt();
+    let mut place: Vec<f64> = state.orbit.velocities_kms(&cycles).map(|v| (v + state.vsys_kms) / unit).collect();
+    let stellar = space.free().iter().zip(theta).zip(space.scales()).filter(|((f, _), _)| !f.parameter.only_shifts());
+    place.extend(stellar.map(|((_, x), scale)| x / scale));
+    place
+}
+
+/// The foothold nearest to `theta`, the first of equals; one that stands alone is not looked for.
+pub fn nearest<'a>(footholds: &'a [Foothold], imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> &'a Foothold {
+    if let [only] = footholds {
+        return only;
+    }
+    let here = place(imager, space, theta);
+    let to = |foothold: &&Foothold| distance(&foothold.place, &here);
+    footholds.iter().min_by(|a, b| to(a).total_cmp(&to(b))).expect("the reference is one")
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Passes of an evaluation that starts so far from where it ends: about what the paper's setup takes in the mean.
+fn passes(distance: f64) -> f64 {
+    (15.0 + 6.0 * distance.powf(3.5)).min(500.0)
+}
+
+/// Passes that a foothold takes to be made.
+const PASSES: f64 = 2000.0;
+
+/// Bytes that all footholds together may take.
+const MEMORY: usize = 1 << 29;
+
+/// Most places that are considered for a foothold, and most that it is judged by: equally spaced ones stand for all.
+const CONSIDERED: usize = 400;
+const JUDGED: usize = 2000;
+
+/// At which of `places` footholds save more passes than they take, if so many `evaluations` are spread like the places and there is
+/// the `reference` already: the one that saves most, then the next.
+pub fn worthwhile(reference: &Foothold, places: &[Vec<f64>], evaluations: usize) -> Vec<usize> {
+    let spaced = |most: usize| (0..places.len()).step_by(places.len().div_ceil(most).max(1));
+    let judged: Vec<&Vec<f64>> = spaced(JUDGED).map(|i| &places[i]).collect();
+    let each = evaluations as f64 / judged.len() as f64;
+    let mut now: Vec<f64> = judged.iter().map(|place| passes(distance(&reference.place, place))).collect();
+    // what evaluations at the places judged would take from each candidate
+    let of = |i: usize| (i, judged.iter().map(|place| passes(distance(&places[i], place))).collect());
+    let candidates: Vec<(usize, Vec<f64>)> = spaced(CONSIDERED).map(of).collect();
+    let most = MEMORY / reference.preconditioner.bytes().max(1);
+    let mut chosen = Vec::new();
+    while chosen.len() < most {
+        let saved = |(_, then): &&(usize, Vec<f64>)| -> f64 {
+            each * now.iter().zip(then).map(|(now, then)| (now - then).max(0.0)).sum::<f64>()
+        };
+        let best = candidates.iter().map(|c| (c, saved(&c))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some(((index, then), _)) = best.filter(|(_, saved)| *saved > PASSES) else { break };
+        now.iter_mut().zip(then).for_each(|(now, then)| *now = now.min(*then));
+        chosen.push(*index);
+    }
+    chosen
+}
