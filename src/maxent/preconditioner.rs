@@ -40,6 +40,12 @@ const OVERSAMPLING: usize = 60;
 /// Vectors that the operator is applied to before it is applied to what came out.
 const BLOCK: usize = 20;
 
+/// Projections that take the vectors so far out of the next ones: at most so many, ...
+const MOST_PROJECTIONS: usize = 5;
+
+/// ... and no more once each of unit length keeps this much.
+const NOT_SPANNED: f64 = 0.7;
+
 impl Preconditioner {
     /// No preconditioning: the identity.
     pub fn identity() -> Self {
@@ -48,28 +54,11 @@ impl Preconditioner {
 
     /// From the operator M (`apply(v, out)`) on vectors of length `n`: at most `rank` eigenvectors, those with eigenvalues
     /// above `smallest`.
-    pub fn build(n: usize, rank: usize, smallest: f64, mut apply: impl FnMut(&[f64], &mut [f64])) -> Self {
-        let width = BLOCK.min(n);
-        let columns = width * (rank + OVERSAMPLING).min(n).div_ceil(width).min(n / width);
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0x5eed);
-        let (mut basis, mut image) = (DMatrix::zeros(n, columns), DMatrix::zeros(n, columns));
-        let mut block = DMatrix::from_fn(n, width, |_, _| -> f64 { StandardNormal.sample(&mut rng) });
-        for first in (0..columns).step_by(width) {
-            let known = basis.columns(0, first);
-            // twice: once leaves rounding errors of a block that is nearly spanned already
-            for _ in 0..2 {
-                block -= known * (known.transpose() * &block);
-                block = block.qr().q();
-            }
-            for j in 0..width {
-                apply(block.column(j).as_slice(), image.column_mut(first + j).as_mut_slice());
-            }
-            basis.columns_mut(first, width).copy_from(&block);
-            block.copy_from(&image.columns(first, width));
-        }
+    pub fn build(n: usize, rank: usize, smallest: f64, apply: impl FnMut(&[f64], &mut [f64])) -> Self {
+        let (basis, image) = krylov(n, rank + OVERSAMPLING, apply);
         let projected = basis.transpose() * image;
         let eigen = SymmetricEigen::new(0.5 * (&projected + projected.transpose()));
-        let mut order: Vec<usize> = (0..columns).filter(|&i| eigen.eigenvalues[i] > smallest).collect();
+        let mut order: Vec<usize> = (0..basis.ncols()).filter(|&i| eigen.eigenvalues[i] > smallest).collect();
         order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
         order.truncate(rank);
         let vectors = basis * eigen.eigenvectors.select_columns(&order);
@@ -160,6 +149,34 @@ impl Preconditioner {
     }
 }
 
+/// An orthonormal basis of the block Krylov space of an operator from a fixed random start, with about so many columns, and what the
+/// operator makes of it.
+fn krylov(n: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -> (DMatrix<f64>, DMatrix<f64>) {
+    let width = BLOCK.min(n);
+    let columns = width * columns.div_ceil(width).min(n / width);
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0x5eed);
+    let (mut basis, mut image) = (DMatrix::zeros(n, columns), DMatrix::zeros(n, columns));
+    let mut block = DMatrix::from_fn(n, width, |_, _| -> f64 { StandardNormal.sample(&mut rng) });
+    for first in (0..columns).step_by(width) {
+        let known = basis.columns(0, first);
+        // until nothing of the known ones is left: what is nearly spanned by them is mostly rounding errors at first
+        for _ in 0..MOST_PROJECTIONS {
+            block = block.qr().q();
+            block -= known * (known.transpose() * &block);
+            if block.column_iter().all(|column| column.norm() > NOT_SPANNED) {
+                break;
+            }
+        }
+        block = block.qr().q();
+        for j in 0..width {
+            apply(block.column(j).as_slice(), image.column_mut(first + j).as_mut_slice());
+        }
+        basis.columns_mut(first, width).copy_from(&block);
+        block.copy_from(&image.columns(first, width));
+    }
+    (basis, image)
+}
+
 /// Scalar products of `r` with the eigenvectors; single precision suffices for an approximate inverse, and is twice as fast.
 struct Components<'a> {
     basis: &'a Preconditioner,
@@ -241,6 +258,22 @@ mod tests {
         preconditioner.apply(0.7, &b, &mut back);
         for (x, back) in x.iter().zip(&back) {
             assert!((x - back).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn the_basis_is_orthonormal_whatever_the_operator() {
+        // eigenvalues over so many decades, down to those that rounding errors drown
+        for decades in [1.0, 5.0, 20.0, 60.0] {
+            let apply = |v: &[f64], out: &mut [f64]| {
+                for (i, (out, v)) in out.iter_mut().zip(v).enumerate() {
+                    *out = 1e3 * 10f64.powf(-decades * i as f64 / 150.0) * v;
+                }
+            };
+            let (basis, image) = krylov(150, 130, apply);
+            assert_eq!((basis.ncols(), image.ncols()), (140, 140));
+            let error = (basis.transpose() * &basis - DMatrix::identity(140, 140)).amax();
+            assert!(error < 1e-13, "{decades} decades: {error:e}");
         }
     }
 }
