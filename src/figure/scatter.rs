@@ -103,7 +103,8 @@ pub struct ScatterPanel {
 /// Margins of a panel: left, right, above, below (pt).
 const MARGINS: [f64; 4] = [38.0, 8.0, 16.0, 26.0];
 
-/// A figure of such panels, in rows of `columns`: a column of a journal wide if that is 1, a page wide otherwise.
+/// A figure of such panels, in rows of `columns`: a column of a journal wide if that is 1, a page wide otherwise. A legend that the
+/// first of several panels has for all stands above them.
 pub fn scatter(name: &str, panels: &[ScatterPanel], columns: usize) -> Figure {
     let columns = columns.max(1);
     let rows = panels.len().div_ceil(columns).max(1);
@@ -112,6 +113,10 @@ pub fn scatter(name: &str, panels: &[ScatterPanel], columns: usize) -> Figure {
     let [left, right, above, below] = MARGINS;
     let height = 0.78 * (cell_width - left - right);
     let cell_height = height + above + below;
+    let labelled = |panel: &ScatterPanel| panel.series.iter().any(|series| !series.label.is_empty());
+    let shared = panels.len() > 1
+        && panels.iter().all(|panel| panel.title.is_empty() && panel.references.is_empty())
+        && !panels[1..].iter().any(labelled);
     let mut figure = Figure::new(name, width_mm, rows as f64 * cell_height / PT_PER_MM);
     for (k, panel) in panels.iter().enumerate() {
         let (row, column) = ((k / columns) as f64, (k % columns) as f64);
@@ -121,7 +126,11 @@ pub fn scatter(name: &str, panels: &[ScatterPanel], columns: usize) -> Figure {
             width: cell_width - left - right,
             height,
         };
-        panel.draw(&mut figure, frame);
+        if shared {
+            panel.draw_content(&mut figure, frame).row(&mut figure, [0.5 * width_mm * PT_PER_MM, 0.5 * above]);
+        } else {
+            panel.draw(&mut figure, frame);
+        }
     }
     figure
 }
@@ -129,8 +138,24 @@ pub fn scatter(name: &str, panels: &[ScatterPanel], columns: usize) -> Figure {
 impl ScatterPanel {
     /// Draws the panel in `frame`; numbers and labels need some 35 pt to its left and 28 pt below.
     pub fn draw(&self, figure: &mut Figure, frame: Rect) {
-        let axes = self.axes();
-        let panel = Panel { frame, x: axes[0].clone(), y: axes[1].clone() };
+        let legend = self.draw_content(figure, frame);
+        let points: Vec<[f64; 2]> =
+            self.series.iter().flat_map(|s| s.x.iter().zip(&s.y)).map(|(x, y)| [*x, *y]).collect();
+        let corner = self.legend_at.unwrap_or_else(|| legend.free_corner(frame, &self.panel(frame).places(&points)));
+        legend.draw(figure, frame, corner);
+        if !self.title.is_empty() {
+            figure.text(&self.title, [frame.centre()[0], frame.top - 5.0], Font::LABEL, Align::Centre, 0.0);
+        }
+    }
+
+    fn panel(&self, frame: Rect) -> Panel {
+        let [x, y] = self.axes();
+        Panel { frame, x, y }
+    }
+
+    /// Draws all but the title and the legend, which it returns.
+    fn draw_content(&self, figure: &mut Figure, frame: Rect) -> Legend {
+        let panel = self.panel(frame);
         let mut legend = Legend::default();
         for reference in &self.references {
             draw_reference(figure, &panel, reference, &mut legend);
@@ -139,13 +164,7 @@ impl ScatterPanel {
             draw_series(figure, &panel, series, k, &mut legend);
         }
         panel.frame(figure, Sides::BOTH);
-        let points: Vec<[f64; 2]> =
-            self.series.iter().flat_map(|s| s.x.iter().zip(&s.y)).map(|(x, y)| [*x, *y]).collect();
-        let corner = self.legend_at.unwrap_or_else(|| legend.free_corner(frame, &panel.places(&points)));
-        legend.draw(figure, frame, corner);
-        if !self.title.is_empty() {
-            figure.text(&self.title, [frame.centre()[0], frame.top - 5.0], Font::LABEL, Align::Centre, 0.0);
-        }
+        legend
     }
 
     fn axes(&self) -> [Axis; 2] {
@@ -219,5 +238,8 @@ fn draw_series(figure: &mut Figure, panel: &Panel, series: &Series, k: usize, le
         (true, false) => Key::Both(line, marker, colour),
         (false, _) => Key::Point(marker, colour),
     };
-    legend.add(key, &series.label);
+    // what has no point to show is not explained
+    if points.iter().any(|point| point.iter().all(|x| x.is_finite())) {
+        legend.add(key, &series.label);
+    }
 }
