@@ -20,26 +20,12 @@ struct Case {
     counted: &'static str,
     /// What it prints if all went well.
     good: &'static str,
-    /// Whether it takes so long that it is run by name only.
-    long: bool,
 }
 
 const CASES: [Case; 3] = [
-    Case { command: "sample", config: "configs/demo.json", counted: "evaluations", good: "\nconverged", long: false },
-    Case {
-        command: "grid",
-        config: "configs/paper_grid.json",
-        counted: "reconstructions",
-        good: " 0 failed",
-        long: false,
-    },
-    Case {
-        command: "sample",
-        config: "configs/paper_7d.json",
-        counted: "evaluations",
-        good: "\nconverged",
-        long: true,
-    },
+    Case { command: "sample", config: "configs/demo.json", counted: "evaluations", good: "\nconverged" },
+    Case { command: "grid", config: "configs/paper_grid.json", counted: "reconstructions", good: " 0 failed" },
+    Case { command: "sample", config: "configs/paper_7d.json", counted: "evaluations", good: "\nconverged" },
 ];
 
 /// Ticks of processor time in `/proc` a second, on every Linux.
@@ -52,9 +38,9 @@ fn main() {
     let columns = ["command", "seconds", "processor seconds", "peak memory, MiB", "reconstructions"];
     let mut table = Table::new("Whole commands", &columns);
     let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
-    for Case { command, config, counted, good, long } in CASES {
+    for Case { command, config, counted, good } in CASES {
         let name = format!("`dimcmc {command} {config}`");
-        if !name.contains(&filter) || (long && filter.is_empty()) {
+        if !name.contains(&filter) {
             continue;
         }
         println!("{name} ...");

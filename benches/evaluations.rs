@@ -1,5 +1,5 @@
-//! Evaluations of the log-probability over the bulk of the paper's posterior: how many a second, passes each, and what they
-//! cost beyond their passes.
+//! Evaluations of the log-probability over the bulk of the paper's posterior: how many a second, passes each, what they cost beyond
+//! their passes, and how far they are from solutions to rounding error.
 //!
 //! Left out: how evaluations grow with the size of the problem (`growth`), several threads (`threads`).
 
@@ -9,12 +9,16 @@ use common::paper::{Bulk, Free, Passes, Size, scene};
 use common::stopwatch::{Candidate, by_criterion, criterion, quantile, seconds};
 use common::table::{Table, Target, thousands};
 use dimcmc::log_density::{LogDensity, Status};
+use dimcmc::maxent::SolverSettings;
 use dimcmc::objective::Posterior;
 use dimcmc::star::Response;
 use std::hint::black_box;
 
 /// An evaluation over its passes.
 const OVER_PASSES: Target = Target::AtMost(1.5);
+
+/// Error of the log-probability, in units of 1e-3.
+const ERROR: Target = Target::AtMost(1.0);
 
 /// Passes of an evaluation: median and 95 %.
 fn most_passes(free: Free) -> [Target; 2] {
@@ -30,7 +34,9 @@ fn main() {
     }
     let mut criterion = criterion();
     let over = format!("evaluation / its passes ({OVER_PASSES})");
-    let columns = ["free", "pixels", "evaluations / s and core", "passes: median", "95 %", &over];
+    let error = format!("largest error / 1e-3 ({ERROR})");
+    let columns =
+        ["free", "pixels", "evaluations / s and core", "passes: median", "95 %", &over, &error, "mean error / 1e-3"];
     let mut table = Table::new("Evaluations over the bulk of the posterior", &columns);
     for free in [Free::Three, Free::Seven] {
         for (pixels, points) in [(5000, 200), (20_000, 60)] {
@@ -46,13 +52,14 @@ fn main() {
         "Objective spottedness; points drawn from a Gaussian around the maximum with the covariance found there: 200 of them, 60 on \
          20,000 pixels; the faster of two evaluations each. Targets of passes: {} and {} in 3-D, {} and {} in 7-D. The last column \
          is the median over points of the time of an evaluation over that of as many passes, forward and transpose in turn, at \
-         the same point.",
+         the same point. Errors are differences to the log-probability with the solver taken to rounding error.",
         three[0], three[1], seven[0], seven[1]
     ));
 }
 
 fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
-    let (mut times, mut pass_times, mut passes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut times, mut pass_times, mut passes, mut errors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let exact = bulk.posterior.clone().with_settings(SolverSettings::exact());
     for theta in &bulk.points {
         let response = response(&bulk.posterior, theta);
         let mut only_passes = Passes::new(&response);
@@ -63,6 +70,7 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
             time = time.min(seconds(|| bulk.posterior.evaluate(theta)));
             pass_time = pass_time.min(seconds(|| only_passes.run(&response, evaluation.passes)));
         }
+        errors.push(1e3 * (evaluation.log_prob - exact.evaluate(theta).log_prob));
         times.push(time);
         pass_times.push(pass_time);
         passes.push(f64::from(evaluation.passes));
@@ -76,6 +84,8 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
         at_median.judge(quantile(&passes, 0.5), 0),
         at_95.judge(quantile(&passes, 0.95), 0),
         OVER_PASSES.judge(quantile(&ratios, 0.5), 2),
+        ERROR.judge(errors.iter().fold(0.0, |most, error: &f64| most.max(error.abs())), 2),
+        format!("{:.3}", errors.iter().sum::<f64>() / errors.len() as f64),
     ]);
 }
 
