@@ -43,8 +43,8 @@ pub struct Header {
 pub struct Survey {
     /// What it was begun with.
     pub header: Header,
-    /// What is evaluated at the nodes, without its prior.
-    pub posterior: Posterior,
+    /// What is evaluated at the nodes, without its prior; of a whole landscape without its footholds.
+    posterior: Posterior,
     /// The nodes so far.
     pub landscape: Landscape,
     task: Task,
@@ -120,6 +120,11 @@ impl Survey {
         let names = posterior.space().names();
         let task = Task::new(scene, &header.origin, names, Asked::Likelihood { footholds });
         Survey { header, posterior, landscape, task, file }
+    }
+
+    /// Images, besides the reference, that nodes start from; none where no node is left.
+    pub fn footholds(&self) -> usize {
+        self.posterior.footholds().count()
     }
 
     /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one, and of the

@@ -4,7 +4,7 @@ mod common;
 
 use common::{oracle, values, whole_truth};
 use dimcmc::imaging::Imager;
-use dimcmc::log_density::{Gradient, LogDensity};
+use dimcmc::log_density::{Gradient, LogDensity, Status};
 use dimcmc::maxent::SolverSettings;
 use dimcmc::maxent::entropy::Entropy;
 use dimcmc::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference};
@@ -244,6 +244,30 @@ fn footholds_save_passes_and_change_nothing_else() {
         let few = posterior.clone().with_footholds_for(&thetas, 1).footholds().count();
         let many = posterior.with_footholds_for(&thetas, 100_000).footholds().count();
         assert!(few == 0 && many > 0, "{few} {many}");
+    }
+}
+
+#[test]
+fn a_foothold_out_of_the_targets_reach_is_right_for_those_within() {
+    for posterior in MAPS.map(|entropy| posteriors(entropy).swap_remove(0)) {
+        assert_eq!(posterior.kind(), ObjectiveKind::Spottedness);
+        let exact = posterior.clone().with_settings(SolverSettings::exact());
+        let start = posterior.space().start();
+        let at = |i: i32| {
+            let mut theta = start.clone();
+            theta[0] += 0.004 * f64::from(i);
+            theta
+        };
+        let beyond = (1..100).find(|i| posterior.evaluate(&at(*i)).status == Status::Unreachable).unwrap();
+        let placed = posterior.with_footholds(&[at(beyond)]);
+        assert_eq!(placed.footholds().count(), 1);
+        let best = exact.evaluate(&start).log_prob;
+        for theta in (1..4).map(|i| at(beyond - i)) {
+            let (got, wanted) = (placed.evaluate(&theta), exact.evaluate(&theta).log_prob);
+            println!("{} below: {:e}, {} passes", best - wanted, got.log_prob - wanted, got.passes);
+            assert_eq!(got.status, Status::Converged);
+            assert!((got.log_prob - wanted).abs() < 1e-3 + 0.005 * (best - wanted), "{theta:?}: {got:?} {wanted}");
+        }
     }
 }
 

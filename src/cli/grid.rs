@@ -63,7 +63,10 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         let found = search(global, &args.config, &scene, &scene.space_of(&plan.free))?;
         signals.defer();
         let folder = args.output.create()?;
-        Survey::begin(&scene, plan, found, folder, args.output.replaces()).map_err(failed)?
+        let spinner = progress::bar(global, None, "images that nodes far from the best one start from");
+        let survey = Survey::begin(&scene, plan, found, folder, args.output.replaces());
+        spinner.finish_and_clear();
+        survey.map_err(failed)?
     };
     let mut meter = Meter::new(global, &survey.landscape);
     let whole = survey.go(&pool, |landscape| meter.show(landscape));
@@ -84,7 +87,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     // whoever reads may stop reading
     let _ = write!(stdout, "{}", table(landscape, truth));
     let _ = write!(stdout, "{}", paraboloid_table(&found, landscape.grid(), truth));
-    let _ = writeln!(stdout, "{}", meter.cost(landscape));
+    let images = match survey.footholds() {
+        0 => String::new(),
+        others => format!(" from {} images", others + 1),
+    };
+    let _ = writeln!(stdout, "{}{images}", meter.cost(landscape));
     if let Some(warning) = header.origin.reference.warning() {
         let _ = writeln!(stdout, "note: {warning}");
     }
@@ -116,7 +123,7 @@ impl Meter {
         self.bar.set_message(format!("{done}/{total}, {:#} left, {rate:.0} rec/s", indicatif::HumanDuration(left)));
     }
 
-    /// Seconds of this part of the computation, the search before it left out.
+    /// Seconds of this part of the computation; the search before it, and the images that nodes start from, left out.
     fn cost(&self, landscape: &Landscape) -> String {
         let nodes = landscape.nodes().len() - self.before;
         let now = if self.before == 0 { "" } else { " now" };

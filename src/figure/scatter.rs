@@ -127,12 +127,27 @@ pub fn scatter(name: &str, panels: &[ScatterPanel], columns: usize) -> Figure {
             height,
         };
         if shared {
-            panel.draw_content(&mut figure, frame).row(&mut figure, [0.5 * width_mm * PT_PER_MM, 0.5 * above]);
+            panel.draw_content(&mut figure, frame);
         } else {
             panel.draw(&mut figure, frame);
         }
     }
+    if shared {
+        let mut legend = Legend::default();
+        for (k, first) in panels[0].series.iter().enumerate() {
+            if panels.iter().filter_map(|panel| panel.series.get(k)).any(Series::has_points) {
+                legend.add(key(first, k), &first.label);
+            }
+        }
+        legend.row(&mut figure, [0.5 * width_mm * PT_PER_MM, 0.5 * above]);
+    }
     figure
+}
+
+impl Series {
+    fn has_points(&self) -> bool {
+        self.x.iter().zip(&self.y).any(|(x, y)| x.is_finite() && y.is_finite())
+    }
 }
 
 impl ScatterPanel {
@@ -233,13 +248,20 @@ fn draw_series(figure: &mut Figure, panel: &Panel, series: &Series, k: usize, le
     if !series.bare {
         panel.points(figure, "point", &points, (marker, 4.5, colour));
     }
-    let key = match (series.joined, series.bare) {
+    // what has no point to show is not explained
+    if series.has_points() {
+        legend.add(key(series, k), &series.label);
+    }
+}
+
+/// What the legend shows of series `k`.
+fn key(series: &Series, k: usize) -> Key {
+    let colour = SERIES[k % SERIES.len()];
+    let marker = Marker::SERIES[k % Marker::SERIES.len()];
+    let line = Stroke::new(colour, 1.0);
+    match (series.joined, series.bare) {
         (true, true) => Key::Line(line),
         (true, false) => Key::Both(line, marker, colour),
         (false, _) => Key::Point(marker, colour),
-    };
-    // what has no point to show is not explained
-    if points.iter().any(|point| point.iter().all(|x| x.is_finite())) {
-        legend.add(key, &series.label);
     }
 }

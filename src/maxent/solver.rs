@@ -107,6 +107,21 @@ impl Solver<'_> {
         z.iter().zip(&scale).map(|(z, d)| z * d).collect()
     }
 
+    /// The path along lambda from a solution at its bound, where the solver needs none, and the slopes along it.
+    pub fn find_path(&self, problem: &mut impl Problem, solution: &mut Solution) {
+        let n = solution.image.coordinates.len();
+        let (mut s, mut scale, mut gradient) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        self.entropy.image(&solution.image.coordinates, &mut s);
+        self.entropy.metric(&s, problem.area(), &mut scale);
+        problem.linearise(&s);
+        problem.gradient(&mut gradient);
+        let pull: Vec<f64> = gradient.iter().map(|g| -solution.image.lambda * g).collect();
+        let step = self.apply_inverse(problem, &solution.image, &pull);
+        solution.path = step.iter().zip(&scale).map(|(step, scale)| step / scale).collect();
+        solution.chi2_slope = 2.0 * dot(&gradient, &step);
+        solution.spottedness_slope = dot(&self.entropy.spottedness_gradient(&s, problem.area()), &step);
+    }
+
     fn arrive(&self, problem: &mut impl Problem, u: Vec<f64>, lambda: f64) -> Point {
         let mut s = vec![0.0; u.len()];
         let entropy = self.entropy.value(&u, problem.area(), &mut s);

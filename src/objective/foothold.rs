@@ -9,6 +9,8 @@ use super::coordinates::ParameterSpace;
 use super::prediction::Prediction;
 use crate::imaging::Imager;
 use crate::maxent::{Preconditioner, Start};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// An image, and what evaluations nearby need of it.
@@ -24,6 +26,14 @@ pub struct Foothold {
     pub preconditioner: Arc<Preconditioner>,
     /// How image and lambda move with the parameters.
     pub prediction: Prediction,
+}
+
+impl Foothold {
+    /// Bytes that it takes in memory, all but a few.
+    fn bytes(&self) -> usize {
+        let images = 2 + self.prediction.images();
+        self.preconditioner.bytes() + images * size_of_val(&self.start.image.coordinates[..])
+    }
 }
 
 /// Velocities that differ by this (km/s, in the root mean square over the profiles) are one unit apart in [`place`].
@@ -66,30 +76,34 @@ const PASSES: f64 = 2000.0;
 /// Bytes that all footholds together may take.
 const MEMORY: usize = 1 << 29;
 
-/// Most places that are considered for a foothold, and most that it is judged by: equally spaced ones stand for all.
+/// Most places that are considered for a foothold, and most that it is judged by; the others are like them.
 const CONSIDERED: usize = 400;
 const JUDGED: usize = 2000;
 
+/// At most as many of `thetas` as are judged, drawn at random, so that no order of theirs shows; always the same.
+pub fn sampled(thetas: &[Vec<f64>]) -> Vec<&Vec<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let chosen = rand::seq::index::sample(&mut rng, thetas.len(), JUDGED.min(thetas.len()));
+    chosen.into_iter().map(|i| &thetas[i]).collect()
+}
+
 /// At which of `places` footholds save more passes than they take, if so many `evaluations` are spread like the places and there is
-/// the `reference` already: the one that saves most, then the next.
+/// the `reference` already: the one that saves most, then the next. The places are in no particular order.
 pub fn worthwhile(reference: &Foothold, places: &[Vec<f64>], evaluations: usize) -> Vec<usize> {
-    let spaced = |most: usize| (0..places.len()).step_by(places.len().div_ceil(most).max(1));
-    let judged: Vec<&Vec<f64>> = spaced(JUDGED).map(|i| &places[i]).collect();
-    let each = evaluations as f64 / judged.len() as f64;
-    let mut now: Vec<f64> = judged.iter().map(|place| passes(distance(&reference.place, place))).collect();
-    // what evaluations at the places judged would take from each candidate
-    let of = |i: usize| (i, judged.iter().map(|place| passes(distance(&places[i], place))).collect());
-    let candidates: Vec<(usize, Vec<f64>)> = spaced(CONSIDERED).map(of).collect();
-    let most = MEMORY / reference.preconditioner.bytes().max(1);
+    let each = evaluations as f64 / places.len() as f64;
+    let mut now: Vec<f64> = places.iter().map(|place| passes(distance(&reference.place, place))).collect();
+    // what evaluations at all places would take from each candidate
+    let from = |candidate: &Vec<f64>| places.iter().map(|place| passes(distance(candidate, place))).collect();
+    let candidates: Vec<Vec<f64>> = places.iter().take(CONSIDERED).map(from).collect();
     let mut chosen = Vec::new();
-    while chosen.len() < most {
-        let saved = |(_, then): &&(usize, Vec<f64>)| -> f64 {
+    while chosen.len() < MEMORY / reference.bytes() {
+        let saved = |then: &Vec<f64>| -> f64 {
             each * now.iter().zip(then).map(|(now, then)| (now - then).max(0.0)).sum::<f64>()
         };
-        let best = candidates.iter().map(|c| (c, saved(&c))).max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some(((index, then), _)) = best.filter(|(_, saved)| *saved > PASSES) else { break };
-        now.iter_mut().zip(then).for_each(|(now, then)| *now = now.min(*then));
-        chosen.push(*index);
+        let best = candidates.iter().map(saved).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, _)) = best.filter(|(_, saved)| *saved > PASSES) else { break };
+        now.iter_mut().zip(&candidates[index]).for_each(|(now, then)| *now = now.min(*then));
+        chosen.push(index);
     }
     chosen
 }

@@ -4,7 +4,7 @@
 //! Left out: what a reconstruction is worth (`likelihood`), how the reference was found, and who explores the posterior.
 
 use super::coordinates::ParameterSpace;
-use super::foothold::{Foothold, nearest, place, worthwhile};
+use super::foothold::{Foothold, nearest, place, sampled, worthwhile};
 use super::kind::ObjectiveKind;
 use super::parameters::Parameter;
 use super::prediction::{Prediction, Solved};
@@ -74,6 +74,7 @@ impl Posterior {
 
     /// The same posterior with the footholds that so many `evaluations`, spread like `thetas`, are worth.
     pub fn with_footholds_for(self, thetas: &[Vec<f64>], evaluations: usize) -> Self {
+        let thetas: Vec<&Vec<f64>> = sampled(thetas).into_iter().filter(|theta| self.is_physical(theta)).collect();
         let places: Vec<Vec<f64>> = thetas.iter().map(|theta| place(&self.imager, &self.space, theta)).collect();
         let chosen = worthwhile(&self.footholds[0], &places, evaluations);
         let chosen: Vec<Vec<f64>> = chosen.into_iter().map(|i| thetas[i].clone()).collect();
@@ -85,13 +86,22 @@ impl Posterior {
             return None;
         }
         let (solution, mut problem) = self.reconstruct(theta);
+        if solution.termination == Termination::NonFinite {
+            return None;
+        }
         let preconditioner = precondition(&self.imager, &mut problem, &solution);
         // precise, even far below the best
         let settings = SolverSettings { leniency: 0.0, ..SolverSettings::patient() };
         let solver = Solver { entropy: self.imager.entropy, preconditioner: &preconditioner, settings };
-        let solution = solver.solve(&mut problem, self.goal(), &start(&solution));
-        let there = matches!(solution.termination, Termination::Converged | Termination::Unreachable);
-        there.then(|| self.foothold(theta.to_vec(), problem.response(), &solution, Arc::new(preconditioner)))
+        let mut solution = solver.solve(&mut problem, self.goal(), &start(&solution));
+        match solution.termination {
+            Termination::Converged => {}
+            // evaluations nearby may reach the target, and need the way there
+            Termination::Unreachable => solver.find_path(&mut problem, &mut solution),
+            Termination::StepLimit | Termination::NonFinite => return None,
+        }
+        let foothold = self.foothold(theta.to_vec(), problem.response(), &solution, Arc::new(preconditioner));
+        foothold.prediction.is_finite().then_some(foothold)
     }
 
     /// The foothold of a solution.

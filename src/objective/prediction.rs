@@ -72,9 +72,9 @@ impl Prediction {
         problem.linearise(&map);
         let mut gradient = vec![0.0; n];
         problem.gradient(&mut gradient);
-        let adjoint = match (kind, goal) {
-            (ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood, _) | (_, Goal::Lambda(_)) => Vec::new(),
-            (ObjectiveKind::Spottedness, Goal::Chi2 { .. }) => {
+        let adjoint = match kind {
+            ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => Vec::new(),
+            ObjectiveKind::Spottedness => {
                 let weights = imager.entropy.spottedness_gradient(&map, &imager.grid.area);
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
@@ -110,6 +110,17 @@ impl Prediction {
             ln_lambda.push(along);
         }
         Prediction { origin, scales, image, ln_lambda, adjoint }
+    }
+
+    /// Whether all its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let all = self.image.iter().flatten().chain(&self.ln_lambda).chain(&self.adjoint);
+        all.copied().all(f64::is_finite)
+    }
+
+    /// Number of vectors that are as long as an image.
+    pub fn images(&self) -> usize {
+        1 + self.image.len()
     }
 
     /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
