@@ -20,14 +20,12 @@ struct Judge {
     name: &'static str,
     objective: &'static str,
     spots_left: &'static str,
-    /// Most noise seeds of a map.
-    seeds: u64,
 }
 
 const JUDGES: [Judge; 3] = [
-    Judge { name: "spottedness", objective: "spottedness", spots_left: "entropy", seeds: 5 },
-    Judge { name: "regularised_likelihood", objective: "regularised-likelihood", spots_left: "entropy", seeds: 5 },
-    Judge { name: "spots_left_fitted", objective: "spottedness", spots_left: "fitted", seeds: 2 },
+    Judge { name: "spottedness", objective: "spottedness", spots_left: "entropy" },
+    Judge { name: "regularised_likelihood", objective: "regularised-likelihood", spots_left: "entropy" },
+    Judge { name: "spots_left_fitted", objective: "spottedness", spots_left: "fitted" },
 ];
 
 /// Parameters that are sampled.
@@ -57,7 +55,6 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
     let configs = stars.iter().map(|&(map, seed)| star(laboratory, map, seed));
     let configs: Vec<Value> = configs.collect::<Result<_, _>>()?;
     for judge in &JUDGES {
-        let judged = |star: &(&(u64, u64), &Value)| star.0.1 < judge.seeds;
         let case = |((map, seed), config): (&(u64, u64), &Value)| Case {
             name: format!("{}_map_{map}_seed_{seed}", judge.name),
             config: with(
@@ -68,17 +65,15 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
             chain: true,
             periodogram: None,
         };
-        let cases: Vec<Case> = stars.iter().zip(&configs).filter(judged).map(case).collect();
+        let cases: Vec<Case> = stars.iter().zip(&configs).map(case).collect();
         by_judge.push(laboratory.outcomes("coverage", &cases)?);
     }
-    let mut in_turn: Vec<_> = by_judge.iter().map(|outcomes| outcomes.iter()).collect();
     for (k, &(map, seed)) in stars.iter().enumerate() {
         let mut row = vec![map as f64, noise_seed(map, seed) as f64];
         row.extend(ORBIT.map(|name| injected(&by_judge[0][k], name)));
-        for (judge, outcomes) in JUDGES.iter().zip(&mut in_turn) {
-            let outcome = if seed < judge.seeds { outcomes.next() } else { None };
+        for outcomes in &by_judge {
             for name in ORBIT {
-                row.extend(match outcome.and_then(|outcome| estimate(outcome, name)) {
+                row.extend(match estimate(&outcomes[k], name) {
                     Some(one) => [one.value, one.ci68[0], one.ci68[1], one.ci95[0], one.ci95[1]],
                     None => [f64::NAN; 5],
                 });
