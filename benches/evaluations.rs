@@ -41,7 +41,7 @@ fn main() {
     for free in [Free::Three, Free::Seven] {
         for (pixels, points) in [(5000, 200), (20_000, 60)] {
             let bulk = Bulk::new(&scene(free, Size::pixels(pixels)), points);
-            let mut candidate = [Candidate::new(free.name(), || bulk.posterior.evaluate(black_box(&bulk.points[0])))];
+            let mut candidate = [Candidate::new(free.name(), || bulk.target.evaluate(black_box(&bulk.points[0])))];
             by_criterion(&mut criterion, &format!("evaluation, {pixels} pixels"), &mut candidate);
             measure(&bulk, free, pixels, &mut table);
         }
@@ -63,11 +63,11 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
     for theta in &bulk.points {
         let response = response(&bulk.posterior, theta);
         let mut only_passes = Passes::new(&response);
-        let evaluation = bulk.posterior.evaluate(theta);
+        let evaluation = bulk.target.evaluate(theta);
         assert_eq!(evaluation.status, Status::Converged, "{theta:?}");
         let (mut time, mut pass_time) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..2 {
-            time = time.min(seconds(|| bulk.posterior.evaluate(theta)));
+            time = time.min(seconds(|| bulk.target.evaluate(theta)));
             pass_time = pass_time.min(seconds(|| only_passes.run(&response, evaluation.passes)));
         }
         errors.push(1e3 * (evaluation.log_prob - exact.evaluate(theta).log_prob));

@@ -71,14 +71,14 @@ fn seam() {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     one.install(|| {
         for (free, pixels) in CASES {
-            let Case { posterior, target, task, points, .. } = Case::new(free, pixels);
+            let Case { target, task, points, .. } = Case::new(free, pixels);
             let pool = Pool::default();
             let evaluations = Evaluations::new(&pool, &target, &task);
             let (mut bare, mut seam) = (0.0, 0.0);
             for theta in &points[..SINGLE] {
                 let batch = [theta.clone()];
                 let mut candidates = [
-                    Candidate::new("bare", || posterior.evaluate(theta)),
+                    Candidate::new("bare", || target.evaluate(theta)),
                     Candidate::new("pool", || evaluations.evaluate(&batch)),
                 ];
                 let times = in_turn(&mut candidates, ROUNDS, 1);
@@ -158,15 +158,15 @@ fn workers(queue: &Queue) {
     ];
     let mut table = Table::new(&format!("Ranks: {} of them, {workers} of which work", workers + 1), &columns);
     for (free, pixels) in CASES {
-        let Case { posterior, task, points, .. } = Case::new(free, pixels);
+        let Case { target, task, points, .. } = Case::new(free, pixels);
         let brief = Brief::Density(Box::new(task)).to_bytes();
         let questions: Vec<Vec<u8>> = points.iter().map(Question::to_bytes).collect();
         let ask = || queue.answers(&brief, &questions, &AtomicBool::new(false));
-        let here: Vec<Vec<u8>> = points.iter().map(|theta| posterior.evaluate(theta).to_bytes()).collect();
+        let here: Vec<Vec<u8>> = points.iter().map(|theta| target.evaluate(theta).to_bytes()).collect();
         assert!(ask() == here, "the same bytes");
         let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let (one, several) = (pool(1), pool(workers));
-        let threads = |pool: &rayon::ThreadPool| pool.install(|| Threads(&posterior).evaluate(&points));
+        let threads = |pool: &rayon::ThreadPool| pool.install(|| Threads(&target).evaluate(&points));
         let mut candidates = [
             Candidate::new("1 thread", || threads(&one)),
             Candidate::new("as many threads", || threads(&several)),
@@ -196,10 +196,10 @@ fn ingredients(queue: &Queue) {
         ["free", "pixels", "ms of an evaluation: 5 %", "50 %", "95 %", "largest / mean", "ms of rank 0 for a proposal"];
     let mut table = Table::new("Evaluations of the bulk, and what only rank 0 does", &columns);
     for (free, pixels) in CASES {
-        let Case { scene, posterior, points, .. } = Case::new(free, pixels);
+        let Case { scene, posterior, target, points, .. } = Case::new(free, pixels);
         let ms: Vec<f64> = points
             .iter()
-            .map(|theta| 1e3 * (0..3).map(|_| seconds(|| posterior.evaluate(theta))).fold(f64::INFINITY, f64::min))
+            .map(|theta| 1e3 * (0..3).map(|_| seconds(|| target.evaluate(theta))).fold(f64::INFINITY, f64::min))
             .collect();
         let mean = ms.iter().sum::<f64>() / ms.len() as f64;
         let at = |p| format!("{:.2}", quantile(&ms, p));

@@ -27,7 +27,7 @@ fn main() {
         let bulk = Bulk::new(&scene(free, Size::pixels(pixels)), BATCH);
         let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let (one, two) = (pool(1), pool(2));
-        let batch = |pool: &rayon::ThreadPool| pool.install(|| Threads(&bulk.posterior).evaluate(&bulk.points));
+        let batch = |pool: &rayon::ThreadPool| pool.install(|| Threads(&bulk.target).evaluate(&bulk.points));
         let mut candidates = [Candidate::new("1 thread", || batch(&one)), Candidate::new("2 threads", || batch(&two))];
         let times = in_turn(&mut candidates, ROUNDS, 1);
         let rate = |times: &[f64]| format!("{:.0}", BATCH as f64 / fastest(times));

@@ -6,6 +6,7 @@
 use dimcmc::config::{self, ObservationSource};
 use dimcmc::ensemble::{StartDraw, draw_start};
 use dimcmc::objective::Posterior;
+use dimcmc::pool::Target as Density;
 use dimcmc::scene::Scene;
 use dimcmc::search::{self, SearchSettings};
 use dimcmc::star::{Response, StarState};
@@ -112,6 +113,8 @@ impl Passes {
 /// A posterior and points drawn from its bulk: a Gaussian around the maximum, as wide as the curvature there says.
 pub struct Bulk {
     pub posterior: Posterior,
+    /// What a chain samples: the posterior with its footholds.
+    pub target: Density,
     pub points: Vec<Vec<f64>>,
 }
 
@@ -130,6 +133,7 @@ impl Bulk {
         };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
         let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
-        Bulk { posterior: found.posterior, points }
+        let target = Density::new(found.posterior.clone(), scene.settings.imaging.spots_left).unwrap();
+        Bulk { posterior: found.posterior, target, points }
     }
 }
