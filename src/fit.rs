@@ -149,8 +149,7 @@ impl Fit {
     /// Holds `reference` against the `observations` that `imager` was made for.
     pub fn new(imager: &Imager, observations: &Observations, reference: &Reference) -> Self {
         let solution = &reference.solution;
-        let mut map = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&solution.image.coordinates, &mut map);
+        let map = imager.entropy.image(&solution.image.coordinates);
         let mut problem = imager.problem(reference.response.clone());
         let test = parallelism(&mut problem, imager.entropy, &solution.image.coordinates);
         problem.linearise(&map);

@@ -94,12 +94,11 @@ fn the_solution_meets_its_optimality_conditions() {
     let solution = solver.solve(&mut problem, Goal::Chi2 { target, largest_lambda: 1.0 }, &blank);
     assert_eq!(solution.termination, Termination::Converged);
     assert!((solution.chi2 - target).abs() < 1e-5);
-    let n = imager.grid.len();
-    let (mut s, mut misfit, mut order) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    imager.entropy.image(&solution.image.coordinates, &mut s);
+    let s = imager.entropy.image(&solution.image.coordinates);
+    let mut misfit = vec![0.0; s.len()];
     problem.linearise(&s);
     problem.gradient(&mut misfit);
-    imager.entropy.gradient(&solution.image.coordinates, &imager.grid.area, &mut order);
+    let order = imager.entropy.gradient(&solution.image.coordinates, &imager.grid.area);
     // the gradient of -S + (lambda/2) chi2 vanishes, in the entropy's metric, against either of its terms
     let norm = |g: &[f64]| g.iter().zip(&s).map(|(g, s)| g * g * s * (1.0 - s)).sum::<f64>().sqrt();
     let sum: Vec<f64> = order.iter().zip(&misfit).map(|(a, b)| a + solution.image.lambda * b).collect();

@@ -145,12 +145,9 @@ fn predictions_are_right_to_first_order() {
         let (imager, start) = (exact.imager(), exact.space().start());
         let map = |posterior: &Posterior, theta: &[f64]| {
             let image = posterior.reconstruct(theta).0.image;
-            let mut map = vec![0.0; imager.grid.len()];
-            imager.entropy.image(&image.coordinates, &mut map);
-            (map, image.lambda.ln())
+            (imager.entropy.image(&image.coordinates), image.lambda.ln())
         };
-        let mut scale = vec![0.0; imager.grid.len()];
-        imager.entropy.metric(&map(&exact, &start).0, &imager.grid.area, &mut scale);
+        let scale = imager.entropy.metric(&map(&exact, &start).0, &imager.grid.area);
         // K and systemic velocity by 0.4 standard errors, in which no pixels come into sight
         for (j, step) in [(0, 0.004), (7, 0.003)] {
             let errors = [1.0, 2.0].map(|steps| {

@@ -46,8 +46,7 @@ pub(super) struct DisplacedModel<'a> {
 
 impl<'a> DisplacedModel<'a> {
     pub fn new(imager: &'a Imager, reference: &'a Reference, stellar: &[Parameter]) -> Self {
-        let mut map = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&reference.solution.image.coordinates, &mut map);
+        let map = imager.entropy.image(&reference.solution.image.coordinates);
         let base = imager.time_base_cycles() * imager.star.rotation_period_d;
         let steps: Vec<f64> = stellar.iter().map(|&p| step(p, &reference.values, base)).collect();
         let at = |response: Response| displaced(imager, response, &map);

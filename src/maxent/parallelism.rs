@@ -9,12 +9,12 @@ use super::problem::Problem;
 /// Moves `problem` to the image.
 pub fn parallelism(problem: &mut impl Problem, entropy: Entropy, coordinates: &[f64]) -> f64 {
     let n = coordinates.len();
-    let [mut image, mut scale, mut towards_default, mut misfit] = [(); 4].map(|()| vec![0.0; n]);
-    entropy.image(coordinates, &mut image);
-    entropy.metric(&image, problem.area(), &mut scale);
+    let image = entropy.image(coordinates);
+    let scale = entropy.metric(&image, problem.area());
+    let towards_default = entropy.gradient(coordinates, problem.area());
+    let mut misfit = vec![0.0; n];
     problem.linearise(&image);
     problem.gradient(&mut misfit);
-    entropy.gradient(coordinates, problem.area(), &mut towards_default);
     // the gradient of -S, so that the sum is what vanishes
     let product = |a: &[f64], b: &[f64]| -> f64 { (0..n).map(|p| a[p] * b[p] * scale[p] * scale[p]).sum() };
     let (s, c) = (product(&towards_default, &towards_default).sqrt(), product(&misfit, &misfit).sqrt());

@@ -96,12 +96,9 @@ impl Solver<'_> {
     /// The inverse of the Newton system at `image`, applied to the image-space vector `right`; the problem must be
     /// linearised there. For derivatives of solutions by adjoints.
     pub fn apply_inverse(&self, problem: &mut impl Problem, image: &Image, right: &[f64]) -> Vec<f64> {
-        let n = right.len();
-        let (mut s, mut scale) = (vec![0.0; n], vec![0.0; n]);
-        self.entropy.image(&image.coordinates, &mut s);
-        self.entropy.metric(&s, problem.area(), &mut scale);
+        let scale = self.entropy.metric(&self.entropy.image(&image.coordinates), problem.area());
         let scaled: Vec<f64> = right.iter().zip(&scale).map(|(r, d)| r * d).collect();
-        let mut z = vec![0.0; n];
+        let mut z = vec![0.0; right.len()];
         let system = System { lambda: image.lambda, scale: &scale, curvature: Curvature::Exact };
         self.solve_system(problem, system, &scaled, &mut z);
         z.iter().zip(&scale).map(|(z, d)| z * d).collect()
@@ -109,10 +106,9 @@ impl Solver<'_> {
 
     /// The path along lambda from a solution at its bound, where the solver needs none, and the slopes along it.
     pub fn find_path(&self, problem: &mut impl Problem, solution: &mut Solution) {
-        let n = solution.image.coordinates.len();
-        let (mut s, mut scale, mut gradient) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        self.entropy.image(&solution.image.coordinates, &mut s);
-        self.entropy.metric(&s, problem.area(), &mut scale);
+        let s = self.entropy.image(&solution.image.coordinates);
+        let scale = self.entropy.metric(&s, problem.area());
+        let mut gradient = vec![0.0; s.len()];
         problem.linearise(&s);
         problem.gradient(&mut gradient);
         let pull: Vec<f64> = gradient.iter().map(|g| -solution.image.lambda * g).collect();
@@ -138,8 +134,7 @@ impl Solver<'_> {
         if start.path.len() != at.u.len() || !worth_it || move_lambda.is_nan() || move_lambda.abs() > RESTORE_REACH {
             return at;
         }
-        let mut ds = vec![0.0; at.u.len()];
-        self.entropy.metric(&at.s, problem.area(), &mut ds);
+        let mut ds = self.entropy.metric(&at.s, problem.area());
         ds.iter_mut().zip(&start.path).for_each(|(d, z)| *d *= z);
         let mut u = vec![0.0; at.u.len()];
         self.entropy.step(&at.u, &at.s, &ds, move_lambda, STEP_CAP, &mut u);

@@ -78,10 +78,10 @@ impl Standing {
     /// Takes the gradient at a point (one pass) and judges it by the guide.
     pub fn of(problem: &mut impl Problem, entropy: Entropy, at: &Point, goal: Goal, guide: Guide) -> Self {
         let n = at.u.len();
-        let (mut scale, mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        entropy.metric(&at.s, problem.area(), &mut scale);
+        let scale = entropy.metric(&at.s, problem.area());
+        let mut right = entropy.gradient(&at.u, problem.area());
+        let mut chi2_gradient = vec![0.0; n];
         problem.gradient(&mut chi2_gradient);
-        entropy.gradient(&at.u, problem.area(), &mut right);
         for p in 0..n {
             chi2_gradient[p] *= scale[p];
             right[p] = -(right[p] * scale[p] + at.lambda * chi2_gradient[p]);

@@ -3,7 +3,7 @@
 //! The reference is one. Far from it a Newton system is no longer close to the one that its preconditioner inverts, and an
 //! evaluation takes hundreds of passes instead of tens; another foothold there brings it down again, for the passes of about
 //! five such evaluations. What an evaluation ends at does not depend on where it started beyond the solver's tolerance. Left out:
-//! where footholds are worth it (`search`, `survey`).
+//! where a chain, a grid or a search will go, and how an image is made.
 
 use super::coordinates::ParameterSpace;
 use super::prediction::Prediction;

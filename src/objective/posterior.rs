@@ -245,9 +245,8 @@ impl Posterior {
             _ if unreachable => (-0.5, None),
             _ => {
                 let (entropy, area) = (self.imager.entropy, &self.imager.grid.area);
-                let [mut image, mut scale] = [(); 2].map(|()| vec![0.0; area.len()]);
-                entropy.image(&solution.image.coordinates, &mut image);
-                entropy.metric(&image, area, &mut scale);
+                let image = entropy.image(&solution.image.coordinates);
+                let scale = entropy.metric(&image, area);
                 let preconditioner = &self.nearest(theta).preconditioner;
                 let exact = Solver { entropy, preconditioner, settings: SolverSettings::exact() };
                 let inverse =
@@ -303,8 +302,7 @@ impl Gradient for Posterior {
             return (evaluation, Vec::new());
         }
         let (weight, direction) = self.sensitivity(theta, &solution, &mut problem);
-        let mut image = vec![0.0; self.imager.grid.len()];
-        self.imager.entropy.image(&solution.image.coordinates, &mut image);
+        let image = self.imager.entropy.image(&solution.image.coordinates);
         let internal = self.space.to_internal(theta);
         let response = problem.response().clone();
         let at_fixed_map = |i: usize, h: f64| {

@@ -63,11 +63,9 @@ impl Prediction {
         let scales = space.scales();
         let settings = SolverSettings { cg_tolerance: 0.01, ..SolverSettings::patient() };
         let solver = Solver { entropy: imager.entropy, preconditioner, settings };
-        let n = imager.grid.len();
-        let mut map = vec![0.0; n];
-        imager.entropy.image(&solution.image.coordinates, &mut map);
-        let mut scale = vec![0.0; n];
-        imager.entropy.metric(&map, &imager.grid.area, &mut scale);
+        let map = imager.entropy.image(&solution.image.coordinates);
+        let scale = imager.entropy.metric(&map, &imager.grid.area);
+        let n = map.len();
         let mut problem = imager.problem(solved.response.clone());
         problem.linearise(&map);
         let mut gradient = vec![0.0; n];
@@ -136,8 +134,7 @@ impl Prediction {
             ln_lambda += shift * along;
             ds.iter_mut().zip(image).for_each(|(ds, step)| *ds += shift * step);
         }
-        let mut map = vec![0.0; n];
-        imager.entropy.image(&start.image.coordinates, &mut map);
+        let map = imager.entropy.image(&start.image.coordinates);
         let here = start.image.coordinates.clone();
         imager.entropy.step(&here, &map, &ds, 1.0, 1.0, &mut start.image.coordinates);
         start.image.lambda *= ln_lambda.clamp(-LN_LAMBDA_REACH, LN_LAMBDA_REACH).exp();

@@ -190,9 +190,7 @@ impl Reference {
             settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::patient() },
         };
         let blank = Start::blank(&imager.entropy, imager.grid.len(), unit * BLANK_LAMBDA / data);
-        let mut unspotted = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&blank.image.coordinates, &mut unspotted);
-        let blank_chi2 = problem.linearise(&unspotted);
+        let blank_chi2 = problem.linearise(&imager.entropy.image(&blank.image.coordinates));
         if blank_chi2 <= chi2_target {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
         }
@@ -244,10 +242,9 @@ pub(super) fn start(solution: &Solution) -> Start {
 
 /// Eigenbasis of the curvature at a solution, in the entropy's metric.
 pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
-    let n = at.image.coordinates.len();
-    let (mut s, mut scale, mut scaled) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    imager.entropy.image(&at.image.coordinates, &mut s);
-    imager.entropy.metric(&s, problem.area(), &mut scale);
+    let s = imager.entropy.image(&at.image.coordinates);
+    let scale = imager.entropy.metric(&s, problem.area());
+    let (n, mut scaled) = (s.len(), s.clone());
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = v * d);

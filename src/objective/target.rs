@@ -103,8 +103,7 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
     let observed = moments(imager, &imager.data.depth);
     let mut problem = imager.problem(first.response.clone());
     let mut place = |solution: &Solution| {
-        let mut map = vec![0.0; imager.grid.len()];
-        imager.entropy.image(&solution.image.coordinates, &mut map);
+        let map = imager.entropy.image(&solution.image.coordinates);
         problem.linearise(&map);
         let modelled = moments(imager, problem.model());
         let filtered: Vec<f64> = observed.iter().zip(modelled).map(|(o, m)| o - m).collect();

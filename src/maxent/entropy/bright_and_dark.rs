@@ -17,18 +17,18 @@ use crate::vector::{Instructions, Task};
 pub(super) const LN_LIMIT: f64 = 30.0;
 
 /// The image B.
-pub(super) fn image(u: &[f64], b: &mut [f64]) {
-    b.iter_mut().zip(u).for_each(|(b, u)| *b = u.exp());
+pub(super) fn image(u: &[f64]) -> Vec<f64> {
+    u.iter().map(|u| u.exp()).collect()
 }
 
 /// Gradient of -S with respect to B.
-pub(super) fn gradient(u: &[f64], area: &[f64], out: &mut [f64]) {
-    out.iter_mut().zip(u).zip(area).for_each(|((out, u), a)| *out = a * u);
+pub(super) fn gradient(u: &[f64], area: &[f64]) -> Vec<f64> {
+    u.iter().zip(area).map(|(u, a)| a * u).collect()
 }
 
 /// Scale of the metric, `sqrt(B / a)`.
-pub(super) fn metric(b: &[f64], area: &[f64], out: &mut [f64]) {
-    out.iter_mut().zip(b).zip(area).for_each(|((out, b), a)| *out = (b / a).sqrt());
+pub(super) fn metric(b: &[f64], area: &[f64]) -> Vec<f64> {
+    b.iter().zip(area).map(|(b, a)| (b / a).sqrt()).collect()
 }
 
 /// Root mean square deviation from the default.

@@ -65,10 +65,10 @@ impl Entropy {
     }
 
     /// Image of the coordinates u.
-    pub fn image(&self, u: &[f64], image: &mut [f64]) {
+    pub fn image(&self, u: &[f64]) -> Vec<f64> {
         match self {
-            Entropy::Spots { .. } => spots::image(u, image),
-            Entropy::BrightAndDark => bright_and_dark::image(u, image),
+            Entropy::Spots { .. } => spots::image(u),
+            Entropy::BrightAndDark => bright_and_dark::image(u),
         }
     }
 
@@ -90,18 +90,18 @@ impl Entropy {
     }
 
     /// Gradient of -S with respect to the image.
-    pub fn gradient(&self, u: &[f64], area: &[f64], out: &mut [f64]) {
+    pub fn gradient(&self, u: &[f64], area: &[f64]) -> Vec<f64> {
         match *self {
-            Entropy::Spots { default_logit } => spots::gradient(default_logit, u, area, out),
-            Entropy::BrightAndDark => bright_and_dark::gradient(u, area, out),
+            Entropy::Spots { default_logit } => spots::gradient(default_logit, u, area),
+            Entropy::BrightAndDark => bright_and_dark::gradient(u, area),
         }
     }
 
     /// Scale of the metric: a step z in it is the image step `scale * z`.
-    pub fn metric(&self, image: &[f64], area: &[f64], out: &mut [f64]) {
+    pub fn metric(&self, image: &[f64], area: &[f64]) -> Vec<f64> {
         match self {
-            Entropy::Spots { .. } => spots::metric(image, area, out),
-            Entropy::BrightAndDark => bright_and_dark::metric(image, area, out),
+            Entropy::Spots { .. } => spots::metric(image, area),
+            Entropy::BrightAndDark => bright_and_dark::metric(image, area),
         }
     }
 
@@ -153,12 +153,11 @@ mod tests {
     fn value_is_the_formula() {
         assert_eq!(Entropy::new(1e-3), MODELS[0].0);
         for (entropy, u) in MODELS {
-            let (mut map, mut same) = ([0.0; 4], [0.0; 4]);
+            let mut map = [0.0; 4];
             let value = entropy.value(&u, &AREA, &mut map);
             let wanted: f64 = u.iter().zip(AREA).map(|(u, a)| a * formula(entropy, image(entropy, *u))).sum();
             assert!((value + wanted).abs() < 1e-13, "{entropy:?}: {value} {wanted}");
-            entropy.image(&u, &mut same);
-            assert!(map.iter().zip(same).all(|(a, b)| (a / b - 1.0).abs() < 1e-14));
+            assert!(map.iter().zip(entropy.image(&u)).all(|(a, b)| (a / b - 1.0).abs() < 1e-14));
             assert!(map.iter().zip(u).all(|(x, u)| (x / image(entropy, u) - 1.0).abs() < 1e-14));
             assert!(entropy.value(&[entropy.default_coordinate(); 4], &AREA, &mut map).abs() < 1e-15);
         }
@@ -168,10 +167,8 @@ mod tests {
     #[test]
     fn gradient_and_metric_are_its_derivatives() {
         for (entropy, u) in MODELS {
-            let (mut map, mut gradient, mut metric) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-            entropy.image(&u, &mut map);
-            entropy.gradient(&u, &AREA, &mut gradient);
-            entropy.metric(&map, &AREA, &mut metric);
+            let map = entropy.image(&u);
+            let (gradient, metric) = (entropy.gradient(&u, &AREA), entropy.metric(&map, &AREA));
             for p in 0..4 {
                 let h = 1e-4 * map[p].min((1.0 - map[p]).abs());
                 let [below, here, above] = [-h, 0.0, h].map(|h| AREA[p] * formula(entropy, map[p] + h));
@@ -186,12 +183,11 @@ mod tests {
     #[test]
     fn gradient_of_spottedness_is_its_derivative() {
         for (entropy, u) in MODELS {
-            let mut map = [0.0; 4];
-            entropy.image(&u, &mut map);
+            let map = entropy.image(&u);
             let gradient = entropy.spottedness_gradient(&map, &AREA);
             for p in 0..4 {
                 let at = |h: f64| {
-                    let mut moved = map;
+                    let mut moved = map.clone();
                     moved[p] += h;
                     entropy.spottedness(&moved, &AREA)
                 };
@@ -206,12 +202,11 @@ mod tests {
     #[test]
     fn steps_are_straight_in_the_image_as_long_as_they_are_small() {
         for (entropy, u) in MODELS {
-            let (mut map, mut moved, mut there) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-            entropy.image(&u, &mut map);
+            let (map, mut moved) = (entropy.image(&u), [0.0; 4]);
             for part in [-0.45, 0.3] {
-                let step = map.map(|x| part * x.min((1.0 - x).abs()));
+                let step: Vec<f64> = map.iter().map(|x| part * x.min((1.0 - x).abs())).collect();
                 assert!(!entropy.step(&u, &map, &step, 1.0, 2.0, &mut moved));
-                entropy.image(&moved, &mut there);
+                let there = entropy.image(&moved);
                 assert!((0..4).all(|p| ((there[p] - map[p]) / step[p] - 1.0).abs() < 1e-9), "{entropy:?} {part}");
             }
             // what would lead out of the domain does not

@@ -12,24 +12,18 @@ use crate::vector::{Instructions, Task};
 pub(super) const LOGIT_LIMIT: f64 = 30.0;
 
 /// The image s.
-pub(super) fn image(u: &[f64], s: &mut [f64]) {
-    for (s, u) in s.iter_mut().zip(u) {
-        *s = 1.0 / (1.0 + (-u).exp());
-    }
+pub(super) fn image(u: &[f64]) -> Vec<f64> {
+    u.iter().map(|u| 1.0 / (1.0 + (-u).exp())).collect()
 }
 
 /// Gradient of -S with respect to s.
-pub(super) fn gradient(default_logit: f64, u: &[f64], area: &[f64], out: &mut [f64]) {
-    for ((out, u), a) in out.iter_mut().zip(u).zip(area) {
-        *out = a * (u - default_logit);
-    }
+pub(super) fn gradient(default_logit: f64, u: &[f64], area: &[f64]) -> Vec<f64> {
+    u.iter().zip(area).map(|(u, a)| a * (u - default_logit)).collect()
 }
 
 /// Scale of the metric, `sqrt(s (1-s) / a)`.
-pub(super) fn metric(s: &[f64], area: &[f64], out: &mut [f64]) {
-    for ((out, s), a) in out.iter_mut().zip(s).zip(area) {
-        *out = (s * (1.0 - s) / a).sqrt();
-    }
+pub(super) fn metric(s: &[f64], area: &[f64]) -> Vec<f64> {
+    s.iter().zip(area).map(|(s, a)| (s * (1.0 - s) / a).sqrt()).collect()
 }
 
 /// Logits moved by an image step.
