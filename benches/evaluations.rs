@@ -50,9 +50,9 @@ fn main() {
     let [three, seven] = [Free::Three, Free::Seven].map(|free| most_passes(free).map(|target| target.to_string()));
     table.print(&format!(
         "Objective spottedness; points drawn from a Gaussian around the maximum with the covariance found there: 200 of them, 60 on \
-         20,000 pixels; the faster of two evaluations each. Targets of passes: {} and {} in 3-D, {} and {} in 7-D. The last column \
-         is the median over points of the time of an evaluation over that of as many passes, forward and transpose in turn, at \
-         the same point. Errors are differences to the log-probability with the solver taken to rounding error.",
+         20,000 pixels; the faster of two evaluations each. Targets of passes: {} and {} in 3-D, {} and {} in 7-D. An evaluation \
+         over its passes is the median over points of its time over that of as many passes, forward and transpose in turn, at the \
+         same point. Errors are differences to the log-probability with the solver taken to rounding error.",
         three[0], three[1], seven[0], seven[1]
     ));
 }

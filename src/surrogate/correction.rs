@@ -59,7 +59,9 @@ impl Surrogate {
         Surrogate::of(model, self.space.clone(), self.time_base_cycles, self.temperature)
     }
 
-    /// Share of the surrogate's draws that `density` would accept, one after the other.
+    /// Share of the surrogate's proposals that `density` accepts from where a chain is: its draws, each with the weight that
+    /// `density` has over the surrogate there. Without the weights the few draws where the surrogate is far too low, and a
+    /// chain stays for long, would hardly count.
     fn acceptance(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> f64 {
         let draws = self.evaluated(TRIALS, density, evaluator);
         let beyond: Vec<f64> = draws
@@ -71,10 +73,14 @@ impl Surrogate {
         let moves =
             |position: &Vec<f64>| self.place(position).is_some_and(|at| self.walk(at, &mut rng).position != *position);
         let moved = draws.iter().map(|draw| &draw.0).map(moves).filter(|moved| *moved).count() as f64 / TRIALS as f64;
-        // from each draw to every other; what has no log-probability is never accepted, and neither is what cannot be drawn
-        let pairs = beyond.iter().flat_map(|from| beyond.iter().map(move |to| (from, to)));
-        let accepted = |(from, to): (&f64, &f64)| if from.is_finite() { (to - from).exp().min(1.0) } else { 0.0 };
-        moved * pairs.map(accepted).sum::<f64>() / (TRIALS as f64).powi(2)
+        // what has no log-probability is never accepted, and neither is what cannot be drawn
+        let highest = beyond.iter().copied().filter(|beyond| beyond.is_finite()).fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> =
+            beyond.iter().map(|beyond| if beyond.is_finite() { (beyond - highest).exp() } else { 0.0 }).collect();
+        // from x to y: w_x min(1, w_y / w_x)
+        let pairs = weights.iter().flat_map(|from| weights.iter().map(move |to| from.min(*to)));
+        let total = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        moved * pairs.sum::<f64>() / (total * TRIALS as f64)
     }
 
     /// So many draws: internal and written coordinates, and log-probability.
