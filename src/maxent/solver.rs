@@ -104,7 +104,8 @@ impl Solver<'_> {
         z.iter().zip(&scale).map(|(z, d)| z * d).collect()
     }
 
-    /// The path along lambda from a solution at its bound, where the solver needs none, and the slopes along it.
+    /// The path along lambda from a solution, and the slopes along it: at the bound of lambda, where the solver needs none, or as
+    /// precise as this solver's systems are.
     pub fn find_path(&self, problem: &mut impl Problem, solution: &mut Solution) {
         let s = self.entropy.image(&solution.image.coordinates);
         let scale = self.entropy.metric(&s, problem.area());

@@ -22,6 +22,9 @@ const SMALLEST_CURVATURE: f64 = 0.2;
 /// Step in ln(lambda) between nodes of the trade-off curve.
 const CURVE_STEP: f64 = 0.25;
 
+/// Residual of the Newton systems on the way to a node: more steps, and fewer passes. Slopes are of one system solved well.
+const CURVE_CG_TOLERANCE: f64 = 0.05;
+
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
 const CURVE_REACH: (f64, f64) = (1.1, 0.8);
 
@@ -255,16 +258,19 @@ pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Sol
 
 /// Nodes of the trade-off curve, from small lambda to large, through `reference`.
 fn follow(solver: &Solver, problem: &mut impl Problem, reference: &Solution) -> TradeOff {
+    let rough = SolverSettings { cg_tolerance: CURVE_CG_TOLERANCE, ..solver.settings };
+    let rough = Solver { settings: rough, ..solver.clone() };
     let mut walk = |direction: f64, reach: f64| {
         let mut nodes = Vec::new();
         let mut at = reference.clone();
         while (at.image.lambda / reference.image.lambda).ln() * direction < reach {
             let target = at.chi2 + direction * CURVE_STEP * at.chi2_slope;
             let goal = Goal::Chi2 { target, largest_lambda: f64::INFINITY };
-            let next = solver.solve(problem, goal, &start(&at));
+            let mut next = rough.solve(problem, goal, &start(&at));
             if next.termination != Termination::Converged {
                 break;
             }
+            solver.find_path(problem, &mut next);
             nodes.push(node(&next));
             at = next;
         }
