@@ -293,3 +293,34 @@ fn a_posterior_that_counts_spots_left_over() {
         last = (alone, with);
     }
 }
+
+/// What ln L has beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the reference, as it is
+/// next to one that is not its maximum, and the density of the gradient below it.
+#[test]
+fn spots_left_over_magnify_nothing() {
+    let oracle = oracle();
+    let imager = imager(&oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2));
+    let mut at = truth(&oracle);
+    at[Parameter::K] = 0.07;
+    let reference = Reference::build(&imager, at, 0.97).unwrap();
+    let expansion = Expansion::of(&imager, &reference, &[]);
+    let free = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
+    let posterior = Posterior::new(imager.clone(), space(&imager, at, &free), ObjectiveKind::Spottedness, reference);
+    let counted = SpotsCounted::new(&posterior).unwrap();
+    let here = posterior.likelihood(&[0.07, at[Parameter::PorbOverProt], at[Parameter::Phi]]);
+    let here = here.likelihood.unwrap().log_likelihood;
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut above = 0;
+    for _ in 0..2000 {
+        let mut values = at;
+        values[Parameter::K] = rng.random_range(0.0..0.2);
+        values[Parameter::PorbOverProt] = rng.random_range(1.2..2.5);
+        values[Parameter::Phi] = rng.random_range(0.2..0.8);
+        let quadratic = expansion.log_likelihood_at(&values) - expansion.log_likelihood;
+        let at = |beyond: f64| counted.log_likelihood(&values, here + quadratic + beyond);
+        let gain = at(0.5) - at(0.0);
+        assert!(gain > 0.0 && gain <= 0.5, "{values:?}: {gain}");
+        above += usize::from(quadratic > 0.0 && at(0.0) < here);
+    }
+    println!("{above} of 2000 above the reference to second order and below it with spots counted");
+}

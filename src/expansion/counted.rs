@@ -6,19 +6,16 @@
 //! one or the other, so that the size is integrated over, uniform in its logarithm:
 //! `p(x) = sum_f |S_f|^-1/2 exp(-(g - I x) S_f^-1 (g - I x) / 2)`.
 //!
-//! Where the quadratic holds, that changes ln L by `ln p(x) - q(x)`, q the expansion's own. Far from the reference, where ln L is
-//! not the quadratic any more, it falls in the same proportion: `ln L' = ln p + rho (ln L - q)` with all changes from the
-//! reference and `rho` the ratio of the drops of ln p and q, softened where these are nothing: 1 at the reference, and at most 1
-//! where spots left over make the data less certain. Left out: where the reference is.
+//! ln L as the objective has it is more than the quadratic q, the more so the farther from the reference. For one size, spots
+//! left over temper a likelihood: they leave the share `rho = x I S_f^-1 I x / x I x`, at most 1, of what the quadratic falls by
+//! along x, and of all that ln L does beyond it as well. So every term of the sum has `rho_f (ln L - q)` in its exponent besides.
+//! Left out: where the reference is.
 
 use super::spots::SPOTS_LEFT;
 use super::{Expansion, free_stellar, nuisances};
 use crate::log_density::{Evaluation, Status};
 use crate::objective::{Parameter, ParameterSpace, ParameterValues, Posterior};
 use nalgebra::{DMatrix, DVector};
-
-/// Drops of ln L below this are nothing.
-const SOFT: f64 = 0.1;
 
 /// Sizes that are integrated over, for each factor of ten.
 const SIZES_PER_DECADE: f64 = 4.0;
@@ -72,15 +69,16 @@ impl SpotsCounted {
     /// ln L with spots left over counted, where it is `log_likelihood` with spots as the entropy has them.
     pub fn log_likelihood(&self, values: &ParameterValues, log_likelihood: f64) -> f64 {
         let step = self.entropy.coordinates(values) - &self.entropy.centre;
-        let counted = self.ln_density(&step) - self.ln_density(&DVector::zeros(step.len()));
-        let entropy = self.entropy.log_likelihood_at(values) - self.entropy.log_likelihood;
-        let drop = |change: f64| SOFT + (-change).max(0.0);
-        self.at_reference + counted + drop(counted) / drop(entropy) * (log_likelihood - self.at_reference - entropy)
+        let quadratic = self.entropy.log_likelihood_at(values) - self.entropy.log_likelihood;
+        let beyond = log_likelihood - self.at_reference - quadratic;
+        let nowhere = DVector::zeros(step.len());
+        self.at_reference + self.ln_density(&step, beyond) - self.ln_density(&nowhere, 0.0)
     }
 
-    /// ln of the density of the gradient, the size integrated over.
-    fn ln_density(&self, step: &DVector<f64>) -> f64 {
-        let terms: Vec<f64> = self.sizes.iter().map(|size| size.ln_density(step)).collect();
+    /// ln of the density of the gradient, the size integrated over, where ln L is so much `beyond` the quadratic.
+    fn ln_density(&self, step: &DVector<f64>, beyond: f64) -> f64 {
+        let whole = step.dot(&(&self.entropy.information * step));
+        let terms: Vec<f64> = self.sizes.iter().map(|size| size.ln_density(step, whole, beyond)).collect();
         let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
     }
@@ -110,7 +108,12 @@ impl Size {
         })
     }
 
-    fn ln_density(&self, step: &DVector<f64>) -> f64 {
-        self.ln_norm - 0.5 * (&self.gradient - &self.information * step).norm_squared()
+    /// `whole` is what the entropy's information makes of the step.
+    fn ln_density(&self, step: &DVector<f64>, whole: f64, beyond: f64) -> f64 {
+        let moved = &self.information * step;
+        let left = moved.norm_squared();
+        // rounding may make more of it than there is, or of nothing something
+        let share = if left < whole { left / whole } else { 1.0 };
+        self.ln_norm - 0.5 * (&self.gradient - moved).norm_squared() + share * beyond
     }
 }
