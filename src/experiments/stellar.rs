@@ -63,13 +63,16 @@ const STELLAR: [Stellar; 4] = [
     },
 ];
 
+/// First columns of the table: what the chain took, and what a grid as fine over all parameters would take.
+const COSTS: [&str; 3] = ["dimensions", "chain_reconstructions", "nodes_of_a_grid"];
+
 /// R12.
 pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let names: Vec<&str> =
         Parameter::ALL.iter().filter(|&&p| p != Parameter::Vsys && !p.is_surface()).map(|p| p.name()).collect();
     let ends = ["true", "median", "low68", "high68", "low95", "high95"];
     let of_one = |name: &&str| ends.map(|end| format!("{name}_{end}"));
-    let mut report = Report::new(["dimensions".to_owned()].into_iter().chain(names.iter().flat_map(of_one)));
+    let mut report = Report::new(COSTS.map(String::from).into_iter().chain(names.iter().flat_map(of_one)));
     for free in [2, 4] {
         let dimensions = 3 + free;
         let folder = laboratory.folder(&format!("R12/{dimensions}D"))?;
@@ -85,7 +88,9 @@ pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError
         let (grid, _) = case::landscape(&conditional, found, grid, &folder.join("grid"), laboratory.pool)?;
         let comparison = Comparison::of(&Pair::read(&folder.join("chain"), &folder.join("grid"))?, Rule::default())?;
         let truth = &scene.truth.expect("the star is simulated");
-        let mut row = vec![f64::from(dimensions as u32)];
+        let nodes = comparison.nodes_needed.unwrap_or(f64::NAN);
+        let costs = [dimensions as f64, chain.reconstructions as f64, nodes];
+        let mut row = costs.to_vec();
         let (mut inside, mut all) = (0, 0);
         for name in &names {
             let injected = truth[Parameter::from_name(name).expect("a parameter's own name")];
