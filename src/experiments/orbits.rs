@@ -219,16 +219,18 @@ fn panel(x: &str, name: &str) -> Panel {
 
 const SEED: &str = "/observations/simulate/seed";
 
+/// Changes of a config that let the period be anything, as it may be where there is no planet.
+fn all_the_periods() -> [(&'static str, Value); 2] {
+    [("/parameters/porb_over_prot/min", json!(0.5)), ("/parameters/porb_over_prot/max", json!(4.0))]
+}
+
 /// R4. The landscape knows nothing of spots left over, so that only the chain is made in both ways.
 pub(super) fn no_planet(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let mut stars = Vec::new();
     for (way, spots_left) in ways_with_spots_left() {
         for seed in 1..=5_u32 {
-            let mut changes = vec![
-                ("/parameters/porb_over_prot/min", json!(0.5)),
-                ("/parameters/porb_over_prot/max", json!(4.0)),
-                (SEED, json!(seed)),
-            ];
+            let mut changes = vec![(SEED, json!(seed))];
+            changes.extend(all_the_periods());
             changes.extend(spots_left.clone());
             let mut star = star(laboratory, &[("seed", f64::from(seed)), way], [0.0, 1.7, 0.5], &changes);
             let [k, period, phi] = laboratory.full_or_quick([11, 15, 12], [5, 5, 5]);
@@ -279,11 +281,11 @@ pub(super) fn targets(laboratory: &Laboratory) -> Result<Report, ExperimentError
 }
 
 /// R9. Once with the projected velocity as it is, as a line's width gives it, and once with the equatorial velocity kept, so that
-/// vsini goes with the inclination.
+/// vsini goes with the inclination; the latter also with all periods allowed.
 pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     const TRUE_DEG: f64 = 38.0;
     const VSINI_KMS: f64 = 40.0;
-    let star = |(assumed, equatorial): (f64, bool)| {
+    let star = |(assumed, equatorial, all_periods): (f64, bool, bool)| {
         let ratio = assumed.to_radians().sin() / TRUE_DEG.to_radians().sin();
         let mut changes = vec![
             ("/observations/simulate/truth/inclination_deg", json!(TRUE_DEG)),
@@ -293,16 +295,23 @@ pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, Experiment
             changes.push(("/observations/simulate/truth/vsini_kms", json!(VSINI_KMS)));
             changes.push(("/star/vsini_kms", json!(VSINI_KMS * ratio)));
         }
-        let varied = [("assumed_deg", assumed), ("equatorial_velocity_kept", f64::from(u8::from(equatorial)))];
+        if all_periods {
+            changes.extend(all_the_periods());
+            // where nothing fits, K grows beyond what the paper's planets have
+            changes.push(("/parameters/k_kms/max", json!(0.6)));
+        }
+        let [equatorial, all_periods] = [equatorial, all_periods].map(|is| f64::from(u8::from(is)));
+        let varied = [("assumed_deg", assumed), ("equatorial_velocity_kept", equatorial), ("all_periods", all_periods)];
         star(laboratory, &varied, PLANET, &changes)
     };
     // far off the solver takes minutes to find that nothing fits
     let projected = laboratory.full_or_quick(&[33.0, 35.0, 37.0, 38.0, 39.0, 41.0, 43.0][..], &[37.0, 39.0]);
-    let equatorial = laboratory.full_or_quick(&[33.0, 36.0, 40.0, 43.0][..], &[]);
-    let projected = projected.iter().map(|&assumed| (assumed, false));
-    let equatorial = equatorial.iter().map(|&assumed| (assumed, true));
-    let names = ["assumed_deg", "equatorial_velocity_kept"];
-    tabulated(laboratory, "R9", &names, projected.chain(equatorial).map(star).collect())
+    let equatorial = laboratory.full_or_quick(&[33.0, 34.0, 35.0, 36.0, 40.0, 43.0][..], &[]);
+    let projected = projected.iter().map(|&assumed| (assumed, false, false));
+    let near = equatorial.iter().map(|&assumed| (assumed, true, false));
+    let everywhere = equatorial.iter().map(|&assumed| (assumed, true, true));
+    let names = ["assumed_deg", "equatorial_velocity_kept", "all_periods"];
+    tabulated(laboratory, "R9", &names, projected.chain(near).chain(everywhere).map(star).collect())
 }
 
 /// Shear of the star, and of the model.
