@@ -6,9 +6,12 @@
 //! one or the other, so that the size is integrated over, uniform in its logarithm:
 //! `p(x) = sum_f |S_f|^-1/2 exp(-(g - I x) S_f^-1 (g - I x) / 2)`.
 //!
-//! ln L as the objective has it is more than the quadratic q, the more so the farther from the reference. For one size, spots
-//! left over temper a likelihood: they leave the share `rho = x I S_f^-1 I x / x I x`, at most 1, of what the quadratic falls by
-//! along x, and of all that ln L does beyond it as well. So every term of the sum has `rho_f (ln L - q)` in its exponent besides.
+//! ln L as the objective has it is more than the quadratic q, the more so the farther from the reference. A map answers a large
+//! change of the velocities as q says that it would a smaller one in the same direction (or a larger one): in place of x stands
+//! `c x` with `q(c x) = ln L`, on the same side of the highest q in that direction. Next to that height, where c would jump, it is
+//! softened, and of the rest every term has the share `rho_f = x I S_f^-1 I x / x I x`, at most 1, that spots left over leave of what q
+//! does along x. So nothing is better than what explains all velocities but for the rest, and with spots of the entropy's
+//! own size ln L comes back as it is.
 //! Left out: where the reference is.
 
 use super::spots::SPOTS_LEFT;
@@ -16,6 +19,9 @@ use super::{Expansion, free_stellar, nuisances};
 use crate::log_density::{Evaluation, Status};
 use crate::objective::{Parameter, ParameterSpace, ParameterValues, Posterior};
 use nalgebra::{DMatrix, DVector};
+
+/// Differences of ln L below this are next to nothing.
+const SOFT: f64 = 1.0;
 
 /// Sizes that are integrated over, for each factor of ten.
 const SIZES_PER_DECADE: f64 = 4.0;
@@ -69,16 +75,32 @@ impl SpotsCounted {
     /// ln L with spots left over counted, where it is `log_likelihood` with spots as the entropy has them.
     pub fn log_likelihood(&self, values: &ParameterValues, log_likelihood: f64) -> f64 {
         let step = self.entropy.coordinates(values) - &self.entropy.centre;
-        let quadratic = self.entropy.log_likelihood_at(values) - self.entropy.log_likelihood;
-        let beyond = log_likelihood - self.at_reference - quadratic;
+        let (answer, rest) = self.answer(&step, log_likelihood - self.at_reference);
         let nowhere = DVector::zeros(step.len());
-        self.at_reference + self.ln_density(&step, beyond) - self.ln_density(&nowhere, 0.0)
+        self.at_reference + self.ln_density(&step, answer, rest) - self.ln_density(&nowhere, 1.0, 0.0)
     }
 
-    /// ln of the density of the gradient, the size integrated over, where ln L is so much `beyond` the quadratic.
-    fn ln_density(&self, step: &DVector<f64>, beyond: f64) -> f64 {
+    /// How many times `step` the map answers where ln L changes by `change`, and what is left of the change.
+    fn answer(&self, step: &DVector<f64>, change: f64) -> (f64, f64) {
         let whole = step.dot(&(&self.entropy.information * step));
-        let terms: Vec<f64> = self.sizes.iter().map(|size| size.ln_density(step, whole, beyond)).collect();
+        let along = self.entropy.gradient.dot(step);
+        let quadratic = |times: f64| times * (along - 0.5 * times * whole);
+        if whole <= 0.0 {
+            return (1.0, change - quadratic(1.0));
+        }
+        // where the quadratic is highest along the step, and how far below that height it and ln L are
+        let top = along / whole;
+        let height = 0.5 * along * top;
+        let (of_quadratic, of_change) = (0.5 * whole * (1.0 - top).powi(2), (height - change).max(0.0));
+        let shrink = ((SOFT + of_change) / (SOFT + of_quadratic)).sqrt();
+        let times = 1.0 + (shrink - 1.0) * (1.0 - top);
+        (times, change - quadratic(times))
+    }
+
+    /// ln of the density of the gradient, the size integrated over, at so many `times` the step, and the `rest`.
+    fn ln_density(&self, step: &DVector<f64>, times: f64, rest: f64) -> f64 {
+        let whole = step.dot(&(&self.entropy.information * step));
+        let terms: Vec<f64> = self.sizes.iter().map(|size| size.ln_density(step, times, whole, rest)).collect();
         let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
     }
@@ -109,11 +131,106 @@ impl Size {
     }
 
     /// `whole` is what the entropy's information makes of the step.
-    fn ln_density(&self, step: &DVector<f64>, whole: f64, beyond: f64) -> f64 {
+    fn ln_density(&self, step: &DVector<f64>, times: f64, whole: f64, rest: f64) -> f64 {
         let moved = &self.information * step;
         let left = moved.norm_squared();
-        // rounding may make more of it than there is, or of nothing something
+        // rounding may make more of it than there is
         let share = if left < whole { left / whole } else { 1.0 };
-        self.ln_norm - 0.5 * (&self.gradient - moved).norm_squared() + share * beyond
+        self.ln_norm - 0.5 * (&self.gradient - times * moved).norm_squared() + share * rest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_distr::StandardNormal;
+
+    /// Sixteen profiles whose velocities scatter far more than the entropy expects.
+    fn spotted() -> SpotsCounted {
+        let n = 16;
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let waves = DMatrix::from_fn(n, 5, |_, _| rng.sample::<f64, _>(StandardNormal));
+        let noise = DMatrix::identity(n, n) * 4.0;
+        let entropy = Expansion {
+            values: ParameterValues::of_eight([0.0, 1.7, 0.0, 2.0, 0.0, 40.0, 40.0, 0.0]),
+            cycles: (0..n).map(|k| 0.37 * k as f64).collect(),
+            stellar: Vec::new(),
+            log_likelihood: -3.0,
+            centre: DVector::zeros(n),
+            gradient: 20.0 * &waves * DVector::from_fn(5, |_, _| rng.sample::<f64, _>(StandardNormal)),
+            information: &noise + &waves * waves.transpose(),
+            noise,
+        };
+        let sizes = (0..=24).filter_map(|k| Size::new(&entropy, 10f64.powf(0.25 * f64::from(k)))).collect();
+        SpotsCounted { at_reference: 7.0, cautious: entropy.clone(), entropy, sizes }
+    }
+
+    fn orbits() -> impl Iterator<Item = ParameterValues> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        (0..1000).map(move |_| {
+            let orbit = [10f64.powf(rng.random_range(-2.0..2.0)), rng.random_range(0.5..4.0), rng.random()];
+            ParameterValues::of_eight([orbit[0], orbit[1], orbit[2], 2.0, 0.0, 40.0, 40.0, 0.0])
+        })
+    }
+
+    /// Where a map answers as it would a step of that many times the length, spots counted or not.
+    #[test]
+    fn a_map_that_answers_less_is_a_smaller_step() {
+        let counted = spotted();
+        let mut compared = 0;
+        for values in orbits() {
+            let step = counted.entropy.coordinates(&values);
+            for times in [0.2, 0.6, 0.95, 1.0, 1.3] {
+                let smaller = times * &step;
+                let change = counted.entropy.gradient.dot(&smaller)
+                    - 0.5 * smaller.dot(&(&counted.entropy.information * &smaller));
+                let top = counted.entropy.gradient.dot(&step) / step.dot(&(&counted.entropy.information * &step));
+                // beyond the height in its direction on one side only, and by much more than SOFT
+                if (times - top) * (1.0 - top) <= 0.0 || 0.5 * (times - top).powi(2) * step.norm_squared() < 50.0 {
+                    continue;
+                }
+                let wanted = 7.0 + counted.ln_density(&smaller, 1.0, 0.0)
+                    - counted.ln_density(&DVector::zeros(step.len()), 1.0, 0.0);
+                let got = counted.log_likelihood(&values, 7.0 + change);
+                assert!((got - wanted).abs() < SOFT, "{values:?} {times}: {got} for {wanted}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 500, "{compared}");
+    }
+
+    /// ln L that falls no further than to 50 below the reference: no orbit, however large, is better than one that explains all
+    /// velocities.
+    #[test]
+    fn a_map_that_answers_little_is_no_better_than_a_perfect_fit() {
+        let counted = spotted();
+        let perfect = counted.sizes.iter().map(|size| size.ln_norm.exp()).sum::<f64>().ln();
+        let most = 7.0 + perfect - counted.ln_density(&DVector::zeros(counted.entropy.centre.len()), 1.0, 0.0);
+        for values in orbits() {
+            let quadratic = counted.entropy.log_likelihood_at(&values) + 3.0;
+            let at = counted.log_likelihood(&values, 7.0 + quadratic.max(-50.0));
+            assert!(at <= most + SOFT, "{values:?}: {at} of {most}");
+        }
+    }
+
+    /// Where ln L is a little off the quadratic, that changes it little: also where the quadratic is highest along the step.
+    #[test]
+    fn nothing_is_magnified() {
+        let counted = spotted();
+        for mut values in orbits() {
+            let step = counted.entropy.coordinates(&values);
+            let top = counted.entropy.gradient.dot(&step) / step.dot(&(&counted.entropy.information * &step));
+            // at the height, and a little before and beyond it
+            for part in [0.98, 1.0, 1.02] {
+                if top > 0.0 {
+                    values[Parameter::K] *= part * top;
+                }
+                let quadratic = counted.entropy.log_likelihood_at(&values) + 3.0;
+                let at = |beyond: f64| counted.log_likelihood(&values, 7.0 + quadratic + beyond);
+                let change = (at(0.05) - at(-0.05)).abs();
+                assert!(change < 1.0, "{values:?}: {change}");
+            }
+        }
     }
 }

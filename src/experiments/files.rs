@@ -56,7 +56,7 @@ impl Report {
             row: row.name,
             title: row.title,
             paper: row.paper,
-            version: crate::VERSION,
+            version: env!("CARGO_PKG_VERSION"),
             made,
             seed: "chains 1; noise 1, or what the column `seed` says",
             figure: &self.figure,
