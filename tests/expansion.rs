@@ -323,4 +323,5 @@ fn spots_left_over_magnify_nothing() {
         above += usize::from(quadratic > 0.0 && at(0.0) < here);
     }
     println!("{above} of 2000 above the reference to second order and below it with spots counted");
+    assert!(above > 0, "the case that this is about");
 }

@@ -29,8 +29,9 @@ const SIZES_PER_DECADE: f64 = 4.0;
 /// What a posterior becomes where spots left over count as noise.
 #[derive(Clone, Debug)]
 pub struct SpotsCounted {
-    /// ln L as the objective has it at the reference.
+    /// ln L as the objective has it at the reference, and the density of the gradient there, ln of it.
     at_reference: f64,
+    density_at_reference: f64,
     entropy: Expansion,
     cautious: Expansion,
     sizes: Vec<Size>,
@@ -63,7 +64,14 @@ impl SpotsCounted {
         let sizes = (0..=places).filter_map(|place| Size::new(&entropy, factor(place))).collect();
         let theta = posterior.space().theta_of(&reference.values);
         let at_reference = posterior.likelihood(&theta).likelihood?.log_likelihood;
-        Some(SpotsCounted { at_reference, entropy, cautious, sizes })
+        let counted = SpotsCounted::of(at_reference, entropy, cautious, sizes);
+        counted.density_at_reference.is_finite().then_some(counted)
+    }
+
+    fn of(at_reference: f64, entropy: Expansion, cautious: Expansion, sizes: Vec<Size>) -> Self {
+        let nowhere = DVector::zeros(entropy.centre.len());
+        let counted = SpotsCounted { at_reference, density_at_reference: 0.0, entropy, cautious, sizes };
+        SpotsCounted { density_at_reference: counted.ln_density(&nowhere, 1.0, 0.0), ..counted }
     }
 
     /// ln L at the reference to second order, with spots left over of the larger of the sizes that are most probable with the
@@ -76,8 +84,7 @@ impl SpotsCounted {
     pub fn log_likelihood(&self, values: &ParameterValues, log_likelihood: f64) -> f64 {
         let step = self.entropy.coordinates(values) - &self.entropy.centre;
         let (answer, rest) = self.answer(&step, log_likelihood - self.at_reference);
-        let nowhere = DVector::zeros(step.len());
-        self.at_reference + self.ln_density(&step, answer, rest) - self.ln_density(&nowhere, 1.0, 0.0)
+        self.at_reference + self.ln_density(&step, answer, rest) - self.density_at_reference
     }
 
     /// How many times `step` the map answers where ln L changes by `change`, and what is left of the change.
@@ -163,7 +170,7 @@ mod tests {
             noise,
         };
         let sizes = (0..=24).filter_map(|k| Size::new(&entropy, 10f64.powf(0.25 * f64::from(k)))).collect();
-        SpotsCounted { at_reference: 7.0, cautious: entropy.clone(), entropy, sizes }
+        SpotsCounted::of(7.0, entropy.clone(), entropy, sizes)
     }
 
     fn orbits() -> impl Iterator<Item = ParameterValues> {
@@ -190,8 +197,7 @@ mod tests {
                 if (times - top) * (1.0 - top) <= 0.0 || 0.5 * (times - top).powi(2) * step.norm_squared() < 50.0 {
                     continue;
                 }
-                let wanted = 7.0 + counted.ln_density(&smaller, 1.0, 0.0)
-                    - counted.ln_density(&DVector::zeros(step.len()), 1.0, 0.0);
+                let wanted = 7.0 + counted.ln_density(&smaller, 1.0, 0.0) - counted.density_at_reference;
                 let got = counted.log_likelihood(&values, 7.0 + change);
                 assert!((got - wanted).abs() < SOFT, "{values:?} {times}: {got} for {wanted}");
                 compared += 1;
@@ -206,7 +212,7 @@ mod tests {
     fn a_map_that_answers_little_is_no_better_than_a_perfect_fit() {
         let counted = spotted();
         let perfect = counted.sizes.iter().map(|size| size.ln_norm.exp()).sum::<f64>().ln();
-        let most = 7.0 + perfect - counted.ln_density(&DVector::zeros(counted.entropy.centre.len()), 1.0, 0.0);
+        let most = 7.0 + perfect - counted.density_at_reference;
         for values in orbits() {
             let quadratic = counted.entropy.log_likelihood_at(&values) + 3.0;
             let at = counted.log_likelihood(&values, 7.0 + quadratic.max(-50.0));

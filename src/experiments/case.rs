@@ -37,7 +37,7 @@ const SHORTEST: f64 = 0.3;
 
 /// A target out of reach is set above what a provisional reference reaches, by the first of these factors at which there is an
 /// image at the best orbit.
-const ABOVE_REACHED: [f64; 6] = [1.05, 1.08, 1.12, 1.2, 1.5, 2.0];
+const ABOVE_REACHED: [f64; 5] = [1.05, 1.08, 1.12, 1.2, 1.5];
 
 /// Where the nodes of a grid over K, Porb/Prot and phi are.
 #[derive(Clone, Debug, PartialEq)]

@@ -306,7 +306,7 @@ pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, Experiment
     };
     // far off the solver takes minutes to find that nothing fits
     let projected = laboratory.full_or_quick(&[33.0, 35.0, 37.0, 38.0, 39.0, 41.0, 43.0][..], &[37.0, 39.0]);
-    let equatorial = laboratory.full_or_quick(&[33.0, 34.0, 35.0, 36.0, 40.0, 43.0][..], &[]);
+    let equatorial = laboratory.full_or_quick(&[35.0, 36.0, 40.0, 43.0][..], &[]);
     let projected = projected.iter().map(|&assumed| (assumed, false, false));
     let near = equatorial.iter().map(|&assumed| (assumed, true, false));
     let everywhere = equatorial.iter().map(|&assumed| (assumed, true, true));

@@ -144,7 +144,8 @@ pub struct Solution {
     /// `d spottedness / d ln(lambda)` along the path (0 if the goal was a lambda).
     pub spottedness_slope: f64,
     /// `dz / d ln(lambda)` as last computed, before the last step: in the entropy's metric there, good to first order in the
-    /// step. The start's guess if there was no step; of no meaning if the goal was a lambda.
+    /// step. The start's guess if there was no step; of no meaning if the goal was a lambda. Where `find_path` was asked, as it
+    /// is at the image.
     pub path: Vec<f64>,
     /// Newton steps taken.
     pub newton_steps: usize,

@@ -247,7 +247,7 @@ pub(super) fn start(solution: &Solution) -> Start {
 pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
     let s = imager.entropy.image(&at.image.coordinates);
     let scale = imager.entropy.metric(&s, problem.area());
-    let (n, mut scaled) = (s.len(), s.clone());
+    let (n, mut scaled) = (s.len(), vec![0.0; s.len()]);
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = v * d);
@@ -258,8 +258,8 @@ pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Sol
 
 /// Nodes of the trade-off curve, from small lambda to large, through `reference`.
 fn follow(solver: &Solver, problem: &mut impl Problem, reference: &Solution) -> TradeOff {
-    let rough = SolverSettings { cg_tolerance: CURVE_CG_TOLERANCE, ..solver.settings };
-    let rough = Solver { settings: rough, ..solver.clone() };
+    let settings = SolverSettings { cg_tolerance: CURVE_CG_TOLERANCE, ..solver.settings };
+    let rough = Solver { settings, ..solver.clone() };
     let mut walk = |direction: f64, reach: f64| {
         let mut nodes = Vec::new();
         let mut at = reference.clone();
