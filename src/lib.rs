@@ -91,9 +91,6 @@ pub mod units;
 pub mod vector;
 pub mod velocities;
 
-/// The version, with the commit that it was built from where that is known.
-pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"));
-
 pub use fit::Fit;
 pub use log_density::LogDensity;
 pub use objective::{Posterior, Reference};

@@ -36,8 +36,10 @@ mod simulate;
 pub use failure::Failure;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
-use dimcmc::VERSION;
 use std::num::NonZeroUsize;
+
+/// The version, with the commit that it was built from where that is known.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"));
 
 /// Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
 #[derive(Debug, Parser)]
