@@ -106,10 +106,10 @@ for name in names:
     halves = [facet.values[:, whole] if kept % 2 else facet.values for facet in facets]
     close(f"ArviZ R-hat of {name}", max(float(az.rhat(facet)) for facet in halves), wanted["rhat"], 2e-5)
     # ArviZ looks at the series of the walkers, as tau does, but ends its sums by another rule and cuts the series in two, which
-    # takes 2 tau/kept = 5 % of the correlation away; both know tau to 10 %
+    # takes 2 tau/kept = 3 % of the correlation away; both know tau to 10 %
     ess = min(float(az.ess(facet.values)) for facet in facets)
     within(f"ArviZ ESS of {name} over draws / tau", ess * wanted["tau"] / draws, 0.75, 1.35)
-    # summary.json: from the series of the four ensembles' means, whose tau is known to 2 sqrt(5 tau / (4 kept)) = 40 %
+    # summary.json: from the series of the four ensembles' means, whose tau is known to 2 sqrt(5 tau / (4 kept)) = 30 %
     within(f"ArviZ ESS of {name} over summary.json's", ess / wanted["ess"], 0.33, 3.0)
     # draws in the order of the chain hide the correlation between steps behind the walkers
     mixed = cube(name, discarded).transpose(1, 0, 2).reshape(ensembles, -1)

@@ -60,7 +60,7 @@ fn in_order(desk: &Desk, records: &[Value], store: &str, group: &str) -> Vec<Val
 fn other_programs_find_what_the_summary_says() {
     let Some(python) = python::python() else { return };
     let moves = json!({ "surrogate": 0 });
-    let desk = Desk::new(two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 400, "ess": 1e6, "moves": moves })));
+    let desk = Desk::new(two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 800, "ess": 1e6, "moves": moves })));
     desk.succeed(&["sample", CONFIG, "--out", "run"]);
     for format in FORMATS {
         let said = desk.succeed(&["export", "run", "--format", format]);

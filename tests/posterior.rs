@@ -1,9 +1,9 @@
 //! Whole chains against the posterior of an independent implementation (`posterior.json`: emcee on the regularised likelihood
 //! at lambda = 1e-3 on the oracle's pixel table), on the oracle's data.
 //!
-//! Tolerances: the reference chain and ours have an effective size of 600 and about 2000, so that medians agree to 0.05 sigma
-//! and widths to 4 % by chance alone; what is asked for is three times that on the same pixels, and twice as much again on
-//! another grid of pixels.
+//! Tolerances: the reference chain and ours have effective sizes of 600 and of 3000 on the same pixels, 1500 on others, so that
+//! medians agree to 0.056 sigma (`1.25 (1/600 + 1/3000)^1/2`) and widths to 4 % by chance alone; what is asked for is three times
+//! that on the same pixels, and twice as much again on another grid of pixels.
 
 mod common;
 
@@ -34,9 +34,9 @@ fn posterior(oracle: &Oracle, grid: SurfaceGrid, kind: ObjectiveKind, chi2_per_d
     Posterior::new(imager, space, kind, reference)
 }
 
-/// A chain to an effective size of 1500, by the affine-invariant moves alone or with the surrogate move.
-fn sample(posterior: &Posterior, surrogate: bool) -> Summary {
-    let settings = SamplerSettings { walkers: 16, steps: 1500, ess: 1500.0, seed: 7, ..SamplerSettings::default() };
+/// A chain to an effective size, by the affine-invariant moves alone or with the surrogate move.
+fn sample(posterior: &Posterior, surrogate: bool, ess: f64) -> Summary {
+    let settings = SamplerSettings { walkers: 16, steps: 3000, ess, seed: 7, ..SamplerSettings::default() };
     let optimum = climb(posterior, &posterior.space().start(), &|| ()).unwrap();
     let draw = StartDraw {
         centre: &optimum.theta,
@@ -90,19 +90,19 @@ fn regularised_likelihood_on_the_oracle_pixels() {
     let chi2_per_datum = chi2 / oracle.data.depth.len() as f64;
     let posterior = posterior(&oracle, oracle.grid.clone(), ObjectiveKind::RegularisedLikelihood, chi2_per_datum);
     assert!((posterior.reference().solution.image.lambda / 1e-3 - 1.0).abs() < 1e-4);
-    compare(&sample(&posterior, false), 0.15, 0.10);
+    compare(&sample(&posterior, false, 3000.0), 0.17, 0.10);
 }
 
 #[test]
 fn regularised_likelihood_on_5000_pixels() {
     let oracle = oracle();
     let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);
-    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::RegularisedLikelihood, 0.97), true), 0.3, 0.12);
+    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::RegularisedLikelihood, 0.97), true, 1500.0), 0.3, 0.12);
 }
 
 #[test]
 fn spottedness_on_5000_pixels() {
     let oracle = oracle();
     let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);
-    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::Spottedness, 0.97), true), 0.3, 0.12);
+    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::Spottedness, 0.97), true, 1500.0), 0.3, 0.12);
 }

@@ -4,7 +4,6 @@
 //! Knows images, data misfits and their curvature through [`Problem`] alone. Left out: stars, velocities, files.
 
 mod cg;
-mod elementary;
 pub mod entropy;
 mod parallelism;
 pub mod preconditioner;

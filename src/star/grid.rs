@@ -4,6 +4,7 @@
 //! borders are then set so that every pixel has the same area. A pixel is evaluated at its centre or, to match moments
 //! (method section 1), at 2 x 2 Gauss points in longitude and sin(latitude). Left out: what a pixel looks like from Earth.
 
+use super::moments::CHUNK;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use std::ops::Range;
 
@@ -47,12 +48,29 @@ pub struct SurfaceGrid {
     pub latitude: Vec<f64>,
     /// Area of each pixel as a fraction of the star; they sum to 1.
     pub area: Vec<f64>,
-    /// Cosine of each pixel's longitude.
-    pub(crate) longitude_cos: Vec<f64>,
-    /// Sine of each pixel's longitude.
-    pub(crate) longitude_sin: Vec<f64>,
+    /// Cosine and sine of each pixel's longitude.
+    pub(super) directions: Directions,
     /// The pixels in rings of constant latitude, south to north.
     pub(crate) rings: Vec<Ring>,
+}
+
+/// Cosines and sines of longitudes, with zeros behind them for loops over several pixels at a time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Directions {
+    pub cos: Vec<f64>,
+    pub sin: Vec<f64>,
+    /// The same in single precision.
+    pub cos_single: Vec<f32>,
+    pub sin_single: Vec<f32>,
+}
+
+impl Directions {
+    fn of(longitude: &[f64]) -> Self {
+        let behind = std::iter::repeat_n((0.0, 0.0), CHUNK - 1);
+        let (cos, sin): (Vec<f64>, Vec<f64>) = longitude.iter().map(|l| (l.cos(), l.sin())).chain(behind).unzip();
+        let single = |numbers: &[f64]| numbers.iter().map(|x| *x as f32).collect();
+        Directions { cos_single: single(&cos), sin_single: single(&sin), cos, sin }
+    }
 }
 
 impl Ring {
@@ -87,14 +105,13 @@ impl SurfaceGrid {
             longitude: Vec::with_capacity(total),
             latitude: Vec::with_capacity(total),
             area: vec![area; total],
-            longitude_cos: Vec::new(),
-            longitude_sin: Vec::new(),
+            directions: Directions::default(),
             rings: Vec::with_capacity(n_rings),
         };
         for &count in &counts {
             grid.push_ring(count, area, quadrature);
         }
-        (grid.longitude_cos, grid.longitude_sin) = cos_sin(&grid.longitude);
+        grid.directions = Directions::of(&grid.longitude);
         grid
     }
 
@@ -126,8 +143,8 @@ impl SurfaceGrid {
         let rings = (0..longitude.len())
             .map(|p| Ring { pixels: p..p + 1, points: vec![RingPoint::new(latitude[p].sin(), 0.0, area[p])] })
             .collect();
-        let (longitude_cos, longitude_sin) = cos_sin(&longitude);
-        SurfaceGrid { longitude, latitude, area, longitude_cos, longitude_sin, rings }
+        let directions = Directions::of(&longitude);
+        SurfaceGrid { longitude, latitude, area, directions, rings }
     }
 
     /// Number of pixels.
@@ -162,10 +179,6 @@ impl SurfaceGrid {
         }
         means
     }
-}
-
-fn cos_sin(longitude: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    longitude.iter().map(|l| (l.cos(), l.sin())).unzip()
 }
 
 impl RingPoint {

@@ -1,22 +1,27 @@
-//! The innermost loops: sums over the visible pixels that lie in one cell of the velocity grid, and their transpose.
+//! The innermost loops: sums over the visible pixels that lie in a cell of the velocity grid, for several cells side by side,
+//! and their transpose.
 //!
-//! A pixel is a weight at a position t in [0, 1] of the cell. What it leaves on the grid is a polynomial in t (see
+//! A pixel is a weight at a position t in [-1/2, 1/2] of its cell. What it leaves on the grid is a polynomial in t (see
 //! `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in registers however many pixels
-//! there are. Each loop is written twice: as it reads, and in AVX2, which the compiler does not find by itself (four times
-//! slower). Left out: which pixels lie in which cell.
+//! there are. Each loop is written twice: as it reads, and in AVX2, which the compiler does not find by itself (three times
+//! slower). Left out: which pixels lie in which cell, and which cells stand side by side.
 
-use super::line_profile::DEPOSIT_NODES;
+use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
 use crate::vector::Instructions;
 
-/// Pixels that are summed side by side.
+/// Cells side by side.
 pub const LANES: usize = 4;
 
-/// Visible pixels of one cell; a block that is not full ends in pixels of weight 0.
+/// Numbers on the nodes of a cell.
+pub type Nodes = [f64; DEPOSIT_NODES];
+
+/// A visible pixel of each cell; a cell that has no pixel left has one of weight 0.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
 pub struct Block {
     /// Projected area times limb darkening.
     pub weight: [f32; LANES],
-    /// Distance of the mean velocity from the cell's lower border over the grid's step; in [0, 1], as single precision rounds up.
+    /// Distance of the mean velocity from the middle of the cell over the grid's step.
     pub position: [f32; LANES],
     /// Variance of the velocity over twice the squared step.
     pub spread: [f32; LANES],
@@ -24,89 +29,180 @@ pub struct Block {
     pub pixel: [u32; LANES],
 }
 
+/// A lane of a block.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C, align(16))]
+pub struct Pixel {
+    /// As in a block.
+    pub weight: f32,
+    /// As in a block.
+    pub position: f32,
+    /// As in a block.
+    pub spread: f32,
+    /// As in a block.
+    pub pixel: u32,
+}
+
 /// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to 5.
 const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 
-impl Block {
-    /// No pixel yet; the lanes may point to any pixel of the map, and this one stays in the cache.
-    pub fn empty(pixel: u32) -> Self {
-        Block { weight: [0.0; LANES], position: [0.0; LANES], spread: [0.0; LANES], pixel: [pixel; LANES] }
-    }
-
-    /// Means of `t^k` over the extent of the pixel in a lane, to second order in it: `t^k + k (k - 1) t^(k-2) spread`.
-    fn powers(&self, lane: usize) -> [f64; DEPOSIT_NODES] {
-        let (t, spread) = (f64::from(self.position[lane]), f64::from(self.spread[lane]));
-        let t2 = t * t;
-        let plus = |factor: f64| t2 + factor * spread;
-        [1.0, t, plus(2.0), t * plus(6.0), t2 * plus(12.0), t * t2 * plus(20.0)]
+impl Pixel {
+    /// Lanes without a pixel, of a map of so many. They point to different pixels where there are as many, for no sum to wait
+    /// for another.
+    pub fn empty(pixels: usize) -> [Pixel; LANES] {
+        std::array::from_fn(|lane| Pixel { pixel: lane.min(pixels.saturating_sub(1)) as u32, ..Pixel::default() })
     }
 }
 
-/// Sums over the pixels of `x weight t^k`.
+impl Block {
+    /// Of a pixel for each lane.
+    #[inline(always)]
+    pub fn of(pixels: [&Pixel; LANES]) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        return sse::block_of(pixels);
+        #[cfg(not(target_arch = "x86_64"))]
+        Block {
+            weight: pixels.map(|p| p.weight),
+            position: pixels.map(|p| p.position),
+            spread: pixels.map(|p| p.spread),
+            pixel: pixels.map(|p| p.pixel),
+        }
+    }
+
+    /// Copies the pixel of every lane to a place of its own.
+    #[inline(always)]
+    pub fn deal(&self, places: [usize; LANES], to: &mut [Pixel]) {
+        #[cfg(target_arch = "x86_64")]
+        sse::deal(self, places, to);
+        #[cfg(not(target_arch = "x86_64"))]
+        for (lane, place) in places.into_iter().enumerate() {
+            let (weight, position) = (self.weight[lane], self.position[lane]);
+            to[place] = Pixel { weight, position, spread: self.spread[lane], pixel: self.pixel[lane] };
+        }
+    }
+
+    /// What the pixel in a lane leaves on each node of its cell, over its weight.
+    fn shares(&self, lane: usize) -> Nodes {
+        let (t, spread) = (f64::from(self.position[lane]), f64::from(self.spread[lane]));
+        let at = |t: f64, weights: &[f64; DEPOSIT_NODES]| {
+            let t2 = t * t;
+            let plus = |factor: f64| t2 + factor * spread;
+            let powers = [1.0, t, plus(2.0), t * plus(6.0), t2 * plus(12.0), t * t2 * plus(20.0)];
+            weights.iter().zip(powers).map(|(w, power)| w * power).sum()
+        };
+        let [a, b, c] = DEPOSIT_WEIGHTS;
+        [at(t, &a), at(t, &b), at(t, &c), at(-t, &c), at(-t, &b), at(-t, &a)]
+    }
+}
+
+/// What the pixels of each cell, times `x`, leave on its nodes.
 ///
 /// # Safety
 /// Every pixel of every block lies within `x`.
 #[inline(always)]
 #[allow(unsafe_code)]
-pub unsafe fn sum<I: Instructions>(_: I, blocks: &[Block], x: &[f64]) -> [f64; DEPOSIT_NODES] {
+pub unsafe fn gather<I: Instructions>(_: I, blocks: &[Block], x: &[f64]) -> [Nodes; LANES] {
     #[cfg(target_arch = "x86_64")]
     if I::AVX2 {
         // safe: `I` proves the instructions, the caller the pixels
-        return unsafe { avx2::sum(blocks, x) };
+        return unsafe { avx2::gather(blocks, x) };
     }
-    plain_sum(blocks, x)
+    plain_gather(blocks, x)
 }
 
-/// Transpose of [`sum`]: adds `weight (c_0 + c_1 t + ... + c_5 t^5)` to every pixel of `out`.
+/// Transpose of [`gather`]: adds to every pixel of `out` what it gets from the nodes of its cell.
 ///
 /// # Safety
 /// Every pixel of every block lies within `out`.
 #[inline(always)]
 #[allow(unsafe_code)]
-pub unsafe fn spread<I: Instructions>(_: I, blocks: &[Block], coefficients: &[f64; DEPOSIT_NODES], out: &mut [f64]) {
+pub unsafe fn scatter<I: Instructions>(_: I, blocks: &[Block], nodes: [&Nodes; LANES], out: &mut [f64]) {
     #[cfg(target_arch = "x86_64")]
     if I::AVX2 {
         // safe: `I` proves the instructions, the caller the pixels
-        return unsafe { avx2::spread(blocks, coefficients, out) };
+        return unsafe { avx2::scatter(blocks, nodes, out) };
     }
-    plain_spread(blocks, coefficients, out);
+    plain_scatter(blocks, nodes, out);
 }
 
-fn plain_sum(blocks: &[Block], x: &[f64]) -> [f64; DEPOSIT_NODES] {
-    let mut sums = [0.0; DEPOSIT_NODES];
+fn plain_gather(blocks: &[Block], x: &[f64]) -> [Nodes; LANES] {
+    let mut nodes = [[0.0; DEPOSIT_NODES]; LANES];
     for block in blocks {
-        for lane in 0..LANES {
+        for (lane, nodes) in nodes.iter_mut().enumerate() {
             let amount = x[block.pixel[lane] as usize] * f64::from(block.weight[lane]);
-            let terms = block.powers(lane).map(|power| amount * power);
-            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            nodes.iter_mut().zip(block.shares(lane)).for_each(|(node, share)| *node += amount * share);
         }
     }
-    sums
+    nodes
 }
 
-fn plain_spread(blocks: &[Block], coefficients: &[f64; DEPOSIT_NODES], out: &mut [f64]) {
+fn plain_scatter(blocks: &[Block], nodes: [&Nodes; LANES], out: &mut [f64]) {
     for block in blocks {
-        for lane in 0..LANES {
-            let polynomial: f64 = block.powers(lane).iter().zip(coefficients).map(|(power, c)| power * c).sum();
-            out[block.pixel[lane] as usize] += f64::from(block.weight[lane]) * polynomial;
+        for (lane, nodes) in nodes.iter().enumerate() {
+            let sum: f64 = nodes.iter().zip(block.shares(lane)).map(|(node, share)| node * share).sum();
+            out[block.pixel[lane] as usize] += f64::from(block.weight[lane]) * sum;
         }
     }
 }
 
-/// The same loops, four pixels at a time.
+/// Blocks of pixels and pixels of blocks in registers; the compiler takes one number after another through memory.
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod sse {
+    use super::{Block, LANES, Pixel};
+    use std::arch::x86_64::*;
+    use std::mem::transmute;
+
+    #[inline(always)]
+    pub(super) fn block_of(pixels: [&Pixel; LANES]) -> Block {
+        // safe: pixels and rows of a block are four numbers of four bytes
+        unsafe { transmute(transposed(pixels.map(|pixel| transmute::<Pixel, __m128>(*pixel)))) }
+    }
+
+    #[inline(always)]
+    pub(super) fn deal(block: &Block, places: [usize; LANES], to: &mut [Pixel]) {
+        // safe: as above
+        let lanes = unsafe { transposed(transmute::<Block, [__m128; LANES]>(*block)) };
+        for (place, lane) in places.into_iter().zip(lanes) {
+            // safe: as above
+            unsafe { _mm_store_ps((&raw mut to[place]).cast(), lane) };
+        }
+    }
+
+    /// Rows as columns.
+    #[inline(always)]
+    fn transposed([a, b, c, d]: [__m128; LANES]) -> [__m128; LANES] {
+        // safe: every processor of this kind has these instructions
+        unsafe {
+            let (low, low_2) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
+            let (high, high_2) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
+            [
+                _mm_movelh_ps(low, low_2),
+                _mm_movehl_ps(low_2, low),
+                _mm_movelh_ps(high, high_2),
+                _mm_movehl_ps(high_2, high),
+            ]
+        }
+    }
+}
+
+/// The same loops by sums of powers, all cells at a time.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod avx2 {
-    use super::{Block, DEPOSIT_NODES, LANES, SPREAD_FACTORS};
+    use super::{Block, DEPOSIT_NODES, DEPOSIT_WEIGHTS, LANES, Nodes, SPREAD_FACTORS};
     use std::arch::x86_64::*;
 
-    /// As [`super::plain_sum`].
+    /// One number of every node or power: a lane a cell.
+    type Lanes = [__m256d; DEPOSIT_NODES];
+
+    /// As [`super::plain_gather`].
     ///
     /// # Safety
     /// The processor has AVX2 and FMA; every pixel of every block lies within `x`.
     #[inline]
     #[target_feature(enable = "avx2,fma")]
-    pub(super) unsafe fn sum(blocks: &[Block], x: &[f64]) -> [f64; DEPOSIT_NODES] {
+    pub(super) unsafe fn gather(blocks: &[Block], x: &[f64]) -> [Nodes; LANES] {
         let mut sums = [_mm256_setzero_pd(); DEPOSIT_NODES];
         let mut spread_sums = [_mm256_setzero_pd(); SPREAD_FACTORS.len()];
         for block in blocks {
@@ -125,26 +221,39 @@ mod avx2 {
         for ((sum, spread_sum), factor) in sums[2..].iter_mut().zip(spread_sums).zip(SPREAD_FACTORS) {
             *sum = _mm256_fmadd_pd(_mm256_set1_pd(factor), spread_sum, *sum);
         }
-        let mut totals = [0.0; DEPOSIT_NODES];
-        for (totals, pair) in totals.chunks_exact_mut(2).zip(sums.chunks_exact(2)) {
-            let neighbours = _mm256_hadd_pd(pair[0], pair[1]);
-            let both = _mm_add_pd(_mm256_castpd256_pd128(neighbours), _mm256_extractf128_pd::<1>(neighbours));
-            totals[0] = _mm_cvtsd_f64(both);
-            totals[1] = _mm_cvtsd_f64(_mm_unpackhi_pd(both, both));
+        // nodes that mirror each other have the same weights but for the sign of odd powers
+        let mut nodes = sums;
+        for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
+            let half = |first: usize| {
+                let w = |k: usize| _mm256_set1_pd(weights[k]);
+                let highest = _mm256_mul_pd(w(first + 4), sums[first + 4]);
+                _mm256_fmadd_pd(w(first), sums[first], _mm256_fmadd_pd(w(first + 2), sums[first + 2], highest))
+            };
+            let (even, odd) = (half(0), half(1));
+            nodes[n] = _mm256_add_pd(even, odd);
+            nodes[DEPOSIT_NODES - 1 - n] = _mm256_sub_pd(even, odd);
         }
-        totals
+        cells_of_lanes(nodes)
     }
 
-    /// As [`super::plain_spread`].
+    /// As [`super::plain_scatter`].
     ///
     /// # Safety
     /// The processor has AVX2 and FMA; every pixel of every block lies within `out`.
     #[inline]
     #[target_feature(enable = "avx2,fma")]
-    pub(super) unsafe fn spread(blocks: &[Block], coefficients: &[f64; DEPOSIT_NODES], out: &mut [f64]) {
+    pub(super) unsafe fn scatter(blocks: &[Block], nodes: [&Nodes; LANES], out: &mut [f64]) {
+        let nodes = lanes_of_cells(nodes);
+        let mut coefficients = [_mm256_setzero_pd(); DEPOSIT_NODES];
+        for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
+            let (node, mirrored) = (nodes[n], nodes[DEPOSIT_NODES - 1 - n]);
+            let both = [_mm256_add_pd(node, mirrored), _mm256_sub_pd(node, mirrored)];
+            for (k, coefficient) in coefficients.iter_mut().enumerate() {
+                *coefficient = _mm256_fmadd_pd(_mm256_set1_pd(weights[k]), both[k % 2], *coefficient);
+            }
+        }
         let of_spread: [__m256d; SPREAD_FACTORS.len()] =
-            std::array::from_fn(|k| _mm256_set1_pd(SPREAD_FACTORS[k] * coefficients[k + 2]));
-        let coefficients = coefficients.map(|c| _mm256_set1_pd(c));
+            std::array::from_fn(|k| _mm256_mul_pd(_mm256_set1_pd(SPREAD_FACTORS[k]), coefficients[k + 2]));
         for block in blocks {
             let (t, spread) = (load(&block.position), load(&block.spread));
             let at_t = |coefficients: &[__m256d]| {
@@ -164,6 +273,55 @@ mod avx2 {
         }
     }
 
+    /// The nodes of each cell together.
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn cells_of_lanes([a, b, c, d, e, f]: Lanes) -> [Nodes; LANES] {
+        let first = transposed([a, b, c, d]);
+        let (even, odd) = (_mm256_unpacklo_pd(e, f), _mm256_unpackhi_pd(e, f));
+        let last = [
+            _mm256_castpd256_pd128(even),
+            _mm256_castpd256_pd128(odd),
+            _mm256_extractf128_pd::<1>(even),
+            _mm256_extractf128_pd::<1>(odd),
+        ];
+        let mut cells = [[0.0; DEPOSIT_NODES]; LANES];
+        for (cell, (first, last)) in cells.iter_mut().zip(first.into_iter().zip(last)) {
+            // safe: four and two numbers are six
+            unsafe {
+                _mm256_storeu_pd(cell.as_mut_ptr(), first);
+                _mm_storeu_pd(cell.as_mut_ptr().add(LANES), last);
+            }
+        }
+        cells
+    }
+
+    /// The cells of each node together.
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn lanes_of_cells(cells: [&Nodes; LANES]) -> Lanes {
+        // safe: six numbers are four and two
+        let first = cells.map(|cell| unsafe { _mm256_loadu_pd(cell.as_ptr()) });
+        let last = cells.map(|cell| unsafe { _mm_loadu_pd(cell.as_ptr().add(LANES)) });
+        let [a, b, c, d] = transposed(first);
+        let (low, high) = (_mm256_set_m128d(last[2], last[0]), _mm256_set_m128d(last[3], last[1]));
+        [a, b, c, d, _mm256_unpacklo_pd(low, high), _mm256_unpackhi_pd(low, high)]
+    }
+
+    /// Rows as columns.
+    #[inline]
+    #[target_feature(enable = "avx2,fma")]
+    fn transposed([a, b, c, d]: [__m256d; LANES]) -> [__m256d; LANES] {
+        let (even, even_2) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+        let (odd, odd_2) = (_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+        [
+            _mm256_permute2f128_pd::<0x20>(even, even_2),
+            _mm256_permute2f128_pd::<0x20>(odd, odd_2),
+            _mm256_permute2f128_pd::<0x31>(even, even_2),
+            _mm256_permute2f128_pd::<0x31>(odd, odd_2),
+        ]
+    }
+
     #[inline]
     #[target_feature(enable = "avx2,fma")]
     fn load(x: &[f32; LANES]) -> __m256d {
@@ -181,38 +339,60 @@ mod tests {
         (0.5 + 0.5 * (12.9898 * i as f64).sin()) as f32
     }
 
-    struct Both<'a>(&'a [Block], &'a [f64], &'a [f64; DEPOSIT_NODES], &'a mut [f64]);
+    struct Both<'a>(&'a [Block], &'a [f64], [&'a Nodes; LANES], &'a mut [f64]);
 
     impl Task for Both<'_> {
-        type Output = [f64; DEPOSIT_NODES];
+        type Output = [Nodes; LANES];
 
         #[inline(always)]
         #[allow(unsafe_code)]
         fn run<I: Instructions>(self, instructions: I) -> Self::Output {
             // safe: the pixels of the test are below 19
             unsafe {
-                spread(instructions, self.0, self.2, self.3);
-                sum(instructions, self.0, self.1)
+                scatter(instructions, self.0, self.2, self.3);
+                gather(instructions, self.0, self.1)
             }
         }
     }
 
-    #[test]
-    fn the_instructions_of_this_processor_agree_with_the_plain_loops() {
+    fn blocks() -> Vec<Block> {
         let block = |b: usize| Block {
             weight: std::array::from_fn(|l| number(4 * b + l)),
-            position: std::array::from_fn(|l| number(100 + 4 * b + l)),
+            position: std::array::from_fn(|l| number(100 + 4 * b + l) - 0.5),
             spread: std::array::from_fn(|l| number(200 + 4 * b + l)),
             pixel: std::array::from_fn(|l| ((7 * b + l) % 19) as u32),
         };
-        let blocks: Vec<Block> = (0..9).map(block).collect();
+        (0..9).map(block).collect()
+    }
+
+    #[test]
+    fn the_instructions_of_this_processor_agree_with_the_plain_loops() {
+        let blocks = blocks();
         let x: Vec<f64> = (0..19).map(|i| (i as f64).cos()).collect();
-        let coefficients = [0.3, -1.0, 2.0, 0.7, -0.2, 0.9];
+        let nodes: [Nodes; LANES] =
+            std::array::from_fn(|lane| std::array::from_fn(|n| ((7 * lane + n) as f64 + 0.3).sin()));
         let (mut plain, mut fast) = (vec![1.0; 19], vec![1.0; 19]);
-        plain_spread(&blocks, &coefficients, &mut plain);
-        let sums = vector::run(Both(&blocks, &x, &coefficients, &mut fast));
-        for (a, b) in sums.iter().zip(plain_sum(&blocks, &x)).chain(fast.iter().zip(plain)) {
+        plain_scatter(&blocks, nodes.each_ref(), &mut plain);
+        let left = vector::run(Both(&blocks, &x, nodes.each_ref(), &mut fast));
+        let plain_left = plain_gather(&blocks, &x);
+        let pairs = left.as_flattened().iter().zip(plain_left.as_flattened()).chain(fast.iter().zip(&plain));
+        for (a, b) in pairs {
             assert!((a - b).abs() < 1e-13, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn blocks_are_dealt_and_collected() {
+        for block in blocks() {
+            let mut pixels = [Pixel::default(); 9];
+            block.deal([4, 1, 8, 2], &mut pixels);
+            for (lane, place) in [4, 1, 8, 2].into_iter().enumerate() {
+                let (weight, position) = (block.weight[lane], block.position[lane]);
+                let expected = Pixel { weight, position, spread: block.spread[lane], pixel: block.pixel[lane] };
+                assert_eq!(pixels[place], expected);
+            }
+            let again = Block::of([4, 1, 8, 2].map(|place: usize| &pixels[place]));
+            assert_eq!(format!("{again:?}"), format!("{block:?}"));
         }
     }
 }

@@ -70,18 +70,16 @@ impl LineKernel {
 /// Nodes that a pixel is deposited on, and terms of the polynomials that say with which weights.
 pub const DEPOSIT_NODES: usize = 6;
 
-/// The quintic B-spline on one grid cell: weights of the nodes -2 to 3 of the cell (rows) as polynomials in the position
-/// `t` in [0, 1) within it (coefficients of 1, t, ... t^5). The rows sum to the polynomial 1.
+/// The quintic B-spline on one grid cell: weights of the nodes -2, -1 and 0 of the cell (rows) as polynomials in the position
+/// `t` in [-1/2, 1/2] from its middle (coefficients of 1, t, ... t^5). Those of the nodes 3, 2 and 1 are their mirror images,
+/// in which odd powers have the other sign. All six sum to the polynomial 1.
 ///
 /// A pixel with a spread of velocities is deposited with the means of the powers over it, `t^k + k (k - 1) t^(k-2) spread`
 /// to second order, where `spread` = (variance of its velocity) / (2 h^2).
-pub const DEPOSIT_WEIGHTS: [[f64; DEPOSIT_NODES]; DEPOSIT_NODES] = [
-    [1.0 / 120.0, -1.0 / 24.0, 1.0 / 12.0, -1.0 / 12.0, 1.0 / 24.0, -1.0 / 120.0],
-    [13.0 / 60.0, -5.0 / 12.0, 1.0 / 6.0, 1.0 / 6.0, -1.0 / 6.0, 1.0 / 24.0],
-    [11.0 / 20.0, 0.0, -0.5, 0.0, 0.25, -1.0 / 12.0],
-    [13.0 / 60.0, 5.0 / 12.0, 1.0 / 6.0, -1.0 / 6.0, -1.0 / 6.0, 1.0 / 12.0],
-    [1.0 / 120.0, 1.0 / 24.0, 1.0 / 12.0, 1.0 / 12.0, 1.0 / 24.0, -1.0 / 24.0],
-    [0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 120.0],
+pub const DEPOSIT_WEIGHTS: [[f64; DEPOSIT_NODES]; DEPOSIT_NODES / 2] = [
+    [1.0 / 3840.0, -1.0 / 384.0, 1.0 / 96.0, -1.0 / 48.0, 1.0 / 48.0, -1.0 / 120.0],
+    [79.0 / 1280.0, -25.0 / 128.0, 7.0 / 32.0, -1.0 / 16.0, -1.0 / 16.0, 1.0 / 24.0],
+    [841.0 / 1920.0, -77.0 / 192.0, -11.0 / 48.0, 7.0 / 24.0, 1.0 / 24.0, -1.0 / 12.0],
 ];
 
 #[cfg(test)]
@@ -96,12 +94,16 @@ mod tests {
     fn through_grid(line: LocalLine, step: f64, v: f64, v_p: f64, variance: f64) -> f64 {
         let kernel = LineKernel::new(line, step);
         let cell = (v_p / step).floor();
-        let (t, spread) = (v_p / step - cell, variance / (2.0 * step * step));
-        let plus = |factor: f64| t * t + factor * spread;
-        let powers = [1.0, t, plus(2.0), t * plus(6.0), t * t * plus(12.0), t * t * t * plus(20.0)];
-        let weight = |row: &[f64; 6]| row.iter().zip(powers).map(|(c, power)| c * power).sum::<f64>();
-        let nodes = DEPOSIT_WEIGHTS.iter().enumerate();
-        nodes.map(|(i, row)| weight(row) * kernel.at(v - (cell + i as f64 - 2.0) * step)).sum()
+        let spread = variance / (2.0 * step * step);
+        let weight = |row: &[f64; 6], t: f64| {
+            let plus = |factor: f64| t * t + factor * spread;
+            let powers = [1.0, t, plus(2.0), t * plus(6.0), t * t * plus(12.0), t * t * t * plus(20.0)];
+            row.iter().zip(powers).map(|(c, power)| c * power).sum::<f64>()
+        };
+        let t = v_p / step - cell - 0.5;
+        let line = |node: f64| kernel.at(v - (cell + node) * step);
+        let nodes = DEPOSIT_WEIGHTS.iter().zip([-2.0, -1.0, 0.0]);
+        nodes.map(|(row, node)| weight(row, t) * line(node) + weight(row, -t) * line(1.0 - node)).sum()
     }
 
     #[test]

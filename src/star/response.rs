@@ -5,7 +5,7 @@
 //! (what x is), the division by the continuum, data.
 
 use super::convolution::{ProfileConvolution, Rows, VelocityGrid};
-use super::deposit::{Deposit, Moments};
+use super::deposit::Deposit;
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
@@ -171,9 +171,9 @@ impl Task for Apply<'_> {
     fn run<I: Instructions>(self, instructions: I) {
         let Apply { response, x, line, continuum } = self;
         let mut nodes = vec![0.0; response.deposit.nodes];
-        let (mut moments, mut rows) = (Moments::new(&response.deposit), response.rows());
+        let mut rows = response.rows();
         for (k, convolution) in response.convolutions.iter().enumerate() {
-            response.deposit.gather(instructions, k, x, &mut moments, &mut nodes);
+            response.deposit.gather(instructions, k, x, &mut nodes);
             continuum[k] = total(&nodes);
             rows.interleave(&nodes);
             convolution.sum_to_bins(instructions, &rows, &mut line[response.bins(k)]);
@@ -195,13 +195,13 @@ impl Task for ApplyTranspose<'_> {
     fn run<I: Instructions>(self, instructions: I) {
         let ApplyTranspose { response, line, continuum, out } = self;
         let mut nodes = vec![0.0; response.deposit.nodes];
-        let (mut moments, mut rows) = (Moments::new(&response.deposit), response.rows());
+        let mut rows = response.rows();
         out.fill(0.0);
         for (k, convolution) in response.convolutions.iter().enumerate() {
             convolution.spread_bins(instructions, &line[response.bins(k)], &mut rows);
             rows.deinterleave(&mut nodes);
             nodes.iter_mut().for_each(|node| *node += continuum[k]);
-            response.deposit.scatter(instructions, k, &nodes, &mut moments, out);
+            response.deposit.scatter(instructions, k, &nodes, out);
         }
     }
 }

@@ -10,7 +10,7 @@
 
 use super::Step;
 use crate::maxent::cg::dot;
-use crate::maxent::elementary::{exp_minus, ln_1p};
+use crate::vector::elementary::{exp_minus, ln_1p};
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: a pixel that bright outshines, and one that dark is nothing beside, all the others.

@@ -5,7 +5,7 @@
 
 use super::Step;
 use crate::maxent::cg::dot;
-use crate::maxent::elementary::{exp_minus, ln_1p};
+use crate::vector::elementary::{exp_minus, ln_1p};
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: beyond it s (1-s) would lose its precision.

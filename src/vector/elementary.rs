@@ -1,10 +1,10 @@
-//! Exponential and logarithm for loops that are compiled into vector instructions: without branches, to two units in the last
-//! place.
+//! Exponential, logarithm, sine and cosine for loops that are compiled into vector instructions: without branches, to two units
+//! in the last place.
 //!
-//! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for the logarithm, and the series to r^13 over
-//! |r| < ln(2)/2 for the exponential. Left out: infinities, and results that are not normal numbers.
+//! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for logarithm, sine and cosine, and the series to r^13
+//! over |r| < ln(2)/2 for the exponential. Left out: infinities, and results that are not normal numbers.
 
-use crate::vector::Instructions;
+use super::Instructions;
 
 /// ln 2 in two parts: the first is exact times any exponent.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
@@ -14,6 +14,29 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// Beyond it e^-x is no normal number.
 const LARGEST_EXPONENT: f64 = 708.0;
+
+/// pi / 2 in three parts: the first two are exact times any integer below 2^20.
+const HALF_PI: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
+
+/// Coefficients of `(sin r - r) / r^3` in r^2, over |r| < pi/4.
+const SINE: [f64; 6] = [
+    -1.666_666_666_666_663_2e-1,
+    8.333_333_333_322_49e-3,
+    -1.984_126_982_985_795e-4,
+    2.755_731_370_707_006_8e-6,
+    -2.505_076_025_340_686_3e-8,
+    1.589_690_995_211_55e-10,
+];
+
+/// Coefficients of `(cos r - 1 + r^2/2) / r^4` in r^2.
+const COSINE: [f64; 6] = [
+    4.166_666_666_666_66e-2,
+    -1.388_888_888_887_411e-3,
+    2.480_158_728_947_673e-5,
+    -2.755_731_435_139_066_3e-7,
+    2.087_572_321_298_175e-9,
+    -1.135_964_755_778_819_5e-11,
+];
 
 /// Coefficients of `(ln((1 + s) / (1 - s)) - 2 s) / s` in s^2.
 const LOGARITHM: [f64; 7] = [
@@ -49,7 +72,7 @@ fn polynomial<const N: usize>(i: impl Instructions, coefficients: &[f64; N], x: 
 
 /// `e^-x` for x >= 0; that of 708 beyond it.
 #[inline(always)]
-pub(super) fn exp_minus(i: impl Instructions, x: f64) -> f64 {
+pub fn exp_minus(i: impl Instructions, x: f64) -> f64 {
     let x = if x > LARGEST_EXPONENT { LARGEST_EXPONENT } else { x };
     let rounded = i.multiply_add(-x, std::f64::consts::LOG2_E, ROUND);
     let exponent = rounded - ROUND;
@@ -61,7 +84,7 @@ pub(super) fn exp_minus(i: impl Instructions, x: f64) -> f64 {
 
 /// `ln(1 + x)` for x > -1.
 #[inline(always)]
-pub(super) fn ln_1p(i: impl Instructions, x: f64) -> f64 {
+pub fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     const HALF_ROOT: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
     const MANTISSA: u64 = (1 << 52) - 1;
     const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
@@ -79,6 +102,22 @@ pub(super) fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     exponent * LN_2[0] - ((half - rest) - f)
 }
 
+/// Sine and cosine of x (rad); beyond some 10^6, as precise as x is.
+#[inline(always)]
+pub fn sin_cos(i: impl Instructions, x: f64) -> (f64, f64) {
+    let rounded = i.multiply_add(x, std::f64::consts::FRAC_2_PI, ROUND);
+    let quarters = rounded - ROUND;
+    let r = HALF_PI.iter().fold(x, |r, part| i.multiply_add(-quarters, *part, r));
+    let square = r * r;
+    let sine = i.multiply_add(r * square, polynomial(i, &SINE, square), r);
+    let cosine = i.multiply_add(square * square, polynomial(i, &COSINE, square), i.multiply_add(-0.5, square, 1.0));
+    // the quarter turns stand in the last bits of the rounded sum
+    let quarter = rounded.to_bits();
+    let (s, c) = if quarter & 1 == 0 { (sine, cosine) } else { (cosine, sine) };
+    let sign = |negative: u64| negative << 63;
+    (f64::from_bits(s.to_bits() ^ sign(quarter >> 1)), f64::from_bits(c.to_bits() ^ sign((quarter >> 1) ^ quarter)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,6 +131,17 @@ mod tests {
         #[inline(always)]
         fn run<I: Instructions>(self, i: I) -> [f64; 2] {
             [exp_minus(i, self.0), ln_1p(i, self.0)]
+        }
+    }
+
+    struct Circular(f64);
+
+    impl Task for Circular {
+        type Output = (f64, f64);
+
+        #[inline(always)]
+        fn run<I: Instructions>(self, i: I) -> Self::Output {
+            sin_cos(i, self.0)
         }
     }
 
@@ -119,5 +169,29 @@ mod tests {
         }
         assert_eq!(vector::run(Both(0.0)), [1.0, 0.0]);
         assert!(vector::run(Both(f64::NAN)).iter().all(|x| x.is_nan()));
+    }
+
+    #[test]
+    fn sine_and_cosine_are_those_of_the_standard_library_to_two_units_in_the_last_place() {
+        let decades = (-300..60).map(|k| 10_f64.powf(0.1 * f64::from(k) + 0.037));
+        let dense = (0..400_000).map(|k| 1e-3 * f64::from(k));
+        for x in decades.chain(dense).flat_map(|x| [x, -x]) {
+            for (sine, cosine) in [vector::run(Circular(x)), Circular(x).run(Portable)] {
+                // near a zero of either, as precise as the reduced angle
+                let close = |got: f64, wanted: f64| (got - wanted).abs() <= 4.5e-16 * wanted.abs() + 1e-22 * x.abs();
+                assert!(close(sine, x.sin()) && close(cosine, x.cos()), "{x:e}: {sine:e} {cosine:e}");
+            }
+        }
+        // a century of rotations, in either set of instructions
+        for x in (0..1000).map(|k| 3.7e7 * (1.0 + 1e-3 * f64::from(k))) {
+            for (sine, cosine) in [vector::run(Circular(x)), Circular(x).run(Portable)] {
+                assert!(
+                    (sine - x.sin()).abs() < f64::EPSILON * x && (cosine - x.cos()).abs() < f64::EPSILON * x,
+                    "{x}"
+                );
+            }
+        }
+        assert_eq!(vector::run(Circular(0.0)), (0.0, 1.0));
+        assert!(vector::run(Circular(f64::NAN)).0.is_nan());
     }
 }

@@ -4,6 +4,8 @@
 //! with sums in one of them, and the innermost loops (`star::kernel`) sum in another order too: results differ in the last
 //! digits between processors with and without AVX2, never between runs on one.
 
+pub mod elementary;
+
 /// Work that is compiled for every set of instructions.
 pub trait Task {
     /// What it returns.
@@ -20,6 +22,9 @@ pub trait Instructions: Copy + sealed::Sealed {
 
     /// `a b + c`, fused where the processor can.
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64;
+
+    /// The same in single precision.
+    fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32;
 }
 
 /// What every processor has.
@@ -44,6 +49,11 @@ impl Instructions for Portable {
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
         a * b + c
     }
+
+    #[inline(always)]
+    fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
+        a * b + c
+    }
 }
 
 impl Instructions for Avx2 {
@@ -51,6 +61,11 @@ impl Instructions for Avx2 {
 
     #[inline(always)]
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+
+    #[inline(always)]
+    fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
         a.mul_add(b, c)
     }
 }

@@ -1,0 +1,244 @@
+//! Which cell of the velocity grid every visible pixel of every observation lies in, and where in it: the pairs as the hot path
+//! reads them.
+//!
+//! Cells stand side by side (`kernel`) in the order of their numbers of pixels, so that those of a group have about as many.
+//! Left out: what the pairs are used for (`deposit`).
+
+use super::grid::SurfaceGrid;
+use super::kernel::{Block, LANES, Pixel};
+use super::moments::Moments;
+use super::view::Viewer;
+use crate::vector::{Instructions, Task};
+
+/// The visible pixels of all observations.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    /// Number of visible (pixel, observation) pairs.
+    pub pairs: usize,
+    groups: Vec<Group>,
+    groups_each: usize,
+    blocks: Vec<Block>,
+}
+
+/// Cells side by side.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    /// First node of each cell.
+    cells: [u32; LANES],
+    /// First of the group's blocks, and the end.
+    blocks: [u32; 2],
+}
+
+impl Placement {
+    /// Cells and blocks of the groups of an observation; a cell is counted by the first of its nodes.
+    pub fn groups_of(&self, observation: usize) -> impl Iterator<Item = (&[u32; LANES], &[Block])> {
+        let groups = &self.groups[observation * self.groups_each..][..self.groups_each];
+        groups.iter().map(|group| (&group.cells, &self.blocks[group.blocks[0] as usize..group.blocks[1] as usize]))
+    }
+
+    /// Memory (bytes) of all blocks and groups.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.blocks.as_slice()) + size_of_val(self.groups.as_slice())
+    }
+
+    /// Adds the groups of an observation.
+    #[inline(always)]
+    fn add(&mut self, seen: &mut Seen) {
+        self.pairs += seen.pixels;
+        let first_group = self.groups.len();
+        seen.sort_cells();
+        let mut first_block = self.blocks.len() as u32;
+        for cells in seen.fullest_first.chunks(LANES) {
+            let end = first_block + seen.counts[cells[0] as usize];
+            // lanes that are left over at the end repeat a cell and have no pixel
+            let cells = std::array::from_fn(|lane| *cells.get(lane).unwrap_or(&cells[0]));
+            self.groups.push(Group { cells, blocks: [first_block, end] });
+            first_block = end;
+        }
+        let groups = &self.groups[first_group..];
+        seen.sort_pixels(groups);
+        let mut sorted = &seen.sorted[..];
+        for group in groups {
+            let rows = (group.blocks[1] - group.blocks[0]) as usize;
+            let [a, b, c, d] = std::array::from_fn(|lane| sorted[lane * rows..(lane + 1) * rows].iter());
+            self.blocks.extend(a.zip(b).zip(c.zip(d)).map(|((a, b), (c, d))| Block::of([a, b, c, d])));
+            sorted = &sorted[LANES * rows..];
+        }
+    }
+}
+
+/// The work that makes a [`Placement`]: looks at the pixels of every observation and sorts the visible ones into cells.
+pub struct Place<'a> {
+    /// The pixels.
+    pub grid: &'a SurfaceGrid,
+    /// Who looks at them.
+    pub viewer: Viewer,
+    /// The velocity grid.
+    pub scale: Scale,
+    /// Times of the observations since the star's epoch (d).
+    pub since_epoch_d: &'a [f64],
+}
+
+/// Velocities in steps of the grid.
+#[derive(Clone, Copy)]
+pub struct Scale {
+    /// Velocity of the first node (km/s).
+    pub origin_kms: f64,
+    /// Steps in a km/s.
+    pub steps_per_kms: f64,
+    /// Cells that a pixel can lie in.
+    pub cells: usize,
+}
+
+impl Task for Place<'_> {
+    type Output = Placement;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, instructions: I) -> Placement {
+        let Place { grid, viewer, scale, since_epoch_d } = self;
+        let mut views = viewer.of(grid);
+        let mut placement = Placement {
+            pairs: 0,
+            groups: Vec::new(),
+            groups_each: scale.cells.div_ceil(LANES),
+            blocks: Vec::with_capacity(since_epoch_d.len() * grid.len() * 5 / 8 / LANES),
+        };
+        let mut seen = Seen::new(scale, grid.len());
+        for &time in since_epoch_d {
+            seen.place(views.look(instructions, time));
+            placement.add(&mut seen);
+        }
+        placement
+    }
+}
+
+/// What one observation sees.
+struct Seen {
+    scale: Scale,
+    /// Number of visible pixels.
+    pixels: usize,
+    /// Of each, in the order in which they were seen: what a block holds, and its cell.
+    pixel: Vec<u32>,
+    weight: Vec<f32>,
+    position: Vec<f32>,
+    spread: Vec<f32>,
+    cell: Vec<u32>,
+    /// How many of the pixels before it lie in its cell.
+    rank: Vec<u32>,
+    /// Pixels in each cell.
+    counts: Vec<u32>,
+    /// The cells, those with most pixels first.
+    fullest_first: Vec<u32>,
+    /// Place of the first pixel of each cell among the sorted ones.
+    firsts: Vec<u32>,
+    /// The pixels of all cells of all groups one after another, as many places for each cell of a group.
+    sorted: Vec<Pixel>,
+    /// An empty lane of each place in a block.
+    empty: [Pixel; LANES],
+}
+
+impl Seen {
+    fn new(scale: Scale, pixels: usize) -> Self {
+        let (room, cells) = (pixels.next_multiple_of(LANES), scale.cells);
+        Seen {
+            scale,
+            pixels: 0,
+            pixel: vec![0; room],
+            weight: vec![0.0; room],
+            position: vec![0.0; room],
+            spread: vec![0.0; room],
+            cell: vec![0; room],
+            rank: vec![0; room],
+            counts: vec![0; cells + 1],
+            fullest_first: vec![0; cells],
+            firsts: vec![0; cells + 1],
+            sorted: Vec::new(),
+            empty: Pixel::empty(pixels),
+        }
+    }
+
+    /// Finds the cell of every pixel and its place there.
+    #[inline(always)]
+    fn place(&mut self, moments: &Moments) {
+        self.pixels = moments.pixels;
+        let Scale { origin_kms, steps_per_kms, .. } = self.scale;
+        let per_variance = (0.5 * steps_per_kms * steps_per_kms) as f32;
+        let whole = self.pixels.next_multiple_of(LANES);
+        self.pixel[..whole].copy_from_slice(&moments.pixel[..whole]);
+        self.weight[..whole].copy_from_slice(&moments.weight[..whole]);
+        for (spread, variance) in self.spread[..whole].iter_mut().zip(&moments.variance) {
+            *spread = variance * per_variance;
+        }
+        let places = self.position[..whole].iter_mut().zip(&mut self.cell[..whole]);
+        for ((position, cell), velocity) in places.zip(&moments.velocity) {
+            let steps = (velocity - origin_kms) * steps_per_kms - 0.5;
+            // the middle of the cell: the last bits of the sum are an integer
+            let middle = steps + INTEGERS;
+            *cell = (middle.to_bits() as u32).wrapping_sub(NODES_BEFORE);
+            *position = (steps - (middle - INTEGERS)) as f32;
+        }
+    }
+
+    /// Counts the pixels of every cell, and sorts the cells by that.
+    fn sort_cells(&mut self) {
+        self.counts.fill(0);
+        let whole = self.pixels.next_multiple_of(LANES);
+        self.cell[self.pixels..whole].fill(self.scale.cells as u32);
+        for (cell, rank) in self.cell[..whole].iter().zip(&mut self.rank) {
+            let count = &mut self.counts[*cell as usize];
+            *rank = *count;
+            *count += 1;
+        }
+        let counts = &self.counts[..self.scale.cells];
+        let most = counts.iter().fold(0, |most, count| most.max(*count)) as usize;
+        // of each number of pixels the cells that have it, then those that have more
+        let mut places = vec![0; most + 1];
+        counts.iter().for_each(|count| places[*count as usize] += 1);
+        let mut more = 0;
+        for cells in places.iter_mut().rev() {
+            more += std::mem::replace(cells, more);
+        }
+        for (cell, count) in counts.iter().enumerate() {
+            let place = &mut places[*count as usize];
+            self.fullest_first[*place] = cell as u32;
+            *place += 1;
+        }
+    }
+
+    /// Sorts the pixels by group, cell, and order in which they were seen.
+    #[inline(always)]
+    fn sort_pixels(&mut self, groups: &[Group]) {
+        let mut end = 0;
+        for Group { cells, blocks } in groups {
+            let rows = (blocks[1] - blocks[0]) as usize;
+            self.sorted.resize(self.sorted.len().max(end + LANES * rows), Pixel::default());
+            for (lane, cell) in cells.iter().enumerate() {
+                let again = cells[..lane].contains(cell);
+                let count = if again { 0 } else { self.counts[*cell as usize] as usize };
+                if !again {
+                    self.firsts[*cell as usize] = end as u32;
+                }
+                self.sorted[end + count..end + rows].fill(self.empty[lane]);
+                end += rows;
+            }
+        }
+        let Seen { sorted, firsts, .. } = self;
+        firsts[self.scale.cells] = end as u32;
+        sorted.resize(sorted.len().max(end + LANES), Pixel::default());
+        let numbers = self.weight.as_chunks().0.iter().zip(self.position.as_chunks().0);
+        let rest = self.spread.as_chunks().0.iter().zip(self.pixel.as_chunks().0);
+        let places = self.cell.as_chunks::<LANES>().0.iter().zip(self.rank.as_chunks::<LANES>().0);
+        for (((weight, position), (spread, pixel)), (cells, ranks)) in
+            numbers.zip(rest).zip(places).take(self.pixels.div_ceil(LANES))
+        {
+            let block = Block { weight: *weight, position: *position, spread: *spread, pixel: *pixel };
+            block.deal(std::array::from_fn(|lane| (firsts[cells[lane] as usize] + ranks[lane]) as usize), sorted);
+        }
+    }
+}
+
+/// From here on neighbouring numbers are integers.
+const INTEGERS: f64 = 4_503_599_627_370_496.0;
+
+/// Nodes of a cell before the one at its lower border.
+const NODES_BEFORE: u32 = 2;
