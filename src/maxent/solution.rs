@@ -143,9 +143,9 @@ pub struct Solution {
     pub chi2_slope: f64,
     /// `d spottedness / d ln(lambda)` along the path (0 if the goal was a lambda).
     pub spottedness_slope: f64,
-    /// `dz / d ln(lambda)` as last computed, before the last step: in the entropy's metric there, good to first order in the
-    /// step. The start's guess if there was no step; of no meaning if the goal was a lambda. Where `find_path` was asked, as it
-    /// is at the image.
+    /// `dz / d ln(lambda)`: that of the start if it came with one and an adjoint, or if there was no step; else as last computed,
+    /// before the last step, in the entropy's metric there. Where `find_path` was asked, as it is at the image. Of no meaning if
+    /// the goal was a lambda.
     pub path: Vec<f64>,
     /// Newton steps taken.
     pub newton_steps: usize,

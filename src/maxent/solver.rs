@@ -1,10 +1,11 @@
 //! Newton's method with preconditioned conjugate gradients for `max S subject to chi2 = target`, or at a given lambda
 //! (method section 2).
 //!
-//! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: one solve gives the Newton step
-//! at fixed lambda, a second one `ds / d ln(lambda)`, and the linearised constraint says how far to go along it. The steps end
-//! where a first-order forecast of what they would still change (`standing`) is good enough. Every call starts from the image
-//! it is given and from nothing else, so the answer is a function of problem and start. Left out: what the image shows.
+//! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: the linearised constraint says how
+//! far lambda is to go, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to there. The path takes
+//! a solve of its own unless a solution near by has one. The steps end where a first-order forecast of what they would still
+//! change (`standing`) is good enough. Every call starts from the image it is given and from nothing else, so the answer is a
+//! function of problem and start. Left out: what the image shows.
 
 use super::cg::{self, CgLimits, axpy, dot};
 use super::entropy::Entropy;
@@ -44,15 +45,14 @@ struct System<'a> {
     curvature: Curvature,
 }
 
-/// Step at fixed lambda and path along lambda, in the metric.
+/// A Newton step.
 struct Newton {
+    /// Change of the image, in the metric.
     step: Vec<f64>,
-    path: Vec<f64>,
-    /// Newton decrement squared at fixed lambda.
+    /// Change of ln(lambda).
+    move_lambda: f64,
+    /// Newton decrement squared.
     decrement: f64,
-    /// Slope of chi2 along `path`, and along `step`.
-    chi2_path: f64,
-    chi2_step: f64,
 }
 
 impl Solver<'_> {
@@ -82,13 +82,17 @@ impl Solver<'_> {
             if newton_steps == self.settings.newton_steps {
                 return self.finish(at, Some(standing), path, Termination::StepLimit, newton_steps);
             }
-            let newton = self.newton(problem, &at, &standing, goal, path, curvature);
-            let move_lambda = lambda_step(&at, newton.chi2_path, newton.chi2_step, goal);
-            at = self.advance(problem, &at, &standing.scale, &newton, move_lambda);
+            // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be; and that of a
+            // solution near by serves all the way: lambda goes wrong by as much as the path, and the next step sees it
+            let known = !start.adjoint.is_empty() && !path.is_empty();
+            if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound && !known {
+                self.solve_path(problem, &at, &standing, curvature, &mut path);
+            }
+            let newton = self.newton(problem, &at, &standing, goal, curvature, &path);
+            at = self.advance(problem, &at, &standing.scale, &newton);
             // far away the curvature of the model may make the system indefinite, near by it makes the steps exact
             let near = 0.5 * newton.decrement < EXACT_BELOW * at.lambda;
             curvature = if near { Curvature::Exact } else { Curvature::GaussNewton };
-            path = newton.path;
         }
         unreachable!("the loop returns")
     }
@@ -142,35 +146,41 @@ impl Solver<'_> {
         self.arrive(problem, u, at.lambda * move_lambda.exp())
     }
 
-    /// The Newton step at fixed lambda and, if chi2 is the goal, the path along lambda.
+    /// The path along lambda, from a guess of it or nothing.
+    fn solve_path(
+        &self,
+        problem: &mut impl Problem,
+        at: &Point,
+        standing: &Standing,
+        curvature: Curvature,
+        path: &mut Vec<f64>,
+    ) {
+        path.resize(at.u.len(), 0.0);
+        let pull: Vec<f64> = standing.chi2_gradient.iter().map(|g| -at.lambda * g).collect();
+        self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &pull, path);
+    }
+
+    /// The Newton step to where lambda is to go by the path, which is empty where lambda stays.
     fn newton(
         &self,
         problem: &mut impl Problem,
         at: &Point,
         standing: &Standing,
         goal: Goal,
-        guess: Vec<f64>,
         curvature: Curvature,
+        path: &[f64],
     ) -> Newton {
-        let n = at.u.len();
         let Standing { scale, chi2_gradient, right, .. } = standing;
-        let mut step = vec![0.0; n];
-        let system = System { lambda: at.lambda, scale, curvature };
-        self.solve_system(problem, system, right, &mut step);
-        let mut path = guess;
-        path.resize(n, 0.0);
-        // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be
-        if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound {
-            let pull: Vec<f64> = chi2_gradient.iter().map(|g| -at.lambda * g).collect();
-            self.solve_system(problem, system, &pull, &mut path);
+        let mut right = right.clone();
+        let mut move_lambda = 0.0;
+        if !path.is_empty() {
+            let (chi2_path, chi2_step) = (2.0 * dot(chi2_gradient, path), -2.0 * dot(path, &right) / at.lambda);
+            move_lambda = lambda_step(at, chi2_path, chi2_step, goal);
+            axpy(-move_lambda * at.lambda, chi2_gradient, &mut right);
         }
-        Newton {
-            decrement: dot(&step, right).max(0.0),
-            chi2_path: 2.0 * dot(chi2_gradient, &path),
-            chi2_step: 2.0 * dot(chi2_gradient, &step),
-            step,
-            path,
-        }
+        let mut step = vec![0.0; right.len()];
+        self.solve_system(problem, System { lambda: at.lambda, scale, curvature }, &right, &mut step);
+        Newton { decrement: dot(&step, &right).max(0.0), step, move_lambda }
     }
 
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f64], z: &mut [f64]) {
@@ -189,19 +199,10 @@ impl Solver<'_> {
     }
 
     /// Takes the step, halved until the merit function at the new lambda does not grow.
-    fn advance(
-        &self,
-        problem: &mut impl Problem,
-        at: &Point,
-        scale: &[f64],
-        newton: &Newton,
-        move_lambda: f64,
-    ) -> Point {
-        let lambda = at.lambda * move_lambda.exp();
+    fn advance(&self, problem: &mut impl Problem, at: &Point, scale: &[f64], newton: &Newton) -> Point {
+        let lambda = at.lambda * newton.move_lambda.exp();
         let merit = |p: &Point| -p.entropy + 0.5 * lambda * p.chi2;
-        let mut ds = newton.step.clone();
-        axpy(move_lambda, &newton.path, &mut ds);
-        ds.iter_mut().zip(scale).for_each(|(z, scale)| *z *= scale);
+        let ds: Vec<f64> = newton.step.iter().zip(scale).map(|(z, scale)| z * scale).collect();
         let before = merit(at);
         let mut length = 1.0;
         loop {

@@ -25,6 +25,9 @@ const AT_BOUND: f64 = 1e-12;
 /// changes are often worse, which is why errors come out several times the tolerance.
 const FORECAST_ERROR: f64 = 0.03;
 
+/// Error of what a step along the path of a solution near by makes of chi2/2, over what that lacks.
+const PATH_ERROR: f64 = 0.01;
+
 /// Error left at the bound of lambda, over the forecast of what chi2/2 has left to change, which is not applied there.
 const BOUND_ERROR: f64 = 0.3;
 
@@ -135,6 +138,7 @@ impl Standing {
         // what is left of the way to the target where the move of lambda is cut short
         if let Goal::Chi2 { target, .. } = goal {
             self.error += 0.5 * (target - at.chi2 - chi2_step - self.chi2_path * move_lambda).abs();
+            self.error += 0.5 * PATH_ERROR * (target - at.chi2).abs();
         }
         // of second order in the move along the path
         self.error += 0.5 * (self.chi2_path * move_lambda * move_lambda).abs();

@@ -95,9 +95,8 @@ impl Posterior {
         let solver = Solver { entropy: self.imager.entropy, preconditioner: &preconditioner, settings };
         let mut solution = solver.solve(&mut problem, self.goal(), &start(&solution));
         match solution.termination {
-            Termination::Converged => {}
-            // evaluations nearby may reach the target, and need the way there
-            Termination::Unreachable => solver.find_path(&mut problem, &mut solution),
+            // evaluations nearby take it from here, whether this one reaches the target or not
+            Termination::Converged | Termination::Unreachable => solver.find_path(&mut problem, &mut solution),
             Termination::StepLimit | Termination::NonFinite => return None,
         }
         let foothold = self.foothold(theta.to_vec(), problem.response(), &solution, Arc::new(preconditioner));
@@ -233,8 +232,14 @@ impl Posterior {
     /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem). Spottedness
     /// is not: with `A'` the gradient of spottedness and the constraint chi2 = target, the adjoint system `H y = A' - 2 mu g`, `g y = 0` (g the
     /// gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`.
-    fn sensitivity(&self, theta: &[f64], solution: &Solution, problem: &mut ImagingProblem) -> (f64, Option<Vec<f64>>) {
-        let curve_slope = self.log_likelihood(solution).1;
+    /// The solution's path is found again: the solver is content with that of a solution near by.
+    fn sensitivity(
+        &self,
+        theta: &[f64],
+        mut solution: Solution,
+        problem: &mut ImagingProblem,
+    ) -> (f64, Option<Vec<f64>>) {
+        let curve_slope = self.log_likelihood(&solution).1;
         let lambda = solution.image.lambda;
         let unreachable = solution.termination != Termination::Converged;
         match self.kind {
@@ -249,6 +254,7 @@ impl Posterior {
                 let scale = entropy.metric(&image, area);
                 let preconditioner = &self.nearest(theta).preconditioner;
                 let exact = Solver { entropy, preconditioner, settings: SolverSettings::exact() };
+                exact.find_path(problem, &mut solution);
                 let inverse =
                     exact.apply_inverse(problem, &solution.image, &entropy.spottedness_gradient(&image, area));
                 let mu = solution.spottedness_slope / solution.chi2_slope;
@@ -301,8 +307,8 @@ impl Gradient for Posterior {
         if evaluation.log_prob == f64::NEG_INFINITY {
             return (evaluation, Vec::new());
         }
-        let (weight, direction) = self.sensitivity(theta, &solution, &mut problem);
         let image = self.imager.entropy.image(&solution.image.coordinates);
+        let (weight, direction) = self.sensitivity(theta, solution, &mut problem);
         let internal = self.space.to_internal(theta);
         let response = problem.response().clone();
         let at_fixed_map = |i: usize, h: f64| {
