@@ -90,7 +90,8 @@ pub struct Image {
 pub struct Start {
     /// Image and lambda.
     pub image: Image,
-    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none.
+    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none. With an adjoint
+    /// it is taken for that of a solution near by, and not solved for again in the first steps.
     pub path: Vec<f64>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,
@@ -139,9 +140,9 @@ pub struct Solution {
     pub spottedness: f64,
     /// First-order forecast of what spottedness has still to change at this chi2, from the start's adjoint.
     pub spottedness_left: f64,
-    /// `d chi2 / d ln(lambda)` along the path of solutions (0 if the goal was a lambda).
+    /// `d chi2 / d ln(lambda)` along `path` (0 if the goal was a lambda).
     pub chi2_slope: f64,
-    /// `d spottedness / d ln(lambda)` along the path (0 if the goal was a lambda).
+    /// `d spottedness / d ln(lambda)` along `path` (0 if the goal was a lambda).
     pub spottedness_slope: f64,
     /// `dz / d ln(lambda)`: that of the start if it came with one and an adjoint, or if there was no step; else as last computed,
     /// before the last step, in the entropy's metric there. Where `find_path` was asked, as it is at the image. Of no meaning if

@@ -20,6 +20,9 @@ const STEP_CAP: f64 = 2.0;
 /// Largest change of ln(lambda) that is made before the first Newton step.
 const RESTORE_REACH: f64 = 0.3;
 
+/// Steps that take the path of a solution near by for granted; whoever needs more was not so near.
+const KNOWN_PATH_STEPS: usize = 6;
+
 /// An error below this part of chi2 is rounding, and no step makes it smaller.
 const ROUNDING: f64 = 1.5e-12;
 
@@ -83,9 +86,9 @@ impl Solver<'_> {
                 return self.finish(at, Some(standing), path, Termination::StepLimit, newton_steps);
             }
             // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be; and that of a
-            // solution near by serves all the way: lambda goes wrong by as much as the path, and the next step sees it
-            let known = !start.adjoint.is_empty() && !path.is_empty();
-            if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound && !known {
+            // solution near by serves: lambda goes wrong by as much as the path, and the next step sees it
+            let near_by = !start.adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && standing.chi2_path < 0.0;
+            if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound && !near_by {
                 self.solve_path(problem, &at, &standing, curvature, &mut path);
             }
             let newton = self.newton(problem, &at, &standing, goal, curvature, &path);
@@ -160,7 +163,7 @@ impl Solver<'_> {
         self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &pull, path);
     }
 
-    /// The Newton step to where lambda is to go by the path, which is empty where lambda stays.
+    /// The Newton step to where lambda is to go by the path; it stays where there is none, and if it is the goal.
     fn newton(
         &self,
         problem: &mut impl Problem,

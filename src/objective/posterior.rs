@@ -96,7 +96,9 @@ impl Posterior {
         let mut solution = solver.solve(&mut problem, self.goal(), &start(&solution));
         match solution.termination {
             // evaluations nearby take it from here, whether this one reaches the target or not
-            Termination::Converged | Termination::Unreachable => solver.find_path(&mut problem, &mut solution),
+            Termination::Converged | Termination::Unreachable => {
+                Solver { settings: SolverSettings::exact(), ..solver }.find_path(&mut problem, &mut solution);
+            }
             Termination::StepLimit | Termination::NonFinite => return None,
         }
         let foothold = self.foothold(theta.to_vec(), problem.response(), &solution, Arc::new(preconditioner));

@@ -149,7 +149,7 @@ impl<const POINTS: usize> RingView<POINTS> {
                 first += moment;
                 second = fma(moment, v, second);
             }
-            let per_weight = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+            let per_weight = if sum > f32::MIN_POSITIVE { 1.0 / sum } else { 0.0 };
             let mean = first * per_weight;
             let spread = fma(second, per_weight, -mean * mean);
             weight[lane] = sum;

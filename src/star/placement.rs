@@ -1,8 +1,9 @@
 //! Which cell of the velocity grid every visible pixel of every observation lies in, and where in it: the pairs as the hot path
 //! reads them.
 //!
-//! Cells stand side by side (`kernel`) in the order of their numbers of pixels, so that those of a group have about as many.
-//! Left out: what the pairs are used for (`deposit`).
+//! Cells stand side by side (`kernel`) in the order of their numbers of pixels, so that those of a group have about as many. On a
+//! large map, where neighbours should be taken one after another, every group is one cell. Left out: what the pairs are used
+//! for (`deposit`).
 
 use super::grid::SurfaceGrid;
 use super::kernel::{Block, LANES, Pixel};
@@ -20,13 +21,23 @@ pub struct Placement {
     blocks: Vec<Block>,
 }
 
-/// Cells side by side.
+/// Cells side by side, or one whose pixels are dealt to all lanes.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     /// First node of each cell.
     cells: [u32; LANES],
     /// First of the group's blocks, and the end.
     blocks: [u32; 2],
+}
+
+impl Group {
+    fn is_one_cell(&self) -> bool {
+        self.cells.iter().all(|cell| *cell == self.cells[0])
+    }
+
+    fn rows(&self) -> usize {
+        (self.blocks[1] - self.blocks[0]) as usize
+    }
 }
 
 impl Placement {
@@ -48,8 +59,9 @@ impl Placement {
         let first_group = self.groups.len();
         seen.sort_cells();
         let mut first_block = self.blocks.len() as u32;
-        for cells in seen.fullest_first.chunks(LANES) {
-            let end = first_block + seen.counts[cells[0] as usize];
+        for cells in seen.order.chunks(seen.scale.side_by_side) {
+            let most = seen.counts[cells[0] as usize];
+            let end = first_block + if cells.len() == 1 { most.div_ceil(LANES as u32) } else { most };
             // lanes that are left over at the end repeat a cell and have no pixel
             let cells = std::array::from_fn(|lane| *cells.get(lane).unwrap_or(&cells[0]));
             self.groups.push(Group { cells, blocks: [first_block, end] });
@@ -59,9 +71,14 @@ impl Placement {
         seen.sort_pixels(groups);
         let mut sorted = &seen.sorted[..];
         for group in groups {
-            let rows = (group.blocks[1] - group.blocks[0]) as usize;
-            let [a, b, c, d] = std::array::from_fn(|lane| sorted[lane * rows..(lane + 1) * rows].iter());
-            self.blocks.extend(a.zip(b).zip(c.zip(d)).map(|((a, b), (c, d))| Block::of([a, b, c, d])));
+            let rows = group.rows();
+            if group.is_one_cell() {
+                let rows = sorted[..LANES * rows].as_chunks::<LANES>().0;
+                self.blocks.extend(rows.iter().map(|lanes| Block::of(lanes.each_ref())));
+            } else {
+                let [a, b, c, d] = std::array::from_fn(|lane| sorted[lane * rows..(lane + 1) * rows].iter());
+                self.blocks.extend(a.zip(b).zip(c.zip(d)).map(|((a, b), (c, d))| Block::of([a, b, c, d])));
+            }
             sorted = &sorted[LANES * rows..];
         }
     }
@@ -88,6 +105,8 @@ pub struct Scale {
     pub steps_per_kms: f64,
     /// Cells that a pixel can lie in.
     pub cells: usize,
+    /// How many of them stand side by side: [`LANES`] or 1.
+    pub side_by_side: usize,
 }
 
 impl Task for Place<'_> {
@@ -100,7 +119,7 @@ impl Task for Place<'_> {
         let mut placement = Placement {
             pairs: 0,
             groups: Vec::new(),
-            groups_each: scale.cells.div_ceil(LANES),
+            groups_each: scale.cells.div_ceil(scale.side_by_side),
             blocks: Vec::with_capacity(since_epoch_d.len() * grid.len() * 5 / 8 / LANES),
         };
         let mut seen = Seen::new(scale, grid.len());
@@ -127,8 +146,8 @@ struct Seen {
     rank: Vec<u32>,
     /// Pixels in each cell.
     counts: Vec<u32>,
-    /// The cells, those with most pixels first.
-    fullest_first: Vec<u32>,
+    /// The cells, those with most pixels first where several stand side by side.
+    order: Vec<u32>,
     /// Place of the first pixel of each cell among the sorted ones.
     firsts: Vec<u32>,
     /// The pixels of all cells of all groups one after another, as many places for each cell of a group.
@@ -150,7 +169,7 @@ impl Seen {
             cell: vec![0; room],
             rank: vec![0; room],
             counts: vec![0; cells + 1],
-            fullest_first: vec![0; cells],
+            order: vec![0; cells],
             firsts: vec![0; cells + 1],
             sorted: Vec::new(),
             empty: Pixel::empty(pixels),
@@ -163,7 +182,7 @@ impl Seen {
         self.pixels = moments.pixels;
         let Scale { origin_kms, steps_per_kms, .. } = self.scale;
         let per_variance = (0.5 * steps_per_kms * steps_per_kms) as f32;
-        let whole = self.pixels.next_multiple_of(LANES);
+        let (whole, last) = (self.pixels.next_multiple_of(LANES), self.scale.cells as u32 - 1);
         self.pixel[..whole].copy_from_slice(&moments.pixel[..whole]);
         self.weight[..whole].copy_from_slice(&moments.weight[..whole]);
         for (spread, variance) in self.spread[..whole].iter_mut().zip(&moments.variance) {
@@ -174,7 +193,8 @@ impl Seen {
             let steps = (velocity - origin_kms) * steps_per_kms - 0.5;
             // the middle of the cell: the last bits of the sum are an integer
             let middle = steps + INTEGERS;
-            *cell = (middle.to_bits() as u32).wrapping_sub(NODES_BEFORE);
+            // at angles beyond all meaning velocities are, too
+            *cell = (middle.to_bits() as u32).wrapping_sub(NODES_BEFORE).min(last);
             *position = (steps - (middle - INTEGERS)) as f32;
         }
     }
@@ -190,6 +210,10 @@ impl Seen {
             *count += 1;
         }
         let counts = &self.counts[..self.scale.cells];
+        if self.scale.side_by_side == 1 {
+            self.order.iter_mut().enumerate().for_each(|(cell, place)| *place = cell as u32);
+            return;
+        }
         let most = counts.iter().fold(0, |most, count| most.max(*count)) as usize;
         // of each number of pixels the cells that have it, then those that have more
         let mut places = vec![0; most + 1];
@@ -200,7 +224,7 @@ impl Seen {
         }
         for (cell, count) in counts.iter().enumerate() {
             let place = &mut places[*count as usize];
-            self.fullest_first[*place] = cell as u32;
+            self.order[*place] = cell as u32;
             *place += 1;
         }
     }
@@ -209,18 +233,25 @@ impl Seen {
     #[inline(always)]
     fn sort_pixels(&mut self, groups: &[Group]) {
         let mut end = 0;
-        for Group { cells, blocks } in groups {
-            let rows = (blocks[1] - blocks[0]) as usize;
+        for group in groups {
+            let (cells, rows) = (&group.cells, group.rows());
             self.sorted.resize(self.sorted.len().max(end + LANES * rows), Pixel::default());
-            for (lane, cell) in cells.iter().enumerate() {
-                let again = cells[..lane].contains(cell);
-                let count = if again { 0 } else { self.counts[*cell as usize] as usize };
-                if !again {
-                    self.firsts[*cell as usize] = end as u32;
+            let places = &mut self.sorted[end..end + LANES * rows];
+            if group.is_one_cell() {
+                self.firsts[cells[0] as usize] = end as u32;
+                let count = self.counts[cells[0] as usize] as usize;
+                (count..places.len()).for_each(|place| places[place] = self.empty[place % LANES]);
+            } else {
+                for (lane, cell) in cells.iter().enumerate() {
+                    let again = cells[..lane].contains(cell);
+                    let count = if again { 0 } else { self.counts[*cell as usize] as usize };
+                    if !again {
+                        self.firsts[*cell as usize] = (end + lane * rows) as u32;
+                    }
+                    places[lane * rows + count..(lane + 1) * rows].fill(self.empty[lane]);
                 }
-                self.sorted[end + count..end + rows].fill(self.empty[lane]);
-                end += rows;
             }
+            end += LANES * rows;
         }
         let Seen { sorted, firsts, .. } = self;
         firsts[self.scale.cells] = end as u32;
@@ -242,3 +273,71 @@ const INTEGERS: f64 = 4_503_599_627_370_496.0;
 
 /// Nodes of a cell before the one at its lower border.
 const NODES_BEFORE: u32 = 2;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::star::kernel::{self, Nodes};
+    use crate::star::{LimbDarkening, Orbit, Quadrature, Rotation, StarState};
+    use crate::vector;
+
+    /// Deposits `x` as an observation sees it on `nodes` nodes.
+    struct Gather<'a>(&'a Placement, usize, &'a [f64], usize);
+
+    impl Task for Gather<'_> {
+        type Output = Vec<f64>;
+
+        #[inline(always)]
+        #[allow(unsafe_code)]
+        fn run<I: Instructions>(self, i: I) -> Vec<f64> {
+            let Gather(placement, observation, x, nodes) = self;
+            let mut sums = vec![0.0; nodes];
+            for (cells, blocks) in placement.groups_of(observation) {
+                // safe: `x` has the map's pixels
+                let left = unsafe { kernel::gather(i, blocks, x) };
+                for (cell, left) in cells.iter().zip(left) {
+                    let nodes: &mut Nodes = sums[*cell as usize..].first_chunk_mut().unwrap();
+                    nodes.iter_mut().zip(left).for_each(|(sum, left)| *sum += left);
+                }
+            }
+            sums
+        }
+    }
+
+    #[test]
+    fn cells_side_by_side_or_one_by_one_hold_every_visible_pixel_once() {
+        let state = StarState {
+            rotation: Rotation { omega_eq_rad_d: 2.1, domega_rad_d: 0.05 },
+            inclination: 0.7,
+            vsini_kms: 40.0,
+            vsys_kms: 0.0,
+            orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 },
+            surface: Default::default(),
+        };
+        let viewer = Viewer::new(&state, LimbDarkening::Linear(0.7));
+        let times = [0.0, 0.9, 700.3];
+        for (pixels, quadrature) in [(3, Quadrature::Centre), (7, Quadrature::Gauss2x2), (900, Quadrature::Gauss2x2)] {
+            let grid = SurfaceGrid::equal_area(pixels, quadrature);
+            let place = |side_by_side: usize| {
+                let scale = Scale { origin_kms: -46.0, steps_per_kms: 1.0, cells: 88, side_by_side };
+                vector::run(Place { grid: &grid, viewer, scale, since_epoch_d: &times })
+            };
+            let [together, alone] = [LANES, 1].map(place);
+            assert_eq!(together.pairs, alone.pairs);
+            let x: Vec<f64> = (0..grid.len()).map(|p| (0.7 * p as f64).sin()).collect();
+            for observation in 0..times.len() {
+                let mut seen: Vec<u32> = Vec::new();
+                for (_, blocks) in together.groups_of(observation) {
+                    let lanes = blocks.iter().flat_map(|block| block.pixel.iter().zip(block.weight));
+                    seen.extend(lanes.filter(|(_, weight)| *weight > 0.0).map(|(pixel, _)| pixel));
+                }
+                let count = seen.len();
+                seen.sort_unstable();
+                seen.dedup();
+                assert!(count == seen.len() && count > 0, "{pixels} pixels, observation {observation}");
+                let [a, b] = [&together, &alone].map(|p| vector::run(Gather(p, observation, &x, 93)));
+                assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {b:?}");
+            }
+        }
+    }
+}

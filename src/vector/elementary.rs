@@ -102,7 +102,7 @@ pub fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     exponent * LN_2[0] - ((half - rest) - f)
 }
 
-/// Sine and cosine of x (rad); beyond some 10^6, as precise as x is.
+/// Sine and cosine of x (rad); beyond some 10^6, as precise as x is, and beyond 10^15 without a meaning.
 #[inline(always)]
 pub fn sin_cos(i: impl Instructions, x: f64) -> (f64, f64) {
     let rounded = i.multiply_add(x, std::f64::consts::FRAC_2_PI, ROUND);
