@@ -3,8 +3,8 @@
 //!
 //! A pixel is a weight at a position t in [-1/2, 1/2] of its cell. What it leaves on the grid is a polynomial in t (see
 //! `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in registers however many pixels
-//! there are. Each loop is written twice: as it reads, and in AVX2, which the compiler does not find by itself (three times
-//! slower). Left out: which pixels lie in which cell, and which cells stand side by side.
+//! there are. Each loop is written twice: as it reads, and in AVX2, which the compiler does not find by itself. Left
+//! out: which pixels lie in which cell, and which cells stand side by side.
 
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
 use crate::vector::Instructions;
@@ -81,17 +81,12 @@ impl Block {
         }
     }
 
-    /// What the pixel in a lane leaves on each node of its cell, over its weight.
-    fn shares(&self, lane: usize) -> Nodes {
+    /// Means of `t^k` over the extent of the pixel in a lane.
+    fn powers(&self, lane: usize) -> [f64; DEPOSIT_NODES] {
         let (t, spread) = (f64::from(self.position[lane]), f64::from(self.spread[lane]));
-        let at = |t: f64, weights: &[f64; DEPOSIT_NODES]| {
-            let t2 = t * t;
-            let plus = |factor: f64| t2 + factor * spread;
-            let powers = [1.0, t, plus(2.0), t * plus(6.0), t2 * plus(12.0), t * t2 * plus(20.0)];
-            weights.iter().zip(powers).map(|(w, power)| w * power).sum()
-        };
-        let [a, b, c] = DEPOSIT_WEIGHTS;
-        [at(t, &a), at(t, &b), at(t, &c), at(-t, &c), at(-t, &b), at(-t, &a)]
+        let t2 = t * t;
+        let plus = |factor: f64| t2 + factor * spread;
+        [1.0, t, plus(2.0), t * plus(6.0), t2 * plus(12.0), t * t2 * plus(20.0)]
     }
 }
 
@@ -126,23 +121,46 @@ pub unsafe fn scatter<I: Instructions>(_: I, blocks: &[Block], nodes: [&Nodes; L
 }
 
 fn plain_gather(blocks: &[Block], x: &[f64]) -> [Nodes; LANES] {
-    let mut nodes = [[0.0; DEPOSIT_NODES]; LANES];
+    let mut sums = [[0.0; DEPOSIT_NODES]; LANES];
     for block in blocks {
-        for (lane, nodes) in nodes.iter_mut().enumerate() {
+        for (lane, sums) in sums.iter_mut().enumerate() {
             let amount = x[block.pixel[lane] as usize] * f64::from(block.weight[lane]);
-            nodes.iter_mut().zip(block.shares(lane)).for_each(|(node, share)| *node += amount * share);
+            sums.iter_mut().zip(block.powers(lane)).for_each(|(sum, power)| *sum += amount * power);
         }
     }
-    nodes
+    sums.map(|sums| {
+        let mut nodes = [0.0; DEPOSIT_NODES];
+        for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
+            for (k, (weight, sum)) in weights.iter().zip(sums).enumerate() {
+                nodes[n] += weight * sum;
+                nodes[DEPOSIT_NODES - 1 - n] += mirrored(k, weight * sum);
+            }
+        }
+        nodes
+    })
 }
 
 fn plain_scatter(blocks: &[Block], nodes: [&Nodes; LANES], out: &mut [f64]) {
+    let coefficients = nodes.map(|nodes| {
+        let mut coefficients = [0.0; DEPOSIT_NODES];
+        for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
+            for (k, (coefficient, weight)) in coefficients.iter_mut().zip(weights).enumerate() {
+                *coefficient += weight * (nodes[n] + mirrored(k, nodes[DEPOSIT_NODES - 1 - n]));
+            }
+        }
+        coefficients
+    });
     for block in blocks {
-        for (lane, nodes) in nodes.iter().enumerate() {
-            let sum: f64 = nodes.iter().zip(block.shares(lane)).map(|(node, share)| node * share).sum();
-            out[block.pixel[lane] as usize] += f64::from(block.weight[lane]) * sum;
+        for (lane, coefficients) in coefficients.iter().enumerate() {
+            let polynomial: f64 = coefficients.iter().zip(block.powers(lane)).map(|(c, power)| c * power).sum();
+            out[block.pixel[lane] as usize] += f64::from(block.weight[lane]) * polynomial;
         }
     }
+}
+
+/// A term of `t^k` as the mirror image of a node has it.
+fn mirrored(k: usize, term: f64) -> f64 {
+    if k % 2 == 0 { term } else { -term }
 }
 
 /// Blocks of pixels and pixels of blocks in registers; the compiler takes one number after another through memory.
@@ -186,7 +204,7 @@ mod sse {
     }
 }
 
-/// The same loops by sums of powers, all cells at a time.
+/// The same loops, all cells at a time.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod avx2 {
