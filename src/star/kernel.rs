@@ -160,7 +160,10 @@ fn plain_scatter(blocks: &[Block], nodes: [&Nodes; LANES], out: &mut [f64]) {
 
 /// A term of `t^k` as the mirror image of a node has it.
 fn mirrored(k: usize, term: f64) -> f64 {
-    if k % 2 == 0 { term } else { -term }
+    match k % 2 {
+        0 => term,
+        _ => -term,
+    }
 }
 
 /// Blocks of pixels and pixels of blocks in registers; the compiler takes one number after another through memory.
