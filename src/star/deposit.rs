@@ -8,7 +8,7 @@
 
 use super::StarState;
 use super::grid::SurfaceGrid;
-use super::kernel::{self, LANES, Nodes};
+use super::kernel;
 use super::limb_darkening::LimbDarkening;
 use super::line_profile::DEPOSIT_NODES;
 use super::placement::{Place, Placement, Scale};
@@ -40,9 +40,8 @@ impl Deposit {
         let viewer = Viewer::new(state, limb);
         let reach = reach(&viewer, step_kms);
         let (origin_kms, nodes) = (-reach * step_kms, 2 * reach as usize + 1);
-        let side_by_side = if grid.len() > LARGE_MAP { 1 } else { LANES };
         let cells = nodes + 1 - DEPOSIT_NODES;
-        let scale = Scale { origin_kms, steps_per_kms: 1.0 / step_kms, cells, side_by_side };
+        let scale = Scale { origin_kms, steps_per_kms: 1.0 / step_kms, cells, by_size: grid.len() <= LARGE_MAP };
         let placement = vector::run(Place { grid, viewer, scale, since_epoch_d });
         Deposit { origin_kms, step_kms, nodes, pixels: grid.len(), placement }
     }
@@ -71,15 +70,11 @@ impl Deposit {
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn gather<I: Instructions>(&self, i: I, k: usize, x: &[f64], nodes: &mut [f64]) {
-        assert_eq!(x.len(), self.pixels);
+        assert!(x.len() == self.pixels && nodes.len() == self.nodes);
         nodes.fill(0.0);
         for (cells, blocks) in self.placement.groups_of(k).filter(|(_, blocks)| !blocks.is_empty()) {
-            // safe: blocks hold pixels of the grid alone
-            let left = unsafe { kernel::gather(i, blocks, x) };
-            for (cell, left) in cells.iter().zip(&left) {
-                let nodes: &mut Nodes = nodes[*cell as usize..].first_chunk_mut().expect("nodes of a cell");
-                nodes.iter_mut().zip(left).for_each(|(node, left)| *node += left);
-            }
+            // safe: blocks hold pixels of the grid alone, and the nodes of all cells are there
+            unsafe { kernel::gather(i, blocks, cells, x, nodes) };
         }
     }
 
@@ -87,11 +82,10 @@ impl Deposit {
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn scatter<I: Instructions>(&self, i: I, k: usize, nodes: &[f64], out: &mut [f64]) {
-        assert_eq!(out.len(), self.pixels);
+        assert!(out.len() == self.pixels && nodes.len() == self.nodes);
         for (cells, blocks) in self.placement.groups_of(k).filter(|(_, blocks)| !blocks.is_empty()) {
-            let of_cells = cells.map(|cell| nodes[cell as usize..].first_chunk().expect("nodes of a cell"));
-            // safe: blocks hold pixels of the grid alone
-            unsafe { kernel::scatter(i, blocks, of_cells, out) };
+            // safe: as above
+            unsafe { kernel::scatter(i, blocks, cells, nodes, out) };
         }
     }
 }

@@ -3,6 +3,7 @@
 //!
 //! Left out: priors, chi2, chains, files. Angles are radians here, velocities km/s, times days.
 
+mod block;
 pub mod brightness;
 mod convolution;
 mod correlate;

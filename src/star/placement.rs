@@ -1,12 +1,12 @@
 //! Which cell of the velocity grid every visible pixel of every observation lies in, and where in it: the pairs as the hot path
 //! reads them.
 //!
-//! Cells stand side by side (`kernel`) in the order of their numbers of pixels, so that those of a group have about as many. On a
-//! large map, where neighbours should be taken one after another, every group is one cell. Left out: what the pairs are used
-//! for (`deposit`).
+//! Cells stand side by side (`block`) in the order of their numbers of pixels, so that those of a group have about as many. On a
+//! large map, where neighbours should be taken one after another, they stand in the order of their velocities: cells with
+//! hundreds of pixels have about as many as their neighbours. Left out: what the pairs are used for (`deposit`).
 
 use super::grid::SurfaceGrid;
-use super::kernel::{Block, LANES, Pixel};
+use super::block::{Block, LANES, Pixel};
 use super::moments::Moments;
 use super::view::Viewer;
 use crate::vector::{Instructions, Task};
@@ -21,7 +21,7 @@ pub struct Placement {
     blocks: Vec<Block>,
 }
 
-/// Cells side by side, or one whose pixels are dealt to all lanes.
+/// Cells side by side, those with most pixels first.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     /// First node of each cell.
@@ -31,10 +31,6 @@ struct Group {
 }
 
 impl Group {
-    fn is_one_cell(&self) -> bool {
-        self.cells.iter().all(|cell| *cell == self.cells[0])
-    }
-
     fn rows(&self) -> usize {
         (self.blocks[1] - self.blocks[0]) as usize
     }
@@ -59,9 +55,8 @@ impl Placement {
         let first_group = self.groups.len();
         seen.sort_cells();
         let mut first_block = self.blocks.len() as u32;
-        for cells in seen.order.chunks(seen.scale.side_by_side) {
-            let most = seen.counts[cells[0] as usize];
-            let end = first_block + if cells.len() == 1 { most.div_ceil(LANES as u32) } else { most };
+        for cells in seen.order.chunks(LANES) {
+            let end = first_block + seen.counts[cells[0] as usize];
             // lanes that are left over at the end repeat a cell and have no pixel
             let cells = std::array::from_fn(|lane| *cells.get(lane).unwrap_or(&cells[0]));
             self.groups.push(Group { cells, blocks: [first_block, end] });
@@ -72,13 +67,9 @@ impl Placement {
         let mut sorted = &seen.sorted[..];
         for group in groups {
             let rows = group.rows();
-            if group.is_one_cell() {
-                let rows = sorted[..LANES * rows].as_chunks::<LANES>().0;
-                self.blocks.extend(rows.iter().map(|lanes| Block::of(lanes.each_ref())));
-            } else {
-                let [a, b, c, d] = std::array::from_fn(|lane| sorted[lane * rows..(lane + 1) * rows].iter());
-                self.blocks.extend(a.zip(b).zip(c.zip(d)).map(|((a, b), (c, d))| Block::of([a, b, c, d])));
-            }
+            let lane = |lane: usize| &sorted[lane * rows..(lane + 1) * rows];
+            let lanes: [&[Pixel]; LANES] = std::array::from_fn(lane);
+            self.blocks.extend((0..rows).map(|row| Block::of(lanes.map(|lane| &lane[row]))));
             sorted = &sorted[LANES * rows..];
         }
     }
@@ -105,8 +96,8 @@ pub struct Scale {
     pub steps_per_kms: f64,
     /// Cells that a pixel can lie in.
     pub cells: usize,
-    /// How many of them stand side by side: [`LANES`] or 1.
-    pub side_by_side: usize,
+    /// Whether they stand in the order of their numbers of pixels, not of their velocities.
+    pub by_size: bool,
 }
 
 impl Task for Place<'_> {
@@ -119,7 +110,7 @@ impl Task for Place<'_> {
         let mut placement = Placement {
             pairs: 0,
             groups: Vec::new(),
-            groups_each: scale.cells.div_ceil(scale.side_by_side),
+            groups_each: scale.cells.div_ceil(LANES),
             blocks: Vec::with_capacity(since_epoch_d.len() * grid.len() * 5 / 8 / LANES),
         };
         let mut seen = Seen::new(scale, grid.len());
@@ -134,6 +125,8 @@ impl Task for Place<'_> {
 /// What one observation sees.
 struct Seen {
     scale: Scale,
+    /// Number of pixels of the map.
+    room: usize,
     /// Number of visible pixels.
     pixels: usize,
     /// Of each, in the order in which they were seen: what a block holds, and its cell.
@@ -146,14 +139,12 @@ struct Seen {
     rank: Vec<u32>,
     /// Pixels in each cell.
     counts: Vec<u32>,
-    /// The cells, those with most pixels first where several stand side by side.
+    /// The cells as they stand side by side.
     order: Vec<u32>,
     /// Place of the first pixel of each cell among the sorted ones.
     firsts: Vec<u32>,
     /// The pixels of all cells of all groups one after another, as many places for each cell of a group.
     sorted: Vec<Pixel>,
-    /// An empty lane of each place in a block.
-    empty: [Pixel; LANES],
 }
 
 impl Seen {
@@ -161,6 +152,7 @@ impl Seen {
         let (room, cells) = (pixels.next_multiple_of(LANES), scale.cells);
         Seen {
             scale,
+            room: pixels,
             pixels: 0,
             pixel: vec![0; room],
             weight: vec![0.0; room],
@@ -172,7 +164,6 @@ impl Seen {
             order: vec![0; cells],
             firsts: vec![0; cells + 1],
             sorted: Vec::new(),
-            empty: Pixel::empty(pixels),
         }
     }
 
@@ -199,7 +190,7 @@ impl Seen {
         }
     }
 
-    /// Counts the pixels of every cell, and sorts the cells by that.
+    /// Counts the pixels of every cell, and puts the cells in their order.
     fn sort_cells(&mut self) {
         self.counts.fill(0);
         let whole = self.pixels.next_multiple_of(LANES);
@@ -210,8 +201,11 @@ impl Seen {
             *count += 1;
         }
         let counts = &self.counts[..self.scale.cells];
-        if self.scale.side_by_side == 1 {
+        if !self.scale.by_size {
             self.order.iter_mut().enumerate().for_each(|(cell, place)| *place = cell as u32);
+            for group in self.order.chunks_mut(LANES) {
+                group.sort_by_key(|cell| std::cmp::Reverse(counts[*cell as usize]));
+            }
             return;
         }
         let most = counts.iter().fold(0, |most, count| most.max(*count)) as usize;
@@ -237,18 +231,15 @@ impl Seen {
             let (cells, rows) = (&group.cells, group.rows());
             self.sorted.resize(self.sorted.len().max(end + LANES * rows), Pixel::default());
             let places = &mut self.sorted[end..end + LANES * rows];
-            if group.is_one_cell() {
-                self.firsts[cells[0] as usize] = end as u32;
-                let count = self.counts[cells[0] as usize] as usize;
-                (count..places.len()).for_each(|place| places[place] = self.empty[place % LANES]);
-            } else {
-                for (lane, cell) in cells.iter().enumerate() {
-                    let again = cells[..lane].contains(cell);
-                    let count = if again { 0 } else { self.counts[*cell as usize] as usize };
-                    if !again {
-                        self.firsts[*cell as usize] = (end + lane * rows) as u32;
-                    }
-                    places[lane * rows + count..(lane + 1) * rows].fill(self.empty[lane]);
+            for (lane, cell) in cells.iter().enumerate() {
+                let again = cells[..lane].contains(cell);
+                let count = if again { 0 } else { self.counts[*cell as usize] as usize };
+                if !again {
+                    self.firsts[*cell as usize] = (end + lane * rows) as u32;
+                }
+                for place in lane * rows + count..(lane + 1) * rows {
+                    // never one pixel in two blocks that follow each other, for no sum to wait for another
+                    places[place] = Pixel { pixel: ((end + place) % self.room) as u32, ..Pixel::default() };
                 }
             }
             end += LANES * rows;
@@ -277,7 +268,7 @@ const NODES_BEFORE: u32 = 2;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::kernel::{self, Nodes};
+    use crate::star::kernel;
     use crate::star::{LimbDarkening, Orbit, Quadrature, Rotation, StarState};
     use crate::vector;
 
@@ -294,18 +285,14 @@ mod tests {
             let mut sums = vec![0.0; nodes];
             for (cells, blocks) in placement.groups_of(observation) {
                 // safe: `x` has the map's pixels
-                let left = unsafe { kernel::gather(i, blocks, x) };
-                for (cell, left) in cells.iter().zip(left) {
-                    let nodes: &mut Nodes = sums[*cell as usize..].first_chunk_mut().unwrap();
-                    nodes.iter_mut().zip(left).for_each(|(sum, left)| *sum += left);
-                }
+                unsafe { kernel::gather(i, blocks, cells, x, &mut sums) };
             }
             sums
         }
     }
 
     #[test]
-    fn cells_side_by_side_or_one_by_one_hold_every_visible_pixel_once() {
+    fn cells_in_either_order_hold_every_visible_pixel_once() {
         let state = StarState {
             rotation: Rotation { omega_eq_rad_d: 2.1, domega_rad_d: 0.05 },
             inclination: 0.7,
@@ -318,16 +305,16 @@ mod tests {
         let times = [0.0, 0.9, 700.3];
         for (pixels, quadrature) in [(3, Quadrature::Centre), (7, Quadrature::Gauss2x2), (900, Quadrature::Gauss2x2)] {
             let grid = SurfaceGrid::equal_area(pixels, quadrature);
-            let place = |side_by_side: usize| {
-                let scale = Scale { origin_kms: -46.0, steps_per_kms: 1.0, cells: 88, side_by_side };
+            let place = |by_size: bool| {
+                let scale = Scale { origin_kms: -46.0, steps_per_kms: 1.0, cells: 88, by_size };
                 vector::run(Place { grid: &grid, viewer, scale, since_epoch_d: &times })
             };
-            let [together, alone] = [LANES, 1].map(place);
-            assert_eq!(together.pairs, alone.pairs);
+            let [sorted, in_order] = [true, false].map(place);
+            assert_eq!(sorted.pairs, in_order.pairs);
             let x: Vec<f64> = (0..grid.len()).map(|p| (0.7 * p as f64).sin()).collect();
             for observation in 0..times.len() {
                 let mut seen: Vec<u32> = Vec::new();
-                for (_, blocks) in together.groups_of(observation) {
+                for (_, blocks) in sorted.groups_of(observation) {
                     let lanes = blocks.iter().flat_map(|block| block.pixel.iter().zip(block.weight));
                     seen.extend(lanes.filter(|(_, weight)| *weight > 0.0).map(|(pixel, _)| pixel));
                 }
@@ -335,7 +322,7 @@ mod tests {
                 seen.sort_unstable();
                 seen.dedup();
                 assert!(count == seen.len() && count > 0, "{pixels} pixels, observation {observation}");
-                let [a, b] = [&together, &alone].map(|p| vector::run(Gather(p, observation, &x, 93)));
+                let [a, b] = [&sorted, &in_order].map(|p| vector::run(Gather(p, observation, &x, 93)));
                 assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {b:?}");
             }
         }

@@ -1,10 +1,12 @@
-//! Vector instructions: hot loops are compiled for AVX2 with fused multiply-add as well, and chosen at run time.
+//! Vector instructions: hot loops are compiled for AVX2 with fused multiply-add and for AVX-512 as well, and chosen at run time.
 //!
-//! A hot loop is a [`Task`]: written once, inlined into an entry compiled for either set of instructions. Products are fused
-//! with sums in one of them, and the innermost loops (`star::kernel`) sum in another order too: results differ in the last
-//! digits between processors with and without AVX2, never between runs on one.
+//! A hot loop is a [`Task`]: written once, inlined into an entry compiled for each set of instructions. The compiler makes vectors of
+//! most loops by itself; where it does not, numbers side by side are written as [`Instructions::Lanes`]. Products are fused
+//! with sums in two of the sets, and as many numbers are summed side by side as a register holds: results differ in the
+//! last digits between processors, never between runs on one. Left out: what the loops are.
 
 pub mod elementary;
+mod registers;
 
 /// Work that is compiled for every set of instructions.
 pub trait Task {
@@ -15,16 +17,51 @@ pub trait Task {
     fn run<I: Instructions>(self, instructions: I) -> Self::Output;
 }
 
-/// A set of instructions; having one at hand proves that the processor has them. There are no others than those of this file.
+/// A set of instructions; having one at hand proves that the processor has them. There are no others than those of this module.
 pub trait Instructions: Copy + sealed::Sealed {
-    /// Whether AVX2 and FMA are there.
-    const AVX2: bool;
+    /// Numbers side by side, in a register.
+    type Lanes: Copy;
+
+    /// How many of them.
+    const LANES: usize;
 
     /// `a b + c`, fused where the processor can.
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64;
 
     /// The same in single precision.
     fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32;
+
+    /// One number in every lane.
+    fn splat(self, x: f64) -> Self::Lanes;
+
+    /// The numbers from entry `first` on.
+    fn widen(self, from: &[f32], first: usize) -> Self::Lanes;
+
+    /// `a + b`.
+    fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+
+    /// `a - b`.
+    fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+
+    /// `a b`.
+    fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+
+    /// `a b + c`, fused where the processor can.
+    fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
+
+    /// The numbers at the places that are listed from entry `first` on.
+    ///
+    /// # Safety
+    /// The places lie within `from`.
+    #[allow(unsafe_code)]
+    unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes;
+
+    /// Puts numbers where [`Instructions::pick`] takes them from, the first lane last: where two have one place, the first is it.
+    ///
+    /// # Safety
+    /// The places lie within `to`.
+    #[allow(unsafe_code)]
+    unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize);
 }
 
 /// What every processor has.
@@ -32,51 +69,38 @@ pub trait Instructions: Copy + sealed::Sealed {
 pub struct Portable;
 
 /// AVX2 and fused multiply-add.
+#[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
+
+/// AVX-512 with its instructions for single and double precision.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512(());
 
 /// What unsafe code relies on, out of reach for anybody else.
 mod sealed {
     pub trait Sealed {}
     impl Sealed for super::Portable {}
+    #[cfg(target_arch = "x86_64")]
     impl Sealed for super::Avx2 {}
-}
-
-impl Instructions for Portable {
-    const AVX2: bool = false;
-
-    #[inline(always)]
-    fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
-        a * b + c
-    }
-
-    #[inline(always)]
-    fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
-        a * b + c
-    }
-}
-
-impl Instructions for Avx2 {
-    const AVX2: bool = true;
-
-    #[inline(always)]
-    fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
-        a.mul_add(b, c)
-    }
-
-    #[inline(always)]
-    fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
-        a.mul_add(b, c)
-    }
+    #[cfg(target_arch = "x86_64")]
+    impl Sealed for super::Avx512 {}
 }
 
 /// Runs `task` with the best instructions of this processor.
 pub fn run<T: Task>(task: T) -> T::Output {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+    {
+        use std::arch::is_x86_feature_detected as has;
+        let avx2 = has!("avx2") && has!("fma");
         // safe: they are there
         #[allow(unsafe_code)]
-        return unsafe { run_avx2(task) };
+        if avx2 && has!("avx512f") && has!("avx512dq") && has!("avx512vl") {
+            return unsafe { run_avx512(task) };
+        } else if avx2 {
+            return unsafe { run_avx2(task) };
+        }
     }
     task.run(Portable)
 }
@@ -85,4 +109,10 @@ pub fn run<T: Task>(task: T) -> T::Output {
 #[target_feature(enable = "avx2,fma")]
 fn run_avx2<T: Task>(task: T) -> T::Output {
     task.run(Avx2(()))
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
+fn run_avx512<T: Task>(task: T) -> T::Output {
+    task.run(Avx512(()))
 }

@@ -1,0 +1,230 @@
+//! Numbers side by side, in the registers of each set of instructions.
+//!
+//! Left out: how a processor's set is found out (`mod`).
+
+use super::{Instructions, Portable};
+
+impl Instructions for Portable {
+    type Lanes = [f64; 2];
+    const LANES: usize = 2;
+
+    #[inline(always)]
+    fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+
+    #[inline(always)]
+    fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
+        a * b + c
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f64) -> Self::Lanes {
+        [x; 2]
+    }
+
+    #[inline(always)]
+    fn widen(self, from: &[f32], first: usize) -> Self::Lanes {
+        [f64::from(from[first]), f64::from(from[first + 1])]
+    }
+
+    #[inline(always)]
+    fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        [a[0] + b[0], a[1] + b[1]]
+    }
+
+    #[inline(always)]
+    fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        [a[0] - b[0], a[1] - b[1]]
+    }
+
+    #[inline(always)]
+    fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        [a[0] * b[0], a[1] * b[1]]
+    }
+
+    #[inline(always)]
+    fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+        [a[0] * b[0] + c[0], a[1] * b[1] + c[1]]
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
+        [from[places[first] as usize], from[places[first + 1] as usize]]
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
+        to[places[first + 1] as usize] = x[1];
+        to[places[first] as usize] = x[0];
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod x86 {
+    use super::super::{Avx2, Avx512};
+    use super::Instructions;
+    use std::arch::x86_64::*;
+
+    impl Instructions for Avx2 {
+        type Lanes = __m256d;
+        const LANES: usize = 4;
+
+        #[inline(always)]
+        fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+            a.mul_add(b, c)
+        }
+
+        #[inline(always)]
+        fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
+            a.mul_add(b, c)
+        }
+
+        // safe, here and below: `self` proves the instructions
+
+        #[inline(always)]
+        fn splat(self, x: f64) -> Self::Lanes {
+            unsafe { _mm256_set1_pd(x) }
+        }
+
+        #[inline(always)]
+        fn widen(self, from: &[f32], first: usize) -> Self::Lanes {
+            let four: &[f32; 4] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm256_cvtps_pd(_mm_loadu_ps(four.as_ptr())) }
+        }
+
+        #[inline(always)]
+        fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm256_add_pd(a, b) }
+        }
+
+        #[inline(always)]
+        fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm256_sub_pd(a, b) }
+        }
+
+        #[inline(always)]
+        fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm256_mul_pd(a, b) }
+        }
+
+        #[inline(always)]
+        fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm256_fmadd_pd(a, b, c) }
+        }
+
+        #[inline(always)]
+        unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
+            let places: &[u32; 4] = places[first..].first_chunk().expect("as many places");
+            // safe: the caller knows the places
+            unsafe { pick_four(from, places) }
+        }
+
+        #[inline(always)]
+        unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
+            let places: &[u32; 4] = places[first..].first_chunk().expect("as many places");
+            // safe: the caller knows the places
+            unsafe {
+                put_two(_mm256_extractf128_pd::<1>(x), to, [places[2], places[3]]);
+                put_two(_mm256_castpd256_pd128(x), to, [places[0], places[1]]);
+            }
+        }
+    }
+
+    impl Instructions for Avx512 {
+        type Lanes = __m512d;
+        const LANES: usize = 8;
+
+        #[inline(always)]
+        fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+            a.mul_add(b, c)
+        }
+
+        #[inline(always)]
+        fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
+            a.mul_add(b, c)
+        }
+
+        #[inline(always)]
+        fn splat(self, x: f64) -> Self::Lanes {
+            unsafe { _mm512_set1_pd(x) }
+        }
+
+        #[inline(always)]
+        fn widen(self, from: &[f32], first: usize) -> Self::Lanes {
+            let eight: &[f32; 8] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm512_cvtps_pd(_mm256_loadu_ps(eight.as_ptr())) }
+        }
+
+        #[inline(always)]
+        fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm512_add_pd(a, b) }
+        }
+
+        #[inline(always)]
+        fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm512_sub_pd(a, b) }
+        }
+
+        #[inline(always)]
+        fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm512_mul_pd(a, b) }
+        }
+
+        #[inline(always)]
+        fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+            unsafe { _mm512_fmadd_pd(a, b, c) }
+        }
+
+        #[inline(always)]
+        unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
+            let places: &[u32; 8] = places[first..].first_chunk().expect("as many places");
+            let [low, high] = halves(places);
+            // safe: the caller knows the places
+            unsafe { _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(pick_four(from, low)), pick_four(from, high)) }
+        }
+
+        #[inline(always)]
+        unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
+            let places: &[u32; 8] = places[first..].first_chunk().expect("as many places");
+            // safe: the caller knows the places
+            unsafe {
+                put_two(_mm512_extractf64x2_pd::<3>(x), to, [places[6], places[7]]);
+                put_two(_mm512_extractf64x2_pd::<2>(x), to, [places[4], places[5]]);
+                put_two(_mm512_extractf64x2_pd::<1>(x), to, [places[2], places[3]]);
+                put_two(_mm512_castpd512_pd128(x), to, [places[0], places[1]]);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn halves(places: &[u32; 8]) -> [&[u32; 4]; 2] {
+        let (halves, []) = places.as_chunks() else { unreachable!() };
+        [&halves[0], &halves[1]]
+    }
+
+    /// # Safety
+    /// The places lie within `from`; the processor has AVX.
+    #[inline(always)]
+    unsafe fn pick_four(from: &[f64], places: &[u32; 4]) -> __m256d {
+        unsafe {
+            let at = |lane: usize| from.as_ptr().add(places[lane] as usize);
+            let low = _mm_loadh_pd(_mm_load_sd(at(0)), at(1));
+            let high = _mm_loadh_pd(_mm_load_sd(at(2)), at(3));
+            _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(low), high)
+        }
+    }
+
+    /// # Safety
+    /// The places lie within `to`.
+    #[inline(always)]
+    unsafe fn put_two(x: __m128d, to: &mut [f64], places: [u32; 2]) {
+        unsafe {
+            _mm_storeh_pd(to.as_mut_ptr().add(places[1] as usize), x);
+            _mm_storel_pd(to.as_mut_ptr().add(places[0] as usize), x);
+        }
+    }
+}
