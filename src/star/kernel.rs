@@ -12,14 +12,16 @@ use crate::vector::Instructions;
 /// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to 5.
 const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 
-/// Adds to `nodes` what the pixels of each cell, times `x`, leave on the nodes that begin with the cell's.
+/// What the pixels of each cell, times `x`, leave on its nodes: at the cell's place in the row of every node of `left`. Of two
+/// lanes of one cell the first counts.
 ///
 /// # Safety
-/// Every pixel of every block lies within `x`, and the nodes of every cell within `nodes`.
+/// Every pixel of every block lies within `x`, and every cell within a row of `left`.
 #[inline(always)]
 #[allow(unsafe_code)]
-pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANES], x: &[f64], nodes: &mut [f64]) {
-    for first in (0..LANES).step_by(I::LANES) {
+pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANES], x: &[f64], left: &mut [f64]) {
+    let row = left.len() / DEPOSIT_NODES;
+    for first in (0..LANES).step_by(I::LANES).rev() {
         let mut sums = [i.splat(0.0); DEPOSIT_NODES];
         let mut spread_sums = [i.splat(0.0); SPREAD_FACTORS.len()];
         for block in blocks {
@@ -41,7 +43,7 @@ pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANE
             *sum = i.multiply_add_lanes(i.splat(factor), spread_sum, *sum);
         }
         // nodes that mirror each other have the same weights but for the sign of odd powers
-        let mut left = sums;
+        let mut nodes = sums;
         for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
             let half = |first: usize| {
                 let highest = i.multiply(i.splat(weights[first + 4]), sums[first + 4]);
@@ -49,13 +51,12 @@ pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANE
                 i.multiply_add_lanes(i.splat(weights[first]), sums[first], lower)
             };
             let (even, odd) = (half(0), half(1));
-            left[n] = i.add(even, odd);
-            left[DEPOSIT_NODES - 1 - n] = i.subtract(even, odd);
+            nodes[n] = i.add(even, odd);
+            nodes[DEPOSIT_NODES - 1 - n] = i.subtract(even, odd);
         }
-        for (n, left) in left.into_iter().enumerate() {
-            let nodes = &mut nodes[n..];
+        for (n, node) in nodes.into_iter().enumerate() {
             // safe: the caller knows the cells
-            unsafe { i.put(i.add(i.pick(nodes, cells, first), left), nodes, cells, first) };
+            unsafe { i.put(node, &mut left[n * row..], cells, first) };
         }
     }
 }

@@ -170,10 +170,10 @@ impl Task for Apply<'_> {
     #[inline(always)]
     fn run<I: Instructions>(self, instructions: I) {
         let Apply { response, x, line, continuum } = self;
-        let mut nodes = vec![0.0; response.deposit.nodes];
+        let (mut nodes, mut left) = (vec![0.0; response.deposit.nodes], Vec::new());
         let mut rows = response.rows();
         for (k, convolution) in response.convolutions.iter().enumerate() {
-            response.deposit.gather(instructions, k, x, &mut nodes);
+            response.deposit.gather(instructions, k, x, &mut left, &mut nodes);
             continuum[k] = total(&nodes);
             rows.interleave(&nodes);
             convolution.sum_to_bins(instructions, &rows, &mut line[response.bins(k)]);

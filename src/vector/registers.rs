@@ -125,7 +125,8 @@ mod x86 {
 
         #[inline(always)]
         unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
-            let places: &[u32; 4] = places[first..].first_chunk().expect("as many places");
+            // a copy: nothing that is put changes it
+            let places: [u32; 4] = *places[first..].first_chunk().expect("as many places");
             // safe: the caller knows the places
             unsafe {
                 put_two(_mm256_extractf128_pd::<1>(x), to, [places[2], places[3]]);
@@ -189,7 +190,7 @@ mod x86 {
 
         #[inline(always)]
         unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
-            let places: &[u32; 8] = places[first..].first_chunk().expect("as many places");
+            let places: [u32; 8] = *places[first..].first_chunk().expect("as many places");
             // safe: the caller knows the places
             unsafe {
                 put_two(_mm512_extractf64x2_pd::<3>(x), to, [places[6], places[7]]);
