@@ -5,7 +5,7 @@
 use crate::vector::Instructions;
 
 /// Results that are kept in registers together.
-pub const CHUNK: usize = 16;
+pub const CHUNK: usize = 32;
 
 /// `sums[j] += sum_q taps[q] source[q + j]`; the source must reach [`CHUNK`] - 1 entries beyond the last tap.
 #[inline(always)]

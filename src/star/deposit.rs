@@ -98,7 +98,7 @@ impl Deposit {
 
 /// A map of more pixels than this does not stay in the fast caches while all its cells are gone through: cells in the order of their
 /// sizes take twice as long on 80,000 pixels, and a little less than cells in the order of velocity on 20,000.
-const LARGE_MAP: usize = 40_000;
+const LARGE_MAP: usize = 12_000;
 
 /// Nodes on either side of the line's centre.
 fn reach(viewer: &Viewer, step_kms: f64) -> f64 {
