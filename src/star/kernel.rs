@@ -28,15 +28,17 @@ pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANE
             // safe: the caller knows the pixels
             let x = unsafe { i.pick(x, &block.pixel, first) };
             let (t, spread) = (i.widen(&block.position, first), i.widen(&block.spread, first));
-            let mut term = i.multiply(x, i.widen(&block.weight, first));
-            for (k, sum) in sums.iter_mut().enumerate() {
-                *sum = i.add(*sum, term);
-                if let Some(sum) = spread_sums.get_mut(k) {
-                    *sum = i.multiply_add_lanes(term, spread, *sum);
-                }
-                if k + 1 < DEPOSIT_NODES {
-                    term = i.multiply(term, t);
-                }
+            let squared = i.multiply(t, t);
+            // times 1, t, t^2 and t^3: no long chain of products, each of which waits for the one before
+            let term = i.multiply(x, i.widen(&block.weight, first));
+            let times_t = i.multiply(term, t);
+            let terms = [term, times_t, i.multiply(term, squared), i.multiply(times_t, squared)];
+            for (k, term) in terms.into_iter().enumerate() {
+                sums[k] = i.add(sums[k], term);
+                spread_sums[k] = i.multiply_add_lanes(term, spread, spread_sums[k]);
+            }
+            for k in terms.len()..DEPOSIT_NODES {
+                sums[k] = i.multiply_add_lanes(terms[k - 2], squared, sums[k]);
             }
         }
         for ((sum, spread_sum), factor) in sums[2..].iter_mut().zip(spread_sums).zip(SPREAD_FACTORS) {
@@ -86,11 +88,9 @@ pub unsafe fn scatter<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LAN
             std::array::from_fn(|k| i.multiply(i.splat(SPREAD_FACTORS[k]), coefficients[k + 2]));
         for block in blocks {
             let (t, spread) = (i.widen(&block.position, first), i.widen(&block.spread, first));
-            let at_t = |coefficients: &[I::Lanes]| {
-                let (last, rest) = coefficients.split_last().expect("coefficients");
-                rest.iter().rev().fold(*last, |sum, c| i.multiply_add_lanes(sum, t, *c))
-            };
-            let polynomial = i.multiply_add_lanes(at_t(&of_spread), spread, at_t(&coefficients));
+            let squared = i.multiply(t, t);
+            let [of_spread, rest] = [polynomial(i, &of_spread, t, squared), polynomial(i, &coefficients, t, squared)];
+            let polynomial = i.multiply_add_lanes(of_spread, spread, rest);
             // safe: the caller knows the pixels
             unsafe {
                 let sums = i.multiply_add_lanes(polynomial, i.widen(&block.weight, first), i.pick(out, &block.pixel, first));
@@ -100,3 +100,13 @@ pub unsafe fn scatter<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LAN
     }
 }
 
+/// `c_0 + c_1 t + ...`, an even number of coefficients: pairs of them beside each other, then one after another.
+#[inline(always)]
+fn polynomial<I: Instructions>(i: I, coefficients: &[I::Lanes], t: I::Lanes, squared: I::Lanes) -> I::Lanes {
+    let (pairs, _) = coefficients.as_chunks();
+    let mut sum = i.multiply_add_lanes(pairs[pairs.len() - 1][1], t, pairs[pairs.len() - 1][0]);
+    for [even, odd] in pairs[..pairs.len() - 1].iter().rev() {
+        sum = i.multiply_add_lanes(sum, squared, i.multiply_add_lanes(*odd, t, *even));
+    }
+    sum
+}
