@@ -66,21 +66,21 @@ impl Deposit {
         self.pixels
     }
 
-    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid (overwritten). What the cells leave on
-    /// their nodes is kept in `left`.
+    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid (overwritten). What cells leave on
+    /// each of their nodes is kept in `left`, which is empty at first.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn gather<I: Instructions>(&self, i: I, k: usize, x: &[f64], left: &mut Vec<f64>, nodes: &mut [f64]) {
-        let cells = self.nodes + 1 - DEPOSIT_NODES;
         assert!(x.len() == self.pixels && nodes.len() == self.nodes);
-        left.resize(DEPOSIT_NODES * cells, 0.0);
+        left.resize(DEPOSIT_NODES * self.nodes, 0.0);
         for (cells, blocks) in self.placement.groups_of(k) {
             // safe: blocks hold pixels of the grid alone, and groups its cells
             unsafe { kernel::gather(i, blocks, cells, x, left) };
         }
         nodes.fill(0.0);
-        for (first, row) in left.chunks(cells).enumerate() {
-            nodes[first..][..cells].iter_mut().zip(row).for_each(|(node, left)| *node += left);
+        for two in left.chunks_exact(2 * self.nodes) {
+            let (a, b) = two.split_at(self.nodes);
+            nodes.iter_mut().zip(a.iter().zip(b)).for_each(|(node, (a, b))| *node += a + b);
         }
     }
 

@@ -12,15 +12,15 @@ use crate::vector::Instructions;
 /// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to 5.
 const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 
-/// What the pixels of each cell, times `x`, leave on its nodes: at the cell's place in the row of every node of `left`. Of two
-/// lanes of one cell the first counts.
+/// What the pixels of each cell, times `x`, leave on its nodes: row n of `left`, as long as the grid, gets the n-th node of the cell.
+/// Of two lanes of one cell the first counts.
 ///
 /// # Safety
-/// Every pixel of every block lies within `x`, and every cell within a row of `left`.
+/// Every pixel of every block lies within `x`, and the nodes of every cell within the grid.
 #[inline(always)]
 #[allow(unsafe_code)]
 pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANES], x: &[f64], left: &mut [f64]) {
-    let row = left.len() / DEPOSIT_NODES;
+    let grid = left.len() / DEPOSIT_NODES;
     for first in (0..LANES).step_by(I::LANES).rev() {
         let mut sums = [i.splat(0.0); DEPOSIT_NODES];
         let mut spread_sums = [i.splat(0.0); SPREAD_FACTORS.len()];
@@ -58,7 +58,7 @@ pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANE
         }
         for (n, node) in nodes.into_iter().enumerate() {
             // safe: the caller knows the cells
-            unsafe { i.put(node, &mut left[n * row..], cells, first) };
+            unsafe { i.put(node, &mut left[n * (grid + 1)..], cells, first) };
         }
     }
 }

@@ -206,13 +206,15 @@ impl Task for ApplyTranspose<'_> {
     }
 }
 
-/// The sum of all, in eight parts that do not wait for each other.
+/// The sum of all, in parts that do not wait for each other.
+#[inline(always)]
 fn total(x: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    for chunk in x.chunks(sums.len()) {
+    let (chunks, rest) = x.as_chunks::<16>();
+    let mut sums = [0.0; 16];
+    for chunk in chunks {
         sums.iter_mut().zip(chunk).for_each(|(sum, x)| *sum += x);
     }
-    sums.iter().sum()
+    sums.iter().chain(rest).sum()
 }
 
 #[cfg(test)]
