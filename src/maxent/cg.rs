@@ -1,6 +1,8 @@
 //! Conjugate gradients for the Newton system in the entropy's metric, `(1 + lambda M) z = b` (Hestenes & Stiefel 1952;
 //! truncated Newton as in Steihaug 1983: a direction of negative curvature ends it).
 
+use crate::vector::linear::{axpy, combine, dot};
+
 /// When to stop, and what to do it with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CgLimits {
@@ -30,7 +32,7 @@ pub(super) fn solve(
     let goal = limits.tolerance * limits.tolerance * scale;
     if z.iter().any(|&z| z != 0.0) {
         apply(z, &mut applied);
-        residual.iter_mut().zip(&applied).for_each(|(r, a)| *r -= a);
+        axpy(-1.0, &applied, &mut residual);
         precondition(&residual, &mut preconditioned);
     }
     let mut direction = preconditioned.clone();
@@ -54,26 +56,7 @@ pub(super) fn solve(
         let next = dot(&residual, &preconditioned);
         let beta = next / rho;
         rho = next;
-        direction.iter_mut().zip(&preconditioned).for_each(|(d, p)| *d = p + beta * *d);
+        combine(&mut direction, &preconditioned, |d, p| p + beta * d);
     }
     limits.iterations
-}
-
-/// Scalar product.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // partial sums: a fixed order that the compiler may vectorise
-    let mut sums = [0.0; 16];
-    let (whole_a, rest_a) = a.as_chunks::<16>();
-    let (whole_b, rest_b) = b.as_chunks::<16>();
-    for (a, b) in whole_a.iter().zip(whole_b) {
-        for i in 0..16 {
-            sums[i] += a[i] * b[i];
-        }
-    }
-    sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
-}
-
-/// `y += scale * x`.
-pub(super) fn axpy(scale: f64, x: &[f64], y: &mut [f64]) {
-    y.iter_mut().zip(x).for_each(|(y, x)| *y += scale * x);
 }

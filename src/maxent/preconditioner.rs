@@ -5,7 +5,7 @@
 //! of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and lives on the
 //! pixels that carry it: the spotted part of the star. Left out: when to rebuild it.
 
-use super::cg::dot;
+use crate::vector::linear::dot;
 use crate::vector::{self, Instructions, Task};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;

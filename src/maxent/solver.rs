@@ -7,12 +7,13 @@
 //! change (`standing`) is good enough. Every call starts from the image it is given and from nothing else, so the answer is a
 //! function of problem and start. Left out: what the image shows.
 
-use super::cg::{self, CgLimits, axpy, dot};
+use super::cg::{self, CgLimits};
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing, lambda_step};
+use crate::vector::linear::{axpy, combine_two, dot};
 
 /// Largest change of a coordinate in one step.
 const STEP_CAP: f64 = 2.0;
@@ -190,11 +191,9 @@ impl Solver<'_> {
         let System { lambda, scale, curvature } = system;
         let mut scaled = vec![0.0; right.len()];
         let apply = |v: &[f64], out: &mut [f64]| {
-            scaled.iter_mut().zip(v).zip(scale).for_each(|((x, v), scale)| *x = v * scale);
+            combine_two(&mut scaled, v, scale, |_, v, scale| v * scale);
             problem.curvature(curvature, &scaled, out);
-            for ((out, v), scale) in out.iter_mut().zip(v).zip(scale) {
-                *out = v + lambda * scale * *out;
-            }
+            combine_two(out, v, scale, |out, v, scale| v + lambda * scale * out);
         };
         let precondition = |r: &[f64], out: &mut [f64]| self.preconditioner.apply(lambda, r, out);
         let limits = CgLimits { tolerance: self.settings.cg_tolerance, iterations: self.settings.cg_iterations };

@@ -6,11 +6,11 @@
 //! order in the distance. Where data say little, an adjoint is in proportion to the scale of the metric, and is kept relative
 //! to it: a pixel that has become spotted since then weighs what it weighs now. Left out: the steps (`solver`).
 
-use super::cg::{axpy, dot};
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::Problem;
 use super::solution::{Best, Goal};
+use crate::vector::linear::{axpy, dot};
 
 /// Largest change of ln(lambda) in one step.
 const LN_LAMBDA_CAP: f64 = 1.5;

@@ -6,6 +6,7 @@
 //! last digits between processors, never between runs on one. Left out: what the loops are.
 
 pub mod elementary;
+pub mod linear;
 mod registers;
 
 /// Work that is compiled for every set of instructions.

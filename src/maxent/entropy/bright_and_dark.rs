@@ -9,8 +9,8 @@
 //! Left out: which entropy an image has (`entropy`), data.
 
 use super::Step;
-use crate::maxent::cg::dot;
 use crate::vector::elementary::{exp_minus, ln_1p};
+use crate::vector::linear::dot;
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: a pixel that bright outshines, and one that dark is nothing beside, all the others.

@@ -7,8 +7,7 @@
 mod bright_and_dark;
 mod spots;
 
-use super::cg::dot;
-use crate::vector;
+use crate::vector::{self, linear::dot};
 use std::borrow::Cow;
 
 /// The entropy with its default image.

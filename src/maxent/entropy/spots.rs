@@ -4,8 +4,8 @@
 //! The coordinate is `u = logit(s)`, which keeps s inside (0, 1). Left out: which entropy an image has (`entropy`), data.
 
 use super::Step;
-use crate::maxent::cg::dot;
 use crate::vector::elementary::{exp_minus, ln_1p};
+use crate::vector::linear::dot;
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: beyond it s (1-s) would lose its precision.
