@@ -96,16 +96,25 @@ impl<const POINTS: usize> RingView<POINTS> {
     /// The view of a ring whose first point is one of `points`; each stands for so large a part of the star.
     #[inline(always)]
     pub fn new(points: &TurnedPoints, mu_pole: &[f32; CHUNK], first: usize, limb: LimbDarkening, area: f64) -> Self {
-        let middle = points.velocity.each_ref().map(|v| v[first..first + POINTS].iter().sum::<f64>() / POINTS as f64);
         let (u1, u2) = limb.coefficients();
-        RingView {
-            mu_pole: std::array::from_fn(|p| mu_pole[first + p]),
-            mu: [0, 1].map(|k| std::array::from_fn(|p| points.mu[k][first + p])),
-            velocity: [0, 1].map(|k| std::array::from_fn(|p| (points.velocity[k][first + p] - middle[k]) as f32)),
-            middle,
+        let mut view = RingView {
+            mu_pole: [0.0; POINTS],
+            mu: [[0.0; POINTS]; 2],
+            velocity: [[0.0; POINTS]; 2],
+            middle: [0.0; 2],
             // mu LD(mu) = mu (1 - u1 (1 - mu) - u2 (1 - mu)^2)
-            limb: [1.0 - u1 - u2, u1 + 2.0 * u2, -u2].map(|x| (area * x) as f32),
+            limb: [(area * (1.0 - u1 - u2)) as f32, (area * (u1 + 2.0 * u2)) as f32, (-area * u2) as f32],
+        };
+        view.mu_pole.copy_from_slice(&mu_pole[first..first + POINTS]);
+        for k in 0..2 {
+            view.mu[k].copy_from_slice(&points.mu[k][first..first + POINTS]);
+            let velocity = &points.velocity[k][first..first + POINTS];
+            view.middle[k] = velocity.iter().sum::<f64>() / POINTS as f64;
+            for p in 0..POINTS {
+                view.velocity[k][p] = (velocity[p] - view.middle[k]) as f32;
+            }
         }
+        view
     }
 
     /// Adds the moments of some of its pixels.

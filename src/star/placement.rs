@@ -111,7 +111,7 @@ impl Task for Place<'_> {
             pairs: 0,
             groups: Vec::new(),
             groups_each: scale.cells.div_ceil(LANES),
-            blocks: Vec::with_capacity(since_epoch_d.len() * grid.len() * 5 / 8 / LANES),
+            blocks: Vec::with_capacity(since_epoch_d.len() * grid.len() * 3 / 4 / LANES),
         };
         let mut seen = Seen::new(scale, grid.len());
         for &time in since_epoch_d {
