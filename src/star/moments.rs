@@ -11,7 +11,7 @@ use crate::vector::elementary::sin_cos;
 use std::ops::Range;
 
 /// Numbers that are computed side by side.
-pub const CHUNK: usize = 8;
+pub const CHUNK: usize = 16;
 
 /// Evaluation points of pixels, seen from the pixels' centres as the star turns.
 #[derive(Clone, Copy, Debug, Default)]

@@ -50,7 +50,7 @@ impl Placement {
 
     /// Adds the groups of an observation.
     #[inline(always)]
-    fn add(&mut self, seen: &mut Seen) {
+    fn add(&mut self, seen: &mut Seen, moments: &Moments) {
         self.pairs += seen.pixels;
         let first_group = self.groups.len();
         seen.sort_cells();
@@ -63,7 +63,7 @@ impl Placement {
             first_block = end;
         }
         let groups = &self.groups[first_group..];
-        seen.sort_pixels(groups);
+        seen.sort_pixels(groups, moments);
         let mut sorted = &seen.sorted[..];
         for group in groups {
             let rows = group.rows();
@@ -115,8 +115,9 @@ impl Task for Place<'_> {
         };
         let mut seen = Seen::new(scale, grid.len());
         for &time in since_epoch_d {
-            seen.place(views.look(instructions, time));
-            placement.add(&mut seen);
+            let moments = views.look(instructions, time);
+            seen.place(moments);
+            placement.add(&mut seen, moments);
         }
         placement
     }
@@ -129,12 +130,9 @@ struct Seen {
     room: usize,
     /// Number of visible pixels.
     pixels: usize,
-    /// Of each, in the order in which they were seen: what a block holds, and its cell.
-    pixel: Vec<u32>,
-    weight: Vec<f32>,
-    position: Vec<f32>,
-    spread: Vec<f32>,
+    /// Of each, in the order in which they were seen: its cell, and where in it.
     cell: Vec<u32>,
+    position: Vec<f32>,
     /// How many of the pixels before it lie in its cell.
     rank: Vec<u32>,
     /// Pixels in each cell.
@@ -154,11 +152,8 @@ impl Seen {
             scale,
             room: pixels,
             pixels: 0,
-            pixel: vec![0; room],
-            weight: vec![0.0; room],
-            position: vec![0.0; room],
-            spread: vec![0.0; room],
             cell: vec![0; room],
+            position: vec![0.0; room],
             rank: vec![0; room],
             counts: vec![0; cells + 1],
             order: vec![0; cells],
@@ -172,13 +167,7 @@ impl Seen {
     fn place(&mut self, moments: &Moments) {
         self.pixels = moments.pixels;
         let Scale { origin_kms, steps_per_kms, .. } = self.scale;
-        let per_variance = (0.5 * steps_per_kms * steps_per_kms) as f32;
         let (whole, last) = (self.pixels.next_multiple_of(LANES), self.scale.cells as u32 - 1);
-        self.pixel[..whole].copy_from_slice(&moments.pixel[..whole]);
-        self.weight[..whole].copy_from_slice(&moments.weight[..whole]);
-        for (spread, variance) in self.spread[..whole].iter_mut().zip(&moments.variance) {
-            *spread = variance * per_variance;
-        }
         let places = self.position[..whole].iter_mut().zip(&mut self.cell[..whole]);
         for ((position, cell), velocity) in places.zip(&moments.velocity) {
             let steps = (velocity - origin_kms) * steps_per_kms - 0.5;
@@ -225,7 +214,8 @@ impl Seen {
 
     /// Sorts the pixels by group, cell, and order in which they were seen.
     #[inline(always)]
-    fn sort_pixels(&mut self, groups: &[Group]) {
+    fn sort_pixels(&mut self, groups: &[Group], moments: &Moments) {
+        let per_variance = (0.5 * self.scale.steps_per_kms * self.scale.steps_per_kms) as f32;
         let mut end = 0;
         for group in groups {
             let (cells, rows) = (&group.cells, group.rows());
@@ -247,13 +237,14 @@ impl Seen {
         let Seen { sorted, firsts, .. } = self;
         firsts[self.scale.cells] = end as u32;
         sorted.resize(sorted.len().max(end + LANES), Pixel::default());
-        let numbers = self.weight.as_chunks().0.iter().zip(self.position.as_chunks().0);
-        let rest = self.spread.as_chunks().0.iter().zip(self.pixel.as_chunks().0);
+        let numbers = moments.weight.as_chunks().0.iter().zip(self.position.as_chunks().0);
+        let rest = moments.variance.as_chunks().0.iter().zip(moments.pixel.as_chunks().0);
         let places = self.cell.as_chunks::<LANES>().0.iter().zip(self.rank.as_chunks::<LANES>().0);
-        for (((weight, position), (spread, pixel)), (cells, ranks)) in
+        for (((weight, position), (variance, pixel)), (cells, ranks)) in
             numbers.zip(rest).zip(places).take(self.pixels.div_ceil(LANES))
         {
-            let block = Block { weight: *weight, position: *position, spread: *spread, pixel: *pixel };
+            let mut block = Block { weight: *weight, position: *position, spread: *variance, pixel: *pixel };
+            block.spread.iter_mut().for_each(|spread| *spread *= per_variance);
             block.deal(std::array::from_fn(|lane| (firsts[cells[lane] as usize] + ranks[lane]) as usize), sorted);
         }
     }
