@@ -64,14 +64,9 @@ impl Placement {
         }
         let groups = &self.groups[first_group..];
         seen.sort_pixels(groups, moments);
-        let mut sorted = &seen.sorted[..];
-        for group in groups {
-            let rows = group.rows();
-            let lane = |lane: usize| &sorted[lane * rows..(lane + 1) * rows];
-            let lanes: [&[Pixel]; LANES] = std::array::from_fn(lane);
-            self.blocks.extend((0..rows).map(|row| Block::of(lanes.map(|lane| &lane[row]))));
-            sorted = &sorted[LANES * rows..];
-        }
+        let rows = groups.iter().map(Group::rows).sum();
+        let lanes = seen.sorted.as_chunks::<LANES>().0[..rows].iter();
+        self.blocks.extend(lanes.map(|lanes| Block::of(lanes.each_ref())));
     }
 }
 
@@ -225,9 +220,9 @@ impl Seen {
                 let again = cells[..lane].contains(cell);
                 let count = if again { 0 } else { self.counts[*cell as usize] as usize };
                 if !again {
-                    self.firsts[*cell as usize] = (end + lane * rows) as u32;
+                    self.firsts[*cell as usize] = (end + lane) as u32;
                 }
-                for place in lane * rows + count..(lane + 1) * rows {
+                for place in (lane + LANES * count..LANES * rows).step_by(LANES) {
                     // never one pixel in two blocks that follow each other, for no sum to wait for another
                     places[place] = Pixel { pixel: ((end + place) % self.room) as u32, ..Pixel::default() };
                 }
@@ -236,7 +231,7 @@ impl Seen {
         }
         let Seen { sorted, firsts, .. } = self;
         firsts[self.scale.cells] = end as u32;
-        sorted.resize(sorted.len().max(end + LANES), Pixel::default());
+        sorted.resize(sorted.len().max(end + LANES * LANES), Pixel::default());
         let numbers = moments.weight.as_chunks().0.iter().zip(self.position.as_chunks().0);
         let rest = moments.variance.as_chunks().0.iter().zip(moments.pixel.as_chunks().0);
         let places = self.cell.as_chunks::<LANES>().0.iter().zip(self.rank.as_chunks::<LANES>().0);
@@ -245,7 +240,7 @@ impl Seen {
         {
             let mut block = Block { weight: *weight, position: *position, spread: *variance, pixel: *pixel };
             block.spread.iter_mut().for_each(|spread| *spread *= per_variance);
-            block.deal(std::array::from_fn(|lane| (firsts[cells[lane] as usize] + ranks[lane]) as usize), sorted);
+            block.deal(std::array::from_fn(|lane| (firsts[cells[lane] as usize] + LANES as u32 * ranks[lane]) as usize), sorted);
         }
     }
 }
