@@ -16,20 +16,24 @@ use rand_distr::{Distribution, StandardNormal};
 pub struct Preconditioner {
     /// Largest eigenvalues of M.
     eigenvalues: Vec<f64>,
-    /// Pixels on which the basis lives, and others with rows of zeros to make the number of rows a multiple of [`GROUP`].
+    /// Pixels on which the basis lives, and others on which it is zero to make their number a multiple of [`LANES`].
     pixels: Vec<u32>,
     /// How many of them are not there to fill up.
     active: usize,
-    /// Eigenvectors: one row of components a pixel, filled up with zeros to a multiple of [`LANES`].
+    /// Of [`LANES`] pixels after [`LANES`] pixels, every eigenvector, and zeros to make their number a multiple of [`PARTS`].
     rows: Vec<Lanes>,
 }
 
-/// Components of a row that are computed side by side.
-const LANES: usize = 8;
-type Lanes = [f32; LANES];
+/// Pixels side by side.
+const LANES: usize = 16;
 
-/// Rows that are read together, so that the components are loaded once for all of them.
-const GROUP: usize = 4;
+/// A number of each, on a cache line.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+struct Lanes([f32; LANES]);
+
+/// Sums that do not wait for each other.
+const PARTS: usize = 4;
 
 /// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
 const DROPPED_ENERGY: f64 = 1e-3;
@@ -79,15 +83,16 @@ impl Preconditioner {
         let first = faint.count();
         let mut active = by_energy.split_off(first);
         active.sort_unstable();
-        let mut rows = Vec::new();
-        for &p in &active {
-            let row: Vec<f32> = vectors.row(p as usize).iter().map(|x| *x as f32).collect();
-            rows.extend(row.chunks(LANES).map(|part| std::array::from_fn(|i| part.get(i).copied().unwrap_or(0.0))));
-        }
-        let (mut pixels, width) = (active, eigenvalues.len().div_ceil(LANES));
+        let mut pixels = active;
         let active = pixels.len();
-        pixels.resize(active.next_multiple_of(GROUP), 0);
-        rows.resize(pixels.len() * width, [0.0; LANES]);
+        let width = eigenvalues.len().next_multiple_of(PARTS);
+        let mut rows = vec![Lanes::default(); active.div_ceil(LANES) * width];
+        for (pixels, rows) in pixels.chunks(LANES).zip(rows.chunks_mut(width.max(1))) {
+            for (k, Lanes(row)) in rows.iter_mut().take(eigenvalues.len()).enumerate() {
+                row.iter_mut().zip(pixels).for_each(|(x, p)| *x = vectors[(*p as usize, k)] as f32);
+            }
+        }
+        pixels.resize(active.next_multiple_of(LANES), 0);
         Preconditioner { eigenvalues, pixels, active, rows }
     }
 
@@ -106,18 +111,15 @@ impl Preconditioner {
         size_of_val(&self.rows[..])
     }
 
-    /// Groups of components in a row.
+    /// Eigenvectors and zeros.
     fn width(&self) -> usize {
-        self.eigenvalues.len().div_ceil(LANES)
+        self.rank().next_multiple_of(PARTS)
     }
 
-    /// Rows and their pixels, [`GROUP`] at a time.
+    /// Lanes of pixels and what every eigenvector has there.
     #[inline(always)]
-    fn groups(&self) -> impl DoubleEndedIterator<Item = ([&[Lanes]; GROUP], &[u32; GROUP])> {
-        let width = self.width();
-        let rows = self.rows.chunks_exact((GROUP * width).max(1));
-        rows.map(move |rows| std::array::from_fn(|j| &rows[j * width..][..width]))
-            .zip(self.pixels.as_chunks::<GROUP>().0)
+    fn groups(&self) -> impl DoubleEndedIterator<Item = (&[u32; LANES], &[Lanes])> {
+        self.pixels.as_chunks::<LANES>().0.iter().zip(self.rows.chunks_exact(self.width().max(1)))
     }
 
     /// Eigenvalues of M, largest first.
@@ -129,7 +131,7 @@ impl Preconditioner {
     pub fn apply(&self, lambda: f64, r: &[f64], out: &mut [f64]) {
         out.copy_from_slice(r);
         let mut components = vector::run(Components { basis: self, r });
-        for (c, e) in components.as_flattened_mut().iter_mut().zip(&self.eigenvalues) {
+        for (c, e) in components.iter_mut().zip(&self.eigenvalues) {
             *c *= (lambda * e / (1.0 + lambda * e)) as f32;
         }
         vector::run(Subtract { basis: self, components: &components, out });
@@ -138,11 +140,7 @@ impl Preconditioner {
     /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
     pub fn norms(&self, lambda: f64, r: &[f64]) -> (f64, f64) {
         let components = vector::run(Components { basis: self, r });
-        let spanned = components
-            .as_flattened()
-            .iter()
-            .zip(&self.eigenvalues)
-            .map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));
+        let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));
         let mut rest = r.to_vec();
         vector::run(Subtract { basis: self, components: &components, out: &mut rest });
         (spanned.sum(), dot(&rest, &rest))
@@ -184,30 +182,32 @@ struct Components<'a> {
 }
 
 impl Task for Components<'_> {
-    type Output = Vec<Lanes>;
+    type Output = Vec<f32>;
 
     #[inline(always)]
-    fn run<I: Instructions>(self, _: I) -> Vec<Lanes> {
-        let mut components = vec![[0.0; LANES]; self.basis.width()];
-        for (rows, pixels) in self.basis.groups() {
-            let r = pixels.map(|p| self.r[p as usize] as f32);
-            for (k, sums) in components.iter_mut().enumerate() {
-                // values, not references: the compiler makes vectors of the lanes then
-                let rows = rows.map(|row| row[k]);
-                for lane in 0..LANES {
-                    let of_row = |j: usize| r[j] * rows[j][lane];
-                    sums[lane] += (of_row(0) + of_row(1)) + (of_row(2) + of_row(3));
+    fn run<I: Instructions>(self, i: I) -> Vec<f32> {
+        let mut sums = vec![Lanes::default(); self.basis.width()];
+        for (pixels, rows) in self.basis.groups() {
+            let mut r = [0.0; LANES];
+            for (r, p) in r.iter_mut().zip(pixels) {
+                *r = self.r[*p as usize] as f32;
+            }
+            for first in (0..LANES).step_by(2 * I::LANES) {
+                let r = i.load_singles(&r, first);
+                for (Lanes(sum), Lanes(row)) in sums.iter_mut().zip(rows) {
+                    let more = i.multiply_add_singles(i.load_singles(row, first), r, i.load_singles(sum, first));
+                    i.store_singles(more, sum, first);
                 }
             }
         }
-        components
+        sums.iter().map(|Lanes(sum)| sum.iter().sum()).collect()
     }
 }
 
 /// Subtracts a combination of the eigenvectors from `out`.
 struct Subtract<'a> {
     basis: &'a Preconditioner,
-    components: &'a [Lanes],
+    components: &'a [f32],
     out: &'a mut [f64],
 }
 
@@ -215,19 +215,26 @@ impl Task for Subtract<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<I: Instructions>(self, _: I) {
+    fn run<I: Instructions>(self, i: I) {
         // backwards: the last rows are still in the cache
-        for (rows, pixels) in self.basis.groups().rev() {
-            let mut sums = [[0.0; LANES]; GROUP];
-            for (k, components) in self.components.iter().enumerate() {
-                for j in 0..GROUP {
-                    for lane in 0..LANES {
-                        sums[j][lane] += rows[j][k][lane] * components[lane];
+        for (pixels, rows) in self.basis.groups().rev() {
+            let mut parts = [Lanes::default(); PARTS];
+            for first in (0..LANES).step_by(2 * I::LANES) {
+                let mut sums = [i.splat_single(0.0); PARTS];
+                let (rows, components) = (rows.as_chunks::<PARTS>().0, self.components.as_chunks::<PARTS>().0);
+                for (rows, components) in rows.iter().zip(components) {
+                    for k in 0..PARTS {
+                        let row = i.load_singles(&rows[k].0, first);
+                        sums[k] = i.multiply_add_singles(row, i.splat_single(components[k]), sums[k]);
                     }
                 }
+                for (Lanes(part), sum) in parts.iter_mut().zip(sums) {
+                    i.store_singles(sum, part, first);
+                }
             }
-            for (p, sums) in pixels.iter().zip(sums) {
-                self.out[*p as usize] -= f64::from(sums.iter().sum::<f32>());
+            let [Lanes(a), Lanes(b), Lanes(c), Lanes(d)] = parts;
+            for (lane, pixel) in pixels.iter().enumerate() {
+                self.out[*pixel as usize] -= f64::from((a[lane] + b[lane]) + (c[lane] + d[lane]));
             }
         }
     }

@@ -93,7 +93,8 @@ pub unsafe fn scatter<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LAN
             let polynomial = i.multiply_add_lanes(of_spread, spread, rest);
             // safe: the caller knows the pixels
             unsafe {
-                let sums = i.multiply_add_lanes(polynomial, i.widen(&block.weight, first), i.pick(out, &block.pixel, first));
+                let sums =
+                    i.multiply_add_lanes(polynomial, i.widen(&block.weight, first), i.pick(out, &block.pixel, first));
                 i.put(sums, out, &block.pixel, first);
             }
         }

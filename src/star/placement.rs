@@ -5,8 +5,8 @@
 //! large map, where neighbours should be taken one after another, they stand in the order of their velocities: cells with
 //! hundreds of pixels have about as many as their neighbours. Left out: what the pairs are used for (`deposit`).
 
-use super::grid::SurfaceGrid;
 use super::block::{Block, LANES, Pixel};
+use super::grid::SurfaceGrid;
 use super::moments::Moments;
 use super::view::Viewer;
 use crate::vector::{Instructions, Task};
@@ -240,7 +240,10 @@ impl Seen {
         {
             let mut block = Block { weight: *weight, position: *position, spread: *variance, pixel: *pixel };
             block.spread.iter_mut().for_each(|spread| *spread *= per_variance);
-            block.deal(std::array::from_fn(|lane| (firsts[cells[lane] as usize] + LANES as u32 * ranks[lane]) as usize), sorted);
+            block.deal(
+                std::array::from_fn(|lane| (firsts[cells[lane] as usize] + LANES as u32 * ranks[lane]) as usize),
+                sorted,
+            );
         }
     }
 }

@@ -26,6 +26,9 @@ pub trait Instructions: Copy + sealed::Sealed {
     /// How many of them.
     const LANES: usize;
 
+    /// The same in single precision: twice as many.
+    type Singles: Copy;
+
     /// `a b + c`, fused where the processor can.
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64;
 
@@ -49,6 +52,18 @@ pub trait Instructions: Copy + sealed::Sealed {
 
     /// `a b + c`, fused where the processor can.
     fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
+
+    /// One number in every lane.
+    fn splat_single(self, x: f32) -> Self::Singles;
+
+    /// The numbers from entry `first` on.
+    fn load_singles(self, from: &[f32], first: usize) -> Self::Singles;
+
+    /// Puts numbers there.
+    fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize);
+
+    /// `a b + c`, fused where the processor can.
+    fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles;
 
     /// The numbers at the places that are listed from entry `first` on.
     ///

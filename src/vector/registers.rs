@@ -6,6 +6,7 @@ use super::{Instructions, Portable};
 
 impl Instructions for Portable {
     type Lanes = [f64; 2];
+    type Singles = [f32; 4];
     const LANES: usize = 2;
 
     #[inline(always)]
@@ -49,6 +50,26 @@ impl Instructions for Portable {
     }
 
     #[inline(always)]
+    fn splat_single(self, x: f32) -> Self::Singles {
+        [x; 4]
+    }
+
+    #[inline(always)]
+    fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
+        *from[first..].first_chunk().expect("as many numbers")
+    }
+
+    #[inline(always)]
+    fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
+        to[first..][..4].copy_from_slice(&x);
+    }
+
+    #[inline(always)]
+    fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
+        [a[0] * b[0] + c[0], a[1] * b[1] + c[1], a[2] * b[2] + c[2], a[3] * b[3] + c[3]]
+    }
+
+    #[inline(always)]
     #[allow(unsafe_code)]
     unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
         [from[places[first] as usize], from[places[first + 1] as usize]]
@@ -71,6 +92,7 @@ mod x86 {
 
     impl Instructions for Avx2 {
         type Lanes = __m256d;
+        type Singles = __m256;
         const LANES: usize = 4;
 
         #[inline(always)]
@@ -117,6 +139,28 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn splat_single(self, x: f32) -> Self::Singles {
+            unsafe { _mm256_set1_ps(x) }
+        }
+
+        #[inline(always)]
+        fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
+            let eight: &[f32; 8] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm256_loadu_ps(eight.as_ptr()) }
+        }
+
+        #[inline(always)]
+        fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
+            let eight: &mut [f32; 8] = to[first..].first_chunk_mut().expect("as many numbers");
+            unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), x) }
+        }
+
+        #[inline(always)]
+        fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
+            unsafe { _mm256_fmadd_ps(a, b, c) }
+        }
+
+        #[inline(always)]
         unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
             let places: &[u32; 4] = places[first..].first_chunk().expect("as many places");
             // safe: the caller knows the places
@@ -137,6 +181,7 @@ mod x86 {
 
     impl Instructions for Avx512 {
         type Lanes = __m512d;
+        type Singles = __m512;
         const LANES: usize = 8;
 
         #[inline(always)]
@@ -178,6 +223,28 @@ mod x86 {
         #[inline(always)]
         fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
             unsafe { _mm512_fmadd_pd(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn splat_single(self, x: f32) -> Self::Singles {
+            unsafe { _mm512_set1_ps(x) }
+        }
+
+        #[inline(always)]
+        fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
+            let sixteen: &[f32; 16] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm512_loadu_ps(sixteen.as_ptr()) }
+        }
+
+        #[inline(always)]
+        fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
+            let sixteen: &mut [f32; 16] = to[first..].first_chunk_mut().expect("as many numbers");
+            unsafe { _mm512_storeu_ps(sixteen.as_mut_ptr(), x) }
+        }
+
+        #[inline(always)]
+        fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
+            unsafe { _mm512_fmadd_ps(a, b, c) }
         }
 
         #[inline(always)]
