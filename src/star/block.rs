@@ -112,3 +112,25 @@ mod sse {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_dealt_and_collected() {
+        let row = |first: usize| std::array::from_fn(|lane| (first + lane) as f32 * 0.37);
+        let pixel = std::array::from_fn(|lane| 40 + lane as u32);
+        let block = Block { weight: row(0), position: row(10), spread: row(20), pixel };
+        let places = [4, 1, 8, 2, 11, 0, 6, 9];
+        let mut pixels = [Pixel::default(); 12];
+        block.deal(places, &mut pixels);
+        for (lane, place) in places.into_iter().enumerate() {
+            let (weight, position) = (block.weight[lane], block.position[lane]);
+            let expected = Pixel { weight, position, spread: block.spread[lane], pixel: block.pixel[lane] };
+            assert_eq!(pixels[place], expected);
+        }
+        let again = Block::of(places.map(|place| &pixels[place]));
+        assert_eq!(format!("{again:?}"), format!("{block:?}"));
+    }
+}

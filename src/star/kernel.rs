@@ -111,3 +111,101 @@ fn polynomial<I: Instructions>(i: I, coefficients: &[I::Lanes], t: I::Lanes, squ
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::{self, Task};
+
+    const PIXELS: usize = 190;
+    const GRID: usize = 20;
+
+    fn number(i: usize) -> f64 {
+        0.5 + 0.5 * (12.9898 * i as f64).sin()
+    }
+
+    /// Groups of cells: neither all of a group nor all rows of a cell are there.
+    fn groups() -> Vec<([u32; LANES], Vec<Block>)> {
+        let block = |b: usize, filled: usize| Block {
+            weight: std::array::from_fn(|l| if l < filled { number(8 * b + l) as f32 } else { 0.0 }),
+            position: std::array::from_fn(|l| if l < filled { number(100 + 8 * b + l) as f32 - 0.5 } else { 0.0 }),
+            spread: std::array::from_fn(|l| if l < filled { number(300 + 8 * b + l) as f32 } else { 0.0 }),
+            // what is empty lies on a pixel of the group that is not
+            pixel: std::array::from_fn(|l| if l < filled { 8 * b + l } else { 8 * b } as u32),
+        };
+        let filled = [vec![8, 8, 8, 8, 7, 6, 3, 1], vec![5, 5, 4], vec![]];
+        let mut first = 0;
+        let mut group = |filled: &Vec<usize>, cells: [u32; LANES]| {
+            let blocks = filled.iter().enumerate().map(|(row, filled)| block(first + row, *filled)).collect();
+            first += filled.len();
+            (cells, blocks)
+        };
+        let cells = [[3, 0, 1, 9, 14, 2, 7, 5], [4, 6, 8, 10, 11, 4, 4, 4], [12, 13, 12, 12, 12, 12, 12, 12]];
+        filled.iter().zip(cells).map(|(filled, cells)| group(filled, cells)).collect()
+    }
+
+    /// Every pair, its weight on each node of its cell: the yardstick, a pixel after another.
+    fn pairs() -> Vec<(usize, usize, f64)> {
+        let mut pairs = Vec::new();
+        for (cells, blocks) in groups() {
+            for (block, lane) in blocks.iter().flat_map(|block| (0..LANES).map(move |lane| (block, lane))) {
+                let [weight, t, spread] = [block.weight, block.position, block.spread].map(|row| f64::from(row[lane]));
+                // P(t) + spread P''(t), the polynomial of node n by its coefficients
+                for n in 0..DEPOSIT_NODES {
+                    let mirrored = DEPOSIT_NODES - 1 - n;
+                    let (weights, t) =
+                        if n < mirrored { (DEPOSIT_WEIGHTS[n], t) } else { (DEPOSIT_WEIGHTS[mirrored], -t) };
+                    let power = |k: usize| t.powi(k as i32);
+                    let second = |k: usize| if k < 2 { 0.0 } else { (k * (k - 1)) as f64 * power(k - 2) };
+                    let on_node: f64 =
+                        weights.iter().enumerate().map(|(k, w)| w * (power(k) + spread * second(k))).sum();
+                    pairs.push((block.pixel[lane] as usize, cells[lane] as usize + n, weight * on_node));
+                }
+            }
+        }
+        pairs
+    }
+
+    struct Both {
+        x: Vec<f64>,
+        nodes: Vec<f64>,
+        left: Vec<f64>,
+        out: Vec<f64>,
+    }
+
+    impl Task for Both {
+        type Output = (Vec<f64>, Vec<f64>);
+
+        #[inline(always)]
+        #[allow(unsafe_code)]
+        fn run<I: Instructions>(mut self, i: I) -> Self::Output {
+            for (cells, blocks) in groups() {
+                // safe: pixels and cells of the test
+                unsafe {
+                    gather(i, &blocks, &cells, &self.x, &mut self.left);
+                    scatter(i, &blocks, &cells, &self.nodes, &mut self.out);
+                }
+            }
+            let nodes = (0..GRID).map(|node| self.left.chunks(GRID).map(|row| row[node]).sum()).collect();
+            (nodes, self.out)
+        }
+    }
+
+    #[test]
+    fn all_instructions_give_what_a_plain_loop_over_pairs_gives() {
+        let (x, nodes): (Vec<f64>, Vec<f64>) = ((0..PIXELS).map(number).collect(), (0..GRID).map(number).collect());
+        let (mut plain_nodes, mut plain_out) = (vec![0.0; GRID], vec![1.0; PIXELS]);
+        for (pixel, node, weight) in pairs() {
+            plain_nodes[node] += weight * x[pixel];
+            plain_out[pixel] += weight * nodes[node];
+        }
+        let left = vec![0.0; DEPOSIT_NODES * GRID];
+        let task = || Both { x: x.clone(), nodes: nodes.clone(), left: left.clone(), out: vec![1.0; PIXELS] };
+        for (got_nodes, got_out) in vector::by_each(task) {
+            let both = got_nodes.iter().zip(&plain_nodes).chain(got_out.iter().zip(&plain_out));
+            for (got, wanted) in both {
+                assert!((got - wanted).abs() < 1e-13, "{got} {wanted}");
+            }
+        }
+    }
+}

@@ -258,6 +258,7 @@ const NODES_BEFORE: u32 = 2;
 mod tests {
     use super::*;
     use crate::star::kernel;
+    use crate::star::line_profile::DEPOSIT_NODES;
     use crate::star::{LimbDarkening, Orbit, Quadrature, Rotation, StarState};
     use crate::vector;
 
@@ -271,12 +272,12 @@ mod tests {
         #[allow(unsafe_code)]
         fn run<I: Instructions>(self, i: I) -> Vec<f64> {
             let Gather(placement, observation, x, nodes) = self;
-            let mut sums = vec![0.0; nodes];
+            let mut left = vec![0.0; DEPOSIT_NODES * nodes];
             for (cells, blocks) in placement.groups_of(observation) {
-                // safe: `x` has the map's pixels
-                unsafe { kernel::gather(i, blocks, cells, x, &mut sums) };
+                // safe: `x` has the map's pixels, and the grid so many nodes
+                unsafe { kernel::gather(i, blocks, cells, x, &mut left) };
             }
-            sums
+            (0..nodes).map(|node| left.chunks(nodes).map(|row| row[node]).sum()).collect()
         }
     }
 

@@ -108,17 +108,45 @@ mod sealed {
 pub fn run<T: Task>(task: T) -> T::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        use std::arch::is_x86_feature_detected as has;
-        let avx2 = has!("avx2") && has!("fma");
         // safe: they are there
         #[allow(unsafe_code)]
-        if avx2 && has!("avx512f") && has!("avx512dq") && has!("avx512vl") {
+        if has_avx512() {
             return unsafe { run_avx512(task) };
-        } else if avx2 {
+        } else if has_avx2() {
             return unsafe { run_avx2(task) };
         }
     }
     task.run(Portable)
+}
+
+/// What each set of instructions that this processor has makes of a task, the portable one first.
+#[cfg(test)]
+pub fn by_each<T: Task>(mut task: impl FnMut() -> T) -> Vec<T::Output> {
+    let mut outputs = vec![task().run(Portable)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        // safe: they are there
+        #[allow(unsafe_code)]
+        if has_avx2() {
+            outputs.push(unsafe { run_avx2(task()) });
+        }
+        #[allow(unsafe_code)]
+        if has_avx512() {
+            outputs.push(unsafe { run_avx512(task()) });
+        }
+    }
+    outputs
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_avx2() -> bool {
+    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_avx512() -> bool {
+    use std::arch::is_x86_feature_detected as has;
+    has_avx2() && has!("avx512f") && has!("avx512dq") && has!("avx512vl")
 }
 
 #[cfg(target_arch = "x86_64")]
