@@ -110,8 +110,8 @@ impl<const POINTS: usize> RingView<POINTS> {
             view.mu[k].copy_from_slice(&points.mu[k][first..first + POINTS]);
             let velocity = &points.velocity[k][first..first + POINTS];
             view.middle[k] = velocity.iter().sum::<f64>() / POINTS as f64;
-            for p in 0..POINTS {
-                view.velocity[k][p] = (velocity[p] - view.middle[k]) as f32;
+            for (relative, velocity) in view.velocity[k].iter_mut().zip(velocity) {
+                *relative = (velocity - view.middle[k]) as f32;
             }
         }
         view

@@ -1,9 +1,10 @@
 //! Vector instructions: hot loops are compiled for AVX2 with fused multiply-add and for AVX-512 as well, and chosen at run time.
 //!
 //! A hot loop is a [`Task`]: written once, inlined into an entry compiled for each set of instructions. The compiler makes vectors of
-//! most loops by itself; where it does not, numbers side by side are written as [`Instructions::Lanes`]. Products are fused
-//! with sums in two of the sets, and as many numbers are summed side by side as a register holds: results differ in the
-//! last digits between processors, never between runs on one. Left out: what the loops are.
+//! most loops by itself; where it does not, they are written in registers. Products are fused with sums in two of the
+//! sets, so that results differ in the last digits between processors with and without AVX2, never between runs on one; how
+//! wide the registers are does not change the order of a sum. Closures are to be kept out of hot loops: where one is not
+//! inlined, its instructions are those of every processor. Left out: what the loops are.
 
 pub mod elementary;
 pub mod linear;
