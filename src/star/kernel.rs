@@ -47,12 +47,7 @@ pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANE
         // nodes that mirror each other have the same weights but for the sign of odd powers
         let mut nodes = sums;
         for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
-            let half = |first: usize| {
-                let highest = i.multiply(i.splat(weights[first + 4]), sums[first + 4]);
-                let lower = i.multiply_add_lanes(i.splat(weights[first + 2]), sums[first + 2], highest);
-                i.multiply_add_lanes(i.splat(weights[first]), sums[first], lower)
-            };
-            let (even, odd) = (half(0), half(1));
+            let (even, odd) = (every_second(i, weights, &sums, 0), every_second(i, weights, &sums, 1));
             nodes[n] = i.add(even, odd);
             nodes[DEPOSIT_NODES - 1 - n] = i.subtract(even, odd);
         }
@@ -99,6 +94,19 @@ pub unsafe fn scatter<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LAN
             }
         }
     }
+}
+
+/// The sum of `w_k s_k` over even k, or from 1 on over odd ones.
+#[inline(always)]
+fn every_second<I: Instructions>(
+    i: I,
+    w: &[f64; DEPOSIT_NODES],
+    s: &[I::Lanes; DEPOSIT_NODES],
+    first: usize,
+) -> I::Lanes {
+    let highest = i.multiply(i.splat(w[first + 4]), s[first + 4]);
+    let lower = i.multiply_add_lanes(i.splat(w[first + 2]), s[first + 2], highest);
+    i.multiply_add_lanes(i.splat(w[first]), s[first], lower)
 }
 
 /// `c_0 + c_1 t + ...`, an even number of coefficients: pairs of them beside each other, then one after another.
