@@ -10,6 +10,7 @@ use super::grid::SurfaceGrid;
 use super::moments::Moments;
 use super::view::Viewer;
 use crate::vector::{Instructions, Task};
+use std::cell::Cell;
 
 /// The visible pixels of all observations.
 #[derive(Clone, Debug)]
@@ -33,6 +34,22 @@ struct Group {
 impl Group {
     fn rows(&self) -> usize {
         (self.blocks[1] - self.blocks[0]) as usize
+    }
+}
+
+thread_local! {
+    /// Memory for blocks that a thread had. What a large map takes, tens of megabytes, the system hands out anew page by page:
+    /// three times the time of filling it.
+    static SPARE: Cell<Vec<Block>> = const { Cell::new(Vec::new()) };
+}
+
+impl Drop for Placement {
+    fn drop(&mut self) {
+        // where a thread ends, its spare memory may be gone
+        let _ = SPARE.try_with(|spare| {
+            let (a, b) = (spare.take(), std::mem::take(&mut self.blocks));
+            spare.set(if a.capacity() > b.capacity() { a } else { b });
+        });
     }
 }
 
@@ -102,12 +119,11 @@ impl Task for Place<'_> {
     fn run<I: Instructions>(self, instructions: I) -> Placement {
         let Place { grid, viewer, scale, since_epoch_d } = self;
         let mut views = viewer.of(grid);
-        let mut placement = Placement {
-            pairs: 0,
-            groups: Vec::new(),
-            groups_each: scale.cells.div_ceil(LANES),
-            blocks: Vec::with_capacity(since_epoch_d.len() * grid.len() * 3 / 4 / LANES),
-        };
+        let mut blocks = SPARE.take();
+        blocks.clear();
+        blocks.reserve(since_epoch_d.len() * grid.len() * 3 / 4 / LANES);
+        let groups_each = scale.cells.div_ceil(LANES);
+        let mut placement = Placement { pairs: 0, groups: Vec::new(), groups_each, blocks };
         let mut seen = Seen::new(scale, grid.len());
         for &time in since_epoch_d {
             let moments = views.look(instructions, time);
