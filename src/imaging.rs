@@ -248,27 +248,29 @@ impl Problem for ImagingProblem<'_> {
     fn curvature(&mut self, which: Curvature, v: &[f64], out: &mut [f64]) {
         self.passes += 2;
         let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
-        self.response.apply(v, &mut self.bins, &mut self.constants);
-        for k in 0..self.response.profiles() {
-            let scale = self.brightness_of.slope / self.continuum[k];
-            let d_continuum = self.constants[k] * scale;
-            let bins = self.response.bins(k);
-            let model = &self.model[bins.clone()];
-            let d_model = self.differences[bins.clone()].iter_mut().zip(&self.bins[bins.clone()]);
-            for ((d_model, line), model) in d_model.zip(model) {
+        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, bins: weighed, .. } =
+            self;
+        let slope = self.brightness_of.slope;
+        response.apply_and_back(v, out, |k, line, d_continuum| {
+            let bins = response.bins(k);
+            let (scale, model, residuals) =
+                (slope / continuum[k], &model[bins.clone()], &weighted_residual[bins.clone()]);
+            let d_continuum = scale * d_continuum;
+            for ((d_model, line), model) in differences[bins.clone()].iter_mut().zip(&*line).zip(model) {
                 *d_model = scale * line - model * d_continuum;
             }
-            self.data.weigh(bins.clone(), &self.differences, &mut self.bins);
+            data.weigh(bins.clone(), differences, weighed);
             let mut constant = 0.0;
-            let changes = self.differences[bins.clone()].iter().zip(&self.weighted_residual[bins.clone()]);
-            for ((back, model), (d_model, residual)) in self.bins[bins].iter_mut().zip(model).zip(changes) {
+            let changes = weighed[bins.clone()].iter().zip(&differences[bins]);
+            for (((back, model), residual), (weighed, d_model)) in
+                line.iter_mut().zip(model).zip(residuals).zip(changes)
+            {
                 let residual = second_order * residual;
-                *back = scale * (*back - residual * d_continuum);
+                *back = scale * (weighed - residual * d_continuum);
                 constant -= *back * model + scale * residual * d_model;
             }
-            self.constants[k] = constant;
-        }
-        self.response.apply_transpose(&self.bins, &self.constants, out);
+            constant
+        });
     }
 
     fn passes(&self) -> u32 {

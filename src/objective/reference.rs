@@ -155,11 +155,17 @@ impl Reference {
     pub fn provisional(imager: &Imager, values: ParameterValues, chi2_per_datum: f64) -> Result<Self, ReferenceError> {
         // a lower target is that of data of which fewer are independent, which bear the larger weight
         let largest_lambda = PROVISIONAL_LAMBDA / (chi2_per_datum / USUAL_CHI2).min(1.0);
-        let reference = Reference::approach(imager, values, chi2_per_datum, largest_lambda)?;
-        match reference.solution.termination {
-            Termination::NonFinite => Err(ReferenceError::Solver(Termination::NonFinite)),
-            _ => Ok(reference),
+        let mut reference = Reference::approach(imager, values, chi2_per_datum, largest_lambda)?;
+        if reference.solution.termination == Termination::NonFinite {
+            return Err(ReferenceError::Solver(Termination::NonFinite));
         }
+        // evaluations nearby take its path, which the last step has left as it was before
+        let mut problem = imager.problem(reference.response.clone());
+        let (entropy, preconditioner) = (imager.entropy, &reference.preconditioner);
+        let solver = Solver { entropy, preconditioner, settings: SolverSettings::patient() };
+        solver.find_path(&mut problem, &mut reference.solution);
+        reference.passes += problem.passes();
+        Ok(reference)
     }
 
     /// The image at `lambda` over the number of data, whatever its chi2.

@@ -3,7 +3,7 @@
 //! A bin is a whole number m of grid steps wide: kept as m interleaved rows (node i is entry i / m of row i mod m), the grid
 //! is turned into bins by one short filter a row. The orbit and the systemic velocity only shift the filters. Left out: pixels.
 
-use super::correlate::{CHUNK, correlate, in_chunks};
+use super::correlate::{self, CHUNK, correlate};
 use super::line_profile::LineKernel;
 use crate::vector::Instructions;
 
@@ -64,12 +64,14 @@ impl ProfileConvolution {
     /// Line depth in every bin (overwritten) from the rows of the grid.
     #[inline(always)]
     pub fn sum_to_bins(&self, i: impl Instructions, rows: &Rows, bins: &mut [f64]) {
-        in_chunks(bins, |bin, sums| {
+        for (k, chunk) in bins.chunks_mut(CHUNK).enumerate() {
+            let mut sums = [0.0; CHUNK];
             for (row, filter) in self.filters.iter().enumerate() {
-                let first = (filter.first + rows.margin as isize) as usize + bin;
-                correlate(i, &filter.taps, &rows.row(row)[first..], sums);
+                let first = (filter.first + rows.margin as isize) as usize + k * CHUNK;
+                correlate(i, &filter.taps, &rows.row(row)[first..], &mut sums);
             }
-        });
+            correlate::put(&sums, chunk);
+        }
     }
 
     /// Transpose of [`ProfileConvolution::sum_to_bins`]: sets the rows of the grid from the bins.
@@ -85,7 +87,11 @@ impl ProfileConvolution {
             rows.padded.resize(bins.len() + 2 * margin + CHUNK, 0.0);
             let first = (filter.first + rows.margin as isize) as usize;
             let targets = &mut rows.values[row * rows.stride + first..][..bins.len() + margin];
-            in_chunks(targets, |column, sums| correlate(i, &filter.reversed, &rows.padded[column..], sums));
+            for (k, chunk) in targets.chunks_mut(CHUNK).enumerate() {
+                let mut sums = [0.0; CHUNK];
+                correlate(i, &filter.reversed, &rows.padded[k * CHUNK..], &mut sums);
+                correlate::put(&sums, chunk);
+            }
         }
     }
 }

@@ -18,15 +18,11 @@ pub fn correlate(i: impl Instructions, taps: &[f64], source: &[f64], sums: &mut 
     }
 }
 
-/// Sets `out[j]` to what `sum` makes of the chunk that begins at `j`.
+/// Puts the results of a chunk where they belong; the last chunk may be shorter.
 #[inline(always)]
-pub fn in_chunks(out: &mut [f64], mut sum: impl FnMut(usize, &mut [f64; CHUNK])) {
-    for (k, chunk) in out.chunks_mut(CHUNK).enumerate() {
-        let mut sums = [0.0; CHUNK];
-        sum(k * CHUNK, &mut sums);
-        match <&mut [f64; CHUNK]>::try_from(&mut *chunk) {
-            Ok(whole) => *whole = sums,
-            Err(_) => chunk.iter_mut().zip(sums).for_each(|(out, sum)| *out = sum),
-        }
+pub fn put(sums: &[f64; CHUNK], chunk: &mut [f64]) {
+    match <&mut [f64; CHUNK]>::try_from(&mut *chunk) {
+        Ok(whole) => *whole = *sums,
+        Err(_) => chunk.copy_from_slice(&sums[..chunk.len()]),
     }
 }

@@ -143,24 +143,25 @@ impl<const POINTS: usize> RingView<POINTS> {
     /// Weights, mean velocities over that of the middle of the points, and their variances.
     #[inline(always)]
     fn relative_moments(&self, i: impl Instructions, cos_l: [f32; CHUNK], sin_l: [f32; CHUNK]) -> [[f32; CHUNK]; 3] {
-        let fma = |a, b, c| i.multiply_add_single(a, b, c);
         let RingView { mu_pole, mu, velocity, limb, .. } = self;
         let [mut weight, mut deviation, mut variance] = [[0.0; CHUNK]; 3];
         for lane in 0..CHUNK {
             let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
             for p in 0..POINTS {
-                let mu = fma(cos_l[lane], mu[0][p], fma(sin_l[lane], mu[1][p], mu_pole[p]));
+                let on_equator = i.multiply_add_single(sin_l[lane], mu[1][p], mu_pole[p]);
+                let mu = i.multiply_add_single(cos_l[lane], mu[0][p], on_equator);
                 let mu = if mu > 0.0 { mu } else { 0.0 };
-                let w = mu * fma(mu, fma(mu, limb[2], limb[1]), limb[0]);
-                let v = fma(cos_l[lane], velocity[0][p], sin_l[lane] * velocity[1][p]);
+                let limb_darkening = i.multiply_add_single(mu, i.multiply_add_single(mu, limb[2], limb[1]), limb[0]);
+                let w = mu * limb_darkening;
+                let v = i.multiply_add_single(cos_l[lane], velocity[0][p], sin_l[lane] * velocity[1][p]);
                 let moment = w * v;
                 sum += w;
                 first += moment;
-                second = fma(moment, v, second);
+                second = i.multiply_add_single(moment, v, second);
             }
             let per_weight = if sum > f32::MIN_POSITIVE { 1.0 / sum } else { 0.0 };
             let mean = first * per_weight;
-            let spread = fma(second, per_weight, -mean * mean);
+            let spread = i.multiply_add_single(second, per_weight, -mean * mean);
             weight[lane] = sum;
             deviation[lane] = mean;
             variance[lane] = if spread > 0.0 { spread } else { 0.0 };
