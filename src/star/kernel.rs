@@ -13,7 +13,7 @@ use crate::vector::Instructions;
 const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 
 /// What the pixels of each cell, times `x`, leave on its nodes: row n of `left`, as long as the grid, gets the n-th node of the cell.
-/// Of two lanes of one cell the first counts.
+/// Where all lanes are one cell, it gets the sum of them.
 ///
 /// # Safety
 /// Every pixel of every block lies within `x`, and the nodes of every cell within the grid.
@@ -21,6 +21,8 @@ const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 #[allow(unsafe_code)]
 pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANES], x: &[f64], left: &mut [f64]) {
     let grid = left.len() / DEPOSIT_NODES;
+    // lanes without a pixel may repeat a cell: they come last, and the first of two that are put in one place stays
+    let (one_cell, mut totals) = (cells[0] == cells[1], [0.0; DEPOSIT_NODES]);
     for first in (0..LANES).step_by(I::LANES).rev() {
         let mut sums = [i.splat(0.0); DEPOSIT_NODES];
         let mut spread_sums = [i.splat(0.0); SPREAD_FACTORS.len()];
@@ -52,13 +54,23 @@ pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANE
             nodes[DEPOSIT_NODES - 1 - n] = i.subtract(even, odd);
         }
         for (n, node) in nodes.into_iter().enumerate() {
-            // safe: the caller knows the cells
-            unsafe { i.put(node, &mut left[n * (grid + 1)..], cells, first) };
+            if one_cell {
+                totals[n] += i.total(node);
+            } else {
+                // safe: the caller knows the cells
+                unsafe { i.put(node, &mut left[n * (grid + 1)..], cells, first) };
+            }
+        }
+    }
+    if one_cell {
+        for (n, total) in totals.into_iter().enumerate() {
+            left[n * (grid + 1) + cells[0] as usize] = total;
         }
     }
 }
 
-/// Transpose of [`gather`]: adds to every pixel of `out` what it gets from the nodes of its cell.
+/// Transpose of [`gather`]: adds to every pixel of `out` what it gets from the nodes of its cell. No pixel may be twice in a block
+/// but for lanes of weight 0, which come last.
 ///
 /// # Safety
 /// Every pixel of every block lies within `out`, and the nodes of every cell within `nodes`.
@@ -141,14 +153,14 @@ mod tests {
             // what is empty lies on a pixel of the group that is not
             pixel: std::array::from_fn(|l| if l < filled { 8 * b + l } else { 8 * b } as u32),
         };
-        let filled = [vec![8, 8, 8, 8, 7, 6, 3, 1], vec![5, 5, 4], vec![]];
+        let filled = [vec![8, 8, 8, 8, 7, 6, 3, 1], vec![5, 5, 4], vec![8, 8, 8, 3], vec![]];
         let mut first = 0;
         let mut group = |filled: &Vec<usize>, cells: [u32; LANES]| {
             let blocks = filled.iter().enumerate().map(|(row, filled)| block(first + row, *filled)).collect();
             first += filled.len();
             (cells, blocks)
         };
-        let cells = [[3, 0, 1, 9, 14, 2, 7, 5], [4, 6, 8, 10, 11, 4, 4, 4], [12, 13, 12, 12, 12, 12, 12, 12]];
+        let cells = [[3, 0, 1, 9, 14, 2, 7, 5], [4, 6, 8, 10, 11, 4, 4, 4], [12; LANES], [13; LANES]];
         filled.iter().zip(cells).map(|(filled, cells)| group(filled, cells)).collect()
     }
 

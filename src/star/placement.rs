@@ -1,9 +1,9 @@
 //! Which cell of the velocity grid every visible pixel of every observation lies in, and where in it: the pairs as the hot path
 //! reads them.
 //!
-//! Cells stand side by side (`block`) in the order of their numbers of pixels, so that those of a group have about as many. On a
-//! large map, where neighbours should be taken one after another, they stand in the order of their velocities: cells with
-//! hundreds of pixels have about as many as their neighbours. Left out: what the pairs are used for (`deposit`).
+//! Cells stand side by side (`block`) as [`Order`] says: the fewer pixels a cell has, the more it matters that those of a group have
+//! as many; the larger the map, the more that neighbours are taken one after another. Left out: what the pairs are
+//! used for (`deposit`).
 
 use super::block::{Block, LANES, Pixel};
 use super::grid::SurfaceGrid;
@@ -22,7 +22,7 @@ pub struct Placement {
     blocks: Vec<Block>,
 }
 
-/// Cells side by side, those with most pixels first.
+/// Cells side by side, those with most pixels first; or one, whose pixels are dealt to all lanes.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     /// First node of each cell.
@@ -72,8 +72,10 @@ impl Placement {
         let first_group = self.groups.len();
         seen.sort_cells();
         let mut first_block = self.blocks.len() as u32;
-        for cells in seen.order.chunks(LANES) {
-            let end = first_block + seen.counts[cells[0] as usize];
+        for cells in seen.order.chunks(seen.scale.order.side_by_side()) {
+            let most = seen.counts[cells[0] as usize];
+            let rows = if seen.scale.order == Order::OneByOne { most.div_ceil(LANES as u32) } else { most };
+            let end = first_block + rows;
             // lanes that are left over at the end repeat a cell and have no pixel
             let cells = std::array::from_fn(|lane| *cells.get(lane).unwrap_or(&cells[0]));
             self.groups.push(Group { cells, blocks: [first_block, end] });
@@ -108,8 +110,26 @@ pub struct Scale {
     pub steps_per_kms: f64,
     /// Cells that a pixel can lie in.
     pub cells: usize,
-    /// Whether they stand in the order of their numbers of pixels, not of their velocities.
-    pub by_size: bool,
+    /// How they stand.
+    pub order: Order,
+}
+
+/// How cells stand side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Order {
+    /// In the order of their numbers of pixels.
+    BySize,
+    /// In the order of their velocities.
+    ByVelocity,
+    /// One at a time in all lanes, in the order of velocities.
+    OneByOne,
+}
+
+impl Order {
+    /// Cells in a group.
+    fn side_by_side(self) -> usize {
+        if self == Order::OneByOne { 1 } else { LANES }
+    }
 }
 
 impl Task for Place<'_> {
@@ -122,7 +142,7 @@ impl Task for Place<'_> {
         let mut blocks = SPARE.take();
         blocks.clear();
         blocks.reserve(since_epoch_d.len() * grid.len() * 3 / 4 / LANES);
-        let groups_each = scale.cells.div_ceil(LANES);
+        let groups_each = scale.cells.div_ceil(scale.order.side_by_side());
         let mut placement = Placement { pairs: 0, groups: Vec::new(), groups_each, blocks };
         let mut seen = Seen::new(scale, grid.len());
         for &time in since_epoch_d {
@@ -138,7 +158,7 @@ impl Task for Place<'_> {
 struct Seen {
     scale: Scale,
     /// Number of pixels of the map.
-    room: usize,
+    map_pixels: usize,
     /// Number of visible pixels.
     pixels: usize,
     /// Of each, in the order in which they were seen: its cell, and where in it.
@@ -161,7 +181,7 @@ impl Seen {
         let (room, cells) = (pixels.next_multiple_of(LANES), scale.cells);
         Seen {
             scale,
-            room: pixels,
+            map_pixels: pixels,
             pixels: 0,
             cell: vec![0; room],
             position: vec![0.0; room],
@@ -201,9 +221,9 @@ impl Seen {
             *count += 1;
         }
         let counts = &self.counts[..self.scale.cells];
-        if !self.scale.by_size {
+        if self.scale.order != Order::BySize {
             self.order.iter_mut().enumerate().for_each(|(cell, place)| *place = cell as u32);
-            for group in self.order.chunks_mut(LANES) {
+            for group in self.order.chunks_mut(self.scale.order.side_by_side()) {
                 group.sort_by_key(|cell| std::cmp::Reverse(counts[*cell as usize]));
             }
             return;
@@ -227,20 +247,23 @@ impl Seen {
     #[inline(always)]
     fn sort_pixels(&mut self, groups: &[Group], moments: &Moments) {
         let per_variance = (0.5 * self.scale.steps_per_kms * self.scale.steps_per_kms) as f32;
+        // from one pixel of a cell to the next, and as many cells
+        let step = self.scale.order.side_by_side();
         let mut end = 0;
         for group in groups {
             let (cells, rows) = (&group.cells, group.rows());
             self.sorted.resize(self.sorted.len().max(end + LANES * rows), Pixel::default());
             let places = &mut self.sorted[end..end + LANES * rows];
-            for (lane, cell) in cells.iter().enumerate() {
+            // hardly ever one pixel in two blocks that follow each other, for no sum to wait for another
+            let empty = |place: usize| Pixel { pixel: ((end + place) % self.map_pixels) as u32, ..Pixel::default() };
+            for (lane, cell) in cells.iter().enumerate().take(step) {
                 let again = cells[..lane].contains(cell);
                 let count = if again { 0 } else { self.counts[*cell as usize] as usize };
                 if !again {
                     self.firsts[*cell as usize] = (end + lane) as u32;
                 }
-                for place in (lane + LANES * count..LANES * rows).step_by(LANES) {
-                    // never one pixel in two blocks that follow each other, for no sum to wait for another
-                    places[place] = Pixel { pixel: ((end + place) % self.room) as u32, ..Pixel::default() };
+                for place in (lane + step * count..LANES * rows).step_by(step) {
+                    places[place] = empty(place);
                 }
             }
             end += LANES * rows;
@@ -257,7 +280,7 @@ impl Seen {
             let mut block = Block { weight: *weight, position: *position, spread: *variance, pixel: *pixel };
             block.spread.iter_mut().for_each(|spread| *spread *= per_variance);
             block.deal(
-                std::array::from_fn(|lane| (firsts[cells[lane] as usize] + LANES as u32 * ranks[lane]) as usize),
+                std::array::from_fn(|lane| (firsts[cells[lane] as usize] + step as u32 * ranks[lane]) as usize),
                 sorted,
             );
         }
@@ -298,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_in_either_order_hold_every_visible_pixel_once() {
+    fn cells_in_any_order_hold_every_visible_pixel_once() {
         let state = StarState {
             rotation: Rotation { omega_eq_rad_d: 2.1, domega_rad_d: 0.05 },
             inclination: 0.7,
@@ -311,12 +334,12 @@ mod tests {
         let times = [0.0, 0.9, 700.3];
         for (pixels, quadrature) in [(3, Quadrature::Centre), (7, Quadrature::Gauss2x2), (900, Quadrature::Gauss2x2)] {
             let grid = SurfaceGrid::equal_area(pixels, quadrature);
-            let place = |by_size: bool| {
-                let scale = Scale { origin_kms: -46.0, steps_per_kms: 1.0, cells: 88, by_size };
+            let place = |order: Order| {
+                let scale = Scale { origin_kms: -46.0, steps_per_kms: 1.0, cells: 88, order };
                 vector::run(Place { grid: &grid, viewer, scale, since_epoch_d: &times })
             };
-            let [sorted, in_order] = [true, false].map(place);
-            assert_eq!(sorted.pairs, in_order.pairs);
+            let [sorted, in_order, one_by_one] = [Order::BySize, Order::ByVelocity, Order::OneByOne].map(place);
+            assert!(sorted.pairs == in_order.pairs && sorted.pairs == one_by_one.pairs);
             let x: Vec<f64> = (0..grid.len()).map(|p| (0.7 * p as f64).sin()).collect();
             for observation in 0..times.len() {
                 let mut seen: Vec<u32> = Vec::new();
@@ -328,7 +351,8 @@ mod tests {
                 seen.sort_unstable();
                 seen.dedup();
                 assert!(count == seen.len() && count > 0, "{pixels} pixels, observation {observation}");
-                let [a, b] = [&sorted, &in_order].map(|p| vector::run(Gather(p, observation, &x, 93)));
+                let [a, b, c] = [&sorted, &in_order, &one_by_one].map(|p| vector::run(Gather(p, observation, &x, 93)));
+                assert!(a.iter().zip(&c).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {c:?}");
                 assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {b:?}");
             }
         }

@@ -54,6 +54,9 @@ pub trait Instructions: Copy + sealed::Sealed {
     /// `a b + c`, fused where the processor can.
     fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
 
+    /// The sum over the lanes.
+    fn total(self, x: Self::Lanes) -> f64;
+
     /// One number in every lane.
     fn splat_single(self, x: f32) -> Self::Singles;
 

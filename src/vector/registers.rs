@@ -50,6 +50,11 @@ impl Instructions for Portable {
     }
 
     #[inline(always)]
+    fn total(self, x: Self::Lanes) -> f64 {
+        x[0] + x[1]
+    }
+
+    #[inline(always)]
     fn splat_single(self, x: f32) -> Self::Singles {
         [x; 4]
     }
@@ -139,6 +144,13 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn total(self, x: Self::Lanes) -> f64 {
+            // safe: four numbers of eight bytes
+            let [a, b, c, d] = unsafe { std::mem::transmute::<__m256d, [f64; 4]>(x) };
+            (a + b) + (c + d)
+        }
+
+        #[inline(always)]
         fn splat_single(self, x: f32) -> Self::Singles {
             unsafe { _mm256_set1_ps(x) }
         }
@@ -223,6 +235,13 @@ mod x86 {
         #[inline(always)]
         fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
             unsafe { _mm512_fmadd_pd(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn total(self, x: Self::Lanes) -> f64 {
+            // safe: eight numbers of eight bytes; in the order of two registers of four
+            let [a, b, c, d, e, f, g, h] = unsafe { std::mem::transmute::<__m512d, [f64; 8]>(x) };
+            ((a + b) + (c + d)) + ((e + f) + (g + h))
         }
 
         #[inline(always)]
