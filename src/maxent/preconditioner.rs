@@ -16,7 +16,7 @@ use rand_distr::{Distribution, StandardNormal};
 pub struct Preconditioner {
     /// Largest eigenvalues of M.
     eigenvalues: Vec<f64>,
-    /// Pixels on which the basis lives, and others on which it is zero to make their number a multiple of [`LANES`].
+    /// Pixels on which the basis lives, and others, whose rows are zero, to make their number a multiple of [`LANES`].
     pixels: Vec<u32>,
     /// How many of them are not there to fill up.
     active: usize,
@@ -81,9 +81,8 @@ impl Preconditioner {
             dropped < DROPPED_ENERGY * total
         });
         let first = faint.count();
-        let mut active = by_energy.split_off(first);
-        active.sort_unstable();
-        let mut pixels = active;
+        let mut pixels = by_energy.split_off(first);
+        pixels.sort_unstable();
         let active = pixels.len();
         let width = eigenvalues.len().next_multiple_of(PARTS);
         let mut rows = vec![Lanes::default(); active.div_ceil(LANES) * width];
@@ -281,6 +280,32 @@ mod tests {
             assert_eq!((basis.ncols(), image.ncols()), (140, 140));
             let error = (basis.transpose() * &basis - DMatrix::identity(140, 140)).amax();
             assert!(error < 1e-13, "{decades} decades: {error:e}");
+        }
+    }
+
+    #[test]
+    fn any_rank_on_any_number_of_pixels_by_all_instructions() {
+        for (n, rank) in [(1, 1), (16, 4), (40, 7), (83, 12)] {
+            // orthonormal columns that live on all pixels
+            let noise = DMatrix::from_fn(n, rank, |i, k| (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin());
+            let vectors = noise.qr().q();
+            let eigenvalues: Vec<f64> = (0..rank).map(|k| 100.0 / (1.0 + k as f64)).collect();
+            let preconditioner = Preconditioner::on_active_pixels(eigenvalues.clone(), &vectors);
+            let r: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
+            let (dense_r, lambda) = (nalgebra::DVector::from_column_slice(&r), 0.4);
+            let along = vectors.transpose() * &dense_r;
+            let kept = nalgebra::DVector::from_fn(rank, |k, _| {
+                along[k] * lambda * eigenvalues[k] / (1.0 + lambda * eigenvalues[k])
+            });
+            let (wanted, mut out) = (&dense_r - &vectors * kept, vec![0.0; n]);
+            preconditioner.apply(lambda, &r, &mut out);
+            assert!(out.iter().zip(wanted.iter()).all(|(a, b)| (a - b).abs() < 1e-5), "{n} {rank}: {out:?} {wanted}");
+            let basis = &preconditioner;
+            let components = vector::by_each(|| Components { basis, r: &r });
+            for components in &components {
+                assert!(components.iter().zip(along.iter()).all(|(a, b)| (f64::from(*a) - b).abs() < 1e-5));
+            }
+            assert!(components[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
         }
     }
 }

@@ -40,8 +40,8 @@ impl Deposit {
         // what is said of pixels below holds for these
         assert!(grid.rings.iter().all(|ring| ring.pixels.end <= grid.len()));
         let order = match grid.len() {
-            0..=MEDIUM_MAP => Order::BySize,
-            ..=LARGE_MAP => Order::ByVelocity,
+            pixels if pixels <= MEDIUM_MAP => Order::BySize,
+            pixels if pixels <= LARGE_MAP => Order::ByVelocity,
             _ => Order::OneByOne,
         };
         let viewer = Viewer::new(state, limb);

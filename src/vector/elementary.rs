@@ -182,7 +182,7 @@ mod tests {
                 assert!(close(sine, x.sin()) && close(cosine, x.cos()), "{x:e}: {sine:e} {cosine:e}");
             }
         }
-        // a century of rotations, in either set of instructions
+        // a century of rotations, by two sets of instructions
         for x in (0..1000).map(|k| 3.7e7 * (1.0 + 1e-3 * f64::from(k))) {
             for (sine, cosine) in [vector::run(Circular(x)), Circular(x).run(Portable)] {
                 assert!(

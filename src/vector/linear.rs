@@ -20,11 +20,13 @@ pub fn axpy(scale: f64, x: &[f64], y: &mut [f64]) {
 
 /// `y = f(y, x)`, number by number.
 pub fn combine(y: &mut [f64], x: &[f64], f: impl Fn(f64, f64) -> f64) {
+    assert_eq!(y.len(), x.len());
     super::run(Combine { y, x, f });
 }
 
 /// `z = f(z, x, y)`, number by number.
 pub fn combine_two(z: &mut [f64], x: &[f64], y: &[f64], f: impl Fn(f64, f64, f64) -> f64) {
+    assert!(z.len() == x.len() && z.len() == y.len());
     super::run(CombineTwo { z, x, y, f });
 }
 

@@ -3,8 +3,8 @@
 //! A hot loop is a [`Task`]: written once, inlined into an entry compiled for each set of instructions. The compiler makes vectors of
 //! most loops by itself; where it does not, they are written in registers. Products are fused with sums in two of the
 //! sets, so that results differ in the last digits between processors with and without AVX2, never between runs on one; how
-//! wide the registers are does not change the order of a sum. Closures are to be kept out of hot loops: where one is not
-//! inlined, its instructions are those of every processor. Left out: what the loops are.
+//! wide the registers are does not change the order of a sum. Closures that take instructions are to be kept out of hot
+//! loops: where one is not inlined, it is compiled for every processor. Left out: what the loops are.
 
 pub mod elementary;
 pub mod linear;
@@ -126,6 +126,7 @@ pub fn run<T: Task>(task: T) -> T::Output {
 /// What each set of instructions that this processor has makes of a task, the portable one first.
 #[cfg(test)]
 pub fn by_each<T: Task>(mut task: impl FnMut() -> T) -> Vec<T::Output> {
+    #[cfg_attr(not(target_arch = "x86_64"), allow(unused_mut))]
     let mut outputs = vec![task().run(Portable)];
     #[cfg(target_arch = "x86_64")]
     {
