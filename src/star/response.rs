@@ -43,7 +43,7 @@ pub const MOST_NODES: f64 = 65_535.0;
 pub const MOST_STEPS_PER_BIN: f64 = 200.0;
 
 /// A map of more pixels than this is taken there and back profile by profile: what a pass reads comes from memory then, and is
-/// read once (an eighth of an evaluation on 80,000 pixels). On 5,000 two maps at a time cost a twentieth, on 20,000 nothing.
+/// read once (a tenth of an evaluation on 80,000 pixels). On 5,000 two maps at a time cost a twentieth, on 20,000 nothing.
 const MEMORY_BOUND: usize = 40_000;
 
 /// The response of a sampled set of profiles to a map of the star.
