@@ -301,22 +301,26 @@ mod tests {
     use crate::star::{LimbDarkening, Orbit, Quadrature, Rotation, StarState};
     use crate::vector;
 
-    /// Deposits `x` as an observation sees it on `nodes` nodes.
-    struct Gather<'a>(&'a Placement, usize, &'a [f64], usize);
+    /// Deposits `x` as an observation sees it on so many nodes, and gives a map what it gets from others.
+    struct Both<'a>(&'a Placement, usize, &'a [f64], usize);
 
-    impl Task for Gather<'_> {
-        type Output = Vec<f64>;
+    impl Task for Both<'_> {
+        type Output = (Vec<f64>, Vec<f64>);
 
         #[inline(always)]
         #[allow(unsafe_code)]
-        fn run<I: Instructions>(self, i: I) -> Vec<f64> {
-            let Gather(placement, observation, x, nodes) = self;
-            let mut left = vec![0.0; DEPOSIT_NODES * nodes];
+        fn run<I: Instructions>(self, i: I) -> Self::Output {
+            let Both(placement, observation, x, nodes) = self;
+            let (mut left, mut out) = (vec![0.0; DEPOSIT_NODES * nodes], vec![0.0; x.len()]);
+            let given: Vec<f64> = (0..nodes).map(|node| (1.3 * node as f64).cos()).collect();
             for (cells, blocks) in placement.groups_of(observation) {
                 // safe: `x` has the map's pixels, and the grid so many nodes
-                unsafe { kernel::gather(i, blocks, cells, x, &mut left) };
+                unsafe {
+                    kernel::gather(i, blocks, cells, x, &mut left);
+                    kernel::scatter(i, blocks, cells, &given, &mut out);
+                }
             }
-            (0..nodes).map(|node| left.chunks(nodes).map(|row| row[node]).sum()).collect()
+            ((0..nodes).map(|node| left.chunks(nodes).map(|row| row[node]).sum()).collect(), out)
         }
     }
 
@@ -351,9 +355,14 @@ mod tests {
                 seen.sort_unstable();
                 seen.dedup();
                 assert!(count == seen.len() && count > 0, "{pixels} pixels, observation {observation}");
-                let [a, b, c] = [&sorted, &in_order, &one_by_one].map(|p| vector::run(Gather(p, observation, &x, 93)));
-                assert!(a.iter().zip(&c).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {c:?}");
-                assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {b:?}");
+                let both = [&sorted, &in_order, &one_by_one].map(|p| vector::by_each(|| Both(p, observation, &x, 93)));
+                let (nodes, map) = &both[0][0];
+                for (other_nodes, other_map) in both.iter().flatten() {
+                    let pairs = nodes.iter().zip(other_nodes).chain(map.iter().zip(other_map));
+                    for (a, b) in pairs {
+                        assert!((a - b).abs() < 1e-13, "{pixels} pixels: {a} {b}");
+                    }
+                }
             }
         }
     }
