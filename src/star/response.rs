@@ -141,11 +141,13 @@ impl Response {
 
     /// Line depth of every bin and continuum of every profile for the map `x`.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
+        assert_eq!(continuum.len(), self.profiles());
         vector::run(Apply { response: self, x, line, continuum });
     }
 
     /// Transpose of [`Response::apply`]; `out` is overwritten.
     pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
+        assert_eq!(continuum.len(), self.profiles());
         vector::run(ApplyTranspose { response: self, line, continuum, out });
     }
 
@@ -176,6 +178,40 @@ impl Response {
     }
 }
 
+/// One profile after another, in one direction: the rows of the grid are left as that direction left them.
+struct Pass<'a> {
+    response: &'a Response,
+    nodes: Vec<f64>,
+    left: Vec<f64>,
+    rows: Rows,
+}
+
+impl<'a> Pass<'a> {
+    fn new(response: &'a Response) -> Self {
+        Pass { response, nodes: vec![0.0; response.deposit.nodes], left: Vec::new(), rows: response.rows() }
+    }
+
+    /// Line depth of every bin of profile `k` (overwritten) for the map `x`; returns its continuum.
+    #[inline(always)]
+    fn forward<I: Instructions>(&mut self, i: I, k: usize, x: &[f64], line: &mut [f64]) -> f64 {
+        let Pass { response, nodes, left, rows } = self;
+        response.deposit.gather(i, k, x, left, nodes);
+        rows.interleave(nodes);
+        response.convolutions[k].sum_to_bins(i, rows, line);
+        total(nodes)
+    }
+
+    /// Transpose of [`Pass::forward`]: adds to the map `out`.
+    #[inline(always)]
+    fn back<I: Instructions>(&mut self, i: I, k: usize, line: &[f64], continuum: f64, out: &mut [f64]) {
+        let Pass { response, nodes, rows, .. } = self;
+        response.convolutions[k].spread_bins(i, line, rows);
+        rows.deinterleave(nodes);
+        nodes.iter_mut().for_each(|node| *node += continuum);
+        response.deposit.scatter(i, k, nodes, out);
+    }
+}
+
 struct Apply<'a> {
     response: &'a Response,
     x: &'a [f64],
@@ -189,13 +225,9 @@ impl Task for Apply<'_> {
     #[inline(always)]
     fn run<I: Instructions>(self, instructions: I) {
         let Apply { response, x, line, continuum } = self;
-        let (mut nodes, mut left) = (vec![0.0; response.deposit.nodes], Vec::new());
-        let mut rows = response.rows();
-        for (k, convolution) in response.convolutions.iter().enumerate() {
-            response.deposit.gather(instructions, k, x, &mut left, &mut nodes);
-            continuum[k] = total(&nodes);
-            rows.interleave(&nodes);
-            convolution.sum_to_bins(instructions, &rows, &mut line[response.bins(k)]);
+        let mut pass = Pass::new(response);
+        for (k, continuum) in continuum.iter_mut().enumerate() {
+            *continuum = pass.forward(instructions, k, x, &mut line[response.bins(k)]);
         }
     }
 }
@@ -213,14 +245,10 @@ impl Task for ApplyTranspose<'_> {
     #[inline(always)]
     fn run<I: Instructions>(self, instructions: I) {
         let ApplyTranspose { response, line, continuum, out } = self;
-        let mut nodes = vec![0.0; response.deposit.nodes];
-        let mut rows = response.rows();
+        let mut pass = Pass::new(response);
         out.fill(0.0);
-        for (k, convolution) in response.convolutions.iter().enumerate() {
-            convolution.spread_bins(instructions, &line[response.bins(k)], &mut rows);
-            rows.deinterleave(&mut nodes);
-            nodes.iter_mut().for_each(|node| *node += continuum[k]);
-            response.deposit.scatter(instructions, k, &nodes, out);
+        for (k, continuum) in continuum.iter().enumerate() {
+            pass.back(instructions, k, &line[response.bins(k)], *continuum, out);
         }
     }
 }
@@ -239,20 +267,13 @@ impl<F: FnMut(usize, &mut [f64], f64) -> f64> Task for ApplyAndBack<'_, F> {
     #[inline(always)]
     fn run<I: Instructions>(self, instructions: I) {
         let ApplyAndBack { response, x, out, mut weigh } = self;
-        let (mut nodes, mut left, mut line) = (vec![0.0; response.deposit.nodes], Vec::new(), Vec::new());
-        let (mut rows, mut rows_back) = (response.rows(), response.rows());
+        let (mut there, mut back, mut line) = (Pass::new(response), Pass::new(response), Vec::new());
         out.fill(0.0);
-        for (k, convolution) in response.convolutions.iter().enumerate() {
-            response.deposit.gather(instructions, k, x, &mut left, &mut nodes);
-            let continuum = total(&nodes);
-            rows.interleave(&nodes);
+        for k in 0..response.profiles() {
             line.resize(response.bins(k).len(), 0.0);
-            convolution.sum_to_bins(instructions, &rows, &mut line);
+            let continuum = there.forward(instructions, k, x, &mut line);
             let continuum = weigh(k, &mut line, continuum);
-            convolution.spread_bins(instructions, &line, &mut rows_back);
-            rows_back.deinterleave(&mut nodes);
-            nodes.iter_mut().for_each(|node| *node += continuum);
-            response.deposit.scatter(instructions, k, &nodes, out);
+            back.back(instructions, k, &line, continuum, out);
         }
     }
 }

@@ -95,26 +95,80 @@ mod x86 {
     use super::Instructions;
     use std::arch::x86_64::*;
 
+    /// What differs between sets of registers by the names of their instructions alone.
+    macro_rules! arithmetic {
+        (
+            doubles: $splat:ident, $add:ident, $subtract:ident, $multiply:ident, $multiply_add:ident;
+            $count:literal singles: $splat_single:ident, $load:ident, $store:ident, $multiply_add_singles:ident
+        ) => {
+            #[inline(always)]
+            fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+                a.mul_add(b, c)
+            }
+
+            #[inline(always)]
+            fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
+                a.mul_add(b, c)
+            }
+
+            #[inline(always)]
+            fn splat(self, x: f64) -> Self::Lanes {
+                unsafe { $splat(x) }
+            }
+
+            #[inline(always)]
+            fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                unsafe { $add(a, b) }
+            }
+
+            #[inline(always)]
+            fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                unsafe { $subtract(a, b) }
+            }
+
+            #[inline(always)]
+            fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                unsafe { $multiply(a, b) }
+            }
+
+            #[inline(always)]
+            fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+                unsafe { $multiply_add(a, b, c) }
+            }
+
+            #[inline(always)]
+            fn splat_single(self, x: f32) -> Self::Singles {
+                unsafe { $splat_single(x) }
+            }
+
+            #[inline(always)]
+            fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
+                let numbers: &[f32; $count] = from[first..].first_chunk().expect("as many numbers");
+                unsafe { $load(numbers.as_ptr()) }
+            }
+
+            #[inline(always)]
+            fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
+                let numbers: &mut [f32; $count] = to[first..].first_chunk_mut().expect("as many numbers");
+                unsafe { $store(numbers.as_mut_ptr(), x) }
+            }
+
+            #[inline(always)]
+            fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
+                unsafe { $multiply_add_singles(a, b, c) }
+            }
+        };
+    }
+
+    // safe, here and above: `self` proves the instructions
     impl Instructions for Avx2 {
         type Lanes = __m256d;
         type Singles = __m256;
         const LANES: usize = 4;
 
-        #[inline(always)]
-        fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
-            a.mul_add(b, c)
-        }
-
-        #[inline(always)]
-        fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
-            a.mul_add(b, c)
-        }
-
-        // safe, here and below: `self` proves the instructions
-
-        #[inline(always)]
-        fn splat(self, x: f64) -> Self::Lanes {
-            unsafe { _mm256_set1_pd(x) }
+        arithmetic! {
+            doubles: _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd;
+            8 singles: _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_fmadd_ps
         }
 
         #[inline(always)]
@@ -124,52 +178,10 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm256_add_pd(a, b) }
-        }
-
-        #[inline(always)]
-        fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm256_sub_pd(a, b) }
-        }
-
-        #[inline(always)]
-        fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm256_mul_pd(a, b) }
-        }
-
-        #[inline(always)]
-        fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm256_fmadd_pd(a, b, c) }
-        }
-
-        #[inline(always)]
         fn total(self, x: Self::Lanes) -> f64 {
             // safe: four numbers of eight bytes
             let [a, b, c, d] = unsafe { std::mem::transmute::<__m256d, [f64; 4]>(x) };
             (a + b) + (c + d)
-        }
-
-        #[inline(always)]
-        fn splat_single(self, x: f32) -> Self::Singles {
-            unsafe { _mm256_set1_ps(x) }
-        }
-
-        #[inline(always)]
-        fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
-            let eight: &[f32; 8] = from[first..].first_chunk().expect("as many numbers");
-            unsafe { _mm256_loadu_ps(eight.as_ptr()) }
-        }
-
-        #[inline(always)]
-        fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
-            let eight: &mut [f32; 8] = to[first..].first_chunk_mut().expect("as many numbers");
-            unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), x) }
-        }
-
-        #[inline(always)]
-        fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
-            unsafe { _mm256_fmadd_ps(a, b, c) }
         }
 
         #[inline(always)]
@@ -196,19 +208,9 @@ mod x86 {
         type Singles = __m512;
         const LANES: usize = 8;
 
-        #[inline(always)]
-        fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
-            a.mul_add(b, c)
-        }
-
-        #[inline(always)]
-        fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
-            a.mul_add(b, c)
-        }
-
-        #[inline(always)]
-        fn splat(self, x: f64) -> Self::Lanes {
-            unsafe { _mm512_set1_pd(x) }
+        arithmetic! {
+            doubles: _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd;
+            16 singles: _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_fmadd_ps
         }
 
         #[inline(always)]
@@ -218,52 +220,10 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm512_add_pd(a, b) }
-        }
-
-        #[inline(always)]
-        fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm512_sub_pd(a, b) }
-        }
-
-        #[inline(always)]
-        fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm512_mul_pd(a, b) }
-        }
-
-        #[inline(always)]
-        fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
-            unsafe { _mm512_fmadd_pd(a, b, c) }
-        }
-
-        #[inline(always)]
         fn total(self, x: Self::Lanes) -> f64 {
             // safe: eight numbers of eight bytes; in the order of two registers of four
             let [a, b, c, d, e, f, g, h] = unsafe { std::mem::transmute::<__m512d, [f64; 8]>(x) };
             ((a + b) + (c + d)) + ((e + f) + (g + h))
-        }
-
-        #[inline(always)]
-        fn splat_single(self, x: f32) -> Self::Singles {
-            unsafe { _mm512_set1_ps(x) }
-        }
-
-        #[inline(always)]
-        fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
-            let sixteen: &[f32; 16] = from[first..].first_chunk().expect("as many numbers");
-            unsafe { _mm512_loadu_ps(sixteen.as_ptr()) }
-        }
-
-        #[inline(always)]
-        fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
-            let sixteen: &mut [f32; 16] = to[first..].first_chunk_mut().expect("as many numbers");
-            unsafe { _mm512_storeu_ps(sixteen.as_mut_ptr(), x) }
-        }
-
-        #[inline(always)]
-        fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
-            unsafe { _mm512_fmadd_ps(a, b, c) }
         }
 
         #[inline(always)]
