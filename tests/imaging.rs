@@ -6,7 +6,9 @@ mod common;
 use common::{Oracle, oracle, values};
 use dimcmc::imaging::{Data, Imager, ImagingProblem};
 use dimcmc::maxent::entropy::Entropy;
-use dimcmc::maxent::{Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
+use dimcmc::maxent::{
+    Curvature, Goal, Precision, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
+};
 use dimcmc::objective::{Parameter, Reference};
 use dimcmc::observation::{Observations, Profile};
 use dimcmc::star::{Quadrature, SurfaceGrid};
@@ -74,12 +76,32 @@ fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
     let ((chi2_plus, slope_plus), (chi2_minus, slope_minus)) = (at(h), at(-h));
     problem.linearise(&s);
     problem.gradient(&mut gradient);
-    problem.curvature(Curvature::Exact, &v, &mut curved);
+    problem.curvature(Curvature::Exact, Precision::Double, &v, &mut curved);
     let slope = (chi2_plus - chi2_minus) / (4.0 * h);
     assert!((dot(&gradient, &v) / slope - 1.0).abs() < 1e-6);
     assert!((problem.slope(&v) / slope - 1.0).abs() < 1e-6);
     let second = (slope_plus - slope_minus) / (2.0 * h);
     assert!((dot(&curved, &w) / second - 1.0).abs() < 1e-6, "{} {second}", dot(&curved, &w));
+}
+
+#[test]
+fn single_precision_is_good_to_six_digits_however_small_or_large_the_map() {
+    let oracle = oracle();
+    let imager = imager(&oracle);
+    let mut problem = problem(&oracle, &imager);
+    let n = imager.grid.len();
+    problem.linearise(&wave(n, 0.37).iter().map(|x| 0.3 + 0.2 * x).collect::<Vec<f64>>());
+    for which in [Curvature::Exact, Curvature::GaussNewton] {
+        for size in [0.0, 1e-60, 1.0, 1e60] {
+            let v: Vec<f64> = wave(n, 0.9).iter().map(|x| size * x).collect();
+            let (mut double, mut single) = (vec![0.0; n], vec![f64::NAN; n]);
+            problem.curvature(which, Precision::Double, &v, &mut double);
+            problem.curvature(which, Precision::Single, &v, &mut single);
+            let largest = double.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+            let furthest = double.iter().zip(&single).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(furthest <= 1e-6 * largest, "{which:?}, {size:e}: {furthest:e} of {largest:e}");
+        }
+    }
 }
 
 #[test]

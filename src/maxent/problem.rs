@@ -9,6 +9,15 @@ pub enum Curvature {
     GaussNewton,
 }
 
+/// Arithmetic of a curvature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// To rounding error.
+    Double,
+    /// To six digits of the largest, in half the time.
+    Single,
+}
+
 /// A twice differentiable misfit `chi2(s)` of an image s.
 ///
 /// The methods refer to the image last given to [`Problem::linearise`]. Each call counts the applications of the response
@@ -24,7 +33,7 @@ pub trait Problem {
     fn gradient(&mut self, out: &mut [f64]);
 
     /// Second derivative of chi2 / 2 times `v`.
-    fn curvature(&mut self, which: Curvature, v: &[f64], out: &mut [f64]);
+    fn curvature(&mut self, which: Curvature, precision: Precision, v: &[f64], out: &mut [f64]);
 
     /// Applications of the response or its transpose so far.
     fn passes(&self) -> u32;

@@ -10,7 +10,7 @@
 use super::cg::{self, CgLimits};
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
-use super::problem::{Curvature, Problem};
+use super::problem::{Curvature, Precision, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing, lambda_step};
 use crate::vector::linear::{axpy, combine_two, dot};
@@ -40,6 +40,9 @@ pub struct Solver<'a> {
     /// Precision and effort.
     pub settings: SolverSettings,
 }
+
+/// Systems that are solved no better than this are applied in single precision.
+const SINGLE_PRECISION: f64 = 3e-3;
 
 /// A Newton system in the entropy's metric.
 #[derive(Clone, Copy)]
@@ -190,9 +193,11 @@ impl Solver<'_> {
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f64], z: &mut [f64]) {
         let System { lambda, scale, curvature } = system;
         let mut scaled = vec![0.0; right.len()];
+        let single = self.settings.cg_tolerance >= SINGLE_PRECISION;
+        let precision = if single { Precision::Single } else { Precision::Double };
         let apply = |v: &[f64], out: &mut [f64]| {
             combine_two(&mut scaled, v, scale, |_, v, scale| v * scale);
-            problem.curvature(curvature, &scaled, out);
+            problem.curvature(curvature, precision, &scaled, out);
             combine_two(out, v, scale, |out, v, scale| v + lambda * scale * out);
         };
         let precondition = |r: &[f64], out: &mut [f64]| self.preconditioner.apply(lambda, r, out);

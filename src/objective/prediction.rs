@@ -15,6 +15,8 @@ use crate::star::Response;
 pub struct Prediction {
     /// Internal coordinates of the solution.
     origin: Vec<f64>,
+    /// Its image.
+    map: Vec<f64>,
     /// Natural scales of the coordinates.
     scales: Vec<f64>,
     /// Image step per unit of each coordinate.
@@ -107,7 +109,7 @@ impl Prediction {
             image.push(step);
             ln_lambda.push(along);
         }
-        Prediction { origin, scales, image, ln_lambda, adjoint }
+        Prediction { origin, map, scales, image, ln_lambda, adjoint }
     }
 
     /// Whether all its numbers are finite.
@@ -118,7 +120,7 @@ impl Prediction {
 
     /// Number of vectors that are as long as an image.
     pub fn images(&self) -> usize {
-        1 + self.image.len()
+        2 + self.image.len()
     }
 
     /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
@@ -134,9 +136,8 @@ impl Prediction {
             ln_lambda += shift * along;
             ds.iter_mut().zip(image).for_each(|(ds, step)| *ds += shift * step);
         }
-        let map = imager.entropy.image(&start.image.coordinates);
-        let here = start.image.coordinates.clone();
-        imager.entropy.step(&here, &map, &ds, 1.0, 1.0, &mut start.image.coordinates);
+        let here = &known.image.coordinates;
+        imager.entropy.step(here, &self.map, &ds, 1.0, 1.0, &mut start.image.coordinates);
         start.image.lambda *= ln_lambda.clamp(-LN_LAMBDA_REACH, LN_LAMBDA_REACH).exp();
         start
     }

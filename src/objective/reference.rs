@@ -8,7 +8,7 @@ use super::parameters::ParameterValues;
 use super::tradeoff::{Node, TradeOff};
 use crate::imaging::Imager;
 use crate::maxent::{
-    Best, Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
+    Best, Curvature, Goal, Precision, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
 };
 use crate::star::Response;
 use std::sync::Arc;
@@ -257,7 +257,7 @@ pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Sol
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = v * d);
-        problem.curvature(Curvature::Exact, &scaled, out);
+        problem.curvature(Curvature::Exact, Precision::Single, &scaled, out);
         out.iter_mut().zip(&scale).for_each(|(x, d)| *x *= d);
     })
 }

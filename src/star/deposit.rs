@@ -13,7 +13,7 @@ use super::limb_darkening::LimbDarkening;
 use super::line_profile::DEPOSIT_NODES;
 use super::placement::{Order, Place, Placement, Scale};
 use super::view::Viewer;
-use crate::vector::{self, Instructions};
+use crate::vector::{self, Instructions, Number};
 
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.
 #[derive(Clone, Debug)]
@@ -77,29 +77,29 @@ impl Deposit {
     /// each of their nodes is kept in `left`, which is empty at first.
     #[inline(always)]
     #[allow(unsafe_code)]
-    pub fn gather<I: Instructions>(&self, i: I, k: usize, x: &[f64], left: &mut Vec<f64>, nodes: &mut [f64]) {
+    pub fn gather<N: Number>(&self, i: impl Instructions, k: usize, x: &[N], left: &mut Vec<N>, nodes: &mut [f64]) {
         assert!(x.len() == self.pixels && nodes.len() == self.nodes);
         assert!(left.is_empty() || left.len() == DEPOSIT_NODES * self.nodes);
-        left.resize(DEPOSIT_NODES * self.nodes, 0.0);
+        left.resize(DEPOSIT_NODES * self.nodes, N::default());
         for (cells, blocks) in self.placement.groups_of(k) {
             // safe: blocks hold pixels of the grid alone, and groups its cells
-            unsafe { kernel::gather(i, blocks, cells, x, left) };
+            unsafe { kernel::gather(N::registers(i), blocks, cells, x, left) };
         }
         nodes.fill(0.0);
         for two in left.chunks_exact(2 * self.nodes) {
             let (a, b) = two.split_at(self.nodes);
-            nodes.iter_mut().zip(a.iter().zip(b)).for_each(|(node, (a, b))| *node += a + b);
+            nodes.iter_mut().zip(a.iter().zip(b)).for_each(|(node, (a, b))| *node += (*a).into() + (*b).into());
         }
     }
 
     /// Transpose of [`Deposit::gather`]: adds to map `out` what observation `k` gives back from the grid `nodes`.
     #[inline(always)]
     #[allow(unsafe_code)]
-    pub fn scatter<I: Instructions>(&self, i: I, k: usize, nodes: &[f64], out: &mut [f64]) {
+    pub fn scatter<N: Number>(&self, i: impl Instructions, k: usize, nodes: &[N], out: &mut [N]) {
         assert!(out.len() == self.pixels && nodes.len() == self.nodes);
         for (cells, blocks) in self.placement.groups_of(k).filter(|(_, blocks)| !blocks.is_empty()) {
             // safe: as above
-            unsafe { kernel::scatter(i, blocks, cells, nodes, out) };
+            unsafe { kernel::scatter(N::registers(i), blocks, cells, nodes, out) };
         }
     }
 }

@@ -7,7 +7,10 @@
 
 use super::block::{Block, LANES};
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
-use crate::vector::Instructions;
+use crate::vector::{self, Number, Registers, Scattered};
+
+/// Blocks (128 bytes each) from the one at work to the one that is asked for; all of an observation follow each other.
+const AHEAD: isize = 32;
 
 /// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to 5.
 const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
@@ -19,52 +22,59 @@ const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 /// Every pixel of every block lies within `x`, and the nodes of every cell within the grid.
 #[inline(always)]
 #[allow(unsafe_code)]
-pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANES], x: &[f64], left: &mut [f64]) {
+pub unsafe fn gather<R: Scattered>(
+    r: R,
+    blocks: &[Block],
+    cells: &[u32; LANES],
+    x: &[R::Number],
+    left: &mut [R::Number],
+) {
     let grid = left.len() / DEPOSIT_NODES;
     // lanes without a pixel may repeat a cell: they come last, and the first of two that are put in one place stays
     let (one_cell, mut totals) = (cells[0] == cells[1], [0.0; DEPOSIT_NODES]);
-    for first in (0..LANES).step_by(I::LANES).rev() {
-        let mut sums = [i.splat(0.0); DEPOSIT_NODES];
-        let mut spread_sums = [i.splat(0.0); SPREAD_FACTORS.len()];
+    for first in (0..LANES).step_by(R::LANES).rev() {
+        let mut sums = [r.splat(R::Number::default()); DEPOSIT_NODES];
+        let mut spread_sums = [r.splat(R::Number::default()); SPREAD_FACTORS.len()];
         for block in blocks {
+            vector::fetch_ahead(block, AHEAD);
             // safe: the caller knows the pixels
-            let x = unsafe { i.pick(x, &block.pixel, first) };
-            let (t, spread) = (i.widen(&block.position, first), i.widen(&block.spread, first));
-            let squared = i.multiply(t, t);
+            let x = unsafe { r.pick(x, &block.pixel, first) };
+            let (t, spread) = (r.load(&block.position, first), r.load(&block.spread, first));
+            let squared = r.multiply(t, t);
             // times 1, t, t^2 and t^3: no long chain of products, each of which waits for the one before
-            let term = i.multiply(x, i.widen(&block.weight, first));
-            let times_t = i.multiply(term, t);
-            let terms = [term, times_t, i.multiply(term, squared), i.multiply(times_t, squared)];
+            let term = r.multiply(x, r.load(&block.weight, first));
+            let times_t = r.multiply(term, t);
+            let terms = [term, times_t, r.multiply(term, squared), r.multiply(times_t, squared)];
             for (k, term) in terms.into_iter().enumerate() {
-                sums[k] = i.add(sums[k], term);
-                spread_sums[k] = i.multiply_add_lanes(term, spread, spread_sums[k]);
+                sums[k] = r.add(sums[k], term);
+                spread_sums[k] = r.multiply_add(term, spread, spread_sums[k]);
             }
             for k in terms.len()..DEPOSIT_NODES {
-                sums[k] = i.multiply_add_lanes(terms[k - 2], squared, sums[k]);
+                sums[k] = r.multiply_add(terms[k - 2], squared, sums[k]);
             }
         }
         for ((sum, spread_sum), factor) in sums[2..].iter_mut().zip(spread_sums).zip(SPREAD_FACTORS) {
-            *sum = i.multiply_add_lanes(i.splat(factor), spread_sum, *sum);
+            *sum = r.multiply_add(r.splat(R::Number::of(factor)), spread_sum, *sum);
         }
         // nodes that mirror each other have the same weights but for the sign of odd powers
         let mut nodes = sums;
         for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
-            let (even, odd) = (every_second(i, weights, &sums, 0), every_second(i, weights, &sums, 1));
-            nodes[n] = i.add(even, odd);
-            nodes[DEPOSIT_NODES - 1 - n] = i.subtract(even, odd);
+            let (even, odd) = (every_second(r, weights, &sums, 0), every_second(r, weights, &sums, 1));
+            nodes[n] = r.add(even, odd);
+            nodes[DEPOSIT_NODES - 1 - n] = r.subtract(even, odd);
         }
         for (n, node) in nodes.into_iter().enumerate() {
             if one_cell {
-                totals[n] += i.total(node);
+                totals[n] += r.total(node);
             } else {
                 // safe: the caller knows the cells
-                unsafe { i.put(node, &mut left[n * (grid + 1)..], cells, first) };
+                unsafe { r.put(node, &mut left[n * (grid + 1)..], cells, first) };
             }
         }
     }
     if one_cell {
         for (n, total) in totals.into_iter().enumerate() {
-            left[n * (grid + 1) + cells[0] as usize] = total;
+            left[n * (grid + 1) + cells[0] as usize] = R::Number::of(total);
         }
     }
 }
@@ -76,33 +86,39 @@ pub unsafe fn gather<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANE
 /// Every pixel of every block lies within `out`, and the nodes of every cell within `nodes`.
 #[inline(always)]
 #[allow(unsafe_code)]
-pub unsafe fn scatter<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LANES], nodes: &[f64], out: &mut [f64]) {
-    for first in (0..LANES).step_by(I::LANES) {
-        let mut of_cells = [i.splat(0.0); DEPOSIT_NODES];
+pub unsafe fn scatter<R: Scattered>(
+    r: R,
+    blocks: &[Block],
+    cells: &[u32; LANES],
+    nodes: &[R::Number],
+    out: &mut [R::Number],
+) {
+    for first in (0..LANES).step_by(R::LANES) {
+        let mut of_cells = [r.splat(R::Number::default()); DEPOSIT_NODES];
         for (n, node) in of_cells.iter_mut().enumerate() {
             // safe: the caller knows the cells
-            *node = unsafe { i.pick(&nodes[n..], cells, first) };
+            *node = unsafe { r.pick(&nodes[n..], cells, first) };
         }
-        let mut coefficients = [i.splat(0.0); DEPOSIT_NODES];
+        let mut coefficients = [r.splat(R::Number::default()); DEPOSIT_NODES];
         for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
             let (node, mirrored) = (of_cells[n], of_cells[DEPOSIT_NODES - 1 - n]);
-            let both = [i.add(node, mirrored), i.subtract(node, mirrored)];
+            let both = [r.add(node, mirrored), r.subtract(node, mirrored)];
             for (k, coefficient) in coefficients.iter_mut().enumerate() {
-                *coefficient = i.multiply_add_lanes(i.splat(weights[k]), both[k % 2], *coefficient);
+                *coefficient = r.multiply_add(r.splat(R::Number::of(weights[k])), both[k % 2], *coefficient);
             }
         }
-        let of_spread: [I::Lanes; SPREAD_FACTORS.len()] =
-            std::array::from_fn(|k| i.multiply(i.splat(SPREAD_FACTORS[k]), coefficients[k + 2]));
+        let of_spread: [R::Lanes; SPREAD_FACTORS.len()] =
+            std::array::from_fn(|k| r.multiply(r.splat(R::Number::of(SPREAD_FACTORS[k])), coefficients[k + 2]));
         for block in blocks {
-            let (t, spread) = (i.widen(&block.position, first), i.widen(&block.spread, first));
-            let squared = i.multiply(t, t);
-            let [of_spread, rest] = [polynomial(i, &of_spread, t, squared), polynomial(i, &coefficients, t, squared)];
-            let polynomial = i.multiply_add_lanes(of_spread, spread, rest);
+            vector::fetch_ahead(block, AHEAD);
+            let (t, spread) = (r.load(&block.position, first), r.load(&block.spread, first));
+            let squared = r.multiply(t, t);
+            let [of_spread, rest] = [polynomial(r, &of_spread, t, squared), polynomial(r, &coefficients, t, squared)];
+            let polynomial = r.multiply_add(of_spread, spread, rest);
             // safe: the caller knows the pixels
             unsafe {
-                let sums =
-                    i.multiply_add_lanes(polynomial, i.widen(&block.weight, first), i.pick(out, &block.pixel, first));
-                i.put(sums, out, &block.pixel, first);
+                let sums = r.multiply_add(polynomial, r.load(&block.weight, first), r.pick(out, &block.pixel, first));
+                r.put(sums, out, &block.pixel, first);
             }
         }
     }
@@ -110,24 +126,19 @@ pub unsafe fn scatter<I: Instructions>(i: I, blocks: &[Block], cells: &[u32; LAN
 
 /// The sum of `w_k s_k` over even k, or from 1 on over odd ones.
 #[inline(always)]
-fn every_second<I: Instructions>(
-    i: I,
-    w: &[f64; DEPOSIT_NODES],
-    s: &[I::Lanes; DEPOSIT_NODES],
-    first: usize,
-) -> I::Lanes {
-    let highest = i.multiply(i.splat(w[first + 4]), s[first + 4]);
-    let lower = i.multiply_add_lanes(i.splat(w[first + 2]), s[first + 2], highest);
-    i.multiply_add_lanes(i.splat(w[first]), s[first], lower)
+fn every_second<R: Registers>(r: R, w: &[f64; DEPOSIT_NODES], s: &[R::Lanes; DEPOSIT_NODES], first: usize) -> R::Lanes {
+    let highest = r.multiply(r.splat(R::Number::of(w[first + 4])), s[first + 4]);
+    let lower = r.multiply_add(r.splat(R::Number::of(w[first + 2])), s[first + 2], highest);
+    r.multiply_add(r.splat(R::Number::of(w[first])), s[first], lower)
 }
 
 /// `c_0 + c_1 t + ...`, an even number of coefficients: pairs of them beside each other, then one after another.
 #[inline(always)]
-fn polynomial<I: Instructions>(i: I, coefficients: &[I::Lanes], t: I::Lanes, squared: I::Lanes) -> I::Lanes {
+fn polynomial<R: Registers>(r: R, coefficients: &[R::Lanes], t: R::Lanes, squared: R::Lanes) -> R::Lanes {
     let (pairs, _) = coefficients.as_chunks();
-    let mut sum = i.multiply_add_lanes(pairs[pairs.len() - 1][1], t, pairs[pairs.len() - 1][0]);
+    let mut sum = r.multiply_add(pairs[pairs.len() - 1][1], t, pairs[pairs.len() - 1][0]);
     for [even, odd] in pairs[..pairs.len() - 1].iter().rev() {
-        sum = i.multiply_add_lanes(sum, squared, i.multiply_add_lanes(*odd, t, *even));
+        sum = r.multiply_add(sum, squared, r.multiply_add(*odd, t, *even));
     }
     sum
 }
@@ -135,7 +146,7 @@ fn polynomial<I: Instructions>(i: I, coefficients: &[I::Lanes], t: I::Lanes, squ
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::{self, Task};
+    use crate::vector::{self, Instructions, Task};
 
     const PIXELS: usize = 190;
     const GRID: usize = 20;
@@ -187,48 +198,55 @@ mod tests {
         pairs
     }
 
-    struct Both {
-        x: Vec<f64>,
-        nodes: Vec<f64>,
-        left: Vec<f64>,
-        out: Vec<f64>,
+    struct Both<N> {
+        x: Vec<N>,
+        nodes: Vec<N>,
+        left: Vec<N>,
+        out: Vec<N>,
     }
 
-    impl Task for Both {
-        type Output = (Vec<f64>, Vec<f64>);
+    impl<N: Number> Task for Both<N> {
+        type Output = [Vec<f64>; 2];
 
         #[inline(always)]
         #[allow(unsafe_code)]
         fn run<I: Instructions>(mut self, i: I) -> Self::Output {
+            let r = N::registers(i);
             for (cells, blocks) in groups() {
                 // safe: pixels and cells of the test
                 unsafe {
-                    gather(i, &blocks, &cells, &self.x, &mut self.left);
-                    scatter(i, &blocks, &cells, &self.nodes, &mut self.out);
+                    gather(r, &blocks, &cells, &self.x, &mut self.left);
+                    scatter(r, &blocks, &cells, &self.nodes, &mut self.out);
                 }
             }
-            let nodes = (0..GRID).map(|node| self.left.chunks(GRID).map(|row| row[node]).sum()).collect();
-            (nodes, self.out)
+            let node = |node: usize| self.left.chunks(GRID).map(|row| row[node].into()).sum();
+            [(0..GRID).map(node).collect(), self.out.iter().map(|x| (*x).into()).collect()]
         }
+    }
+
+    /// Holds what all instructions give to what a plain loop over pairs gives.
+    fn check<N: Number>(tolerance: f64) {
+        let numbers = |count: usize| (0..count).map(|i| N::of(number(i))).collect::<Vec<N>>();
+        let (x, nodes) = (numbers(PIXELS), numbers(GRID));
+        let (mut plain_nodes, mut plain_out) = (vec![0.0; GRID], vec![1.0; PIXELS]);
+        for (pixel, node, weight) in pairs() {
+            plain_nodes[node] += weight * x[pixel].into();
+            plain_out[pixel] += weight * nodes[node].into();
+        }
+        let (left, out) = (vec![N::default(); DEPOSIT_NODES * GRID], vec![N::of(1.0); PIXELS]);
+        let task = || Both { x: x.clone(), nodes: nodes.clone(), left: left.clone(), out: out.clone() };
+        let outputs = vector::by_each(task);
+        for (got, wanted) in outputs.iter().flat_map(|both| both.iter().zip([&plain_nodes, &plain_out])) {
+            for (got, wanted) in got.iter().zip(wanted) {
+                assert!((got - wanted).abs() < tolerance, "{got} {wanted}");
+            }
+        }
+        assert!(outputs[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
     }
 
     #[test]
     fn all_instructions_give_what_a_plain_loop_over_pairs_gives() {
-        let (x, nodes): (Vec<f64>, Vec<f64>) = ((0..PIXELS).map(number).collect(), (0..GRID).map(number).collect());
-        let (mut plain_nodes, mut plain_out) = (vec![0.0; GRID], vec![1.0; PIXELS]);
-        for (pixel, node, weight) in pairs() {
-            plain_nodes[node] += weight * x[pixel];
-            plain_out[pixel] += weight * nodes[node];
-        }
-        let left = vec![0.0; DEPOSIT_NODES * GRID];
-        let task = || Both { x: x.clone(), nodes: nodes.clone(), left: left.clone(), out: vec![1.0; PIXELS] };
-        let outputs = vector::by_each(task);
-        for (got_nodes, got_out) in &outputs {
-            let both = got_nodes.iter().zip(&plain_nodes).chain(got_out.iter().zip(&plain_out));
-            for (got, wanted) in both {
-                assert!((got - wanted).abs() < 1e-13, "{got} {wanted}");
-            }
-        }
-        assert!(outputs[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
+        check::<f64>(1e-13);
+        check::<f32>(5e-6);
     }
 }

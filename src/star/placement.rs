@@ -255,7 +255,11 @@ impl Seen {
             self.sorted.resize(self.sorted.len().max(end + LANES * rows), Pixel::default());
             let places = &mut self.sorted[end..end + LANES * rows];
             // hardly ever one pixel in two blocks that follow each other, for no sum to wait for another
-            let empty = |place: usize| Pixel { pixel: ((end + place) % self.map_pixels) as u32, ..Pixel::default() };
+            let mut pixel = end % self.map_pixels;
+            let mut empty = || {
+                pixel = if pixel + 1 < self.map_pixels { pixel + 1 } else { 0 };
+                Pixel { pixel: pixel as u32, ..Pixel::default() }
+            };
             for (lane, cell) in cells.iter().enumerate().take(step) {
                 let again = cells[..lane].contains(cell);
                 let count = if again { 0 } else { self.counts[*cell as usize] as usize };
@@ -263,7 +267,7 @@ impl Seen {
                     self.firsts[*cell as usize] = (end + lane) as u32;
                 }
                 for place in (lane + step * count..LANES * rows).step_by(step) {
-                    places[place] = empty(place);
+                    places[place] = empty();
                 }
             }
             end += LANES * rows;
@@ -316,8 +320,8 @@ mod tests {
             for (cells, blocks) in placement.groups_of(observation) {
                 // safe: `x` has the map's pixels, and the grid so many nodes
                 unsafe {
-                    kernel::gather(i, blocks, cells, x, &mut left);
-                    kernel::scatter(i, blocks, cells, &given, &mut out);
+                    kernel::gather(i.doubles(), blocks, cells, x, &mut left);
+                    kernel::scatter(i.doubles(), blocks, cells, &given, &mut out);
                 }
             }
             ((0..nodes).map(|node| left.chunks(nodes).map(|row| row[node]).sum()).collect(), out)

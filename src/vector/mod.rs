@@ -10,6 +10,8 @@ pub mod elementary;
 pub mod linear;
 mod registers;
 
+pub use registers::{Number, Registers, Scattered};
+
 /// Work that is compiled for every set of instructions.
 pub trait Task {
     /// What it returns.
@@ -21,67 +23,32 @@ pub trait Task {
 
 /// A set of instructions; having one at hand proves that the processor has them. There are no others than those of this module.
 pub trait Instructions: Copy + sealed::Sealed {
-    /// Numbers side by side, in a register.
-    type Lanes: Copy;
+    /// Its registers for numbers in double precision.
+    type Doubles: Scattered<Number = f64>;
 
-    /// How many of them.
-    const LANES: usize;
+    /// Those for numbers in single precision, of up to eight numbers.
+    type Singles: Scattered<Number = f32>;
 
-    /// The same in single precision: twice as many.
-    type Singles: Copy;
+    /// The widest for numbers in single precision.
+    type Broad: Registers<Number = f32>;
+
+    /// The registers for double precision.
+    fn doubles(self) -> Self::Doubles;
+
+    /// Those for single precision.
+    fn singles(self) -> Self::Singles;
+
+    /// The widest for single precision.
+    fn broad(self) -> Self::Broad;
+
+    /// The whole numbers from entry `first` on.
+    fn load_whole(self, from: &[i16], first: usize) -> <Self::Broad as Registers>::Lanes;
 
     /// `a b + c`, fused where the processor can.
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64;
 
     /// The same in single precision.
     fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32;
-
-    /// One number in every lane.
-    fn splat(self, x: f64) -> Self::Lanes;
-
-    /// The numbers from entry `first` on.
-    fn widen(self, from: &[f32], first: usize) -> Self::Lanes;
-
-    /// `a + b`.
-    fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-
-    /// `a - b`.
-    fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-
-    /// `a b`.
-    fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
-
-    /// `a b + c`, fused where the processor can.
-    fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
-
-    /// The sum over the lanes.
-    fn total(self, x: Self::Lanes) -> f64;
-
-    /// One number in every lane.
-    fn splat_single(self, x: f32) -> Self::Singles;
-
-    /// The numbers from entry `first` on.
-    fn load_singles(self, from: &[f32], first: usize) -> Self::Singles;
-
-    /// Puts numbers there.
-    fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize);
-
-    /// `a b + c`, fused where the processor can.
-    fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles;
-
-    /// The numbers at the places that are listed from entry `first` on.
-    ///
-    /// # Safety
-    /// The places lie within `from`.
-    #[allow(unsafe_code)]
-    unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes;
-
-    /// Puts numbers where [`Instructions::pick`] takes them from, the first lane last: where two have one place, the first is it.
-    ///
-    /// # Safety
-    /// The places lie within `to`.
-    #[allow(unsafe_code)]
-    unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize);
 }
 
 /// What every processor has.
@@ -96,7 +63,7 @@ pub struct Avx2(());
 /// AVX-512 with its instructions for single and double precision.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
-pub struct Avx512(());
+pub struct Avx512(Avx2);
 
 /// What unsafe code relies on, out of reach for anybody else.
 mod sealed {
@@ -106,6 +73,10 @@ mod sealed {
     impl Sealed for super::Avx2 {}
     #[cfg(target_arch = "x86_64")]
     impl Sealed for super::Avx512 {}
+    impl<I: Sealed> Sealed for super::registers::Doubles<I> {}
+    impl<I: Sealed> Sealed for super::registers::Singles<I> {}
+    impl Sealed for f64 {}
+    impl Sealed for f32 {}
 }
 
 /// Runs `task` with the best instructions of this processor.
@@ -122,6 +93,30 @@ pub fn run<T: Task>(task: T) -> T::Output {
     }
     task.run(Portable)
 }
+
+/// Has the entry so far behind this one (or before it) brought near, wherever it is: what is read in a row from a distant memory comes
+/// a third sooner by it. Nothing happens where there is none.
+#[inline(always)]
+pub fn fetch_ahead<T>(entry: &T, distance: isize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let start = std::ptr::from_ref(entry).wrapping_offset(distance).cast::<i8>();
+        for line in (0..size_of::<T>()).step_by(CACHE_LINE) {
+            // safe: a hint, which never fails and never changes anything
+            #[allow(unsafe_code)]
+            unsafe {
+                _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line));
+            }
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (entry, distance);
+}
+
+/// Bytes that memory hands out at a time.
+#[cfg(target_arch = "x86_64")]
+const CACHE_LINE: usize = 64;
 
 /// What each set of instructions that this processor has makes of a task, the portable one first.
 #[cfg(test)]
@@ -163,5 +158,5 @@ fn run_avx2<T: Task>(task: T) -> T::Output {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 fn run_avx512<T: Task>(task: T) -> T::Output {
-    task.run(Avx512(()))
+    task.run(Avx512(Avx2(())))
 }

@@ -1,13 +1,135 @@
-//! Numbers side by side, in the registers of each set of instructions.
+//! Numbers side by side, in the registers of each set of instructions, in double or single precision.
 //!
 //! Left out: how a processor's set is found out (`mod`).
 
-use super::{Instructions, Portable};
+use super::{Instructions, Portable, sealed};
+
+/// A number in one of two precisions.
+pub trait Number: Copy + Default + Into<f64> + sealed::Sealed {
+    /// Registers of such numbers.
+    type Of<I: Instructions>: Scattered<Number = Self>;
+
+    /// The registers that a set of instructions has for them.
+    fn registers<I: Instructions>(instructions: I) -> Self::Of<I>;
+
+    /// The nearest number.
+    fn of(x: f64) -> Self;
+}
+
+/// Arithmetic on numbers side by side; having it at hand proves that the processor has the instructions.
+pub trait Registers: Copy + sealed::Sealed {
+    /// What stands in a lane.
+    type Number: Number;
+
+    /// Numbers side by side, in a register.
+    type Lanes: Copy;
+
+    /// How many of them.
+    const LANES: usize;
+
+    /// One number in every lane.
+    fn splat(self, x: Self::Number) -> Self::Lanes;
+
+    /// The numbers from entry `first` on.
+    fn load(self, from: &[f32], first: usize) -> Self::Lanes;
+
+    /// Puts numbers there.
+    fn store(self, x: Self::Lanes, to: &mut [Self::Number], first: usize);
+
+    /// `a + b`.
+    fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+
+    /// `a - b`.
+    fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+
+    /// `a b`.
+    fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+
+    /// `a b + c`, fused where the processor can.
+    fn multiply_add(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
+}
+
+/// Registers whose lanes lie anywhere in memory.
+pub trait Scattered: Registers {
+    /// The sum over the lanes.
+    fn total(self, x: Self::Lanes) -> f64;
+
+    /// The numbers at the places that are listed from entry `first` on.
+    ///
+    /// # Safety
+    /// The places lie within `from`.
+    #[allow(unsafe_code)]
+    unsafe fn pick(self, from: &[Self::Number], places: &[u32], first: usize) -> Self::Lanes;
+
+    /// Puts numbers where [`Scattered::pick`] takes them from, the first lane last: where two have one place, the first is it.
+    ///
+    /// # Safety
+    /// The places lie within `to`.
+    #[allow(unsafe_code)]
+    unsafe fn put(self, x: Self::Lanes, to: &mut [Self::Number], places: &[u32], first: usize);
+}
+
+/// Registers for double precision of a set of instructions.
+#[derive(Clone, Copy, Debug)]
+pub struct Doubles<I>(I);
+
+/// Registers for single precision of a set of instructions.
+#[derive(Clone, Copy, Debug)]
+pub struct Singles<I>(I);
+
+impl Number for f64 {
+    type Of<I: Instructions> = I::Doubles;
+
+    #[inline(always)]
+    fn registers<I: Instructions>(instructions: I) -> I::Doubles {
+        instructions.doubles()
+    }
+
+    #[inline(always)]
+    fn of(x: f64) -> f64 {
+        x
+    }
+}
+
+impl Number for f32 {
+    type Of<I: Instructions> = I::Singles;
+
+    #[inline(always)]
+    fn registers<I: Instructions>(instructions: I) -> I::Singles {
+        instructions.singles()
+    }
+
+    #[inline(always)]
+    fn of(x: f64) -> f32 {
+        x as f32
+    }
+}
 
 impl Instructions for Portable {
-    type Lanes = [f64; 2];
-    type Singles = [f32; 4];
-    const LANES: usize = 2;
+    type Doubles = Doubles<Portable>;
+    type Singles = Singles<Portable>;
+    type Broad = Singles<Portable>;
+
+    #[inline(always)]
+    fn doubles(self) -> Self::Doubles {
+        Doubles(self)
+    }
+
+    #[inline(always)]
+    fn singles(self) -> Self::Singles {
+        Singles(self)
+    }
+
+    #[inline(always)]
+    fn broad(self) -> Self::Broad {
+        Singles(self)
+    }
+
+    #[inline(always)]
+    fn load_whole(self, from: &[i16], first: usize) -> [f32; 4] {
+        let numbers: &[i16; 4] = from[first..].first_chunk().expect("as many numbers");
+        numbers.map(f32::from)
+    }
 
     #[inline(always)]
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
@@ -18,181 +140,235 @@ impl Instructions for Portable {
     fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
         a * b + c
     }
-
-    #[inline(always)]
-    fn splat(self, x: f64) -> Self::Lanes {
-        [x; 2]
-    }
-
-    #[inline(always)]
-    fn widen(self, from: &[f32], first: usize) -> Self::Lanes {
-        [f64::from(from[first]), f64::from(from[first + 1])]
-    }
-
-    #[inline(always)]
-    fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-        [a[0] + b[0], a[1] + b[1]]
-    }
-
-    #[inline(always)]
-    fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-        [a[0] - b[0], a[1] - b[1]]
-    }
-
-    #[inline(always)]
-    fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-        [a[0] * b[0], a[1] * b[1]]
-    }
-
-    #[inline(always)]
-    fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
-        [a[0] * b[0] + c[0], a[1] * b[1] + c[1]]
-    }
-
-    #[inline(always)]
-    fn total(self, x: Self::Lanes) -> f64 {
-        x[0] + x[1]
-    }
-
-    #[inline(always)]
-    fn splat_single(self, x: f32) -> Self::Singles {
-        [x; 4]
-    }
-
-    #[inline(always)]
-    fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
-        *from[first..].first_chunk().expect("as many numbers")
-    }
-
-    #[inline(always)]
-    fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
-        to[first..][..4].copy_from_slice(&x);
-    }
-
-    #[inline(always)]
-    fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
-        [a[0] * b[0] + c[0], a[1] * b[1] + c[1], a[2] * b[2] + c[2], a[3] * b[3] + c[3]]
-    }
-
-    #[inline(always)]
-    #[allow(unsafe_code)]
-    unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
-        [from[places[first] as usize], from[places[first + 1] as usize]]
-    }
-
-    #[inline(always)]
-    #[allow(unsafe_code)]
-    unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
-        to[places[first + 1] as usize] = x[1];
-        to[places[first] as usize] = x[0];
-    }
 }
+
+/// Arrays of so many numbers.
+macro_rules! portable {
+    ($registers:ident, $number:ident, $count:literal) => {
+        impl Registers for $registers<Portable> {
+            type Number = $number;
+            type Lanes = [$number; $count];
+            const LANES: usize = $count;
+
+            #[inline(always)]
+            fn splat(self, x: $number) -> Self::Lanes {
+                [x; $count]
+            }
+
+            #[inline(always)]
+            fn load(self, from: &[f32], first: usize) -> Self::Lanes {
+                let numbers: &[f32; $count] = from[first..].first_chunk().expect("as many numbers");
+                numbers.map(<$number>::from)
+            }
+
+            #[inline(always)]
+            fn store(self, x: Self::Lanes, to: &mut [$number], first: usize) {
+                to[first..][..$count].copy_from_slice(&x);
+            }
+
+            #[inline(always)]
+            fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                std::array::from_fn(|k| a[k] + b[k])
+            }
+
+            #[inline(always)]
+            fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                std::array::from_fn(|k| a[k] - b[k])
+            }
+
+            #[inline(always)]
+            fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                std::array::from_fn(|k| a[k] * b[k])
+            }
+
+            #[inline(always)]
+            fn multiply_add(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+                std::array::from_fn(|k| a[k] * b[k] + c[k])
+            }
+        }
+
+        impl Scattered for $registers<Portable> {
+            #[inline(always)]
+            fn total(self, x: Self::Lanes) -> f64 {
+                x.into_iter().map(f64::from).sum()
+            }
+
+            #[inline(always)]
+            #[allow(unsafe_code)]
+            unsafe fn pick(self, from: &[$number], places: &[u32], first: usize) -> Self::Lanes {
+                std::array::from_fn(|k| from[places[first + k] as usize])
+            }
+
+            #[inline(always)]
+            #[allow(unsafe_code)]
+            unsafe fn put(self, x: Self::Lanes, to: &mut [$number], places: &[u32], first: usize) {
+                for k in (0..$count).rev() {
+                    to[places[first + k] as usize] = x[k];
+                }
+            }
+        }
+    };
+}
+
+portable!(Doubles, f64, 2);
+portable!(Singles, f32, 4);
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod x86 {
     use super::super::{Avx2, Avx512};
-    use super::Instructions;
+    use super::{Doubles, Instructions, Registers, Scattered, Singles};
     use std::arch::x86_64::*;
+
+    impl Instructions for Avx2 {
+        type Doubles = Doubles<Avx2>;
+        type Singles = Singles<Avx2>;
+        type Broad = Singles<Avx2>;
+
+        #[inline(always)]
+        fn doubles(self) -> Self::Doubles {
+            Doubles(self)
+        }
+
+        #[inline(always)]
+        fn singles(self) -> Self::Singles {
+            Singles(self)
+        }
+
+        #[inline(always)]
+        fn broad(self) -> Self::Broad {
+            Singles(self)
+        }
+
+        #[inline(always)]
+        fn load_whole(self, from: &[i16], first: usize) -> __m256 {
+            let eight: &[i16; 8] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(eight.as_ptr().cast()))) }
+        }
+
+        #[inline(always)]
+        fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+            a.mul_add(b, c)
+        }
+
+        #[inline(always)]
+        fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
+            a.mul_add(b, c)
+        }
+    }
+
+    impl Instructions for Avx512 {
+        type Doubles = Doubles<Avx512>;
+        type Singles = Singles<Avx2>;
+        type Broad = Singles<Avx512>;
+
+        #[inline(always)]
+        fn doubles(self) -> Self::Doubles {
+            Doubles(self)
+        }
+
+        #[inline(always)]
+        fn singles(self) -> Self::Singles {
+            // as many numbers as cells stand side by side
+            Singles(self.0)
+        }
+
+        #[inline(always)]
+        fn broad(self) -> Self::Broad {
+            Singles(self)
+        }
+
+        #[inline(always)]
+        fn load_whole(self, from: &[i16], first: usize) -> __m512 {
+            let sixteen: &[i16; 16] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(sixteen.as_ptr().cast()))) }
+        }
+
+        #[inline(always)]
+        fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
+            a.mul_add(b, c)
+        }
+
+        #[inline(always)]
+        fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
+            a.mul_add(b, c)
+        }
+    }
 
     /// What differs between sets of registers by the names of their instructions alone.
     macro_rules! arithmetic {
         (
-            doubles: $splat:ident, $add:ident, $subtract:ident, $multiply:ident, $multiply_add:ident;
-            $count:literal singles: $splat_single:ident, $load:ident, $store:ident, $multiply_add_singles:ident
+            $count:literal $number:ident in $lanes:ident:
+            $splat:ident, $store:ident, $add:ident, $subtract:ident, $multiply:ident, $multiply_add:ident
         ) => {
-            #[inline(always)]
-            fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
-                a.mul_add(b, c)
-            }
+            type Number = $number;
+            type Lanes = $lanes;
+            const LANES: usize = $count;
 
             #[inline(always)]
-            fn multiply_add_single(self, a: f32, b: f32, c: f32) -> f32 {
-                a.mul_add(b, c)
-            }
-
-            #[inline(always)]
-            fn splat(self, x: f64) -> Self::Lanes {
+            fn splat(self, x: $number) -> $lanes {
                 unsafe { $splat(x) }
             }
 
             #[inline(always)]
-            fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-                unsafe { $add(a, b) }
-            }
-
-            #[inline(always)]
-            fn subtract(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-                unsafe { $subtract(a, b) }
-            }
-
-            #[inline(always)]
-            fn multiply(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-                unsafe { $multiply(a, b) }
-            }
-
-            #[inline(always)]
-            fn multiply_add_lanes(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
-                unsafe { $multiply_add(a, b, c) }
-            }
-
-            #[inline(always)]
-            fn splat_single(self, x: f32) -> Self::Singles {
-                unsafe { $splat_single(x) }
-            }
-
-            #[inline(always)]
-            fn load_singles(self, from: &[f32], first: usize) -> Self::Singles {
-                let numbers: &[f32; $count] = from[first..].first_chunk().expect("as many numbers");
-                unsafe { $load(numbers.as_ptr()) }
-            }
-
-            #[inline(always)]
-            fn store_singles(self, x: Self::Singles, to: &mut [f32], first: usize) {
-                let numbers: &mut [f32; $count] = to[first..].first_chunk_mut().expect("as many numbers");
+            fn store(self, x: $lanes, to: &mut [$number], first: usize) {
+                let numbers: &mut [$number; $count] = to[first..].first_chunk_mut().expect("as many numbers");
                 unsafe { $store(numbers.as_mut_ptr(), x) }
             }
 
             #[inline(always)]
-            fn multiply_add_singles(self, a: Self::Singles, b: Self::Singles, c: Self::Singles) -> Self::Singles {
-                unsafe { $multiply_add_singles(a, b, c) }
+            fn add(self, a: $lanes, b: $lanes) -> $lanes {
+                unsafe { $add(a, b) }
+            }
+
+            #[inline(always)]
+            fn subtract(self, a: $lanes, b: $lanes) -> $lanes {
+                unsafe { $subtract(a, b) }
+            }
+
+            #[inline(always)]
+            fn multiply(self, a: $lanes, b: $lanes) -> $lanes {
+                unsafe { $multiply(a, b) }
+            }
+
+            #[inline(always)]
+            fn multiply_add(self, a: $lanes, b: $lanes, c: $lanes) -> $lanes {
+                unsafe { $multiply_add(a, b, c) }
             }
         };
     }
 
     // safe, here and above: `self` proves the instructions
-    impl Instructions for Avx2 {
-        type Lanes = __m256d;
-        type Singles = __m256;
-        const LANES: usize = 4;
-
+    impl Registers for Doubles<Avx2> {
         arithmetic! {
-            doubles: _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd;
-            8 singles: _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_fmadd_ps
+            4 f64 in __m256d:
+            _mm256_set1_pd, _mm256_storeu_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_fmadd_pd
         }
 
         #[inline(always)]
-        fn widen(self, from: &[f32], first: usize) -> Self::Lanes {
+        fn load(self, from: &[f32], first: usize) -> __m256d {
             let four: &[f32; 4] = from[first..].first_chunk().expect("as many numbers");
             unsafe { _mm256_cvtps_pd(_mm_loadu_ps(four.as_ptr())) }
         }
+    }
 
+    impl Scattered for Doubles<Avx2> {
         #[inline(always)]
-        fn total(self, x: Self::Lanes) -> f64 {
+        fn total(self, x: __m256d) -> f64 {
             // safe: four numbers of eight bytes
             let [a, b, c, d] = unsafe { std::mem::transmute::<__m256d, [f64; 4]>(x) };
             (a + b) + (c + d)
         }
 
         #[inline(always)]
-        unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
+        unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> __m256d {
             let places: &[u32; 4] = places[first..].first_chunk().expect("as many places");
             // safe: the caller knows the places
             unsafe { pick_four(from, places) }
         }
 
         #[inline(always)]
-        unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
+        unsafe fn put(self, x: __m256d, to: &mut [f64], places: &[u32], first: usize) {
             // a copy: nothing that is put changes it
             let places: [u32; 4] = *places[first..].first_chunk().expect("as many places");
             // safe: the caller knows the places
@@ -203,39 +379,40 @@ mod x86 {
         }
     }
 
-    impl Instructions for Avx512 {
-        type Lanes = __m512d;
-        type Singles = __m512;
-        const LANES: usize = 8;
-
+    impl Registers for Doubles<Avx512> {
         arithmetic! {
-            doubles: _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd;
-            16 singles: _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_fmadd_ps
+            8 f64 in __m512d:
+            _mm512_set1_pd, _mm512_storeu_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_fmadd_pd
         }
 
         #[inline(always)]
-        fn widen(self, from: &[f32], first: usize) -> Self::Lanes {
+        fn load(self, from: &[f32], first: usize) -> __m512d {
             let eight: &[f32; 8] = from[first..].first_chunk().expect("as many numbers");
             unsafe { _mm512_cvtps_pd(_mm256_loadu_ps(eight.as_ptr())) }
         }
+    }
 
+    impl Scattered for Doubles<Avx512> {
         #[inline(always)]
-        fn total(self, x: Self::Lanes) -> f64 {
+        fn total(self, x: __m512d) -> f64 {
             // safe: eight numbers of eight bytes; in the order of two registers of four
             let [a, b, c, d, e, f, g, h] = unsafe { std::mem::transmute::<__m512d, [f64; 8]>(x) };
             ((a + b) + (c + d)) + ((e + f) + (g + h))
         }
 
         #[inline(always)]
-        unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> Self::Lanes {
+        unsafe fn pick(self, from: &[f64], places: &[u32], first: usize) -> __m512d {
             let places: &[u32; 8] = places[first..].first_chunk().expect("as many places");
-            let [low, high] = halves(places);
+            let (halves, []) = places.as_chunks::<4>() else { unreachable!() };
             // safe: the caller knows the places
-            unsafe { _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(pick_four(from, low)), pick_four(from, high)) }
+            unsafe {
+                let [low, high] = [pick_four(from, &halves[0]), pick_four(from, &halves[1])];
+                _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low), high)
+            }
         }
 
         #[inline(always)]
-        unsafe fn put(self, x: Self::Lanes, to: &mut [f64], places: &[u32], first: usize) {
+        unsafe fn put(self, x: __m512d, to: &mut [f64], places: &[u32], first: usize) {
             let places: [u32; 8] = *places[first..].first_chunk().expect("as many places");
             // safe: the caller knows the places
             unsafe {
@@ -247,10 +424,62 @@ mod x86 {
         }
     }
 
-    #[inline(always)]
-    fn halves(places: &[u32; 8]) -> [&[u32; 4]; 2] {
-        let (halves, []) = places.as_chunks() else { unreachable!() };
-        [&halves[0], &halves[1]]
+    impl Registers for Singles<Avx2> {
+        arithmetic! {
+            8 f32 in __m256:
+            _mm256_set1_ps, _mm256_storeu_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_fmadd_ps
+        }
+
+        #[inline(always)]
+        fn load(self, from: &[f32], first: usize) -> __m256 {
+            let eight: &[f32; 8] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm256_loadu_ps(eight.as_ptr()) }
+        }
+    }
+
+    impl Scattered for Singles<Avx2> {
+        #[inline(always)]
+        fn total(self, x: __m256) -> f64 {
+            // safe: eight numbers of four bytes
+            let [a, b, c, d, e, f, g, h] = unsafe { std::mem::transmute::<__m256, [f32; 8]>(x) };
+            f64::from((a + b) + (c + d)) + f64::from((e + f) + (g + h))
+        }
+
+        #[inline(always)]
+        unsafe fn pick(self, from: &[f32], places: &[u32], first: usize) -> __m256 {
+            let places: &[u32; 8] = places[first..].first_chunk().expect("as many places");
+            let (halves, []) = places.as_chunks::<4>() else { unreachable!() };
+            // safe: the caller knows the places
+            unsafe {
+                let [low, high] = [pick_four_singles(from, &halves[0]), pick_four_singles(from, &halves[1])];
+                _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low), high)
+            }
+        }
+
+        #[inline(always)]
+        unsafe fn put(self, x: __m256, to: &mut [f32], places: &[u32], first: usize) {
+            let places: [u32; 8] = *places[first..].first_chunk().expect("as many places");
+            // safe: eight numbers of four bytes; the caller knows the places
+            unsafe {
+                let x = std::mem::transmute::<__m256, [f32; 8]>(x);
+                for lane in (0..8).rev() {
+                    *to.as_mut_ptr().add(places[lane] as usize) = x[lane];
+                }
+            }
+        }
+    }
+
+    impl Registers for Singles<Avx512> {
+        arithmetic! {
+            16 f32 in __m512:
+            _mm512_set1_ps, _mm512_storeu_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_fmadd_ps
+        }
+
+        #[inline(always)]
+        fn load(self, from: &[f32], first: usize) -> __m512 {
+            let sixteen: &[f32; 16] = from[first..].first_chunk().expect("as many numbers");
+            unsafe { _mm512_loadu_ps(sixteen.as_ptr()) }
+        }
     }
 
     /// # Safety
@@ -262,6 +491,18 @@ mod x86 {
             let low = _mm_loadh_pd(_mm_load_sd(at(0)), at(1));
             let high = _mm_loadh_pd(_mm_load_sd(at(2)), at(3));
             _mm256_insertf128_pd::<1>(_mm256_castpd128_pd256(low), high)
+        }
+    }
+
+    /// # Safety
+    /// The places lie within `from`; the processor has AVX.
+    #[inline(always)]
+    unsafe fn pick_four_singles(from: &[f32], places: &[u32; 4]) -> __m128 {
+        unsafe {
+            let at = |lane: usize| from.as_ptr().add(places[lane] as usize);
+            let two = _mm_insert_ps::<0x10>(_mm_load_ss(at(0)), _mm_load_ss(at(1)));
+            let three = _mm_insert_ps::<0x20>(two, _mm_load_ss(at(2)));
+            _mm_insert_ps::<0x30>(three, _mm_load_ss(at(3)))
         }
     }
 
