@@ -61,10 +61,7 @@ fn main() {
         };
         table.row(cells);
     }
-    table.print(
-        "All processors. Reconstructions of a chain are those of its steps, without the search before them. `-- 7d` runs the chain \
-         of seven parameters, which takes minutes.",
-    );
+    table.print("All processors. Reconstructions of a chain are those of its steps, without the search before them.");
 }
 
 /// A command that has run.
