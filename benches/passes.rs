@@ -6,7 +6,7 @@ mod common;
 #[path = "../tests/common/plain_loop.rs"]
 mod plain_loop;
 
-use common::paper::{Free, Size, scene, truth, uneven_map};
+use common::paper::{Free, Passes, Size, scene, truth, uneven_map};
 use common::stopwatch::{Candidate, by_criterion, criterion, fastest, in_turn};
 use common::table::{Table, Target, thousands};
 use criterion::Criterion;
@@ -43,12 +43,12 @@ fn main() {
     for pixels in [5000, 20_000] {
         let scene = scene(Free::Three, Size::pixels(pixels));
         passes(&scene, pixels, &mut criterion, &mut table);
-        builds(&scene, pixels, &mut criterion, &mut table);
+        others(&scene, pixels, &mut criterion, &mut table);
     }
     criterion.final_summary();
     table.print(&format!(
         "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row. `read` sums as many \
-         bytes as the response stores for its pairs, by the same instructions, `plain read` by those that the plain loop is compiled for ({} each in the plain loop, whose windows have {WINDOW} bins). `build` is a response for new stellar parameters, `shift` one for a new orbit.",
+         bytes as the response stores for its pairs, by the same instructions, `plain read` by those that the plain loop is compiled for ({} each in the plain loop, whose windows have {WINDOW} bins). `build` is a response for new stellar parameters, `shift` one for a new orbit; there and back are two passes, and the time is that of one.",
         PlainLoop::<WINDOW>::PAIR_BYTES,
     ));
 }
@@ -109,17 +109,24 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
     }
 }
 
-/// Responses for new stellar parameters and for a new orbit.
-fn builds(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut Table) {
+/// Responses for new stellar parameters and for a new orbit, and a pass of those there and back in single precision.
+fn others(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut Table) {
     let (imager, state) = (&scene.imager, truth(scene));
     let response = imager.response(&state);
     let build = || imager.response(black_box(&state));
     let shift = || response.with_velocities(&imager.star, black_box(&state), &imager.sampling);
-    let mut candidates = [Candidate::new("build", build), Candidate::new("shift", shift)];
+    let mut only_passes = Passes::new(&response);
+    let single = || only_passes.run_single(&response, 2);
+    let mut candidates = [
+        Candidate::new("build", build),
+        Candidate::new("shift", shift),
+        Candidate::new("there and back, single precision", single),
+    ];
     by_criterion(criterion, &format!("response, {pixels} pixels"), &mut candidates);
     let times = in_turn(&mut candidates, ROUNDS / 2, 1);
     for (candidate, times) in candidates.iter().zip(times) {
-        let per_pair = format!("{:.2}", 1e9 * fastest(&times) / response.pairs() as f64);
+        let passes = if candidate.name.starts_with("there") { 2.0 } else { 1.0 };
+        let per_pair = format!("{:.2}", 1e9 * fastest(&times) / (passes * response.pairs() as f64));
         let none = || "-".to_owned();
         let row = [thousands(pixels), candidate.name.to_owned(), per_pair];
         table.row(row.into_iter().chain((0..6).map(|_| none())));

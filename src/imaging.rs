@@ -115,6 +115,7 @@ pub struct ImagingProblem<'a> {
     response: Response,
     brightness_of: Brightness,
     passes: u32,
+    single_passes: u32,
     /// Model depth of every bin at the current map.
     model: Vec<f64>,
     /// `W (model - data)`, without nuisances `(model - data) / sigma^2`.
@@ -128,9 +129,6 @@ pub struct ImagingProblem<'a> {
     single: SinglePrecision,
 }
 
-/// A map of no norm at all keeps it.
-const SMALLEST_NORM: f64 = 1e-300;
-
 /// Room for a map in single precision, and for what is made of it.
 #[derive(Default)]
 struct SinglePrecision {
@@ -141,8 +139,8 @@ struct SinglePrecision {
 impl SinglePrecision {
     /// `out = f(v)` of a linear map f; v comes to it with a norm of 1, for nothing to be too small or too large.
     fn run(&mut self, v: &[f64], out: &mut [f64], f: impl FnOnce(&[f32], &mut [f32])) {
-        let norm = dot(v, v).sqrt().max(SMALLEST_NORM);
-        let per_norm = 1.0 / norm;
+        let norm = dot(v, v).sqrt();
+        let per_norm = if norm == 0.0 { 0.0 } else { norm.recip() };
         self.v.resize(v.len(), 0.0);
         self.out.resize(out.len(), 0.0);
         self.v.iter_mut().zip(v).for_each(|(single, v)| *single = (v * per_norm) as f32);
@@ -166,6 +164,7 @@ impl<'a> ImagingProblem<'a> {
             response,
             brightness_of,
             passes: 0,
+            single_passes: 0,
             model: vec![0.0; bins],
             weighted_residual: vec![0.0; bins],
             continuum: vec![0.0; profiles],
@@ -175,6 +174,11 @@ impl<'a> ImagingProblem<'a> {
             constants: vec![0.0; profiles],
             single: SinglePrecision::default(),
         }
+    }
+
+    /// How many of its passes were in single precision.
+    pub fn single_passes(&self) -> u32 {
+        self.single_passes
     }
 
     /// Model depth `1 - I` of every bin at the current map.
@@ -273,9 +277,10 @@ impl Problem for ImagingProblem<'_> {
     /// in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`.
     fn curvature(&mut self, which: Curvature, precision: Precision, v: &[f64], out: &mut [f64]) {
         self.passes += 2;
+        self.single_passes += if precision == Precision::Single { 2 } else { 0 };
         let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
-        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, single, .. } = self;
-        let weighed = &mut self.bins;
+        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
+        let (weighed, single) = (&mut self.bins, &mut self.single);
         let slope = self.brightness_of.slope;
         let weigh = |k: usize, line: &mut [f64], d_continuum: f64| {
             let bins = response.bins(k);

@@ -92,14 +92,20 @@ fn single_precision_is_good_to_six_digits_however_small_or_large_the_map() {
     let n = imager.grid.len();
     problem.linearise(&wave(n, 0.37).iter().map(|x| 0.3 + 0.2 * x).collect::<Vec<f64>>());
     for which in [Curvature::Exact, Curvature::GaussNewton] {
-        for size in [0.0, 1e-60, 1.0, 1e60] {
+        for size in [0.0, 1e-100, 1.0, 1e60] {
             let v: Vec<f64> = wave(n, 0.9).iter().map(|x| size * x).collect();
             let (mut double, mut single) = (vec![0.0; n], vec![f64::NAN; n]);
             problem.curvature(which, Precision::Double, &v, &mut double);
             problem.curvature(which, Precision::Single, &v, &mut single);
             let largest = double.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
             let furthest = double.iter().zip(&single).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            // some ten roundings of 6e-8 each
             assert!(furthest <= 1e-6 * largest, "{which:?}, {size:e}: {furthest:e} of {largest:e}");
+        }
+        for (size, is_expected) in [(1e-200, f64::is_finite as fn(f64) -> bool), (f64::NAN, f64::is_nan)] {
+            let mut out = vec![0.0; n];
+            problem.curvature(which, Precision::Single, &vec![size; n], &mut out);
+            assert!(out.iter().all(|x| is_expected(*x)), "{size:e}");
         }
     }
 }

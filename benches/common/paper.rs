@@ -89,12 +89,14 @@ pub fn uneven_map(pixels: usize) -> Vec<f64> {
 pub struct Passes {
     from: [Vec<f64>; 3],
     to: [Vec<f64>; 3],
+    single: [Vec<f32>; 2],
 }
 
 impl Passes {
     pub fn new(response: &Response) -> Self {
         let from = [response.pixels(), response.data_len(), response.profiles()].map(uneven_map);
-        Passes { to: from.clone(), from }
+        let single: Vec<f32> = from[0].iter().map(|x| *x as f32).collect();
+        Passes { to: from.clone(), from, single: [single.clone(), single] }
     }
 
     /// That many passes, forward and transpose in turn.
@@ -107,6 +109,15 @@ impl Passes {
             }
         }
         black_box(&self.to);
+    }
+
+    /// That many passes there and back in single precision.
+    pub fn run_single(&mut self, response: &Response, passes: u32) {
+        let [x, map] = &mut self.single;
+        for _ in 0..passes / 2 {
+            response.apply_and_back(black_box(x), map, |_, _, continuum| continuum);
+        }
+        black_box(&self.single);
     }
 }
 

@@ -43,6 +43,10 @@ pub(super) fn solve(
         }
         apply(&direction, &mut applied);
         let curvature = dot(&direction, &applied);
+        if curvature.is_nan() {
+            z.fill(f64::NAN);
+            return iteration + 1;
+        }
         if curvature <= 0.0 {
             if iteration == 0 && z.iter().all(|&z| z == 0.0) {
                 z.copy_from_slice(&direction);

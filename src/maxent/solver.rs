@@ -27,6 +27,9 @@ const KNOWN_PATH_STEPS: usize = 6;
 /// An error below this part of chi2 is rounding, and no step makes it smaller.
 const ROUNDING: f64 = 1.5e-12;
 
+/// Systems that are solved to this residual or a larger one are applied in single precision.
+const LOOSE: f64 = 3e-3;
+
 /// The exact curvature is used once a step is worth less than this in `S/lambda - chi2/2`.
 const EXACT_BELOW: f64 = 100.0;
 
@@ -40,9 +43,6 @@ pub struct Solver<'a> {
     /// Precision and effort.
     pub settings: SolverSettings,
 }
-
-/// Systems that are solved no better than this are applied in single precision.
-const SINGLE_PRECISION: f64 = 3e-3;
 
 /// A Newton system in the entropy's metric.
 #[derive(Clone, Copy)]
@@ -193,8 +193,8 @@ impl Solver<'_> {
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f64], z: &mut [f64]) {
         let System { lambda, scale, curvature } = system;
         let mut scaled = vec![0.0; right.len()];
-        let single = self.settings.cg_tolerance >= SINGLE_PRECISION;
-        let precision = if single { Precision::Single } else { Precision::Double };
+        let loose = self.settings.cg_tolerance >= LOOSE;
+        let precision = if loose { Precision::Single } else { Precision::Double };
         let apply = |v: &[f64], out: &mut [f64]| {
             combine_two(&mut scaled, v, scale, |_, v, scale| v * scale);
             problem.curvature(curvature, precision, &scaled, out);

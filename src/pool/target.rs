@@ -53,6 +53,11 @@ impl Target {
         Ok(Target { posterior, counted, surrogate })
     }
 
+    /// The posterior.
+    pub fn posterior(&self) -> &Posterior {
+        &self.posterior
+    }
+
     /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density alone, so that
     /// a resumed run has the same.
     pub fn surrogate(&self, evaluator: &dyn Evaluator) -> Option<(Surrogate, f64)> {

@@ -2,7 +2,7 @@
 //!
 //! Left out: what is made of them (`kernel`), which stand side by side (`placement`).
 
-/// Cells side by side: as many as the widest registers hold.
+/// Cells side by side: as many as the widest registers hold in double precision.
 pub const LANES: usize = 8;
 
 /// A visible pixel of each cell; a cell that has no pixel left has one of weight 0, and the cells after it have none either.

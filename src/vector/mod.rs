@@ -94,14 +94,13 @@ pub fn run<T: Task>(task: T) -> T::Output {
     task.run(Portable)
 }
 
-/// Has the entry so far behind this one (or before it) brought near, wherever it is: what is read in a row from a distant memory comes
-/// a third sooner by it. Nothing happens where there is none.
+/// Asks memory for the entry `distance` entries on, which need not be there: what is read in a row from far away comes sooner.
 #[inline(always)]
-pub fn fetch_ahead<T>(entry: &T, distance: isize) {
+pub fn fetch_ahead<T>(entry: &T, distance: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let start = std::ptr::from_ref(entry).wrapping_offset(distance).cast::<i8>();
+        let start = std::ptr::from_ref(entry).wrapping_add(distance).cast::<i8>();
         for line in (0..size_of::<T>()).step_by(CACHE_LINE) {
             // safe: a hint, which never fails and never changes anything
             #[allow(unsafe_code)]
