@@ -104,7 +104,7 @@ impl Deposit {
     }
 }
 
-/// Up to so many pixels a cell has few, and a pass takes a tenth longer in the order of velocities (5,000 pixels); ...
+/// Up to so many pixels a cell has few, and a pass takes a tenth longer in the order of velocities (5,000 pixels, in double precision); ...
 const MEDIUM_MAP: usize = 12_000;
 
 /// ... up to so many it takes a tenth less (20,000), and beyond it pixels of one cell should follow each other: another tenth (80,000).
