@@ -15,7 +15,7 @@ use crate::star::Response;
 pub struct Prediction {
     /// Internal coordinates of the solution.
     origin: Vec<f64>,
-    /// Its image.
+    /// Its image, which would take a hundredth of an evaluation each time.
     map: Vec<f64>,
     /// Natural scales of the coordinates.
     scales: Vec<f64>,

@@ -64,8 +64,9 @@ pub struct RingView<const POINTS: usize> {
 impl Points {
     /// The points `since_epoch_d` days after the star's epoch.
     #[inline(always)]
-    pub fn turn(&self, i: impl Instructions, since_epoch_d: f64, turned: &mut TurnedPoints) {
-        let Points { angular_velocity, offset, mu_equator, amplitude, .. } = self;
+    pub fn turned(&self, i: impl Instructions, since_epoch_d: f64) -> TurnedPoints {
+        let Points { angular_velocity, offset, mu_equator, amplitude, .. } = *self;
+        let mut turned = TurnedPoints::default();
         for p in 0..CHUNK {
             let (sin, cos) = sin_cos(i, angular_velocity[p] * since_epoch_d + offset[p]);
             turned.mu[0][p] = (mu_equator[p] * cos) as f32;
@@ -73,6 +74,7 @@ impl Points {
             turned.velocity[0][p] = amplitude[p] * sin;
             turned.velocity[1][p] = amplitude[p] * cos;
         }
+        turned
     }
 }
 

@@ -255,11 +255,7 @@ impl Seen {
             self.sorted.resize(self.sorted.len().max(end + LANES * rows), Pixel::default());
             let places = &mut self.sorted[end..end + LANES * rows];
             // hardly ever one pixel in two blocks that follow each other, for no sum to wait for another
-            let mut pixel = end % self.map_pixels;
-            let mut empty = || {
-                pixel = if pixel + 1 < self.map_pixels { pixel + 1 } else { 0 };
-                Pixel { pixel: pixel as u32, ..Pixel::default() }
-            };
+            let empty = |place: usize| Pixel { pixel: ((end + place) % self.map_pixels) as u32, ..Pixel::default() };
             for (lane, cell) in cells.iter().enumerate().take(step) {
                 let again = cells[..lane].contains(cell);
                 let count = if again { 0 } else { self.counts[*cell as usize] as usize };
@@ -267,7 +263,7 @@ impl Seen {
                     self.firsts[*cell as usize] = (end + lane) as u32;
                 }
                 for place in (lane + step * count..LANES * rows).step_by(step) {
-                    places[place] = empty();
+                    places[place] = empty(place);
                 }
             }
             end += LANES * rows;

@@ -100,7 +100,7 @@ impl Views<'_> {
     #[inline(always)]
     pub fn look<I: Instructions>(&mut self, i: I, since_epoch_d: f64) -> &Moments {
         for (turned, points) in self.turned.iter_mut().zip(&self.points) {
-            points.turn(i, since_epoch_d, turned);
+            *turned = points.turned(i, since_epoch_d);
         }
         self.moments.clear();
         let mut end = 0;

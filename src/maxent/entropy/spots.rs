@@ -5,7 +5,7 @@
 
 use super::Step;
 use crate::vector::elementary::{exp_minus, ln_1p};
-use crate::vector::linear::{combine_two, dot};
+use crate::vector::linear::dot;
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: beyond it s (1-s) would lose its precision.
@@ -23,9 +23,7 @@ pub(super) fn gradient(default_logit: f64, u: &[f64], area: &[f64]) -> Vec<f64> 
 
 /// Scale of the metric, `sqrt(s (1-s) / a)`.
 pub(super) fn metric(s: &[f64], area: &[f64]) -> Vec<f64> {
-    let mut scale = vec![0.0; s.len()];
-    combine_two(&mut scale, s, area, |_, s, a| (s * (1.0 - s) / a).sqrt());
-    scale
+    s.iter().zip(area).map(|(s, a)| (s * (1.0 - s) / a).sqrt()).collect()
 }
 
 /// Logits moved by an image step.
