@@ -7,11 +7,11 @@
 mod data;
 
 use crate::maxent::entropy::Entropy;
-use crate::maxent::{Curvature, Precision, Problem};
+use crate::maxent::{Curvature, Problem};
 use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
 use crate::star::{Brightness, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
-use crate::vector::linear::dot;
+use crate::vector::Number;
 
 pub use data::Data;
 
@@ -126,27 +126,6 @@ pub struct ImagingProblem<'a> {
     /// Residuals or changes of the model, before they are weighed.
     differences: Vec<f64>,
     constants: Vec<f64>,
-    single: SinglePrecision,
-}
-
-/// Room for a map in single precision, and for what is made of it.
-#[derive(Default)]
-struct SinglePrecision {
-    v: Vec<f32>,
-    out: Vec<f32>,
-}
-
-impl SinglePrecision {
-    /// `out = f(v)` of a linear map f; v comes to it with a norm of 1, for nothing to be too small or too large.
-    fn run(&mut self, v: &[f64], out: &mut [f64], f: impl FnOnce(&[f32], &mut [f32])) {
-        let norm = dot(v, v).sqrt();
-        let per_norm = if norm == 0.0 { 0.0 } else { norm.recip() };
-        self.v.resize(v.len(), 0.0);
-        self.out.resize(out.len(), 0.0);
-        self.v.iter_mut().zip(v).for_each(|(single, v)| *single = (v * per_norm) as f32);
-        f(&self.v, &mut self.out);
-        out.iter_mut().zip(&self.out).for_each(|(out, single)| *out = norm * f64::from(*single));
-    }
 }
 
 impl<'a> ImagingProblem<'a> {
@@ -172,7 +151,6 @@ impl<'a> ImagingProblem<'a> {
             bins: vec![0.0; bins],
             differences: vec![0.0; bins],
             constants: vec![0.0; profiles],
-            single: SinglePrecision::default(),
         }
     }
 
@@ -275,12 +253,12 @@ impl Problem for ImagingProblem<'_> {
 
     /// `J^T W J v` plus the curvature of the model: with `dD = (line(dB) - D dC) / C`, the second derivative of `D = N/C`
     /// in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`.
-    fn curvature(&mut self, which: Curvature, precision: Precision, v: &[f64], out: &mut [f64]) {
+    fn curvature<N: Number>(&mut self, which: Curvature, v: &[N], out: &mut [N]) {
         self.passes += 2;
-        self.single_passes += if precision == Precision::Single { 2 } else { 0 };
+        self.single_passes += if N::SINGLE { 2 } else { 0 };
         let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
         let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
-        let (weighed, single) = (&mut self.bins, &mut self.single);
+        let weighed = &mut self.bins;
         let slope = self.brightness_of.slope;
         let weigh = |k: usize, line: &mut [f64], d_continuum: f64| {
             let bins = response.bins(k);
@@ -302,10 +280,7 @@ impl Problem for ImagingProblem<'_> {
             }
             constant
         };
-        match precision {
-            Precision::Double => response.apply_and_back(v, out, weigh),
-            Precision::Single => single.run(v, out, |v, out| response.apply_and_back(v, out, weigh)),
-        }
+        response.apply_and_back(v, out, weigh);
     }
 
     fn passes(&self) -> u32 {

@@ -8,7 +8,7 @@ use desk::{Desk, says, two_spots};
 use dimcmc::config;
 use dimcmc::imaging::Imager;
 use dimcmc::maxent::entropy::Entropy;
-use dimcmc::maxent::{Curvature, Precision, Problem, SolverSettings};
+use dimcmc::maxent::{Curvature, Problem, SolverSettings};
 use dimcmc::objective::{ObjectiveKind, Posterior, Reference};
 use dimcmc::scene::Scene;
 use rand::SeedableRng;
@@ -56,7 +56,7 @@ fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
     let ((chi2_plus, slope_plus), (chi2_minus, slope_minus)) = (at(h), at(-h));
     problem.linearise(&b);
     problem.gradient(&mut gradient);
-    problem.curvature(Curvature::Exact, Precision::Double, &v, &mut curved);
+    problem.curvature(Curvature::Exact, &v, &mut curved);
     // differences are good to h^2 and to rounding over h
     assert!((dot(&gradient, &v) / ((chi2_plus - chi2_minus) / (4.0 * h)) - 1.0).abs() < 1e-6);
     assert!((dot(&curved, &w) / ((slope_plus - slope_minus) / (2.0 * h)) - 1.0).abs() < 1e-6);

@@ -7,7 +7,7 @@ use dimcmc::config;
 use dimcmc::expansion::{Expansion, STELLAR};
 use dimcmc::fit::Fit;
 use dimcmc::imaging::Imager;
-use dimcmc::maxent::{Curvature, Precision, Problem, SolverSettings};
+use dimcmc::maxent::{Curvature, Problem, SolverSettings};
 use dimcmc::nuisances::LineAndContinuum;
 use dimcmc::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
@@ -65,7 +65,7 @@ fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
     let ((chi2_plus, slope_plus), (chi2_minus, slope_minus)) = (at(h), at(-h));
     problem.linearise(&s);
     problem.gradient(&mut gradient);
-    problem.curvature(Curvature::Exact, Precision::Double, &v, &mut curved);
+    problem.curvature(Curvature::Exact, &v, &mut curved);
     let slope = (chi2_plus - chi2_minus) / (4.0 * h);
     // differences of chi2, which is some 1e6 and rounded at 1e-16 of itself
     assert!((dot(&gradient, &v) / slope - 1.0).abs() < 1e-6);

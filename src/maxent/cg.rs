@@ -1,6 +1,7 @@
 //! Conjugate gradients for the Newton system in the entropy's metric, `(1 + lambda M) z = b` (Hestenes & Stiefel 1952;
 //! truncated Newton as in Steihaug 1983: a direction of negative curvature ends it).
 
+use crate::vector::Number;
 use crate::vector::linear::{axpy, combine, dot};
 
 /// When to stop, and what to do it with.
@@ -15,22 +16,22 @@ pub(super) struct CgLimits {
 /// Solves `A z = b` from the start `z`; returns the number of iterations.
 ///
 /// The residual is measured against `b A^-1 b`: about `b z` where the start is good, about `b P b` where there is none.
-pub(super) fn solve(
-    mut apply: impl FnMut(&[f64], &mut [f64]),
-    precondition: impl Fn(&[f64], &mut [f64]),
-    b: &[f64],
-    z: &mut [f64],
+pub(super) fn solve<N: Number>(
+    mut apply: impl FnMut(&[N], &mut [N]),
+    precondition: impl Fn(&[N], &mut [N]),
+    b: &[N],
+    z: &mut [N],
     limits: CgLimits,
 ) -> usize {
     let n = b.len();
-    let (mut residual, mut applied, mut preconditioned) = (b.to_vec(), vec![0.0; n], vec![0.0; n]);
+    let (mut residual, mut applied, mut preconditioned) = (b.to_vec(), vec![N::default(); n], vec![N::default(); n]);
     let mut scale = dot(b, z);
     if scale <= 0.0 {
         precondition(b, &mut preconditioned);
         scale = dot(b, &preconditioned);
     }
     let goal = limits.tolerance * limits.tolerance * scale;
-    if z.iter().any(|&z| z != 0.0) {
+    if z.iter().any(|&z| z != N::default()) {
         apply(z, &mut applied);
         axpy(-1.0, &applied, &mut residual);
         precondition(&residual, &mut preconditioned);
@@ -44,11 +45,11 @@ pub(super) fn solve(
         apply(&direction, &mut applied);
         let curvature = dot(&direction, &applied);
         if curvature.is_nan() {
-            z.fill(f64::NAN);
+            z.fill(N::of(f64::NAN));
             return iteration + 1;
         }
         if curvature <= 0.0 {
-            if iteration == 0 && z.iter().all(|&z| z == 0.0) {
+            if iteration == 0 && z.iter().all(|&z| z == N::default()) {
                 z.copy_from_slice(&direction);
             }
             return iteration + 1;
@@ -58,7 +59,7 @@ pub(super) fn solve(
         axpy(-length, &applied, &mut residual);
         precondition(&residual, &mut preconditioned);
         let next = dot(&residual, &preconditioned);
-        let beta = next / rho;
+        let beta = N::of(next / rho);
         rho = next;
         combine(&mut direction, &preconditioned, |d, p| p + beta * d);
     }

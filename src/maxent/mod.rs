@@ -14,6 +14,6 @@ mod standing;
 
 pub use parallelism::parallelism;
 pub use preconditioner::Preconditioner;
-pub use problem::{Curvature, Precision, Problem};
+pub use problem::{Curvature, Problem};
 pub use solution::{Best, Goal, Image, Solution, SolverSettings, Start, Termination};
 pub use solver::Solver;

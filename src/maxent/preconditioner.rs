@@ -6,7 +6,7 @@
 //! pixels that carry it: the spotted part of the star. Left out: when to rebuild it.
 
 use crate::vector::linear::dot;
-use crate::vector::{self, Instructions, Registers, Task};
+use crate::vector::{self, Instructions, Number, Registers, Task};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -138,7 +138,7 @@ impl Preconditioner {
     }
 
     /// Approximates `out = (1 + lambda M)^-1 r`.
-    pub fn apply(&self, lambda: f64, r: &[f64], out: &mut [f64]) {
+    pub fn apply<N: Number>(&self, lambda: f64, r: &[N], out: &mut [N]) {
         out.copy_from_slice(r);
         let mut components = vector::run(Components { basis: self, r });
         for ((c, e), unit) in components.iter_mut().zip(&self.eigenvalues).zip(&self.units) {
@@ -194,12 +194,12 @@ fn krylov(n: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -
 struct Sums([f32; PARTS]);
 
 /// Scalar products of `r` with the eigenvectors, in units of each; single precision suffices for an approximate inverse.
-struct Components<'a> {
+struct Components<'a, N> {
     basis: &'a Preconditioner,
-    r: &'a [f64],
+    r: &'a [N],
 }
 
-impl Task for Components<'_> {
+impl<N: Number> Task for Components<'_, N> {
     type Output = Vec<f32>;
 
     #[inline(always)]
@@ -209,7 +209,8 @@ impl Task for Components<'_> {
         for (pixels, rows) in self.basis.groups() {
             let mut r = [0.0; LANES];
             for (r, p) in r.iter_mut().zip(pixels) {
-                *r = self.r[*p as usize] as f32;
+                let number: f64 = self.r[*p as usize].into();
+                *r = number as f32;
             }
             for first in (0..PARTS).step_by(I::Broad::LANES) {
                 let mut parts = [singles.splat(0.0); LANES / PARTS];
@@ -233,14 +234,14 @@ impl Task for Components<'_> {
 const WIDE: usize = 4;
 
 /// Subtracts a combination of the eigenvectors from `out`.
-struct Subtract<'a> {
+struct Subtract<'a, N> {
     basis: &'a Preconditioner,
     /// In units of each eigenvector.
     components: &'a [f32],
-    out: &'a mut [f64],
+    out: &'a mut [N],
 }
 
-impl Task for Subtract<'_> {
+impl<N: Number> Task for Subtract<'_, N> {
     type Output = ();
 
     #[inline(always)]
@@ -262,7 +263,8 @@ impl Task for Subtract<'_> {
                 }
             }
             for (subtracted, pixel) in subtracted.into_iter().zip(pixels) {
-                self.out[*pixel as usize] -= f64::from(subtracted);
+                let out = &mut self.out[*pixel as usize];
+                *out = *out - N::of(f64::from(subtracted));
             }
         }
     }

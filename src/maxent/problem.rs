@@ -1,5 +1,7 @@
 //! What an inversion needs to know of its data: a misfit, its gradient and its curvature, as functions of an image.
 
+use crate::vector::Number;
+
 /// Which second derivative of the misfit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Curvature {
@@ -7,15 +9,6 @@ pub enum Curvature {
     Exact,
     /// Of the misfit of the linearised model: never negative, however bad the fit.
     GaussNewton,
-}
-
-/// Arithmetic of a curvature.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
-    /// To rounding error.
-    Double,
-    /// To six digits of the largest, in half the time.
-    Single,
 }
 
 /// A twice differentiable misfit `chi2(s)` of an image s.
@@ -32,8 +25,8 @@ pub trait Problem {
     /// Gradient of chi2 / 2.
     fn gradient(&mut self, out: &mut [f64]);
 
-    /// Second derivative of chi2 / 2 times `v`.
-    fn curvature(&mut self, which: Curvature, precision: Precision, v: &[f64], out: &mut [f64]);
+    /// Second derivative of chi2 / 2 times `v`, in the precision of `v`.
+    fn curvature<N: Number>(&mut self, which: Curvature, v: &[N], out: &mut [N]);
 
     /// Applications of the response or its transpose so far.
     fn passes(&self) -> u32;

@@ -10,9 +10,10 @@
 use super::cg::{self, CgLimits};
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
-use super::problem::{Curvature, Precision, Problem};
+use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing, lambda_step};
+use crate::vector::Number;
 use crate::vector::linear::{axpy, combine_two, dot};
 
 /// Largest change of a coordinate in one step.
@@ -27,7 +28,7 @@ const KNOWN_PATH_STEPS: usize = 6;
 /// An error below this part of chi2 is rounding, and no step makes it smaller.
 const ROUNDING: f64 = 1.5e-12;
 
-/// Systems that are solved to this residual or a larger one are applied in single precision.
+/// Systems that are solved to this residual or a larger one are solved in single precision.
 const LOOSE: f64 = 3e-3;
 
 /// The exact curvature is used once a step is worth less than this in `S/lambda - chi2/2`.
@@ -46,9 +47,9 @@ pub struct Solver<'a> {
 
 /// A Newton system in the entropy's metric.
 #[derive(Clone, Copy)]
-struct System<'a> {
+struct System<'a, N = f64> {
     lambda: f64,
-    scale: &'a [f64],
+    scale: &'a [N],
     curvature: Curvature,
 }
 
@@ -190,17 +191,33 @@ impl Solver<'_> {
         Newton { decrement: dot(&step, &right).max(0.0), step, move_lambda }
     }
 
+    /// Solves a system from the start `z`.
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f64], z: &mut [f64]) {
+        if self.settings.cg_tolerance < LOOSE {
+            return self.solve_with(problem, system, right, z);
+        }
+        // right-hand sides come with a norm of 1, for nothing to be too small or too large
+        let norm = dot(right, right).sqrt();
+        let per_norm = if norm == 0.0 { 0.0 } else { norm.recip() };
+        let single = |x: &[f64], factor: f64| x.iter().map(|x| (factor * x) as f32).collect::<Vec<f32>>();
+        let scale = &single(system.scale, 1.0);
+        let mut of_one = single(z, per_norm);
+        let System { lambda, curvature, .. } = system;
+        self.solve_with(problem, System { lambda, scale, curvature }, &single(right, per_norm), &mut of_one);
+        z.iter_mut().zip(of_one).for_each(|(z, of_one)| *z = norm * f64::from(of_one));
+    }
+
+    /// The same in the precision of its numbers.
+    fn solve_with<N: Number>(&self, problem: &mut impl Problem, system: System<N>, right: &[N], z: &mut [N]) {
         let System { lambda, scale, curvature } = system;
-        let mut scaled = vec![0.0; right.len()];
-        let loose = self.settings.cg_tolerance >= LOOSE;
-        let precision = if loose { Precision::Single } else { Precision::Double };
-        let apply = |v: &[f64], out: &mut [f64]| {
+        let mut scaled = vec![N::default(); right.len()];
+        let factor = N::of(lambda);
+        let apply = |v: &[N], out: &mut [N]| {
             combine_two(&mut scaled, v, scale, |_, v, scale| v * scale);
-            problem.curvature(curvature, precision, &scaled, out);
-            combine_two(out, v, scale, |out, v, scale| v + lambda * scale * out);
+            problem.curvature(curvature, &scaled, out);
+            combine_two(out, v, scale, |out, v, scale| v + factor * scale * out);
         };
-        let precondition = |r: &[f64], out: &mut [f64]| self.preconditioner.apply(lambda, r, out);
+        let precondition = |r: &[N], out: &mut [N]| self.preconditioner.apply(lambda, r, out);
         let limits = CgLimits { tolerance: self.settings.cg_tolerance, iterations: self.settings.cg_iterations };
         cg::solve(apply, precondition, right, z, limits);
     }

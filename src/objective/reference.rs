@@ -8,7 +8,7 @@ use super::parameters::ParameterValues;
 use super::tradeoff::{Node, TradeOff};
 use crate::imaging::Imager;
 use crate::maxent::{
-    Best, Curvature, Goal, Precision, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
+    Best, Curvature, Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
 };
 use crate::star::Response;
 use std::sync::Arc;
@@ -253,12 +253,12 @@ pub(super) fn start(solution: &Solution) -> Start {
 pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
     let s = imager.entropy.image(&at.image.coordinates);
     let scale = imager.entropy.metric(&s, problem.area());
-    let (n, mut scaled) = (s.len(), vec![0.0; s.len()]);
+    let (n, mut scaled, mut curved) = (s.len(), vec![0.0f32; s.len()], vec![0.0f32; s.len()]);
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
-        scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = v * d);
-        problem.curvature(Curvature::Exact, Precision::Single, &scaled, out);
-        out.iter_mut().zip(&scale).for_each(|(x, d)| *x *= d);
+        scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = (v * d) as f32);
+        problem.curvature(Curvature::Exact, &scaled, &mut curved);
+        out.iter_mut().zip(&curved).zip(&scale).for_each(|((out, x), d)| *out = f64::from(*x) * d);
     })
 }
 

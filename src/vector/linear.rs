@@ -2,62 +2,64 @@
 //!
 //! Left out: matrices.
 
-use super::{Instructions, Task};
+use super::{Instructions, Number, Task};
 
 /// Numbers that are summed side by side, whatever the instructions.
 const PARTS: usize = 32;
 
 /// Scalar product of rows of one length.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub fn dot<N: Number>(a: &[N], b: &[N]) -> f64 {
     assert_eq!(a.len(), b.len());
     super::run(Dot { a, b })
 }
 
 /// `y += scale x`.
-pub fn axpy(scale: f64, x: &[f64], y: &mut [f64]) {
+pub fn axpy<N: Number>(scale: f64, x: &[N], y: &mut [N]) {
+    let scale = N::of(scale);
     combine(y, x, |y, x| y + scale * x);
 }
 
 /// `y = f(y, x)`, number by number.
-pub fn combine(y: &mut [f64], x: &[f64], f: impl Fn(f64, f64) -> f64) {
+pub fn combine<N: Number>(y: &mut [N], x: &[N], f: impl Fn(N, N) -> N) {
     assert_eq!(y.len(), x.len());
     super::run(Combine { y, x, f });
 }
 
 /// `z = f(z, x, y)`, number by number.
-pub fn combine_two(z: &mut [f64], x: &[f64], y: &[f64], f: impl Fn(f64, f64, f64) -> f64) {
+pub fn combine_two<N: Number>(z: &mut [N], x: &[N], y: &[N], f: impl Fn(N, N, N) -> N) {
     assert!(z.len() == x.len() && z.len() == y.len());
     super::run(CombineTwo { z, x, y, f });
 }
 
-struct Dot<'a> {
-    a: &'a [f64],
-    b: &'a [f64],
+struct Dot<'a, N> {
+    a: &'a [N],
+    b: &'a [N],
 }
 
-impl Task for Dot<'_> {
+impl<N: Number> Task for Dot<'_, N> {
     type Output = f64;
 
     #[inline(always)]
     fn run<I: Instructions>(self, i: I) -> f64 {
-        let mut sums = [0.0; PARTS];
+        let mut sums = [N::default(); PARTS];
         let ((a, rest_a), (b, rest_b)) = (self.a.as_chunks::<PARTS>(), self.b.as_chunks::<PARTS>());
         for (a, b) in a.iter().zip(b) {
             for k in 0..PARTS {
-                sums[k] = i.multiply_add(a[k], b[k], sums[k]);
+                sums[k] = N::multiply_add(i, a[k], b[k], sums[k]);
             }
         }
-        sums.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
+        let rest = rest_a.iter().zip(rest_b).map(|(a, b)| *a * *b);
+        sums.into_iter().map(Into::into).sum::<f64>() + rest.map(Into::into).sum::<f64>()
     }
 }
 
-struct Combine<'a, F> {
-    y: &'a mut [f64],
-    x: &'a [f64],
+struct Combine<'a, N, F> {
+    y: &'a mut [N],
+    x: &'a [N],
     f: F,
 }
 
-impl<F: Fn(f64, f64) -> f64> Task for Combine<'_, F> {
+impl<N: Number, F: Fn(N, N) -> N> Task for Combine<'_, N, F> {
     type Output = ();
 
     #[inline(always)]
@@ -66,14 +68,14 @@ impl<F: Fn(f64, f64) -> f64> Task for Combine<'_, F> {
     }
 }
 
-struct CombineTwo<'a, F> {
-    z: &'a mut [f64],
-    x: &'a [f64],
-    y: &'a [f64],
+struct CombineTwo<'a, N, F> {
+    z: &'a mut [N],
+    x: &'a [N],
+    y: &'a [N],
     f: F,
 }
 
-impl<F: Fn(f64, f64, f64) -> f64> Task for CombineTwo<'_, F> {
+impl<N: Number, F: Fn(N, N, N) -> N> Task for CombineTwo<'_, N, F> {
     type Output = ();
 
     #[inline(always)]

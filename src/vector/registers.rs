@@ -6,9 +6,13 @@
 mod x86;
 
 use super::{Instructions, Portable, sealed};
+use std::ops::{Add, Mul, Sub};
 
 /// A number in one of two precisions.
-pub trait Number: Copy + Default + Into<f64> + sealed::Sealed {
+pub trait Number: Copy + Default + Arithmetic + PartialEq + Into<f64> + sealed::Sealed {
+    /// Whether it has single precision.
+    const SINGLE: bool;
+
     /// Registers of such numbers.
     type Of<I: Instructions>: Scattered<Number = Self>;
 
@@ -17,7 +21,15 @@ pub trait Number: Copy + Default + Into<f64> + sealed::Sealed {
 
     /// The nearest number.
     fn of(x: f64) -> Self;
+
+    /// `a b + c`, fused where the processor can.
+    fn multiply_add(instructions: impl Instructions, a: Self, b: Self, c: Self) -> Self;
 }
+
+/// Sums, differences and products.
+pub trait Arithmetic: Sized + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+
+impl<N: Add<Output = N> + Sub<Output = N> + Mul<Output = N>> Arithmetic for N {}
 
 /// Arithmetic on numbers side by side; having it at hand proves that the processor has the instructions.
 pub trait Registers: Copy + sealed::Sealed {
@@ -81,6 +93,7 @@ pub struct Doubles<I>(I);
 pub struct Singles<I>(I);
 
 impl Number for f64 {
+    const SINGLE: bool = false;
     type Of<I: Instructions> = I::Doubles;
 
     #[inline(always)]
@@ -92,9 +105,15 @@ impl Number for f64 {
     fn of(x: f64) -> f64 {
         x
     }
+
+    #[inline(always)]
+    fn multiply_add(instructions: impl Instructions, a: f64, b: f64, c: f64) -> f64 {
+        instructions.multiply_add(a, b, c)
+    }
 }
 
 impl Number for f32 {
+    const SINGLE: bool = true;
     type Of<I: Instructions> = I::Singles;
 
     #[inline(always)]
@@ -105,6 +124,11 @@ impl Number for f32 {
     #[inline(always)]
     fn of(x: f64) -> f32 {
         x as f32
+    }
+
+    #[inline(always)]
+    fn multiply_add(instructions: impl Instructions, a: f32, b: f32, c: f32) -> f32 {
+        instructions.multiply_add_single(a, b, c)
     }
 }
 
