@@ -134,32 +134,63 @@ fn agree_and_are_precise(posteriors: &[Posterior]) {
     }
 }
 
-/// A solver that takes whatever it starts from leaves the prediction as it is: its error is of second order, in image and lambda.
+/// Errors of predictions at `theta`: of the map, in its metric at the start, and of ln(lambda). A solver that takes whatever it starts
+/// from leaves the prediction as it is.
+fn prediction_errors(posterior: &Posterior, theta: &[f64]) -> [f64; 2] {
+    let careless = SolverSettings { tolerance: f64::INFINITY, ..SolverSettings::default() };
+    let predicted = posterior.clone().with_settings(careless);
+    let exact = posterior.clone().with_settings(SolverSettings::exact());
+    let imager = exact.imager();
+    let map = |posterior: &Posterior, theta: &[f64]| {
+        let image = posterior.reconstruct(theta).0.image;
+        (imager.entropy.image(&image.coordinates), image.lambda.ln())
+    };
+    let scale = imager.entropy.metric(&map(&exact, &exact.space().start()).0, &imager.grid.area);
+    let ((a, lambda_a), (b, lambda_b)) = (map(&predicted, theta), map(&exact, theta));
+    let image = (0..a.len()).map(|p| ((a[p] - b[p]) / scale[p]).powi(2)).sum::<f64>().sqrt();
+    [image, (lambda_a - lambda_b).abs()]
+}
+
+/// Their errors are of second order, in image and lambda.
 #[test]
 fn predictions_are_right_to_first_order() {
     for entropy in MAPS {
         let posterior = posteriors(entropy).swap_remove(0);
-        let careless = SolverSettings { tolerance: f64::INFINITY, ..SolverSettings::default() };
-        let predicted = posterior.clone().with_settings(careless);
-        let exact = posterior.with_settings(SolverSettings::exact());
-        let (imager, start) = (exact.imager(), exact.space().start());
-        let map = |posterior: &Posterior, theta: &[f64]| {
-            let image = posterior.reconstruct(theta).0.image;
-            (imager.entropy.image(&image.coordinates), image.lambda.ln())
-        };
-        let scale = imager.entropy.metric(&map(&exact, &start).0, &imager.grid.area);
         // K and systemic velocity by 0.4 standard errors, in which no pixels come into sight
         for (j, step) in [(0, 0.004), (7, 0.003)] {
             let errors = [1.0, 2.0].map(|steps| {
-                let mut theta = start.clone();
+                let mut theta = posterior.space().start();
                 theta[j] += steps * step;
-                let ((a, lambda_a), (b, lambda_b)) = (map(&predicted, &theta), map(&exact, &theta));
-                let image = (0..a.len()).map(|p| ((a[p] - b[p]) / scale[p]).powi(2)).sum::<f64>().sqrt();
-                [image, (lambda_a - lambda_b).abs()]
+                prediction_errors(&posterior, &theta)
             });
             println!("{j}: {errors:?}");
             // twice the step, four times the error: an error of first order would double, those of third order are smaller
             assert!((0..2).all(|i| (errors[1][i] / errors[0][i] - 4.0).abs() < 0.6), "{j}: {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn predictions_of_orbits_alone_are_right_to_second_order() {
+    for entropy in MAPS {
+        let (imager, space, reference) = setup(entropy);
+        let orbit = |parameter: Parameter| parameter.only_shifts();
+        let free: Vec<FreeParameter> = space.free().iter().filter(|f| orbit(f.parameter)).cloned().collect();
+        let only_orbit =
+            ParameterSpace::new(free, reference.values, imager.mid_cycle(), imager.time_base_cycles(), 3.0);
+        let kind = ObjectiveKind::Spottedness;
+        let [first, second] =
+            [space, only_orbit].map(|space| Posterior::new(imager.clone(), space, kind, reference.clone()));
+        // about a standard error, one by one and together
+        for offset in [[0.01, 0.0, 0.0, 0.0], [0.0, 0.06, 0.0, 0.0], [-0.007, -0.04, 0.02, 0.005]] {
+            let errors = [&first, &second].map(|posterior| {
+                let mut theta = posterior.space().start();
+                let last = theta.len() - 1;
+                [0, 1, 2, last].into_iter().zip(offset).for_each(|(j, offset)| theta[j] += offset);
+                prediction_errors(posterior, &theta)
+            });
+            println!("{offset:?}: {errors:?}");
+            assert!((0..2).all(|i| errors[1][i] < 0.1 * errors[0][i]), "{offset:?}: {errors:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Footholds: images that evaluations nearby start from, each with its preconditioner and what a first-order prediction needs.
+//! Footholds: images that evaluations nearby start from, each with its preconditioner and what a prediction needs.
 //!
 //! The reference is one. Far from it a Newton system is no longer close to the one that its preconditioner inverts, and an
 //! evaluation takes hundreds of passes instead of tens; another foothold there brings it down again, for the passes of about

@@ -1,14 +1,17 @@
-//! A first-order prediction of image and lambda from a known solution: how both change with each parameter (method section 2).
+//! A prediction of image and lambda from a known solution: how both change with each parameter (method section 2), to first or to
+//! second order.
 //!
 //! The solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term
-//! set so that chi2 stays at the target (or left out at a fixed lambda). It is where an evaluation starts, and saves it a
-//! Newton step or two; what it ends at does not depend on it beyond the solver's tolerance. Left out: the solver.
+//! set so that chi2 stays at the target (or left out at a fixed lambda). What that leaves over is taken from solutions near by. It is
+//! where an evaluation starts, and saves it a Newton step or two; what it ends at does not depend on it beyond the solver's tolerance.
+//! Left out: the solver.
 
 use super::coordinates::ParameterSpace;
 use super::kind::ObjectiveKind;
 use crate::imaging::Imager;
-use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start};
+use crate::maxent::{Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start};
 use crate::star::Response;
+use crate::vector::linear::axpy;
 
 /// Derivatives of a solution with respect to internal coordinates.
 #[derive(Clone, Debug)]
@@ -25,6 +28,16 @@ pub struct Prediction {
     ln_lambda: Vec<f64>,
     /// Adjoint of spottedness at fixed chi2, as [`Start::adjoint`]; empty where spottedness does not matter.
     adjoint: Vec<f64>,
+    /// Second order, pair by pair of coordinates; empty where it is not known.
+    bends: Vec<Bend>,
+}
+
+/// What the first order leaves over, per unit of the product of two coordinates.
+#[derive(Clone, Debug)]
+struct Bend {
+    coordinates: [usize; 2],
+    /// Of the image's coordinates, and of ln(lambda) behind them.
+    change: Vec<f32>,
 }
 
 /// Numerical derivatives step by this share of a coordinate's natural scale.
@@ -32,6 +45,12 @@ const STEP: f64 = 0.05;
 
 /// Predictions reach this many natural scales in any coordinate; beyond, they are followed no further.
 const REACH: f64 = 3.0;
+
+/// Solutions for the second order are so many natural scales away.
+const BEND_STEP: f64 = 0.4;
+
+/// Largest change of a coordinate of the image by either order.
+const LARGEST_STEP: f64 = 1.0;
 
 /// Largest change of ln(lambda) that is predicted.
 const LN_LAMBDA_REACH: f64 = 1.0;
@@ -109,18 +128,53 @@ impl Prediction {
             image.push(step);
             ln_lambda.push(along);
         }
-        Prediction { origin, map, scales, image, ln_lambda, adjoint }
+        Prediction { origin, map, scales, image, ln_lambda, adjoint, bends: Vec::new() }
+    }
+
+    /// The same to second order, with `solve` giving the images at internal coordinates around that of the solution and `known` as in
+    /// [`Prediction::start`]; to first order where an image is missing.
+    pub fn with_second_order(self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Self {
+        let bends = self.find_bends(imager, known, solve).unwrap_or_default();
+        Prediction { bends, ..self }
+    }
+
+    fn find_bends(&self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Option<Vec<Bend>> {
+        let steps: Vec<f64> = self.scales.iter().map(|scale| BEND_STEP * scale).collect();
+        // what the first order leaves over after a step forwards or backwards along some of the coordinates
+        let left_over = |moves: &[(usize, f64)]| {
+            let mut x = self.origin.clone();
+            moves.iter().for_each(|(i, sign)| x[*i] += sign * steps[*i]);
+            let (there, predicted) = (solve(&x)?, self.start(imager, known, &x).image);
+            let mut left: Vec<f64> = there.coordinates.iter().zip(&predicted.coordinates).map(|(a, b)| a - b).collect();
+            left.push((there.lambda / predicted.lambda).ln());
+            Some(left)
+        };
+        let (mut bends, mut forwards): (Vec<Bend>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+        for i in 0..steps.len() {
+            let mut bend = |j: usize, change: &dyn Fn(usize) -> f64| {
+                let change = (0..=self.map.len()).map(|p| (change(p) / (steps[i] * steps[j])) as f32).collect();
+                bends.push(Bend { coordinates: [i, j], change });
+            };
+            let (forward, backward) = (left_over(&[(i, 1.0)])?, left_over(&[(i, -1.0)])?);
+            bend(i, &|p| 0.5 * (forward[p] + backward[p]));
+            for (j, other) in forwards.iter().enumerate() {
+                let both = left_over(&[(i, 1.0), (j, 1.0)])?;
+                bend(j, &|p| both[p] - forward[p] - other[p]);
+            }
+            forwards.push(forward);
+        }
+        Some(bends)
     }
 
     /// Whether all its numbers are finite.
     pub fn is_finite(&self) -> bool {
         let all = self.image.iter().flatten().chain(&self.ln_lambda).chain(&self.adjoint);
-        all.copied().all(f64::is_finite)
+        all.copied().all(f64::is_finite) && self.bends.iter().flat_map(|bend| &bend.change).all(|x| x.is_finite())
     }
 
-    /// Number of vectors that are as long as an image.
+    /// Number of vectors in double precision that are as long as an image.
     pub fn images(&self) -> usize {
-        2 + self.image.len()
+        2 + self.image.len() + self.bends.len().div_ceil(2)
     }
 
     /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
@@ -137,7 +191,18 @@ impl Prediction {
             ds.iter_mut().zip(image).for_each(|(ds, step)| *ds += shift * step);
         }
         let here = &known.image.coordinates;
-        imager.entropy.step(here, &self.map, &ds, 1.0, 1.0, &mut start.image.coordinates);
+        imager.entropy.step(here, &self.map, &ds, 1.0, LARGEST_STEP, &mut start.image.coordinates);
+        if !self.bends.is_empty() {
+            let mut change = vec![0.0f32; n + 1];
+            for Bend { coordinates: [i, j], change: per_product } in &self.bends {
+                axpy(shrink * shifts[*i] * shrink * shifts[*j], per_product, &mut change);
+            }
+            let limit = -imager.entropy.lowest_coordinate();
+            for (u, change) in start.image.coordinates.iter_mut().zip(&change) {
+                *u = (*u + f64::from(*change).clamp(-LARGEST_STEP, LARGEST_STEP)).clamp(-limit, limit);
+            }
+            ln_lambda += f64::from(change[n]);
+        }
         start.image.lambda *= ln_lambda.clamp(-LN_LAMBDA_REACH, LN_LAMBDA_REACH).exp();
         start
     }
