@@ -199,12 +199,12 @@ impl Solver<'_> {
         // right-hand sides come with a norm of 1, for nothing to be too small or too large
         let norm = dot(right, right).sqrt();
         let per_norm = if norm == 0.0 { 0.0 } else { norm.recip() };
-        let single = |x: &[f64], factor: f64| x.iter().map(|x| (factor * x) as f32).collect::<Vec<f32>>();
+        let single = |x: &[f64], unit: f64| x.iter().map(|x| (unit * x) as f32).collect::<Vec<f32>>();
         let scale = &single(system.scale, 1.0);
-        let mut of_one = single(z, per_norm);
+        let mut of_unit = single(z, per_norm);
         let System { lambda, curvature, .. } = system;
-        self.solve_with(problem, System { lambda, scale, curvature }, &single(right, per_norm), &mut of_one);
-        z.iter_mut().zip(of_one).for_each(|(z, of_one)| *z = norm * f64::from(of_one));
+        self.solve_with(problem, System { lambda, scale, curvature }, &single(right, per_norm), &mut of_unit);
+        z.iter_mut().zip(of_unit).for_each(|(z, of_unit)| *z = norm * f64::from(of_unit));
     }
 
     /// The same in the precision of its numbers.

@@ -57,7 +57,7 @@ impl Posterior {
         let (theta, solution) = (space.theta_of(&reference.values), &reference.solution);
         let (response, preconditioner) = (&reference.response, reference.preconditioner.clone());
         let mut foothold = posterior.foothold(theta, response, solution, preconditioner);
-        if velocities_only {
+        if velocities_only && kind != ObjectiveKind::RegularisedLikelihood {
             foothold.prediction = posterior.second_order(&foothold);
         }
         posterior.footholds = vec![foothold];
@@ -133,12 +133,13 @@ impl Posterior {
     }
 
     /// A foothold's prediction to second order. For orbits around the reference it is worth its passes (those of an evaluation become a
-    /// quarter fewer). Rotation, inclination and vsini change maps too much within their errors: in 7-D it saves none.
+    /// quarter fewer). Rotation, inclination and vsini change maps too much within their errors: in 7-D it saves none; nor does it
+    /// at a fixed lambda, where the first order leaves little.
     fn second_order(&self, foothold: &Foothold) -> Prediction {
         let settings = SolverSettings { tolerance: BEND_TOLERANCE, leniency: 0.0, ..SolverSettings::patient() };
         let solve = |x: &[f64]| {
             let theta = Some(self.space.to_written(x)).filter(|theta| self.is_physical(theta))?;
-            let solution = self.reconstruct_from(foothold, &theta, settings).0;
+            let solution = self.solve_near(foothold, &theta, settings, &mut self.imager.problem(self.response(&theta)));
             (solution.termination == Termination::Converged).then_some(solution.image)
         };
         foothold.prediction.clone().with_second_order(&self.imager, &foothold.start, solve)
@@ -207,32 +208,32 @@ impl Posterior {
 
     /// The reconstruction at `theta`, whatever the prior says.
     pub fn reconstruct(&self, theta: &[f64]) -> (Solution, ImagingProblem<'_>) {
-        self.reconstruct_from(self.nearest(theta), theta, self.settings)
-    }
-
-    /// The same from a given foothold.
-    fn reconstruct_from(
-        &self,
-        foothold: &Foothold,
-        theta: &[f64],
-        settings: SolverSettings,
-    ) -> (Solution, ImagingProblem<'_>) {
         let mut problem = self.imager.problem(self.response(theta));
-        let few_steps = SolverSettings { newton_steps: NEWTON_STEPS, ..settings };
-        let near =
-            Solver { preconditioner: &foothold.preconditioner, settings: few_steps, entropy: self.imager.entropy };
-        let internal = self.space.to_internal(theta);
-        let start = foothold.prediction.start(&self.imager, &foothold.start, &internal);
-        let solution = near.solve(&mut problem, self.goal(), &start);
+        let solution = self.solve_near(self.nearest(theta), theta, self.settings, &mut problem);
         if solution.termination != Termination::StepLimit {
             return (solution, problem);
         }
         // so far from all footholds that a blank star is the better start
         let none = Preconditioner::identity();
-        let settings = SolverSettings { cg_iterations: SolverSettings::patient().cg_iterations, ..settings };
-        let far = Solver { preconditioner: &none, settings, ..near };
+        let settings = SolverSettings { cg_iterations: SolverSettings::patient().cg_iterations, ..self.settings };
+        let far = Solver { preconditioner: &none, settings, entropy: self.imager.entropy };
         let solution = far.solve(&mut problem, self.goal(), &self.reference.blank(&self.imager));
         (solution, problem)
+    }
+
+    /// The solution of the problem at `theta` from a foothold, in a few steps or not at all.
+    fn solve_near(
+        &self,
+        foothold: &Foothold,
+        theta: &[f64],
+        settings: SolverSettings,
+        problem: &mut ImagingProblem,
+    ) -> Solution {
+        let settings = SolverSettings { newton_steps: NEWTON_STEPS, ..settings };
+        let near = Solver { preconditioner: &foothold.preconditioner, settings, entropy: self.imager.entropy };
+        let internal = self.space.to_internal(theta);
+        let start = foothold.prediction.start(&self.imager, &foothold.start, &internal);
+        near.solve(problem, self.goal(), &start)
     }
 
     /// The evaluation that a reconstruction of so many passes makes with its prior.

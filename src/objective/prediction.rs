@@ -32,7 +32,7 @@ pub struct Prediction {
     bends: Vec<Bend>,
 }
 
-/// What the first order leaves over, per unit of the product of two coordinates.
+/// What the first order leaves over, per product of two coordinates in natural scales.
 #[derive(Clone, Debug)]
 struct Bend {
     coordinates: [usize; 2],
@@ -48,6 +48,9 @@ const REACH: f64 = 3.0;
 
 /// Solutions for the second order are so many natural scales away.
 const BEND_STEP: f64 = 0.4;
+
+/// The second order is followed no farther than this many natural scales: beyond, it takes passes instead of saving them.
+const BEND_REACH: f64 = 1.5;
 
 /// Largest change of a coordinate of the image by either order.
 const LARGEST_STEP: f64 = 1.0;
@@ -134,25 +137,26 @@ impl Prediction {
     /// The same to second order, with `solve` giving the images at internal coordinates around that of the solution and `known` as in
     /// [`Prediction::start`]; to first order where an image is missing.
     pub fn with_second_order(self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Self {
-        let bends = self.find_bends(imager, known, solve).unwrap_or_default();
+        let is_finite = |bend: &Bend| bend.change.iter().all(|x| x.is_finite());
+        let found = self.find_bends(imager, known, solve);
+        let bends = found.filter(|bends| bends.iter().all(is_finite)).unwrap_or_default();
         Prediction { bends, ..self }
     }
 
     fn find_bends(&self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Option<Vec<Bend>> {
-        let steps: Vec<f64> = self.scales.iter().map(|scale| BEND_STEP * scale).collect();
         // what the first order leaves over after a step forwards or backwards along some of the coordinates
         let left_over = |moves: &[(usize, f64)]| {
             let mut x = self.origin.clone();
-            moves.iter().for_each(|(i, sign)| x[*i] += sign * steps[*i]);
+            moves.iter().for_each(|(i, sign)| x[*i] += sign * BEND_STEP * self.scales[*i]);
             let (there, predicted) = (solve(&x)?, self.start(imager, known, &x).image);
             let mut left: Vec<f64> = there.coordinates.iter().zip(&predicted.coordinates).map(|(a, b)| a - b).collect();
             left.push((there.lambda / predicted.lambda).ln());
             Some(left)
         };
         let (mut bends, mut forwards): (Vec<Bend>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
-        for i in 0..steps.len() {
+        for i in 0..self.scales.len() {
             let mut bend = |j: usize, change: &dyn Fn(usize) -> f64| {
-                let change = (0..=self.map.len()).map(|p| (change(p) / (steps[i] * steps[j])) as f32).collect();
+                let change = (0..=self.map.len()).map(|p| (change(p) / BEND_STEP.powi(2)) as f32).collect();
                 bends.push(Bend { coordinates: [i, j], change });
             };
             let (forward, backward) = (left_over(&[(i, 1.0)])?, left_over(&[(i, -1.0)])?);
@@ -166,15 +170,15 @@ impl Prediction {
         Some(bends)
     }
 
-    /// Whether all its numbers are finite.
+    /// Whether all its numbers are finite; those of the second order always are.
     pub fn is_finite(&self) -> bool {
         let all = self.image.iter().flatten().chain(&self.ln_lambda).chain(&self.adjoint);
-        all.copied().all(f64::is_finite) && self.bends.iter().flat_map(|bend| &bend.change).all(|x| x.is_finite())
+        all.copied().all(f64::is_finite)
     }
 
-    /// Number of vectors in double precision that are as long as an image.
+    /// Number of vectors that are as long as an image, but for those of the second order.
     pub fn images(&self) -> usize {
-        2 + self.image.len() + self.bends.len().div_ceil(2)
+        2 + self.image.len()
     }
 
     /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
@@ -194,12 +198,14 @@ impl Prediction {
         imager.entropy.step(here, &self.map, &ds, 1.0, LARGEST_STEP, &mut start.image.coordinates);
         if !self.bends.is_empty() {
             let mut change = vec![0.0f32; n + 1];
+            let shrink = (BEND_REACH / farthest).min(1.0);
+            let bent: Vec<f64> = shifts.iter().zip(&self.scales).map(|(d, s)| shrink * d / s).collect();
             for Bend { coordinates: [i, j], change: per_product } in &self.bends {
-                axpy(shrink * shifts[*i] * shrink * shifts[*j], per_product, &mut change);
+                axpy(bent[*i] * bent[*j], per_product, &mut change);
             }
-            let limit = -imager.entropy.lowest_coordinate();
+            let lowest = imager.entropy.lowest_coordinate();
             for (u, change) in start.image.coordinates.iter_mut().zip(&change) {
-                *u = (*u + f64::from(*change).clamp(-LARGEST_STEP, LARGEST_STEP)).clamp(-limit, limit);
+                *u = (*u + f64::from(*change).clamp(-LARGEST_STEP, LARGEST_STEP)).clamp(lowest, -lowest);
             }
             ln_lambda += f64::from(change[n]);
         }

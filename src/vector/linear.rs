@@ -91,14 +91,19 @@ mod tests {
 
     #[test]
     fn scalar_products_and_combinations_of_any_length() {
+        of_any_length::<f64>();
+        of_any_length::<f32>();
+    }
+
+    fn of_any_length<N: Number>() {
         for n in [0, 1, 31, 32, 33, 100] {
-            let x: Vec<f64> = (0..n).map(f64::from).collect();
-            assert_eq!(dot(&x, &vec![2.0; x.len()]), f64::from(n * (n - 1)));
-            let mut y = vec![1.0; x.len()];
+            let x: Vec<N> = (0..n).map(|i| N::of(f64::from(i))).collect();
+            assert_eq!(dot(&x, &vec![N::of(2.0); x.len()]), f64::from(n * (n - 1)));
+            let mut y = vec![N::of(1.0); x.len()];
             axpy(3.0, &x, &mut y);
-            assert!(y.iter().zip(&x).all(|(y, x)| *y == 1.0 + 3.0 * x));
-            combine_two(&mut y, &x, &x, |y, a, b| y - a - 2.0 * b);
-            assert!(y.iter().all(|y| *y == 1.0));
+            assert!(y.iter().zip(&x).all(|(y, x)| (*y).into() == 1.0 + 3.0 * (*x).into()));
+            combine_two(&mut y, &x, &x, |y, a, b| y - a - N::of(2.0) * b);
+            assert!(y.iter().all(|y| *y == N::of(1.0)));
         }
     }
 }

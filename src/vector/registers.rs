@@ -9,7 +9,9 @@ use super::{Instructions, Portable, sealed};
 use std::ops::{Add, Mul, Sub};
 
 /// A number in one of two precisions.
-pub trait Number: Copy + Default + Arithmetic + PartialEq + Into<f64> + sealed::Sealed {
+pub trait Number:
+    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Into<f64> + sealed::Sealed
+{
     /// Whether it has single precision.
     const SINGLE: bool;
 
@@ -25,11 +27,6 @@ pub trait Number: Copy + Default + Arithmetic + PartialEq + Into<f64> + sealed::
     /// `a b + c`, fused where the processor can.
     fn multiply_add(instructions: impl Instructions, a: Self, b: Self, c: Self) -> Self;
 }
-
-/// Sums, differences and products.
-pub trait Arithmetic: Sized + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
-
-impl<N: Add<Output = N> + Sub<Output = N> + Mul<Output = N>> Arithmetic for N {}
 
 /// Arithmetic on numbers side by side; having it at hand proves that the processor has the instructions.
 pub trait Registers: Copy + sealed::Sealed {

@@ -55,7 +55,7 @@ impl Entropy {
         }
     }
 
-    /// Bound of the coordinates, below which no step leads: the image is as good as 0 there.
+    /// Bound of the coordinates, below which no step leads: the image is as good as 0 there. The upper bound is as far from 0.
     pub fn lowest_coordinate(&self) -> f64 {
         match self {
             Entropy::Spots { .. } => -spots::LOGIT_LIMIT,
