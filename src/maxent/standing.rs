@@ -34,7 +34,7 @@ const BOUND_ERROR: f64 = 0.3;
 /// Error of the forecast of spottedness from what the preconditioner's eigenvectors do not span, over the merit of that: pixels
 /// that become spotted, where spottedness is far from linear. Like the constant above it was measured against exact
 /// solutions on the paper's setup, in three and seven dimensions.
-const REST_ERROR: f64 = 80.0;
+const REST_ERROR: f64 = 40.0;
 
 /// An image with what has been computed there.
 pub(super) struct Point {
