@@ -257,10 +257,10 @@ impl Problem for ImagingProblem<'_> {
         self.passes += 2;
         self.single_passes += if N::SINGLE { 2 } else { 0 };
         let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
-        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
-        let weighed = &mut self.bins;
+        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, bins: weighed, .. } =
+            self;
         let slope = self.brightness_of.slope;
-        let weigh = |k: usize, line: &mut [f64], d_continuum: f64| {
+        response.apply_and_back(v, out, |k, line, d_continuum| {
             let bins = response.bins(k);
             let (scale, model, residuals) =
                 (slope / continuum[k], &model[bins.clone()], &weighted_residual[bins.clone()]);
@@ -279,8 +279,7 @@ impl Problem for ImagingProblem<'_> {
                 constant -= *back * model + scale * residual * d_model;
             }
             constant
-        };
-        response.apply_and_back(v, out, weigh);
+        });
     }
 
     fn passes(&self) -> u32 {
