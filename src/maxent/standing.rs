@@ -10,7 +10,7 @@ use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::Problem;
 use super::solution::{Best, Goal};
-use crate::vector::linear::{axpy, dot};
+use crate::vector::linear::{axpy, combine, combine_two, dot};
 
 /// Largest change of ln(lambda) in one step.
 const LN_LAMBDA_CAP: f64 = 1.5;
@@ -85,10 +85,8 @@ impl Standing {
         let mut right = entropy.gradient(&at.u, problem.area());
         let mut chi2_gradient = vec![0.0; n];
         problem.gradient(&mut chi2_gradient);
-        for p in 0..n {
-            chi2_gradient[p] *= scale[p];
-            right[p] = -(right[p] * scale[p] + at.lambda * chi2_gradient[p]);
-        }
+        combine(&mut chi2_gradient, &scale, |g, scale| g * scale);
+        combine_two(&mut right, &scale, &chi2_gradient, |right, scale, g| -(right * scale + at.lambda * g));
         let (chi2_path, spottedness_path, spottedness_left) = (0.0, 0.0, 0.0);
         let (error, at_bound) = (f64::INFINITY, false);
         let mut standing =
@@ -113,7 +111,9 @@ impl Standing {
         let Guide { preconditioner, path, adjoint } = guide;
         let (g, right) = (&self.chi2_gradient, &self.right);
         self.chi2_path = 2.0 * dot(g, path);
-        self.spottedness_path = self.scale.iter().zip(weights).zip(path).map(|((d, a), z)| d * a * z).sum();
+        let mut weights = weights.to_vec();
+        combine(&mut weights, &self.scale, |weight, scale| weight * scale);
+        self.spottedness_path = dot(&weights, path);
         let chi2_step = -2.0 * dot(path, right) / at.lambda;
         let move_lambda = lambda_step(at, self.chi2_path, chi2_step, goal);
         if let Goal::Chi2 { target, largest_lambda } = goal {
@@ -143,7 +143,8 @@ impl Standing {
         // of second order in the move along the path
         self.error += 0.5 * (self.chi2_path * move_lambda * move_lambda).abs();
         if adjoint.len() == path.len() {
-            let adjoint: Vec<f64> = adjoint.iter().zip(&self.scale).map(|(y, scale)| y * scale).collect();
+            let mut adjoint = adjoint.to_vec();
+            combine(&mut adjoint, &self.scale, |y, scale| y * scale);
             // no component along the path: the move of lambda is accounted for by chi2
             let along = -2.0 * dot(g, &adjoint) / self.chi2_path;
             self.spottedness_left = dot(&adjoint, right) + along * dot(path, right);

@@ -22,9 +22,9 @@ pub struct Prediction {
     map: Vec<f64>,
     /// Natural scales of the coordinates.
     scales: Vec<f64>,
-    /// Image step per unit of each coordinate.
-    image: Vec<Vec<f64>>,
-    /// Change of ln(lambda) per unit of each coordinate.
+    /// Image step per natural scale of each coordinate.
+    image: Vec<Vec<f32>>,
+    /// Change of ln(lambda) per natural scale of each coordinate.
     ln_lambda: Vec<f64>,
     /// Adjoint of spottedness at fixed chi2, as [`Start::adjoint`]; empty where spottedness does not matter.
     adjoint: Vec<f64>,
@@ -128,8 +128,8 @@ impl Prediction {
                 let path = solution.path.iter().zip(&scale).map(|(z, d)| z * d);
                 step.iter_mut().zip(path).for_each(|(s, p)| *s += along * p);
             }
-            image.push(step);
-            ln_lambda.push(along);
+            image.push(step.iter().map(|step| (scale_i * step) as f32).collect());
+            ln_lambda.push(scale_i * along);
         }
         Prediction { origin, map, scales, image, ln_lambda, adjoint, bends: Vec::new() }
     }
@@ -172,8 +172,8 @@ impl Prediction {
 
     /// Whether all its numbers are finite; those of the second order always are.
     pub fn is_finite(&self) -> bool {
-        let all = self.image.iter().flatten().chain(&self.ln_lambda).chain(&self.adjoint);
-        all.copied().all(f64::is_finite)
+        let image = self.image.iter().flatten().all(|x| x.is_finite());
+        image && self.ln_lambda.iter().chain(&self.adjoint).all(|x| x.is_finite())
     }
 
     /// Number of vectors that are as long as an image, but for those of the second order.
@@ -184,22 +184,23 @@ impl Prediction {
     /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
     pub fn start(&self, imager: &Imager, known: &Start, x: &[f64]) -> Start {
         let mut start = Start { adjoint: self.adjoint.clone(), ..known.clone() };
-        let shifts: Vec<f64> = x.iter().zip(&self.origin).map(|(x, x0)| x - x0).collect();
-        let farthest = shifts.iter().zip(&self.scales).map(|(d, s)| (d / s).abs()).fold(0.0, f64::max);
+        let away = x.iter().zip(&self.origin).zip(&self.scales);
+        let shifts: Vec<f64> = away.map(|((x, x0), scale)| (x - x0) / scale).collect();
+        let farthest = shifts.iter().fold(0.0, |farthest: f64, shift| farthest.max(shift.abs()));
         let shrink = (REACH / farthest).min(1.0);
         let n = start.image.coordinates.len();
-        let (mut ds, mut ln_lambda) = (vec![0.0; n], 0.0);
+        let (mut step, mut ln_lambda) = (vec![0.0f32; n], 0.0);
         for ((shift, image), along) in shifts.iter().zip(&self.image).zip(&self.ln_lambda) {
-            let shift = shift * shrink;
-            ln_lambda += shift * along;
-            ds.iter_mut().zip(image).for_each(|(ds, step)| *ds += shift * step);
+            ln_lambda += shrink * shift * along;
+            axpy(shrink * shift, image, &mut step);
         }
+        let ds: Vec<f64> = step.into_iter().map(f64::from).collect();
         let here = &known.image.coordinates;
         imager.entropy.step(here, &self.map, &ds, 1.0, LARGEST_STEP, &mut start.image.coordinates);
         if !self.bends.is_empty() {
             let mut change = vec![0.0f32; n + 1];
             let shrink = (BEND_REACH / farthest).min(1.0);
-            let bent: Vec<f64> = shifts.iter().zip(&self.scales).map(|(d, s)| shrink * d / s).collect();
+            let bent: Vec<f64> = shifts.iter().map(|shift| shrink * shift).collect();
             for Bend { coordinates: [i, j], change: per_product } in &self.bends {
                 axpy(bent[*i] * bent[*j], per_product, &mut change);
             }

@@ -91,7 +91,7 @@ mod sse {
             let lanes = transposed(rows.map(|row| row[half]));
             for (place, lane) in places.iter().zip(lanes) {
                 // safe: as above
-                to[*place] = unsafe { transmute::<__m128, Pixel>(lane) };
+                unsafe { *to.get_unchecked_mut(*place) = transmute::<__m128, Pixel>(lane) };
             }
         }
     }

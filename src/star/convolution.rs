@@ -6,6 +6,7 @@
 use super::correlate::{self, CHUNK, correlate};
 use super::line_profile::LineKernel;
 use crate::vector::Instructions;
+use std::ops::Range;
 
 /// The velocity grid, as far as filters need to know it.
 #[derive(Clone, Copy, Debug)]
@@ -22,15 +23,18 @@ pub struct VelocityGrid {
 #[derive(Clone, Debug)]
 pub struct ProfileConvolution {
     filters: Vec<Filter>,
+    /// Taps of all filters one after another.
+    taps: Vec<f64>,
+    /// All of them in reverse order, for the transpose.
+    reversed: Vec<f64>,
 }
 
 /// `bin[b] = sum_q taps[q] row[first + q + b]`.
 #[derive(Clone, Debug)]
 struct Filter {
     first: isize,
-    taps: Vec<f64>,
-    /// The taps in reverse order, for the transpose.
-    reversed: Vec<f64>,
+    /// Where its taps are.
+    taps: Range<usize>,
 }
 
 impl ProfileConvolution {
@@ -45,13 +49,21 @@ impl ProfileConvolution {
         let lowest = -m * bins as isize;
         let first = ((position - reach).ceil() as isize).clamp(lowest, end);
         let last = ((position + reach).floor() as isize).min(end - 1);
+        let mut taps = Vec::with_capacity((last - first + 1).max(0) as usize);
         let filter = |row: isize| {
-            let nodes = (first..=last).filter(|node| node.rem_euclid(m) == row);
-            let taps: Vec<f64> = nodes.map(|node| kernel.at((position - node as f64) * step_kms)).collect();
-            let reversed = taps.iter().rev().copied().collect();
-            Filter { first: (first - row + m - 1).div_euclid(m), taps, reversed }
+            let (begin, column) = (taps.len(), (first - row + m - 1).div_euclid(m));
+            let nodes = (row + m * column..=last).step_by(steps_per_bin);
+            taps.extend(nodes.map(|node| kernel.at((position - node as f64) * step_kms)));
+            Filter { first: column, taps: begin..taps.len() }
         };
-        ProfileConvolution { filters: (0..m).map(filter).collect() }
+        let filters = (0..m).map(filter).collect();
+        let reversed = taps.iter().rev().copied().collect();
+        ProfileConvolution { filters, taps, reversed }
+    }
+
+    /// A filter's taps in reverse order.
+    fn reversed(&self, Filter { taps, .. }: &Filter) -> &[f64] {
+        &self.reversed[self.taps.len() - taps.end..self.taps.len() - taps.start]
     }
 
     /// Columns before the rows' first, and bins' worth of them from the first on, that the filters reach.
@@ -68,7 +80,7 @@ impl ProfileConvolution {
             let mut sums = [0.0; CHUNK];
             for (row, filter) in self.filters.iter().enumerate() {
                 let first = (filter.first + rows.margin as isize) as usize + k * CHUNK;
-                correlate(i, &filter.taps, &rows.row(row)[first..], &mut sums);
+                correlate(i, &self.taps[filter.taps.clone()], &rows.row(row)[first..], &mut sums);
             }
             correlate::put(&sums, chunk);
         }
@@ -89,7 +101,7 @@ impl ProfileConvolution {
             let targets = &mut rows.values[row * rows.stride + first..][..bins.len() + margin];
             for (k, chunk) in targets.chunks_mut(CHUNK).enumerate() {
                 let mut sums = [0.0; CHUNK];
-                correlate(i, &filter.reversed, &rows.padded[k * CHUNK..], &mut sums);
+                correlate(i, self.reversed(filter), &rows.padded[k * CHUNK..], &mut sums);
                 correlate::put(&sums, chunk);
             }
         }

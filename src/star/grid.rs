@@ -73,22 +73,6 @@ impl Directions {
     }
 }
 
-impl Ring {
-    /// Pixels with centres between two longitudes (rad), which may be any number of turns away; a ring of one pixel may have it
-    /// anywhere, and gives it always.
-    pub(crate) fn between(&self, from: f64, to: f64) -> [Range<usize>; 2] {
-        let (first, count) = (self.pixels.start, self.pixels.len());
-        let place = |longitude: f64| longitude * count as f64 / TAU - 0.5;
-        let (from, to) = (place(from).ceil(), place(to).floor() + 1.0);
-        if count == 1 || to - from >= count as f64 {
-            return [self.pixels.clone(), 0..0];
-        }
-        let start = (from - count as f64 * (from / count as f64).floor()) as usize;
-        let end = start + (to - from).max(0.0) as usize;
-        [first + start..first + end.min(count), first..first + end.saturating_sub(count)]
-    }
-}
-
 impl SurfaceGrid {
     /// About `pixels` pixels of equal area.
     pub fn equal_area(pixels: usize, quadrature: Quadrature) -> Self {
@@ -152,6 +136,11 @@ impl SurfaceGrid {
         self.area.len()
     }
 
+    /// Number of evaluation points of a pixel.
+    pub(super) fn points(&self) -> usize {
+        self.rings.first().map_or(1, |ring| ring.points.len())
+    }
+
     /// Whether there is no pixel.
     pub fn is_empty(&self) -> bool {
         self.area.is_empty()
@@ -200,24 +189,6 @@ mod tests {
         for ring in &grid.rings {
             let area: f64 = ring.points.iter().map(|q| q.area).sum();
             assert!((area - grid.area[ring.pixels.start]).abs() < 1e-16);
-        }
-    }
-
-    #[test]
-    fn pixels_between_longitudes_are_those_whose_centres_are() {
-        let ring = &SurfaceGrid::equal_area(300, Quadrature::Centre).rings[4];
-        let count = ring.pixels.len();
-        for (middle, half_width) in [(0.1, 1.0), (-3.0, 2.9), (100.0, 0.01), (-50.0, 3.2), (2.0, -0.1), (6.2, 0.4)] {
-            let (mut inside, mut given) = (Vec::new(), Vec::new());
-            for j in 0..count {
-                let from_middle = (j as f64 + 0.5) * TAU / count as f64 - middle;
-                if (from_middle - TAU * (from_middle / TAU).round()).abs() < half_width {
-                    inside.push(ring.pixels.start + j);
-                }
-            }
-            ring.between(middle - half_width, middle + half_width).into_iter().for_each(|range| given.extend(range));
-            given.sort_unstable();
-            assert_eq!(given, inside, "{middle} {half_width}");
         }
     }
 

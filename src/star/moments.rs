@@ -2,37 +2,52 @@
 //! across it (method section 1, moment matching).
 //!
 //! Pixels of a ring share their evaluation points but for the longitude, so that several of them are computed side by side, in
-//! single precision where it is enough: weights, and differences of velocities within a pixel. Left out: which pixels.
+//! single precision where it is enough: weights, and differences of velocities within a pixel. So are rings, as they turn. Left out:
+//! which pixels.
 
 use super::grid::Directions;
 use super::limb_darkening::LimbDarkening;
 use crate::vector::Instructions;
 use crate::vector::elementary::sin_cos;
-use std::ops::Range;
 
 /// Numbers that are computed side by side.
 pub const CHUNK: usize = 16;
 
-/// Evaluation points of pixels, seen from the pixels' centres as the star turns.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Points {
+/// An evaluation point of the pixels of a ring, seen from the pixels' centres as the star turns.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
     /// Angular velocity (rad/d).
-    pub angular_velocity: [f64; CHUNK],
+    pub angular_velocity: f64,
     /// Longitude minus that of the pixel's centre (rad).
-    pub offset: [f64; CHUNK],
+    pub offset: f64,
     /// What does not turn of mu: sine of the latitude times cosine of the inclination.
-    pub mu_pole: [f32; CHUNK],
+    pub mu_pole: f64,
     /// What turns of it.
-    pub mu_equator: [f64; CHUNK],
+    pub mu_equator: f64,
     /// Velocity (km/s) at the limb of the equator's direction.
-    pub amplitude: [f64; CHUNK],
+    pub amplitude: f64,
+}
+
+/// Rings side by side, with their pixels' evaluation points.
+#[derive(Clone, Debug)]
+pub struct Rings<const POINTS: usize> {
+    angular_velocity: [[f64; CHUNK]; POINTS],
+    offset: [[f64; CHUNK]; POINTS],
+    mu_pole: [[f32; CHUNK]; POINTS],
+    mu_equator: [[f64; CHUNK]; POINTS],
+    amplitude: [[f64; CHUNK]; POINTS],
+    /// Coefficients of mu, mu^2 and mu^3 in the weight.
+    limb: [[f32; CHUNK]; 3],
+    turned: Turned<POINTS>,
 }
 
 /// The same at one time: factors of cosine and sine of a pixel's longitude.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct TurnedPoints {
-    mu: [[f32; CHUNK]; 2],
-    velocity: [[f64; CHUNK]; 2],
+#[derive(Clone, Debug)]
+struct Turned<const POINTS: usize> {
+    mu: [[[f32; CHUNK]; POINTS]; 2],
+    /// Mean of the points' velocities (km/s), and what each has more.
+    middle: [[f64; CHUNK]; 2],
+    velocity: [[[f32; CHUNK]; POINTS]; 2],
 }
 
 /// Moments of the velocity distributions of the pixels that are seen, weighted by projected area and limb darkening. There is
@@ -50,34 +65,6 @@ pub struct Moments {
     pub variance: Vec<f32>,
 }
 
-/// What the pixels of a ring have in common at one time.
-pub struct RingView<const POINTS: usize> {
-    mu_pole: [f32; POINTS],
-    mu: [[f32; POINTS]; 2],
-    /// Mean of the points' velocities (km/s), and what each has more.
-    middle: [f64; 2],
-    velocity: [[f32; POINTS]; 2],
-    /// Coefficients of mu, mu^2 and mu^3 in the weight.
-    limb: [f32; 3],
-}
-
-impl Points {
-    /// The points `since_epoch_d` days after the star's epoch.
-    #[inline(always)]
-    pub fn turned(&self, i: impl Instructions, since_epoch_d: f64) -> TurnedPoints {
-        let Points { angular_velocity, offset, mu_equator, amplitude, .. } = *self;
-        let mut turned = TurnedPoints::default();
-        for p in 0..CHUNK {
-            let (sin, cos) = sin_cos(i, angular_velocity[p] * since_epoch_d + offset[p]);
-            turned.mu[0][p] = (mu_equator[p] * cos) as f32;
-            turned.mu[1][p] = (-mu_equator[p] * sin) as f32;
-            turned.velocity[0][p] = amplitude[p] * sin;
-            turned.velocity[1][p] = amplitude[p] * cos;
-        }
-        turned
-    }
-}
-
 impl Moments {
     /// Room for the pixels of a map.
     pub fn with_room_for(pixels: usize) -> Self {
@@ -85,75 +72,120 @@ impl Moments {
         let (pixel, weight, variance) = (vec![0; room], vec![0.0; room], vec![0.0; room]);
         Moments { pixels: 0, pixel, weight, velocity: vec![0.0; room], variance }
     }
-
-    /// No pixel is seen yet.
-    pub fn clear(&mut self) {
-        self.pixels = 0;
-    }
 }
 
-impl<const POINTS: usize> RingView<POINTS> {
-    /// The view of a ring whose first point is one of `points`; each stands for so large a part of the star.
-    #[inline(always)]
-    pub fn new(points: &TurnedPoints, mu_pole: &[f32; CHUNK], first: usize, limb: LimbDarkening, area: f64) -> Self {
-        let (u1, u2) = limb.coefficients();
-        let mut view = RingView {
-            mu_pole: [0.0; POINTS],
-            mu: [[0.0; POINTS]; 2],
-            velocity: [[0.0; POINTS]; 2],
-            middle: [0.0; 2],
-            // mu LD(mu) = mu (1 - u1 (1 - mu) - u2 (1 - mu)^2)
-            limb: [(area * (1.0 - u1 - u2)) as f32, (area * (u1 + 2.0 * u2)) as f32, (-area * u2) as f32],
-        };
-        view.mu_pole.copy_from_slice(&mu_pole[first..first + POINTS]);
-        for k in 0..2 {
-            view.mu[k].copy_from_slice(&points.mu[k][first..first + POINTS]);
-            let velocity = &points.velocity[k][first..first + POINTS];
-            view.middle[k] = velocity.iter().sum::<f64>() / POINTS as f64;
-            for (relative, velocity) in view.velocity[k].iter_mut().zip(velocity) {
-                *relative = (velocity - view.middle[k]) as f32;
-            }
+impl<const POINTS: usize> Rings<POINTS> {
+    /// No rings yet.
+    pub fn new() -> Self {
+        let none = [[0.0; CHUNK]; POINTS];
+        let turned =
+            Turned { mu: [[[0.0; CHUNK]; POINTS]; 2], middle: [[0.0; CHUNK]; 2], velocity: [[[0.0; CHUNK]; POINTS]; 2] };
+        Rings {
+            angular_velocity: none,
+            offset: none,
+            mu_pole: [[0.0; CHUNK]; POINTS],
+            mu_equator: none,
+            amplitude: none,
+            limb: [[0.0; CHUNK]; 3],
+            turned,
         }
-        view
     }
 
-    /// Adds the moments of some of its pixels.
-    #[inline(always)]
-    pub fn look(&self, i: impl Instructions, directions: &Directions, pixels: Range<usize>, moments: &mut Moments) {
-        let Directions { cos, sin, cos_single, sin_single } = directions;
-        // chunks go on beyond the last pixel: there is room, and the next pixels overwrite what comes of it
-        for first in pixels.clone().step_by(CHUNK) {
-            let [weight, deviation, variance] =
-                self.relative_moments(i, chunk(cos_single, first), chunk(sin_single, first));
-            let (cos_l, sin_l) = (chunk(cos, first), chunk(sin, first));
-            let mut velocity = [0.0; CHUNK];
-            for lane in 0..CHUNK {
-                let rest = i.multiply_add(sin_l[lane], self.middle[1], f64::from(deviation[lane]));
-                velocity[lane] = i.multiply_add(cos_l[lane], self.middle[0], rest);
-            }
-            let place = moments.pixels + (first - pixels.start);
-            *chunk_mut(&mut moments.pixel, place) = std::array::from_fn(|lane| (first + lane) as u32);
-            *chunk_mut(&mut moments.weight, place) = weight;
-            *chunk_mut(&mut moments.velocity, place) = velocity;
-            *chunk_mut(&mut moments.variance, place) = variance;
+    /// Sets one of the rings: its points, each of which stands for so large a part of the star.
+    pub fn set(&mut self, ring: usize, points: [Point; POINTS], limb: LimbDarkening, area: f64) {
+        for (p, point) in points.into_iter().enumerate() {
+            self.angular_velocity[p][ring] = point.angular_velocity;
+            self.offset[p][ring] = point.offset;
+            self.mu_pole[p][ring] = point.mu_pole as f32;
+            self.mu_equator[p][ring] = point.mu_equator;
+            self.amplitude[p][ring] = point.amplitude;
         }
-        moments.pixels += pixels.len();
+        // mu LD(mu) = mu (1 - u1 (1 - mu) - u2 (1 - mu)^2)
+        let (u1, u2) = limb.coefficients();
+        for (of_rings, coefficient) in self.limb.iter_mut().zip([1.0 - u1 - u2, u1 + 2.0 * u2, -u2]) {
+            of_rings[ring] = (area * coefficient) as f32;
+        }
+    }
+
+    /// Turns the rings to where they are `since_epoch_d` days after the star's epoch.
+    #[inline(always)]
+    pub fn turn(&mut self, i: impl Instructions, since_epoch_d: f64) {
+        let mut velocity = [[[0.0; CHUNK]; POINTS]; 2];
+        for p in 0..POINTS {
+            let (angular_velocity, offset) = (self.angular_velocity[p], self.offset[p]);
+            let (mu_equator, amplitude) = (self.mu_equator[p], self.amplitude[p]);
+            let mut mu = [[0.0; CHUNK]; 2];
+            for ring in 0..CHUNK {
+                let (sin, cos) = sin_cos(i, angular_velocity[ring] * since_epoch_d + offset[ring]);
+                mu[0][ring] = (mu_equator[ring] * cos) as f32;
+                mu[1][ring] = (-mu_equator[ring] * sin) as f32;
+                velocity[0][p][ring] = amplitude[ring] * sin;
+                velocity[1][p][ring] = amplitude[ring] * cos;
+            }
+            for k in 0..2 {
+                self.turned.mu[k][p] = mu[k];
+            }
+        }
+        for k in 0..2 {
+            let mut middle = [0.0; CHUNK];
+            for of_point in &velocity[k] {
+                middle.iter_mut().zip(of_point).for_each(|(middle, v)| *middle += v / POINTS as f64);
+            }
+            for p in 0..POINTS {
+                self.turned.velocity[k][p] = std::array::from_fn(|ring| (velocity[k][p][ring] - middle[ring]) as f32);
+            }
+            self.turned.middle[k] = middle;
+        }
+    }
+
+    /// Writes the moments of the pixels of a ring from `first` on to those from `place` on, a chunk of them, whether there are as many or not.
+    #[inline(always)]
+    pub fn look(
+        &self,
+        i: impl Instructions,
+        ring: usize,
+        directions: &Directions,
+        first: usize,
+        place: usize,
+        moments: &mut Moments,
+    ) {
+        let Directions { cos, sin, cos_single, sin_single } = directions;
+        let [weight, deviation, variance] =
+            self.relative_moments(i, ring, chunk(cos_single, first), chunk(sin_single, first));
+        let (cos_l, sin_l) = (chunk(cos, first), chunk(sin, first));
+        let middle = [self.turned.middle[0][ring], self.turned.middle[1][ring]];
+        let mut velocity = [0.0; CHUNK];
+        for lane in 0..CHUNK {
+            let rest = i.multiply_add(sin_l[lane], middle[1], f64::from(deviation[lane]));
+            velocity[lane] = i.multiply_add(cos_l[lane], middle[0], rest);
+        }
+        *chunk_mut(&mut moments.pixel, place) = std::array::from_fn(|lane| (first + lane) as u32);
+        *chunk_mut(&mut moments.weight, place) = weight;
+        *chunk_mut(&mut moments.velocity, place) = velocity;
+        *chunk_mut(&mut moments.variance, place) = variance;
     }
 
     /// Weights, mean velocities over that of the middle of the points, and their variances.
     #[inline(always)]
-    fn relative_moments(&self, i: impl Instructions, cos_l: [f32; CHUNK], sin_l: [f32; CHUNK]) -> [[f32; CHUNK]; 3] {
-        let RingView { mu_pole, mu, velocity, limb, .. } = self;
+    fn relative_moments(
+        &self,
+        i: impl Instructions,
+        ring: usize,
+        cos_l: [f32; CHUNK],
+        sin_l: [f32; CHUNK],
+    ) -> [[f32; CHUNK]; 3] {
+        let Rings { mu_pole, limb, turned: Turned { mu, velocity, .. }, .. } = self;
+        let limb = [limb[0][ring], limb[1][ring], limb[2][ring]];
         let [mut weight, mut deviation, mut variance] = [[0.0; CHUNK]; 3];
         for lane in 0..CHUNK {
             let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
             for p in 0..POINTS {
-                let on_equator = i.multiply_add_single(sin_l[lane], mu[1][p], mu_pole[p]);
-                let mu = i.multiply_add_single(cos_l[lane], mu[0][p], on_equator);
+                let on_equator = i.multiply_add_single(sin_l[lane], mu[1][p][ring], mu_pole[p][ring]);
+                let mu = i.multiply_add_single(cos_l[lane], mu[0][p][ring], on_equator);
                 let mu = if mu > 0.0 { mu } else { 0.0 };
                 let limb_darkening = i.multiply_add_single(mu, i.multiply_add_single(mu, limb[2], limb[1]), limb[0]);
                 let w = mu * limb_darkening;
-                let v = i.multiply_add_single(cos_l[lane], velocity[0][p], sin_l[lane] * velocity[1][p]);
+                let v = i.multiply_add_single(cos_l[lane], velocity[0][p][ring], sin_l[lane] * velocity[1][p][ring]);
                 let moment = w * v;
                 sum += w;
                 first += moment;

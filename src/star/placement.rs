@@ -137,8 +137,19 @@ impl Task for Place<'_> {
 
     #[inline(always)]
     fn run<I: Instructions>(self, instructions: I) -> Placement {
+        match self.grid.points() {
+            1 => self.by_points::<1>(instructions),
+            4 => self.by_points::<4>(instructions),
+            points => unreachable!("{points} points in a pixel"),
+        }
+    }
+}
+
+impl Place<'_> {
+    #[inline(always)]
+    fn by_points<const POINTS: usize>(self, instructions: impl Instructions) -> Placement {
         let Place { grid, viewer, scale, since_epoch_d } = self;
-        let mut views = viewer.of(grid);
+        let mut views = viewer.of::<POINTS>(grid);
         let mut blocks = SPARE.take();
         blocks.clear();
         blocks.reserve(since_epoch_d.len() * grid.len() * 3 / 4 / LANES);
@@ -213,13 +224,16 @@ impl Seen {
     /// Counts the pixels of every cell, and puts the cells in their order.
     fn sort_cells(&mut self) {
         self.counts.fill(0);
+        let step = self.scale.order.side_by_side() as u32;
         let whole = self.pixels.next_multiple_of(LANES);
         self.cell[self.pixels..whole].fill(self.scale.cells as u32);
         for (cell, rank) in self.cell[..whole].iter().zip(&mut self.rank) {
             let count = &mut self.counts[*cell as usize];
             *rank = *count;
-            *count += 1;
+            *count += step;
         }
+        let times = step.trailing_zeros();
+        self.counts.iter_mut().for_each(|count| *count >>= times);
         let counts = &self.counts[..self.scale.cells];
         if self.scale.order != Order::BySize {
             self.order.iter_mut().enumerate().for_each(|(cell, place)| *place = cell as u32);
@@ -245,28 +259,30 @@ impl Seen {
 
     /// Sorts the pixels by group, cell, and order in which they were seen.
     #[inline(always)]
+    #[allow(unsafe_code)]
     fn sort_pixels(&mut self, groups: &[Group], moments: &Moments) {
         let per_variance = (0.5 * self.scale.steps_per_kms * self.scale.steps_per_kms) as f32;
         // from one pixel of a cell to the next, and as many cells
         let step = self.scale.order.side_by_side();
         let mut end = 0;
-        for group in groups {
-            let (cells, rows) = (&group.cells, group.rows());
-            self.sorted.resize(self.sorted.len().max(end + LANES * rows), Pixel::default());
-            let places = &mut self.sorted[end..end + LANES * rows];
-            // hardly ever one pixel in two blocks that follow each other, for no sum to wait for another
-            let empty = |place: usize| Pixel { pixel: ((end + place) % self.map_pixels) as u32, ..Pixel::default() };
-            for (lane, cell) in cells.iter().enumerate().take(step) {
-                let again = cells[..lane].contains(cell);
-                let count = if again { 0 } else { self.counts[*cell as usize] as usize };
-                if !again {
-                    self.firsts[*cell as usize] = (end + lane) as u32;
-                }
-                for place in (lane + step * count..LANES * rows).step_by(step) {
-                    places[place] = empty(place);
-                }
+        for (group, cells) in groups.iter().zip(self.order.chunks(step)) {
+            let places = end..end + LANES * group.rows();
+            self.sorted.resize(self.sorted.len().max(places.end), Pixel::default());
+            // where cells have no pixels left: hardly ever one pixel in two blocks that follow each other, for no sum to wait for another
+            let full = match cells.len() == step {
+                true => step * self.counts[cells[step - 1] as usize] as usize,
+                false => 0,
+            };
+            let first_pixel = (end + full) % self.map_pixels;
+            for (k, place) in self.sorted[places.clone()][full..].iter_mut().enumerate() {
+                let pixel = first_pixel + k;
+                let pixel = if pixel < self.map_pixels { pixel } else { (pixel - self.map_pixels).min(self.map_pixels - 1) };
+                *place = Pixel { pixel: pixel as u32, ..Pixel::default() };
             }
-            end += LANES * rows;
+            for (lane, cell) in cells.iter().enumerate() {
+                self.firsts[*cell as usize] = (end + lane) as u32;
+            }
+            end = places.end;
         }
         let Seen { sorted, firsts, .. } = self;
         firsts[self.scale.cells] = end as u32;
@@ -280,7 +296,7 @@ impl Seen {
             let mut block = Block { weight: *weight, position: *position, spread: *variance, pixel: *pixel };
             block.spread.iter_mut().for_each(|spread| *spread *= per_variance);
             block.deal(
-                std::array::from_fn(|lane| (firsts[cells[lane] as usize] + step as u32 * ranks[lane]) as usize),
+                std::array::from_fn(|lane| unsafe { (*firsts.get_unchecked(cells[lane] as usize) + ranks[lane]) as usize }),
                 sorted,
             );
         }

@@ -4,9 +4,9 @@
 //! in `response`.
 
 use super::StarState;
-use super::grid::{Ring, SurfaceGrid};
+use super::grid::{Ring, RingPoint, SurfaceGrid};
 use super::limb_darkening::LimbDarkening;
-use super::moments::{CHUNK, Moments, Points, RingView, TurnedPoints};
+use super::moments::{CHUNK, Moments, Point, Rings};
 use crate::vector::Instructions;
 use std::f64::consts::TAU;
 
@@ -19,29 +19,38 @@ pub struct Viewer {
     limb: LimbDarkening,
 }
 
-/// Rings of pixels as they turn before the observer.
-pub struct Views<'a> {
+/// Rings of pixels, each with so many evaluation points, as they turn before the observer. Rings that are never visible are left out.
+pub struct Views<'a, const POINTS: usize> {
     grid: &'a SurfaceGrid,
-    limb: LimbDarkening,
-    rings: Vec<TurningRing<'a>>,
-    /// The evaluation points of all rings, a chunk at a time.
-    points: Vec<Points>,
-    turned: Vec<TurnedPoints>,
+    /// Number of rings.
+    rings: usize,
+    /// A chunk of rings at a time.
+    points: Vec<Rings<POINTS>>,
+    horizons: Vec<Horizons>,
+    parts: Vec<Part>,
     moments: Moments,
 }
 
-/// A ring with the latitudes of its evaluation points, which are the same where there is one.
-struct TurningRing<'a> {
-    ring: &'a Ring,
-    latitudes: [Latitude; 2],
+/// Where rings side by side are visible.
+struct Horizons {
+    /// Of the two latitudes of their evaluation points, which are the same where there is one: angular velocity, ...
+    angular_velocity: [[f64; CHUNK]; 2],
+    /// ... and half the range of longitudes (rad) of pixels in which a point is visible.
+    reach: [[f64; CHUNK]; 2],
+    /// First pixel of each ring.
+    first: [u32; CHUNK],
+    /// Number of pixels of each ring.
+    count: [f64; CHUNK],
 }
 
-/// Evaluation points of one latitude.
-#[derive(Clone, Copy)]
-struct Latitude {
-    angular_velocity: f64,
-    /// Half the range of longitudes (rad) of pixels in which one of them is visible; `None` where none ever is.
-    reach: Option<f64>,
+/// Pixels beside each other of which moments are computed at a time.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    ring: u32,
+    /// The first of them.
+    pixel: u32,
+    /// Its place among the pixels that are seen.
+    place: u32,
 }
 
 impl Viewer {
@@ -57,93 +66,164 @@ impl Viewer {
         self.state.vsini_kms * relative(0.0).max(relative(1.0))
     }
 
-    /// Views of the pixels of `grid`.
-    pub fn of<'a>(&self, grid: &'a SurfaceGrid) -> Views<'a> {
-        let ring = |ring: &'a Ring| TurningRing { ring, latitudes: self.latitudes(ring) };
-        let mut points = Vec::new();
-        for (p, point) in grid.rings.iter().flat_map(|ring| &ring.points).enumerate() {
-            if p % CHUNK == 0 {
-                points.push(Points::default());
+    /// Views of the pixels of `grid`, each with so many evaluation points.
+    pub fn of<'a, const POINTS: usize>(&self, grid: &'a SurfaceGrid) -> Views<'a, POINTS> {
+        let (mut points, mut horizons, mut rings) = (Vec::new(), Vec::new(), 0);
+        for ring in &grid.rings {
+            let ends = [&ring.points[0], &ring.points[POINTS - 1]].map(|point| self.reach(point));
+            let Some(reach) = ends[0].or(ends[1]) else { continue };
+            if rings % CHUNK == 0 {
+                points.push(Rings::new());
+                horizons.push(Horizons::none());
             }
-            let Points { angular_velocity, offset, mu_pole, mu_equator, amplitude } = &mut points[p / CHUNK];
-            let p = p % CHUNK;
-            angular_velocity[p] = self.state.rotation.angular_velocity(point.sin_latitude);
-            offset[p] = point.longitude_offset;
-            mu_pole[p] = (point.sin_latitude * self.cos_inclination) as f32;
-            mu_equator[p] = point.cos_latitude * self.sin_inclination;
-            amplitude[p] = self.state.vsini_kms * self.state.rotation.relative(point.sin_latitude) * point.cos_latitude;
+            let of_points = std::array::from_fn(|p| self.point(&ring.points[p]));
+            points[rings / CHUNK].set(rings % CHUNK, of_points, self.limb, ring.points[0].area);
+            // of two latitudes one of which is never visible the other says where the ring is
+            horizons[rings / CHUNK].set(rings % CHUNK, ring, ends.map(|end| end.unwrap_or(reach)));
+            rings += 1;
         }
-        Views {
-            grid,
-            limb: self.limb,
-            rings: grid.rings.iter().map(ring).collect(),
-            turned: vec![TurnedPoints::default(); points.len()],
-            points,
-            moments: Moments::with_room_for(grid.len()),
+        Views { grid, rings, points, horizons, parts: Vec::new(), moments: Moments::with_room_for(grid.len()) }
+    }
+
+    fn point(&self, point: &RingPoint) -> Point {
+        let (rotation, vsini) = (&self.state.rotation, self.state.vsini_kms);
+        Point {
+            angular_velocity: rotation.angular_velocity(point.sin_latitude),
+            offset: point.longitude_offset,
+            mu_pole: point.sin_latitude * self.cos_inclination,
+            mu_equator: point.cos_latitude * self.sin_inclination,
+            amplitude: vsini * rotation.relative(point.sin_latitude) * point.cos_latitude,
         }
     }
 
-    fn latitudes(&self, ring: &Ring) -> [Latitude; 2] {
-        [&ring.points[0], &ring.points[ring.points.len() - 1]].map(|point| {
-            // mu = sin(latitude) cos(i) + cos(latitude) sin(i) cos(longitude) is positive; i is between 0 and 180 deg
-            let rises = -point.sin_latitude * self.cos_inclination / (point.cos_latitude * self.sin_inclination);
-            Latitude {
-                angular_velocity: self.state.rotation.angular_velocity(point.sin_latitude),
-                reach: (rises < 1.0).then(|| rises.max(-1.0).acos() + point.longitude_offset.abs()),
-            }
-        })
+    /// Angular velocity (rad/d) of a point's latitude, and half the range of longitudes (rad) of pixels in which one of its points
+    /// is visible; nothing where none ever is.
+    fn reach(&self, point: &RingPoint) -> Option<[f64; 2]> {
+        // mu = sin(latitude) cos(i) + cos(latitude) sin(i) cos(longitude) is positive; i is between 0 and 180 deg
+        let rises = -point.sin_latitude * self.cos_inclination / (point.cos_latitude * self.sin_inclination);
+        let angular_velocity = self.state.rotation.angular_velocity(point.sin_latitude);
+        (rises < 1.0).then(|| [angular_velocity, rises.max(-1.0).acos() + point.longitude_offset.abs()])
     }
 }
 
-impl Views<'_> {
+impl<const POINTS: usize> Views<'_, POINTS> {
     /// What is seen `since_epoch_d` days after the star's epoch.
     #[inline(always)]
     pub fn look<I: Instructions>(&mut self, i: I, since_epoch_d: f64) -> &Moments {
-        for (turned, points) in self.turned.iter_mut().zip(&self.points) {
-            *turned = points.turned(i, since_epoch_d);
-        }
-        self.moments.clear();
-        let mut end = 0;
-        for TurningRing { ring, latitudes } in &self.rings {
-            let first = end;
-            end += ring.points.len();
-            let visible = latitudes.iter().filter_map(|latitude| latitude.visible(since_epoch_d));
-            let Some((from, to)) = visible.reduce(joined) else { continue };
-            let (points, lane) = (&self.turned[first / CHUNK], first % CHUNK);
-            let (directions, area) = (&self.grid.directions, ring.points[0].area);
-            let mu_pole = &self.points[first / CHUNK].mu_pole;
-            for pixels in ring.between(from, to) {
-                match ring.points.len() {
-                    1 => RingView::<1>::new(points, mu_pole, lane, self.limb, area).look(
-                        i,
-                        directions,
-                        pixels,
-                        &mut self.moments,
-                    ),
-                    4 => RingView::<4>::new(points, mu_pole, lane, self.limb, area).look(
-                        i,
-                        directions,
-                        pixels,
-                        &mut self.moments,
-                    ),
-                    points => unreachable!("{points} points in a pixel"),
-                }
-            }
+        self.points.iter_mut().for_each(|rings| rings.turn(i, since_epoch_d));
+        self.find_parts(since_epoch_d);
+        for part in &self.parts {
+            let (rings, ring) = (&self.points[part.ring as usize / CHUNK], part.ring as usize % CHUNK);
+            let (first, place) = (part.pixel as usize, part.place as usize);
+            // a part goes on beyond the last pixel: there is room, and the next one overwrites what comes of it
+            rings.look(i, ring, &self.grid.directions, first, place, &mut self.moments);
         }
         &self.moments
     }
-}
 
-impl Latitude {
-    /// Longitudes (rad) of pixel centres between which one of the points is visible.
-    fn visible(&self, since_epoch_d: f64) -> Option<(f64, f64)> {
-        let middle = -self.angular_velocity * since_epoch_d;
-        self.reach.map(|reach| (middle - reach, middle + reach))
+    #[inline(always)]
+    fn find_parts(&mut self, since_epoch_d: f64) {
+        self.parts.clear();
+        let mut place = 0;
+        for (k, horizons) in self.horizons.iter().enumerate() {
+            let [start, length] = horizons.visible(since_epoch_d);
+            for ring in 0..CHUNK.min(self.rings - k * CHUNK) {
+                let (first, count) = (horizons.first[ring], horizons.count[ring] as u32);
+                let (start, length) = (start[ring], length[ring]);
+                let before = length.min(count - start);
+                for (from, pixels) in [(start, before), (0, length - before)] {
+                    for done in (0..pixels).step_by(CHUNK) {
+                        let part =
+                            Part { ring: (k * CHUNK + ring) as u32, pixel: first + from + done, place: place + done };
+                        self.parts.push(part);
+                    }
+                    place += pixels;
+                }
+            }
+        }
+        self.moments.pixels = place as usize;
     }
 }
 
+impl Horizons {
+    fn none() -> Self {
+        let none = [[0.0; CHUNK]; 2];
+        Horizons { angular_velocity: none, reach: none, first: [0; CHUNK], count: [1.0; CHUNK] }
+    }
+
+    /// Sets one of the rings, with angular velocity and reach of two latitudes.
+    fn set(&mut self, ring: usize, Ring { pixels, .. }: &Ring, latitudes: [[f64; 2]; 2]) {
+        for (k, [angular_velocity, reach]) in latitudes.into_iter().enumerate() {
+            self.angular_velocity[k][ring] = angular_velocity;
+            self.reach[k][ring] = reach;
+        }
+        (self.first[ring], self.count[ring]) = (pixels.start as u32, pixels.len() as f64);
+    }
+
+    /// First pixel of each ring that is visible, counted from the ring's first, and how many are, some of them perhaps at the ring's
+    /// beginning.
+    #[inline(always)]
+    fn visible(&self, since_epoch_d: f64) -> [[u32; CHUNK]; 2] {
+        let Horizons { angular_velocity, reach, count, .. } = self;
+        let (mut start, mut length) = ([0; CHUNK], [0; CHUNK]);
+        for ring in 0..CHUNK {
+            let [a, b] = [0, 1].map(|k| {
+                let (middle, reach) = (-angular_velocity[k][ring] * since_epoch_d, reach[k][ring]);
+                (middle - reach, middle + reach)
+            });
+            let (from, to) = joined(a, b);
+            [start[ring], length[ring]] = between(count[ring], from, to).map(whole);
+        }
+        [start, length]
+    }
+}
+
+/// Of a ring's pixels those with centres between two longitudes (rad), which may be any number of turns away: the first, and how many.
+/// A ring of one pixel may have it anywhere, and gives it always.
+#[inline(always)]
+fn between(count: f64, from: f64, to: f64) -> [f64; 2] {
+    let place = |longitude: f64| longitude * count / TAU - 0.5;
+    let (from, to) = (place(from).ceil(), place(to).floor() + 1.0);
+    let all = count == 1.0 || to - from >= count;
+    // at angles beyond all meaning it is any of them
+    let start = (from - count * (from / count).floor()).max(0.0).min(count - 1.0);
+    if all { [0.0, count] } else { [start, (to - from).max(0.0)] }
+}
+
+/// A small number that is not negative, as an integer: the last bits of its sum with one from which on all numbers are.
+#[inline(always)]
+fn whole(x: f64) -> u32 {
+    const INTEGERS: f64 = 4_503_599_627_370_496.0;
+    (x + INTEGERS).to_bits() as u32
+}
+
 /// Two ranges of longitudes (rad) as one, the second moved by whole turns next to the first: latitudes drift apart.
+#[inline(always)]
 fn joined(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     let turns = TAU * ((a.0 + a.1 - b.0 - b.1) * (0.5 / TAU)).round();
     (a.0.min(b.0 + turns), a.1.max(b.1 + turns))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_between_longitudes_are_those_whose_centres_are() {
+        let count = 21;
+        for (middle, half_width) in [(0.1, 1.0), (-3.0, 2.9), (100.0, 0.01), (-50.0, 3.2), (2.0, -0.1), (6.2, 0.4)] {
+            let mut inside = Vec::new();
+            for j in 0..count {
+                let from_middle = (f64::from(j) + 0.5) * TAU / f64::from(count) - middle;
+                if (from_middle - TAU * (from_middle / TAU).round()).abs() < half_width {
+                    inside.push(j);
+                }
+            }
+            let [start, length] =
+                between(f64::from(count), middle - half_width, middle + half_width).map(|x| x as u32);
+            let mut given: Vec<u32> = (start..start + length).map(|j| j % count).collect();
+            given.sort_unstable();
+            assert_eq!(given, inside, "{middle} {half_width}");
+        }
+    }
 }

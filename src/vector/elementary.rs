@@ -94,9 +94,11 @@ pub fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     let exponent = f64::from_bits((bits >> 52) | TWO_TO_52.to_bits()) - (TWO_TO_52 + 1023.0);
     let mantissa = f64::from_bits((bits & MANTISSA) + HALF_ROOT);
     // what the sum has lost
-    let lost = if x > 1.0 { 1.0 - (y - x) } else { x - (y - 1.0) } / y;
+    let lost = if x > 1.0 { 1.0 - (y - x) } else { x - (y - 1.0) };
     let (f, lost) = if exponent == 0.0 { (x, 0.0) } else { (mantissa - 1.0, lost) };
-    let s = f / (2.0 + f);
+    // f / (2 + f) and lost / y by one division, which takes longer than all the rest
+    let per_both = 1.0 / (y * (2.0 + f));
+    let (s, lost) = (f * y * per_both, lost * (2.0 + f) * per_both);
     let (square, half) = (s * s, 0.5 * f * f);
     let rest = s * (half + square * polynomial(i, &LOGARITHM, square)) + (exponent * LN_2[1] + lost);
     exponent * LN_2[0] - ((half - rest) - f)

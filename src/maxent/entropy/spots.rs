@@ -5,7 +5,7 @@
 
 use super::Step;
 use crate::vector::elementary::{exp_minus, ln_1p};
-use crate::vector::linear::dot;
+use crate::vector::linear::{combine, dot};
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: beyond it s (1-s) would lose its precision.
@@ -23,7 +23,9 @@ pub(super) fn gradient(default_logit: f64, u: &[f64], area: &[f64]) -> Vec<f64> 
 
 /// Scale of the metric, `sqrt(s (1-s) / a)`.
 pub(super) fn metric(s: &[f64], area: &[f64]) -> Vec<f64> {
-    s.iter().zip(area).map(|(s, a)| (s * (1.0 - s) / a).sqrt()).collect()
+    let mut scale = s.to_vec();
+    combine(&mut scale, area, |s, a| (s * (1.0 - s) / a).sqrt());
+    scale
 }
 
 /// Logits moved by an image step.
@@ -81,7 +83,9 @@ fn logit_step(i: impl Instructions, s: f64, ds: f64) -> f64 {
     let straight = ds.abs().min(0.5 * room) * ds.signum();
     let (there, rest) = (s + straight, ds - straight);
     let left = 1.0 - there;
-    ln_1p(i, straight / (s * left)) + rest / (there * left)
+    // both quotients by one division, which takes longer than all the rest
+    let per_all = 1.0 / (s * there * left);
+    ln_1p(i, straight * there * per_all) + rest * s * per_all
 }
 
 /// `ln(1 + e^u)`, given `e^-|u|`.
