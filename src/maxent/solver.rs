@@ -83,7 +83,8 @@ impl Solver<'_> {
             let guide = Guide { preconditioner: self.preconditioner, path: &path, adjoint: &start.adjoint };
             let standing = Standing::of(problem, self.entropy, &at, goal, guide);
             let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal));
-            if standing.error < self.settings.tolerance_at(drop).max(ROUNDING * at.chi2) {
+            let tolerance = self.settings.tolerance_at(drop).max(ROUNDING * at.chi2);
+            if standing.is_within(tolerance, &at, goal, guide, self.entropy.lowest_coordinate()) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
                 return self.finish(at, Some(standing), path, why, newton_steps);
             }

@@ -61,8 +61,10 @@ pub(super) struct Standing {
     pub spottedness_path: f64,
     /// What spottedness has left to change at this chi2.
     pub spottedness_left: f64,
-    /// Estimate of the error left in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth.
-    pub error: f64,
+    /// How far ln(lambda) has to move to the target.
+    move_lambda: f64,
+    /// Of the error left all but what takes the preconditioner to tell.
+    known_error: f64,
     /// Whether lambda is at its bound and chi2 stays above the target.
     pub at_bound: bool,
 }
@@ -88,27 +90,33 @@ impl Standing {
         combine(&mut chi2_gradient, &scale, |g, scale| g * scale);
         combine_two(&mut right, &scale, &chi2_gradient, |right, scale, g| -(right * scale + at.lambda * g));
         let (chi2_path, spottedness_path, spottedness_left) = (0.0, 0.0, 0.0);
-        let (error, at_bound) = (f64::INFINITY, false);
-        let mut standing =
-            Standing { scale, chi2_gradient, right, chi2_path, spottedness_path, spottedness_left, error, at_bound };
+        let (move_lambda, known_error, at_bound) = (0.0, 0.0, false);
+        let mut standing = Standing {
+            scale,
+            chi2_gradient,
+            right,
+            chi2_path,
+            spottedness_path,
+            spottedness_left,
+            move_lambda,
+            known_error,
+            at_bound,
+        };
         match goal {
-            Goal::Lambda(_) => {
-                let (spanned, rest) = guide.preconditioner.norms(at.lambda, &standing.right);
-                standing.error = 0.5 * (spanned + rest) / at.lambda;
-            }
+            Goal::Lambda(_) => {}
             Goal::Chi2 { .. } if guide.path.len() == n => {
                 let weights = entropy.spottedness_gradient(&at.s, problem.area());
-                standing.forecast(&weights, at, goal, guide, entropy.lowest_coordinate());
+                standing.forecast(&weights, at, goal, guide);
             }
             // without a path there is no telling how far chi2 is from its target
-            Goal::Chi2 { .. } => {}
+            Goal::Chi2 { .. } => standing.known_error = f64::INFINITY,
         }
         standing
     }
 
-    /// `weights` is the gradient of spottedness with respect to the image, `lowest` the bound of the coordinates.
-    fn forecast(&mut self, weights: &[f64], at: &Point, goal: Goal, guide: Guide, lowest: f64) {
-        let Guide { preconditioner, path, adjoint } = guide;
+    /// `weights` is the gradient of spottedness with respect to the image.
+    fn forecast(&mut self, weights: &[f64], at: &Point, goal: Goal, guide: Guide) {
+        let Guide { path, adjoint, .. } = guide;
         let (g, right) = (&self.chi2_gradient, &self.right);
         self.chi2_path = 2.0 * dot(g, path);
         let mut weights = weights.to_vec();
@@ -116,40 +124,53 @@ impl Standing {
         self.spottedness_path = dot(&weights, path);
         let chi2_step = -2.0 * dot(path, right) / at.lambda;
         let move_lambda = lambda_step(at, self.chi2_path, chi2_step, goal);
+        self.move_lambda = move_lambda;
         if let Goal::Chi2 { target, largest_lambda } = goal {
             let to_bound = (largest_lambda / at.lambda).ln();
             self.at_bound = to_bound < AT_BOUND && move_lambda.abs() < AT_BOUND && at.chi2 + chi2_step > target;
         }
-        let mut left = right.clone();
-        axpy(-move_lambda * at.lambda, g, &mut left);
-        // a pixel at its bound that would go beyond stays where it is, whatever the steps: no error that they could make smaller
-        for (left, u) in left.iter_mut().zip(&at.u) {
-            if *u <= lowest && *left < 0.0 {
-                *left = 0.0;
-            }
-        }
-        let (spanned, rest) = preconditioner.norms(at.lambda, &left);
-        let (spanned, rest) = (0.5 * spanned / at.lambda, 0.5 * rest / at.lambda);
-        self.error = spanned + rest;
         if self.at_bound {
-            self.error += BOUND_ERROR * 0.5 * chi2_step.abs();
+            self.known_error = BOUND_ERROR * 0.5 * chi2_step.abs();
             return;
         }
         // what is left of the way to the target where the move of lambda is cut short
         if let Goal::Chi2 { target, .. } = goal {
-            self.error += 0.5 * (target - at.chi2 - chi2_step - self.chi2_path * move_lambda).abs();
-            self.error += 0.5 * PATH_ERROR * (target - at.chi2).abs();
+            self.known_error += 0.5 * (target - at.chi2 - chi2_step - self.chi2_path * move_lambda).abs();
+            self.known_error += 0.5 * PATH_ERROR * (target - at.chi2).abs();
         }
         // of second order in the move along the path
-        self.error += 0.5 * (self.chi2_path * move_lambda * move_lambda).abs();
+        self.known_error += 0.5 * (self.chi2_path * move_lambda * move_lambda).abs();
         if adjoint.len() == path.len() {
             let mut adjoint = adjoint.to_vec();
             combine(&mut adjoint, &self.scale, |y, scale| y * scale);
             // no component along the path: the move of lambda is accounted for by chi2
             let along = -2.0 * dot(g, &adjoint) / self.chi2_path;
             self.spottedness_left = dot(&adjoint, right) + along * dot(path, right);
-            self.error += FORECAST_ERROR * (self.spottedness_left * self.worth()).abs() + REST_ERROR * rest;
+            self.known_error += FORECAST_ERROR * (self.spottedness_left * self.worth()).abs();
         }
+    }
+
+    /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be below `tolerance`;
+    /// `lowest` is the bound of the coordinates.
+    pub fn is_within(&self, tolerance: f64, at: &Point, goal: Goal, guide: Guide, lowest: f64) -> bool {
+        // for most of the way that is known without the preconditioner
+        if self.known_error >= tolerance {
+            return false;
+        }
+        let mut left = self.right.clone();
+        if matches!(goal, Goal::Chi2 { .. }) {
+            axpy(-self.move_lambda * at.lambda, &self.chi2_gradient, &mut left);
+            // a pixel at its bound that would go beyond stays where it is, whatever the steps: no error that they could make smaller
+            for (left, u) in left.iter_mut().zip(&at.u) {
+                if *u <= lowest && *left < 0.0 {
+                    *left = 0.0;
+                }
+            }
+        }
+        let (spanned, rest) = guide.preconditioner.norms(at.lambda, &left);
+        let forecast = !self.at_bound && !guide.adjoint.is_empty() && guide.adjoint.len() == guide.path.len();
+        let rest_error = if forecast { 1.0 + REST_ERROR } else { 1.0 };
+        self.known_error + 0.5 * (spanned + rest_error * rest) / at.lambda < tolerance
     }
 
     /// How much chi2/2 a spottedness is worth along the path (negative).
