@@ -59,14 +59,10 @@ fn whitened(quadratic: &VelocityQuadratic, trials: &[Trial]) -> DMatrix<f64> {
     columns.transpose()
 }
 
-/// Rows `S'` with `S S'` the covariance.
+/// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do draws.
 fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let eigen = covariance.clone().symmetric_eigen();
-    let largest = eigen.eigenvalues.max();
-    let moving: Vec<usize> = (0..covariance.nrows()).filter(|&k| eigen.eigenvalues[k] > STILL * largest).collect();
-    let mut rows = DMatrix::zeros(moving.len(), covariance.nrows());
-    for (r, &k) in moving.iter().enumerate() {
-        rows.row_mut(r).tr_copy_from(&(eigen.eigenvectors.column(k) * eigen.eigenvalues[k].sqrt()));
-    }
-    rows
+    let mut eigen = covariance.clone().symmetric_eigen();
+    let still = STILL * eigen.eigenvalues.max();
+    eigen.eigenvalues.apply(|variance| *variance = if *variance > still { variance.sqrt() } else { 0.0 });
+    eigen.recompose()
 }

@@ -49,10 +49,17 @@ impl Block {
     }
 
     /// Copies the pixel of every lane to a place of its own.
+    ///
+    /// # Safety
+    /// Every place lies within `to`.
     #[inline(always)]
-    pub fn deal(&self, places: [usize; LANES], to: &mut [Pixel]) {
+    #[allow(unsafe_code)]
+    pub unsafe fn deal(&self, places: [usize; LANES], to: &mut [Pixel]) {
+        // safe: the caller knows the places
         #[cfg(target_arch = "x86_64")]
-        sse::deal(self, places, to);
+        unsafe {
+            sse::deal(self, places, to);
+        }
         #[cfg(not(target_arch = "x86_64"))]
         for (lane, place) in places.into_iter().enumerate() {
             let (weight, position) = (self.weight[lane], self.position[lane]);
@@ -83,14 +90,16 @@ mod sse {
         unsafe { transmute::<Rows, Block>([0, 1, 2, 3].map(|row| [low[row], high[row]])) }
     }
 
+    /// # Safety
+    /// As that of the block.
     #[inline(always)]
-    pub(super) fn deal(block: &Block, places: [usize; LANES], to: &mut [Pixel]) {
+    pub(super) unsafe fn deal(block: &Block, places: [usize; LANES], to: &mut [Pixel]) {
         // safe: as above
         let rows = unsafe { transmute::<Block, Rows>(*block) };
         for (half, places) in places.chunks(LANES / 2).enumerate() {
             let lanes = transposed(rows.map(|row| row[half]));
             for (place, lane) in places.iter().zip(lanes) {
-                // safe: as above
+                // safe: as above, and the caller knows the places
                 unsafe { *to.get_unchecked_mut(*place) = transmute::<__m128, Pixel>(lane) };
             }
         }
@@ -124,7 +133,11 @@ mod tests {
         let block = Block { weight: row(0), position: row(10), spread: row(20), pixel };
         let places = [4, 1, 8, 2, 11, 0, 6, 9];
         let mut pixels = [Pixel::default(); 12];
-        block.deal(places, &mut pixels);
+        // safe: there are twelve
+        #[allow(unsafe_code)]
+        unsafe {
+            block.deal(places, &mut pixels);
+        }
         for (lane, place) in places.into_iter().enumerate() {
             let (weight, position) = (block.weight[lane], block.position[lane]);
             let expected = Pixel { weight, position, spread: block.spread[lane], pixel: block.pixel[lane] };

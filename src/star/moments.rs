@@ -78,8 +78,11 @@ impl<const POINTS: usize> Rings<POINTS> {
     /// No rings yet.
     pub fn new() -> Self {
         let none = [[0.0; CHUNK]; POINTS];
-        let turned =
-            Turned { mu: [[[0.0; CHUNK]; POINTS]; 2], middle: [[0.0; CHUNK]; 2], velocity: [[[0.0; CHUNK]; POINTS]; 2] };
+        let turned = Turned {
+            mu: [[[0.0; CHUNK]; POINTS]; 2],
+            middle: [[0.0; CHUNK]; 2],
+            velocity: [[[0.0; CHUNK]; POINTS]; 2],
+        };
         Rings {
             angular_velocity: none,
             offset: none,
@@ -110,8 +113,9 @@ impl<const POINTS: usize> Rings<POINTS> {
     /// Turns the rings to where they are `since_epoch_d` days after the star's epoch.
     #[inline(always)]
     pub fn turn(&mut self, i: impl Instructions, since_epoch_d: f64) {
-        let mut velocity = [[[0.0; CHUNK]; POINTS]; 2];
-        for p in 0..POINTS {
+        let mut velocities = [[[0.0; CHUNK]; 2]; POINTS];
+        for (p, velocity) in velocities.iter_mut().enumerate() {
+            // copies: what is written could be what is read, for all that the compiler knows, and it would make no vectors
             let (angular_velocity, offset) = (self.angular_velocity[p], self.offset[p]);
             let (mu_equator, amplitude) = (self.mu_equator[p], self.amplitude[p]);
             let mut mu = [[0.0; CHUNK]; 2];
@@ -119,20 +123,18 @@ impl<const POINTS: usize> Rings<POINTS> {
                 let (sin, cos) = sin_cos(i, angular_velocity[ring] * since_epoch_d + offset[ring]);
                 mu[0][ring] = (mu_equator[ring] * cos) as f32;
                 mu[1][ring] = (-mu_equator[ring] * sin) as f32;
-                velocity[0][p][ring] = amplitude[ring] * sin;
-                velocity[1][p][ring] = amplitude[ring] * cos;
+                velocity[0][ring] = amplitude[ring] * sin;
+                velocity[1][ring] = amplitude[ring] * cos;
             }
-            for k in 0..2 {
-                self.turned.mu[k][p] = mu[k];
-            }
+            [self.turned.mu[0][p], self.turned.mu[1][p]] = mu;
         }
         for k in 0..2 {
             let mut middle = [0.0; CHUNK];
-            for of_point in &velocity[k] {
-                middle.iter_mut().zip(of_point).for_each(|(middle, v)| *middle += v / POINTS as f64);
+            for velocity in &velocities {
+                middle.iter_mut().zip(&velocity[k]).for_each(|(middle, v)| *middle += v / POINTS as f64);
             }
-            for p in 0..POINTS {
-                self.turned.velocity[k][p] = std::array::from_fn(|ring| (velocity[k][p][ring] - middle[ring]) as f32);
+            for (relative, velocity) in self.turned.velocity[k].iter_mut().zip(&velocities) {
+                *relative = std::array::from_fn(|ring| (velocity[k][ring] - middle[ring]) as f32);
             }
             self.turned.middle[k] = middle;
         }

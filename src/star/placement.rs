@@ -175,7 +175,7 @@ struct Seen {
     /// Of each, in the order in which they were seen: its cell, and where in it.
     cell: Vec<u32>,
     position: Vec<f32>,
-    /// How many of the pixels before it lie in its cell.
+    /// How many of the pixels before it lie in its cell, times the places from one to the next.
     rank: Vec<u32>,
     /// Pixels in each cell.
     counts: Vec<u32>,
@@ -276,7 +276,8 @@ impl Seen {
             let first_pixel = (end + full) % self.map_pixels;
             for (k, place) in self.sorted[places.clone()][full..].iter_mut().enumerate() {
                 let pixel = first_pixel + k;
-                let pixel = if pixel < self.map_pixels { pixel } else { (pixel - self.map_pixels).min(self.map_pixels - 1) };
+                let pixel =
+                    if pixel < self.map_pixels { pixel } else { (pixel - self.map_pixels).min(self.map_pixels - 1) };
                 *place = Pixel { pixel: pixel as u32, ..Pixel::default() };
             }
             for (lane, cell) in cells.iter().enumerate() {
@@ -295,10 +296,11 @@ impl Seen {
         {
             let mut block = Block { weight: *weight, position: *position, spread: *variance, pixel: *pixel };
             block.spread.iter_mut().for_each(|spread| *spread *= per_variance);
-            block.deal(
-                std::array::from_fn(|lane| unsafe { (*firsts.get_unchecked(cells[lane] as usize) + ranks[lane]) as usize }),
-                sorted,
-            );
+            // safe: `firsts` has an entry for every cell and one for none, and `sorted` a place for each pixel that was counted there
+            unsafe {
+                let place = |lane: usize| firsts.get_unchecked(cells[lane] as usize) + ranks[lane];
+                block.deal(std::array::from_fn(|lane| place(lane) as usize), sorted);
+            }
         }
     }
 }

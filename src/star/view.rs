@@ -219,8 +219,7 @@ mod tests {
                     inside.push(j);
                 }
             }
-            let [start, length] =
-                between(f64::from(count), middle - half_width, middle + half_width).map(|x| x as u32);
+            let [start, length] = between(f64::from(count), middle - half_width, middle + half_width).map(|x| x as u32);
             let mut given: Vec<u32> = (start..start + length).map(|j| j % count).collect();
             given.sort_unstable();
             assert_eq!(given, inside, "{middle} {half_width}");
