@@ -80,11 +80,11 @@ impl Solver<'_> {
             if !(at.chi2.is_finite() && at.entropy.is_finite()) {
                 return self.finish(at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
-            let guide = Guide { preconditioner: self.preconditioner, path: &path, adjoint: &start.adjoint };
+            let guide = Guide { path: &path, adjoint: &start.adjoint };
             let standing = Standing::of(problem, self.entropy, &at, goal, guide);
             let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal));
             let tolerance = self.settings.tolerance_at(drop).max(ROUNDING * at.chi2);
-            if standing.is_within(tolerance, &at, goal, guide, self.entropy.lowest_coordinate()) {
+            if standing.is_within(tolerance, &at, goal, self.preconditioner, self.entropy.lowest_coordinate()) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
                 return self.finish(at, Some(standing), path, why, newton_steps);
             }

@@ -10,7 +10,7 @@ use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::Problem;
 use super::solution::{Best, Goal};
-use crate::vector::linear::{axpy, combine, combine_two, dot};
+use crate::vector::linear::{axpy, combine, combine_two, combined, dot};
 
 /// Largest change of ln(lambda) in one step.
 const LN_LAMBDA_CAP: f64 = 1.5;
@@ -65,6 +65,8 @@ pub(super) struct Standing {
     move_lambda: f64,
     /// Of the error left all but what takes the preconditioner to tell.
     known_error: f64,
+    /// Error from what the preconditioner's eigenvectors do not span, over the merit of that.
+    rest_error: f64,
     /// Whether lambda is at its bound and chi2 stays above the target.
     pub at_bound: bool,
 }
@@ -72,7 +74,6 @@ pub(super) struct Standing {
 /// What is known of solutions near by.
 #[derive(Clone, Copy)]
 pub(super) struct Guide<'a> {
-    pub preconditioner: &'a Preconditioner,
     /// `dz / d ln(lambda)` in the metric; empty for unknown.
     pub path: &'a [f64],
     /// Adjoint of spottedness at fixed chi2, in the metric, over the scale of the metric; empty for unknown.
@@ -90,7 +91,7 @@ impl Standing {
         combine(&mut chi2_gradient, &scale, |g, scale| g * scale);
         combine_two(&mut right, &scale, &chi2_gradient, |right, scale, g| -(right * scale + at.lambda * g));
         let (chi2_path, spottedness_path, spottedness_left) = (0.0, 0.0, 0.0);
-        let (move_lambda, known_error, at_bound) = (0.0, 0.0, false);
+        let (move_lambda, known_error, rest_error, at_bound) = (0.0, 0.0, 1.0, false);
         let mut standing = Standing {
             scale,
             chi2_gradient,
@@ -100,6 +101,7 @@ impl Standing {
             spottedness_left,
             move_lambda,
             known_error,
+            rest_error,
             at_bound,
         };
         match goal {
@@ -116,12 +118,10 @@ impl Standing {
 
     /// `weights` is the gradient of spottedness with respect to the image.
     fn forecast(&mut self, weights: &[f64], at: &Point, goal: Goal, guide: Guide) {
-        let Guide { path, adjoint, .. } = guide;
+        let Guide { path, adjoint } = guide;
         let (g, right) = (&self.chi2_gradient, &self.right);
         self.chi2_path = 2.0 * dot(g, path);
-        let mut weights = weights.to_vec();
-        combine(&mut weights, &self.scale, |weight, scale| weight * scale);
-        self.spottedness_path = dot(&weights, path);
+        self.spottedness_path = dot(&combined(weights, &self.scale, |weight, scale| weight * scale), path);
         let chi2_step = -2.0 * dot(path, right) / at.lambda;
         let move_lambda = lambda_step(at, self.chi2_path, chi2_step, goal);
         self.move_lambda = move_lambda;
@@ -141,18 +141,25 @@ impl Standing {
         // of second order in the move along the path
         self.known_error += 0.5 * (self.chi2_path * move_lambda * move_lambda).abs();
         if adjoint.len() == path.len() {
-            let mut adjoint = adjoint.to_vec();
-            combine(&mut adjoint, &self.scale, |y, scale| y * scale);
+            let adjoint = combined(adjoint, &self.scale, |y, scale| y * scale);
             // no component along the path: the move of lambda is accounted for by chi2
             let along = -2.0 * dot(g, &adjoint) / self.chi2_path;
             self.spottedness_left = dot(&adjoint, right) + along * dot(path, right);
             self.known_error += FORECAST_ERROR * (self.spottedness_left * self.worth()).abs();
+            self.rest_error += REST_ERROR;
         }
     }
 
-    /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be below `tolerance`;
-    /// `lowest` is the bound of the coordinates.
-    pub fn is_within(&self, tolerance: f64, at: &Point, goal: Goal, guide: Guide, lowest: f64) -> bool {
+    /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be below
+    /// `tolerance`; `lowest` is the bound of the coordinates.
+    pub fn is_within(
+        &self,
+        tolerance: f64,
+        at: &Point,
+        goal: Goal,
+        preconditioner: &Preconditioner,
+        lowest: f64,
+    ) -> bool {
         // for most of the way that is known without the preconditioner
         if self.known_error >= tolerance {
             return false;
@@ -160,17 +167,15 @@ impl Standing {
         let mut left = self.right.clone();
         if matches!(goal, Goal::Chi2 { .. }) {
             axpy(-self.move_lambda * at.lambda, &self.chi2_gradient, &mut left);
-            // a pixel at its bound that would go beyond stays where it is, whatever the steps: no error that they could make smaller
+            // a pixel at its bound that would go beyond stays where it is: no error that steps could make smaller
             for (left, u) in left.iter_mut().zip(&at.u) {
                 if *u <= lowest && *left < 0.0 {
                     *left = 0.0;
                 }
             }
         }
-        let (spanned, rest) = guide.preconditioner.norms(at.lambda, &left);
-        let forecast = !self.at_bound && !guide.adjoint.is_empty() && guide.adjoint.len() == guide.path.len();
-        let rest_error = if forecast { 1.0 + REST_ERROR } else { 1.0 };
-        self.known_error + 0.5 * (spanned + rest_error * rest) / at.lambda < tolerance
+        let (spanned, rest) = preconditioner.norms(at.lambda, &left);
+        self.known_error + 0.5 * (spanned + self.rest_error * rest) / at.lambda < tolerance
     }
 
     /// How much chi2/2 a spottedness is worth along the path (negative).

@@ -31,8 +31,8 @@ pub struct Foothold {
 impl Foothold {
     /// Bytes that it takes in memory, all but a few.
     fn bytes(&self) -> usize {
-        let images = 2 + self.prediction.images();
-        self.preconditioner.bytes() + images * size_of_val(&self.start.image.coordinates[..])
+        let start = size_of_val(&self.start.image.coordinates[..]) + size_of_val(&self.start.path[..]);
+        self.preconditioner.bytes() + self.prediction.bytes() + start
     }
 }
 

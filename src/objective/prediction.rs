@@ -55,6 +55,9 @@ const BEND_REACH: f64 = 1.5;
 /// Largest change of a coordinate of the image by either order.
 const LARGEST_STEP: f64 = 1.0;
 
+/// Beyond it a change of an image per natural scale is absurd.
+const LARGEST_CHANGE: f32 = 1e30;
+
 /// Largest change of ln(lambda) that is predicted.
 const LN_LAMBDA_REACH: f64 = 1.0;
 
@@ -170,15 +173,17 @@ impl Prediction {
         Some(bends)
     }
 
-    /// Whether all its numbers are finite; those of the second order always are.
+    /// Whether all its numbers are finite and within reason; those of the second order always are.
     pub fn is_finite(&self) -> bool {
-        let image = self.image.iter().flatten().all(|x| x.is_finite());
+        // in single precision sums of them have to be finite, too
+        let image = self.image.iter().flatten().all(|x| x.abs() < LARGEST_CHANGE);
         image && self.ln_lambda.iter().chain(&self.adjoint).all(|x| x.is_finite())
     }
 
-    /// Number of vectors that are as long as an image, but for those of the second order.
-    pub fn images(&self) -> usize {
-        2 + self.image.len()
+    /// Bytes that it takes in memory, all but a few; the second order, which the reference alone has, is not counted.
+    pub fn bytes(&self) -> usize {
+        let image: usize = self.image.iter().map(|step| size_of_val(&step[..])).sum();
+        image + size_of_val(&self.map[..]) + size_of_val(&self.adjoint[..])
     }
 
     /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.

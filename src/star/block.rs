@@ -55,6 +55,7 @@ impl Block {
     #[inline(always)]
     #[allow(unsafe_code)]
     pub unsafe fn deal(&self, places: [usize; LANES], to: &mut [Pixel]) {
+        debug_assert!(places.iter().all(|place| *place < to.len()));
         // safe: the caller knows the places
         #[cfg(target_arch = "x86_64")]
         unsafe {

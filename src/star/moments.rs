@@ -10,7 +10,7 @@ use super::limb_darkening::LimbDarkening;
 use crate::vector::Instructions;
 use crate::vector::elementary::sin_cos;
 
-/// Numbers that are computed side by side.
+/// Numbers that are computed side by side: pixels of a ring, and rings.
 pub const CHUNK: usize = 16;
 
 /// An evaluation point of the pixels of a ring, seen from the pixels' centres as the star turns.
@@ -140,7 +140,8 @@ impl<const POINTS: usize> Rings<POINTS> {
         }
     }
 
-    /// Writes the moments of the pixels of a ring from `first` on to those from `place` on, a chunk of them, whether there are as many or not.
+    /// Writes the moments of the pixels of a ring from `first` on to those from `place` on: a chunk of them, whether there are as
+    /// many or not.
     #[inline(always)]
     pub fn look(
         &self,

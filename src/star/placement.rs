@@ -9,6 +9,7 @@ use super::block::{Block, LANES, Pixel};
 use super::grid::SurfaceGrid;
 use super::moments::Moments;
 use super::view::Viewer;
+use crate::vector::elementary::INTEGERS;
 use crate::vector::{Instructions, Task};
 use std::cell::Cell;
 
@@ -190,6 +191,8 @@ struct Seen {
 impl Seen {
     fn new(scale: Scale, pixels: usize) -> Self {
         let (room, cells) = (pixels.next_multiple_of(LANES), scale.cells);
+        // what unchecked places rely on: none of them is beyond 32 bits
+        assert!(LANES.saturating_mul(pixels + cells + LANES) < u32::MAX as usize);
         Seen {
             scale,
             map_pixels: pixels,
@@ -232,8 +235,9 @@ impl Seen {
             *rank = *count;
             *count += step;
         }
-        let times = step.trailing_zeros();
-        self.counts.iter_mut().for_each(|count| *count >>= times);
+        const { assert!(LANES.is_power_of_two()) }
+        let shift = step.trailing_zeros();
+        self.counts.iter_mut().for_each(|count| *count >>= shift);
         let counts = &self.counts[..self.scale.cells];
         if self.scale.order != Order::BySize {
             self.order.iter_mut().enumerate().for_each(|(cell, place)| *place = cell as u32);
@@ -268,13 +272,12 @@ impl Seen {
         for (group, cells) in groups.iter().zip(self.order.chunks(step)) {
             let places = end..end + LANES * group.rows();
             self.sorted.resize(self.sorted.len().max(places.end), Pixel::default());
-            // where cells have no pixels left: hardly ever one pixel in two blocks that follow each other, for no sum to wait for another
-            let full = match cells.len() == step {
-                true => step * self.counts[cells[step - 1] as usize] as usize,
-                false => 0,
-            };
-            let first_pixel = (end + full) % self.map_pixels;
+            // where cells have no pixels left: hardly ever one pixel in two blocks that follow each other, for no sum to wait
+            // for another
+            let full = cells.get(step - 1).map_or(0, |last| step * self.counts[*last as usize] as usize);
+            let first_pixel = (end + full) % self.map_pixels.max(1);
             for (k, place) in self.sorted[places.clone()][full..].iter_mut().enumerate() {
+                // of the smallest maps it is the last pixel again and again
                 let pixel = first_pixel + k;
                 let pixel =
                     if pixel < self.map_pixels { pixel } else { (pixel - self.map_pixels).min(self.map_pixels - 1) };
@@ -296,7 +299,8 @@ impl Seen {
         {
             let mut block = Block { weight: *weight, position: *position, spread: *variance, pixel: *pixel };
             block.spread.iter_mut().for_each(|spread| *spread *= per_variance);
-            // safe: `firsts` has an entry for every cell and one for none, and `sorted` a place for each pixel that was counted there
+            // safe: a cell is at most the last, or beyond the last pixel the one behind it, and `firsts` has an entry for each; a
+            // rank is below what was counted of its cell, for which there is room in `sorted`, and for LANES pixels behind all
             unsafe {
                 let place = |lane: usize| firsts.get_unchecked(cells[lane] as usize) + ranks[lane];
                 block.deal(std::array::from_fn(|lane| place(lane) as usize), sorted);
@@ -304,9 +308,6 @@ impl Seen {
         }
     }
 }
-
-/// From here on neighbouring numbers are integers.
-const INTEGERS: f64 = 4_503_599_627_370_496.0;
 
 /// Nodes of a cell before the one at its lower border.
 const NODES_BEFORE: u32 = 2;

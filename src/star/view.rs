@@ -8,6 +8,7 @@ use super::grid::{Ring, RingPoint, SurfaceGrid};
 use super::limb_darkening::LimbDarkening;
 use super::moments::{CHUNK, Moments, Point, Rings};
 use crate::vector::Instructions;
+use crate::vector::elementary::INTEGERS;
 use std::f64::consts::TAU;
 
 /// The star's orientation, shared by all observations.
@@ -22,11 +23,11 @@ pub struct Viewer {
 /// Rings of pixels, each with so many evaluation points, as they turn before the observer. Rings that are never visible are left out.
 pub struct Views<'a, const POINTS: usize> {
     grid: &'a SurfaceGrid,
-    /// Number of rings.
-    rings: usize,
-    /// A chunk of rings at a time.
-    points: Vec<Rings<POINTS>>,
+    /// The rings, and where they are visible, a chunk of them at a time.
+    rings: Vec<Rings<POINTS>>,
     horizons: Vec<Horizons>,
+    /// Number of rings.
+    count: usize,
     parts: Vec<Part>,
     moments: Moments,
 }
@@ -46,7 +47,8 @@ struct Horizons {
 /// Pixels beside each other of which moments are computed at a time.
 #[derive(Clone, Copy, Default)]
 struct Part {
-    ring: u32,
+    /// Chunk of rings, and ring in it.
+    ring: [u32; 2],
     /// The first of them.
     pixel: u32,
     /// Its place among the pixels that are seen.
@@ -68,21 +70,22 @@ impl Viewer {
 
     /// Views of the pixels of `grid`, each with so many evaluation points.
     pub fn of<'a, const POINTS: usize>(&self, grid: &'a SurfaceGrid) -> Views<'a, POINTS> {
-        let (mut points, mut horizons, mut rings) = (Vec::new(), Vec::new(), 0);
+        let (mut rings, mut horizons, mut count) = (Vec::new(), Vec::new(), 0);
         for ring in &grid.rings {
             let ends = [&ring.points[0], &ring.points[POINTS - 1]].map(|point| self.reach(point));
             let Some(reach) = ends[0].or(ends[1]) else { continue };
-            if rings % CHUNK == 0 {
-                points.push(Rings::new());
+            if count % CHUNK == 0 {
+                rings.push(Rings::new());
                 horizons.push(Horizons::none());
             }
             let of_points = std::array::from_fn(|p| self.point(&ring.points[p]));
-            points[rings / CHUNK].set(rings % CHUNK, of_points, self.limb, ring.points[0].area);
+            rings[count / CHUNK].set(count % CHUNK, of_points, self.limb, ring.points[0].area);
             // of two latitudes one of which is never visible the other says where the ring is
-            horizons[rings / CHUNK].set(rings % CHUNK, ring, ends.map(|end| end.unwrap_or(reach)));
-            rings += 1;
+            horizons[count / CHUNK].set(count % CHUNK, ring, ends.map(|end| end.unwrap_or(reach)));
+            count += 1;
         }
-        Views { grid, rings, points, horizons, parts: Vec::new(), moments: Moments::with_room_for(grid.len()) }
+        let parts = Vec::with_capacity(grid.len() / CHUNK + 2 * count);
+        Views { grid, rings, horizons, count, parts, moments: Moments::with_room_for(grid.len()) }
     }
 
     fn point(&self, point: &RingPoint) -> Point {
@@ -110,13 +113,13 @@ impl<const POINTS: usize> Views<'_, POINTS> {
     /// What is seen `since_epoch_d` days after the star's epoch.
     #[inline(always)]
     pub fn look<I: Instructions>(&mut self, i: I, since_epoch_d: f64) -> &Moments {
-        self.points.iter_mut().for_each(|rings| rings.turn(i, since_epoch_d));
+        self.rings.iter_mut().for_each(|rings| rings.turn(i, since_epoch_d));
         self.find_parts(since_epoch_d);
         for part in &self.parts {
-            let (rings, ring) = (&self.points[part.ring as usize / CHUNK], part.ring as usize % CHUNK);
+            let [chunk, ring] = part.ring.map(|ring| ring as usize);
             let (first, place) = (part.pixel as usize, part.place as usize);
             // a part goes on beyond the last pixel: there is room, and the next one overwrites what comes of it
-            rings.look(i, ring, &self.grid.directions, first, place, &mut self.moments);
+            self.rings[chunk].look(i, ring, &self.grid.directions, first, place, &mut self.moments);
         }
         &self.moments
     }
@@ -125,17 +128,16 @@ impl<const POINTS: usize> Views<'_, POINTS> {
     fn find_parts(&mut self, since_epoch_d: f64) {
         self.parts.clear();
         let mut place = 0;
-        for (k, horizons) in self.horizons.iter().enumerate() {
+        for (chunk, horizons) in self.horizons.iter().enumerate() {
             let [start, length] = horizons.visible(since_epoch_d);
-            for ring in 0..CHUNK.min(self.rings - k * CHUNK) {
+            for ring in 0..CHUNK.min(self.count - chunk * CHUNK) {
                 let (first, count) = (horizons.first[ring], horizons.count[ring] as u32);
                 let (start, length) = (start[ring], length[ring]);
                 let before = length.min(count - start);
                 for (from, pixels) in [(start, before), (0, length - before)] {
                     for done in (0..pixels).step_by(CHUNK) {
-                        let part =
-                            Part { ring: (k * CHUNK + ring) as u32, pixel: first + from + done, place: place + done };
-                        self.parts.push(part);
+                        let ring = [chunk as u32, ring as u32];
+                        self.parts.push(Part { ring, pixel: first + from + done, place: place + done });
                     }
                     place += pixels;
                 }
@@ -185,15 +187,14 @@ fn between(count: f64, from: f64, to: f64) -> [f64; 2] {
     let place = |longitude: f64| longitude * count / TAU - 0.5;
     let (from, to) = (place(from).ceil(), place(to).floor() + 1.0);
     let all = count == 1.0 || to - from >= count;
-    // at angles beyond all meaning it is any of them
+    // at angles beyond all meaning it is any of them, but one of them: pixels are not checked again
     let start = (from - count * (from / count).floor()).max(0.0).min(count - 1.0);
     if all { [0.0, count] } else { [start, (to - from).max(0.0)] }
 }
 
-/// A small number that is not negative, as an integer: the last bits of its sum with one from which on all numbers are.
+/// A small number that is not negative, as an integer, in a way that vectors know.
 #[inline(always)]
 fn whole(x: f64) -> u32 {
-    const INTEGERS: f64 = 4_503_599_627_370_496.0;
     (x + INTEGERS).to_bits() as u32
 }
 

@@ -9,6 +9,9 @@ use super::Instructions;
 /// ln 2 in two parts: the first is exact times any exponent.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 
+/// 2^52: from here on neighbouring numbers are integers, which stand in their last bits.
+pub const INTEGERS: f64 = 4_503_599_627_370_496.0;
+
 /// 2^52 and half as much: the sum with a number below 2^51 ends in that number, rounded to an integer.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
@@ -82,16 +85,15 @@ pub fn exp_minus(i: impl Instructions, x: f64) -> f64 {
     (1.0 + more) * f64::from_bits((rounded.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
 }
 
-/// `ln(1 + x)` for x > -1.
+/// `ln(1 + x)` for -1 < x < 1e307.
 #[inline(always)]
 pub fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     const HALF_ROOT: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
     const MANTISSA: u64 = (1 << 52) - 1;
-    const TWO_TO_52: f64 = 4_503_599_627_370_496.0;
     // 1 + x = 2^exponent mantissa, the mantissa within a root of 2 from 1
     let y = 1.0 + x;
     let bits = y.to_bits().wrapping_add(1.0_f64.to_bits() - HALF_ROOT);
-    let exponent = f64::from_bits((bits >> 52) | TWO_TO_52.to_bits()) - (TWO_TO_52 + 1023.0);
+    let exponent = f64::from_bits((bits >> 52) | INTEGERS.to_bits()) - (INTEGERS + 1023.0);
     let mantissa = f64::from_bits((bits & MANTISSA) + HALF_ROOT);
     // what the sum has lost
     let lost = if x > 1.0 { 1.0 - (y - x) } else { x - (y - 1.0) };

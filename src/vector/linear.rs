@@ -25,6 +25,13 @@ pub fn combine<N: Number>(y: &mut [N], x: &[N], f: impl Fn(N, N) -> N) {
     super::run(Combine { y, x, f });
 }
 
+/// `f(x, y)`, number by number.
+pub fn combined<N: Number>(x: &[N], y: &[N], f: impl Fn(N, N) -> N) -> Vec<N> {
+    let mut z = x.to_vec();
+    combine(&mut z, y, f);
+    z
+}
+
 /// `z = f(z, x, y)`, number by number.
 pub fn combine_two<N: Number>(z: &mut [N], x: &[N], y: &[N], f: impl Fn(N, N, N) -> N) {
     assert!(z.len() == x.len() && z.len() == y.len());
@@ -104,6 +111,7 @@ mod tests {
             assert!(y.iter().zip(&x).all(|(y, x)| (*y).into() == 1.0 + 3.0 * (*x).into()));
             combine_two(&mut y, &x, &x, |y, a, b| y - a - N::of(2.0) * b);
             assert!(y.iter().all(|y| *y == N::of(1.0)));
+            assert!(combined(&x, &y, |x, y| x - y).iter().zip(&x).all(|(z, x)| *z == *x - N::of(1.0)));
         }
     }
 }

@@ -10,7 +10,7 @@
 
 use super::Step;
 use crate::vector::elementary::{exp_minus, ln_1p};
-use crate::vector::linear::{combine, dot};
+use crate::vector::linear::{combined, dot};
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: a pixel that bright outshines, and one that dark is nothing beside, all the others.
@@ -28,9 +28,7 @@ pub(super) fn gradient(u: &[f64], area: &[f64]) -> Vec<f64> {
 
 /// Scale of the metric, `sqrt(B / a)`.
 pub(super) fn metric(b: &[f64], area: &[f64]) -> Vec<f64> {
-    let mut scale = b.to_vec();
-    combine(&mut scale, area, |b, a| (b / a).sqrt());
-    scale
+    combined(b, area, |b, a| (b / a).sqrt())
 }
 
 /// Root mean square deviation from the default.

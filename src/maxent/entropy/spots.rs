@@ -5,7 +5,7 @@
 
 use super::Step;
 use crate::vector::elementary::{exp_minus, ln_1p};
-use crate::vector::linear::{combine, dot};
+use crate::vector::linear::{combined, dot};
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: beyond it s (1-s) would lose its precision.
@@ -23,9 +23,7 @@ pub(super) fn gradient(default_logit: f64, u: &[f64], area: &[f64]) -> Vec<f64> 
 
 /// Scale of the metric, `sqrt(s (1-s) / a)`.
 pub(super) fn metric(s: &[f64], area: &[f64]) -> Vec<f64> {
-    let mut scale = s.to_vec();
-    combine(&mut scale, area, |s, a| (s * (1.0 - s) / a).sqrt());
-    scale
+    combined(s, area, |s, a| (s * (1.0 - s) / a).sqrt())
 }
 
 /// Logits moved by an image step.
