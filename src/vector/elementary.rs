@@ -85,7 +85,7 @@ pub fn exp_minus(i: impl Instructions, x: f64) -> f64 {
     (1.0 + more) * f64::from_bits((rounded.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
 }
 
-/// `ln(1 + x)` for -1 < x < 1e307.
+/// `ln(1 + x)` for x > -1.
 #[inline(always)]
 pub fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     const HALF_ROOT: u64 = std::f64::consts::FRAC_1_SQRT_2.to_bits();
@@ -96,11 +96,9 @@ pub fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     let exponent = f64::from_bits((bits >> 52) | INTEGERS.to_bits()) - (INTEGERS + 1023.0);
     let mantissa = f64::from_bits((bits & MANTISSA) + HALF_ROOT);
     // what the sum has lost
-    let lost = if x > 1.0 { 1.0 - (y - x) } else { x - (y - 1.0) };
+    let lost = if x > 1.0 { 1.0 - (y - x) } else { x - (y - 1.0) } / y;
     let (f, lost) = if exponent == 0.0 { (x, 0.0) } else { (mantissa - 1.0, lost) };
-    // f / (2 + f) and lost / y by one division, which takes longer than all the rest
-    let per_both = 1.0 / (y * (2.0 + f));
-    let (s, lost) = (f * y * per_both, lost * (2.0 + f) * per_both);
+    let s = f / (2.0 + f);
     let (square, half) = (s * s, 0.5 * f * f);
     let rest = s * (half + square * polynomial(i, &LOGARITHM, square)) + (exponent * LN_2[1] + lost);
     exponent * LN_2[0] - ((half - rest) - f)

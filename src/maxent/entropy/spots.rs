@@ -81,9 +81,7 @@ fn logit_step(i: impl Instructions, s: f64, ds: f64) -> f64 {
     let straight = ds.abs().min(0.5 * room) * ds.signum();
     let (there, rest) = (s + straight, ds - straight);
     let left = 1.0 - there;
-    // both quotients by one division, which takes longer than all the rest
-    let per_all = 1.0 / (s * there * left);
-    ln_1p(i, straight * there * per_all) + rest * s * per_all
+    ln_1p(i, straight / (s * left)) + rest / (there * left)
 }
 
 /// `ln(1 + e^u)`, given `e^-|u|`.
