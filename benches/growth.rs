@@ -26,7 +26,7 @@ const PIXELS: usize = 2000;
 const PASSES: u32 = 10;
 
 /// Parameter vectors evaluated at each size.
-const POINTS: usize = 6;
+const POINTS: usize = 24;
 
 /// How far chi2 is brought below that of the true map. A fixed chi2 per datum would ask for another fit at every size, down to
 /// impossible ones: noise moves chi2 by the square root of twice the number of data.

@@ -38,6 +38,9 @@ const FIRST_CHI2: f64 = 1.5;
 /// chi2 per datum, all of them independent, that a map fits to: the paper's.
 const USUAL_CHI2: f64 = 0.97;
 
+/// Error allowed to the image that evaluations start from: a worse one costs every one of them passes.
+const TOLERANCE: f64 = 1e-7;
+
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
 const HOPELESS_LAMBDA: f64 = 40.0;
 
@@ -206,8 +209,8 @@ impl Reference {
         let goal = |target| Goal::Chi2 { target, largest_lambda };
         let easy = coarse.solve(&mut problem, goal((FIRST_CHI2 * chi2_target).min(blank_chi2)), &blank);
         let preconditioner = precondition(imager, &mut problem, &easy);
-        let fine =
-            Solver { preconditioner: &preconditioner, settings: SolverSettings::patient(), entropy: imager.entropy };
+        let settings = SolverSettings { tolerance: TOLERANCE, ..SolverSettings::patient() };
+        let fine = Solver { preconditioner: &preconditioner, settings, entropy: imager.entropy };
         let solution = fine.solve(&mut problem, goal(chi2_target), &start(&easy));
         let preconditioner = Arc::new(precondition(imager, &mut problem, &solution));
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
