@@ -139,10 +139,12 @@ impl Reference {
             settings: SolverSettings::exact(),
         };
         let goal = Goal::Chi2 { target: reference.chi2_target, largest_lambda: f64::INFINITY };
-        let solution = solver.solve(&mut problem, goal, &reference.start());
+        let mut solution = solver.solve(&mut problem, goal, &reference.start());
         if solution.termination != Termination::Converged {
             return Err(ReferenceError::Solver(solution.termination));
         }
+        // where there was no step left to take, the path is that of a rougher solution
+        solver.find_path(&mut problem, &mut solution);
         reference.tradeoff = follow(&solver, &mut problem, &solution);
         reference.largest_lambda = reference.tradeoff.nodes().last().expect("the reference itself").lambda;
         reference.solution = solution;
