@@ -84,7 +84,7 @@ impl Solver<'_> {
             let standing = Standing::of(problem, self.entropy, &at, goal, guide);
             let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal));
             let tolerance = self.settings.tolerance_at(drop).max(ROUNDING * at.chi2);
-            if standing.is_within(tolerance, &at, goal, self.preconditioner, self.entropy.lowest_coordinate()) {
+            if standing.is_within(tolerance, &at, goal, self.preconditioner, self.entropy, problem.area()) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
                 return self.finish(at, Some(standing), path, why, newton_steps);
             }

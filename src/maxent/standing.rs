@@ -154,20 +154,21 @@ impl Standing {
     }
 
     /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be below
-    /// `tolerance`; `lowest` is the bound of the coordinates.
+    /// `tolerance`.
     pub fn is_within(
         &self,
         tolerance: f64,
         at: &Point,
         goal: Goal,
         preconditioner: &Preconditioner,
-        lowest: f64,
+        entropy: Entropy,
+        area: &[f64],
     ) -> bool {
         // for most of the way that is known without the preconditioner
         if self.known_error >= tolerance {
             return false;
         }
-        let mut left = self.right.clone();
+        let (mut left, lowest) = (self.right.clone(), entropy.lowest_coordinate());
         if matches!(goal, Goal::Chi2 { .. }) {
             axpy(-self.move_lambda * at.lambda, &self.chi2_gradient, &mut left);
             // a pixel at its bound that would go beyond stays where it is: no error that steps could make smaller
@@ -179,7 +180,23 @@ impl Standing {
         }
         let (spanned, rest) = preconditioner.norms(at.lambda, &left);
         let [of_spanned, of_rest] = self.merit_errors;
-        self.known_error + 0.5 * (of_spanned * spanned + of_rest * rest) / at.lambda < tolerance
+        let faint = self.faint(&left, area);
+        self.known_error + 0.5 * (of_spanned * (spanned + faint) + of_rest * rest) / at.lambda < tolerance
+    }
+
+    /// What the squared norm of `left` lacks of twice the merit to be gained, from pixels far below what their gradient asks for. For the
+    /// data alone a change of x in the logarithm of a faint pixel gains `(scale area)^2 (e^x - 1 - x)`; the metric has its second
+    /// order, next to nothing where a pixel has been pushed into the dark.
+    fn faint(&self, left: &[f64], area: &[f64]) -> f64 {
+        let mut lacking = 0.0;
+        for ((left, scale), area) in left.iter().zip(&self.scale).zip(area) {
+            let per_step = scale * area;
+            if *left > per_step {
+                let step = left / per_step;
+                lacking += 2.0 * per_step * per_step * (step.exp_m1() - step - 0.5 * step * step);
+            }
+        }
+        lacking
     }
 
     /// How much chi2/2 a spottedness is worth along the path (negative).
