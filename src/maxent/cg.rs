@@ -38,8 +38,13 @@ pub(super) fn solve<N: Number>(
     }
     let mut direction = preconditioned.clone();
     let mut rho = dot(&residual, &preconditioned);
+    let mut shortest = f64::INFINITY;
     for iteration in 0..limits.iterations {
         if rho <= goal {
+            if iteration > 0 {
+                // a last step for nothing: its direction is known, and the shortest so far is hardly ever too long
+                axpy(shortest, &direction, z);
+            }
             return iteration;
         }
         apply(&direction, &mut applied);
@@ -55,6 +60,7 @@ pub(super) fn solve<N: Number>(
             return iteration + 1;
         }
         let length = rho / curvature;
+        shortest = shortest.min(length);
         axpy(length, &direction, z);
         axpy(-length, &applied, &mut residual);
         precondition(&residual, &mut preconditioned);

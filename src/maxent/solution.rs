@@ -37,7 +37,7 @@ pub struct SolverSettings {
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        SolverSettings { tolerance: 5e-5, leniency: 0.005, cg_tolerance: 0.05, cg_iterations: 40, newton_steps: 60 }
+        SolverSettings { tolerance: 5e-5, leniency: 0.005, cg_tolerance: 0.08, cg_iterations: 40, newton_steps: 60 }
     }
 }
 
