@@ -183,6 +183,28 @@ fn the_answer_does_not_depend_on_start_and_preconditioner() {
     same(&solver.solve(&mut problem, goal, &there.start()), &here.solution, 1e-6);
 }
 
+/// A pixel of next to nothing that should have something: its gradient, in a metric that has shrunk with it, is next to nothing, too.
+#[test]
+fn a_pixel_in_the_dark_is_not_taken_for_solved() {
+    let oracle = oracle();
+    let imager = imager(&oracle);
+    let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
+    let reference = Reference::build(&imager, truth, 0.97).unwrap();
+    let mut start = reference.start();
+    let pixel = start.image.coordinates.iter().position(|u| (-9.5..-8.5).contains(u)).expect("a faint pixel");
+    start.image.coordinates[pixel] = -29.0;
+    let mut problem = problem(&oracle, &imager);
+    let settings = SolverSettings { tolerance: 1e-7, ..SolverSettings::default() };
+    let solver = Solver { entropy: imager.entropy, preconditioner: &reference.preconditioner, settings };
+    let goal = Goal::Chi2 { target: reference.chi2_target, largest_lambda: 1.0 };
+    let solution = solver.solve(&mut problem, goal, &start);
+    assert_eq!(solution.termination, Termination::Converged);
+    let worth = 0.5 * solution.chi2_slope / solution.spottedness_slope;
+    let error = (solution.spottedness - reference.solution.spottedness) * worth;
+    // spottedness goes with the root of the merit; in the dark, the pixel makes 8e-4
+    assert!(error.abs() < 3e-4, "{error:e} after {} steps", solution.newton_steps);
+}
+
 #[test]
 fn a_target_out_of_reach_is_said_so_with_the_floor() {
     let oracle = oracle();

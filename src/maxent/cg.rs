@@ -71,3 +71,28 @@ pub(super) fn solve<N: Number>(
     }
     limits.iterations
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_step_for_nothing_is_worth_more_than_the_tolerance() {
+        // as a preconditioner leaves a system: eigenvalues from 1 to 2
+        let eigenvalues: Vec<f64> = (0..100).map(|k| 1.0 + 0.01 * f64::from(k)).collect();
+        let b: Vec<f64> = (0..100).map(|k| (0.7 * f64::from(k * k)).sin()).collect();
+        let mut applications = 0;
+        let apply = |v: &[f64], out: &mut [f64]| {
+            applications += 1;
+            out.iter_mut().zip(v).zip(&eigenvalues).for_each(|((out, v), e)| *out = e * v);
+        };
+        let precondition = |r: &[f64], out: &mut [f64]| out.copy_from_slice(r);
+        let mut z = vec![0.0; b.len()];
+        let limits = CgLimits { tolerance: 0.08, iterations: 40 };
+        assert_eq!(solve(apply, precondition, &b, &mut z, limits), applications);
+        let errors = z.iter().zip(&b).zip(&eigenvalues).map(|((z, b), e)| e * (z - b / e).powi(2));
+        let norm = b.iter().zip(&eigenvalues).map(|(b, e)| b * b / e);
+        let error = (errors.sum::<f64>() / norm.sum::<f64>()).sqrt();
+        assert!(applications == 2 && error < 0.02, "{error} after {applications}");
+    }
+}

@@ -180,20 +180,18 @@ impl Standing {
         }
         let (spanned, rest) = preconditioner.norms(at.lambda, &left);
         let [of_spanned, of_rest] = self.merit_errors;
-        let faint = self.faint(&left, area);
+        let faint = self.faint(&left, at, entropy, area);
         self.known_error + 0.5 * (of_spanned * (spanned + faint) + of_rest * rest) / at.lambda < tolerance
     }
 
-    /// What the squared norm of `left` lacks of twice the merit to be gained, from pixels far below what their gradient asks for. For the
-    /// data alone a change of x in the logarithm of a faint pixel gains `(scale area)^2 (e^x - 1 - x)`; the metric has its second
-    /// order, next to nothing where a pixel has been pushed into the dark.
-    fn faint(&self, left: &[f64], area: &[f64]) -> f64 {
+    /// What the squared norm of `left` lacks of twice the merit to be gained. The metric knows changes of second order: next to nothing
+    /// where a pixel has been pushed into the dark and is to come back. For what the data ask of it now, the entropy knows.
+    fn faint(&self, left: &[f64], at: &Point, entropy: Entropy, area: &[f64]) -> f64 {
         let mut lacking = 0.0;
-        for ((left, scale), area) in left.iter().zip(&self.scale).zip(area) {
-            let per_step = scale * area;
-            if *left > per_step {
-                let step = left / per_step;
-                lacking += 2.0 * per_step * per_step * (step.exp_m1() - step - 0.5 * step * step);
+        for (((left, scale), area), u) in left.iter().zip(&self.scale).zip(area).zip(&at.u) {
+            let per_change = scale * area;
+            if left.abs() > per_change {
+                lacking += (2.0 * area * entropy.gain(*u, left / per_change) - left * left).max(0.0);
             }
         }
         lacking

@@ -31,6 +31,11 @@ pub(super) fn metric(b: &[f64], area: &[f64]) -> Vec<f64> {
     combined(b, area, |b, a| (b / a).sqrt())
 }
 
+/// Gain by a change of the logarithm: the divergence of the two images.
+pub(super) fn gain(u: f64, change: f64) -> f64 {
+    u.exp() * (change.exp_m1() - change)
+}
+
 /// Root mean square deviation from the default.
 pub(super) fn spottedness(b: &[f64], area: &[f64]) -> f64 {
     b.iter().zip(area).map(|(b, a)| a * (b - 1.0).powi(2)).sum::<f64>().sqrt()

@@ -104,6 +104,15 @@ impl Entropy {
         }
     }
 
+    /// What a pixel gains, per area, by a change of its coordinate from `u` to the best for a misfit that is linear in the image.
+    pub fn gain(&self, u: f64, change: f64) -> f64 {
+        let change = change.clamp(self.lowest_coordinate() - u, -self.lowest_coordinate() - u);
+        match self {
+            Entropy::Spots { .. } => spots::gain(u, change),
+            Entropy::BrightAndDark => bright_and_dark::gain(u, change),
+        }
+    }
+
     /// Spottedness: how far the image is from one without spots.
     pub fn spottedness(&self, image: &[f64], area: &[f64]) -> f64 {
         match self {
@@ -176,6 +185,23 @@ mod tests {
                 let curvature = (above - 2.0 * here + below) / (h * h);
                 assert!((metric[p].powi(-2) / curvature - 1.0).abs() < 1e-5, "{entropy:?} {p}: {curvature}");
             }
+        }
+    }
+
+    #[test]
+    fn gain_is_the_way_down_to_where_the_gradient_vanishes() {
+        for (entropy, u) in MODELS {
+            for (u, change) in u.into_iter().zip([4.0, -0.3, 0.1, -2.0]) {
+                // -S less its tangent at the best
+                let (here, best) = (image(entropy, u), image(entropy, u + change));
+                let slope = entropy.gradient(&[u + change], &[1.0])[0];
+                let gain = formula(entropy, here) - formula(entropy, best) - slope * (here - best);
+                assert!((entropy.gain(u, change) / gain - 1.0).abs() < 1e-9, "{entropy:?} {u}: {gain}");
+            }
+            // of second order while it is small
+            let metric = entropy.metric(&entropy.image(&[0.2]), &[1.0])[0];
+            assert!((entropy.gain(0.2, 1e-4) / (0.5e-8 * metric * metric) - 1.0).abs() < 1e-3);
+            assert!(entropy.gain(0.2, 1e9).is_finite());
         }
     }
 

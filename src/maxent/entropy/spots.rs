@@ -26,6 +26,12 @@ pub(super) fn metric(s: &[f64], area: &[f64]) -> Vec<f64> {
     combined(s, area, |s, a| (s * (1.0 - s) / a).sqrt())
 }
 
+/// Gain by a change of the logit: the divergence of the two images.
+pub(super) fn gain(u: f64, change: f64) -> f64 {
+    let softplus = |u: f64| u.max(0.0) + (-u.abs()).exp().ln_1p();
+    softplus(u + change) - softplus(u) - change / (1.0 + (-u).exp())
+}
+
 /// Logits moved by an image step.
 pub(super) struct LogitStep<'a>(pub Step<'a>);
 
