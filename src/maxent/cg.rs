@@ -7,13 +7,14 @@ use crate::vector::linear::{axpy, combine, dot};
 /// When to stop, and what to do it with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CgLimits {
-    /// Residual over right-hand side, in the norm of the inverse.
+    /// Residual over right-hand side, in the norm of the inverse, before the last step.
     pub tolerance: f64,
     /// Most iterations.
     pub iterations: usize,
 }
 
-/// Solves `A z = b` from the start `z`; returns the number of iterations.
+/// Solves `A z = b` from the start `z`; returns the number of iterations. Once the residual is small enough one more step is taken,
+/// which costs no application of A, because its length is not computed but guessed.
 ///
 /// The residual is measured against `b A^-1 b`: about `b z` where the start is good, about `b P b` where there is none.
 pub(super) fn solve<N: Number>(
@@ -38,10 +39,11 @@ pub(super) fn solve<N: Number>(
     }
     let mut direction = preconditioned.clone();
     let mut rho = dot(&residual, &preconditioned);
-    let mut shortest = f64::INFINITY;
+    // 1 where the preconditioner is the inverse, and hardly ever more
+    let mut shortest = 1.0_f64;
     for iteration in 0..limits.iterations {
         if rho <= goal {
-            if iteration > 0 {
+            if iteration > 0 && rho > 0.0 {
                 // a last step for nothing: its direction is known, and the shortest so far is hardly ever too long
                 axpy(shortest, &direction, z);
             }

@@ -184,14 +184,16 @@ impl Standing {
         self.known_error + 0.5 * (of_spanned * (spanned + faint) + of_rest * rest) / at.lambda < tolerance
     }
 
-    /// What the squared norm of `left` lacks of twice the merit to be gained. The metric knows changes of second order: next to nothing
-    /// where a pixel has been pushed into the dark and is to come back. For what the data ask of it now, the entropy knows.
+    /// What the squared norm of `left` lacks of twice the merit to be gained by pixels that are to come back to the default. The metric
+    /// knows changes of second order: next to nothing where a pixel has been pushed into the dark.
     fn faint(&self, left: &[f64], at: &Point, entropy: Entropy, area: &[f64]) -> f64 {
-        let mut lacking = 0.0;
+        let (mut lacking, default) = (0.0, entropy.default_coordinate());
         for (((left, scale), area), u) in left.iter().zip(&self.scale).zip(area).zip(&at.u) {
             let per_change = scale * area;
-            if left.abs() > per_change {
-                lacking += (2.0 * area * entropy.gain(*u, left / per_change) - left * left).max(0.0);
+            if *left > per_change && *u < default {
+                // beyond the default it is for the data to say what a pixel gains
+                let change = (left / per_change).min(default - u);
+                lacking += (2.0 * area * entropy.gain(*u, change) - left * left).max(0.0);
             }
         }
         lacking

@@ -38,8 +38,8 @@ const FIRST_CHI2: f64 = 1.5;
 /// chi2 per datum, all of them independent, that a map fits to: the paper's.
 const USUAL_CHI2: f64 = 0.97;
 
-/// Error allowed to the image that evaluations start from: a worse one costs every one of them passes.
-const TOLERANCE: f64 = 1e-7;
+/// Error allowed to the image of a provisional reference: a worse one costs every evaluation that starts from it passes.
+const PROVISIONAL_TOLERANCE: f64 = 1e-7;
 
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
 const HOPELESS_LAMBDA: f64 = 40.0;
@@ -164,11 +164,17 @@ impl Reference {
         if reference.solution.termination == Termination::NonFinite {
             return Err(ReferenceError::Solver(Termination::NonFinite));
         }
-        // evaluations nearby take its path, which the last step has left as it was before
         let mut problem = imager.problem(reference.response.clone());
-        let (entropy, preconditioner) = (imager.entropy, &reference.preconditioner);
-        let solver = Solver { entropy, preconditioner, settings: SolverSettings::patient() };
-        solver.find_path(&mut problem, &mut reference.solution);
+        let settings = SolverSettings { tolerance: PROVISIONAL_TOLERANCE, ..SolverSettings::patient() };
+        let solver = Solver { entropy: imager.entropy, preconditioner: &reference.preconditioner, settings };
+        let goal = Goal::Chi2 { target: reference.chi2_target, largest_lambda: reference.largest_lambda };
+        let precise = solver.solve(&mut problem, goal, &reference.start());
+        if matches!(precise.termination, Termination::Converged | Termination::Unreachable) {
+            reference.solution = precise;
+        }
+        // evaluations nearby take its path, which the last step has left as it was before
+        Solver { settings: SolverSettings::exact(), ..solver }.find_path(&mut problem, &mut reference.solution);
+        reference.tradeoff = TradeOff::new(vec![node(&reference.solution)], 0);
         reference.passes += problem.passes();
         Ok(reference)
     }
@@ -211,8 +217,8 @@ impl Reference {
         let goal = |target| Goal::Chi2 { target, largest_lambda };
         let easy = coarse.solve(&mut problem, goal((FIRST_CHI2 * chi2_target).min(blank_chi2)), &blank);
         let preconditioner = precondition(imager, &mut problem, &easy);
-        let settings = SolverSettings { tolerance: TOLERANCE, ..SolverSettings::patient() };
-        let fine = Solver { preconditioner: &preconditioner, settings, entropy: imager.entropy };
+        let fine =
+            Solver { preconditioner: &preconditioner, settings: SolverSettings::patient(), entropy: imager.entropy };
         let solution = fine.solve(&mut problem, goal(chi2_target), &start(&easy));
         let preconditioner = Arc::new(precondition(imager, &mut problem, &solution));
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
