@@ -22,7 +22,7 @@ pub enum Goal {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings {
     /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth where chi2 is the goal: by the
-    /// solver's estimate, which is no bound (`results/performance.md`: up to fifteen times it over the bulk of a posterior).
+    /// solver's estimate, which is no bound (`results/performance.md`: up to six times it over the bulk of a posterior).
     pub tolerance: f64,
     /// Error allowed besides far below the best solution, over the distance to it: a chain never sees it, and a landscape
     /// shows it as a small part of its depth.
