@@ -39,7 +39,7 @@ pub(super) fn solve<N: Number>(
     }
     let mut direction = preconditioned.clone();
     let mut rho = dot(&residual, &preconditioned);
-    // 1 where the preconditioner is the inverse, and hardly ever more
+    // no longer than where the preconditioner is the inverse
     let mut shortest = 1.0_f64;
     for iteration in 0..limits.iterations {
         if rho <= goal {

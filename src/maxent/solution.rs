@@ -27,7 +27,8 @@ pub struct SolverSettings {
     /// Error allowed besides far below the best solution, over the distance to it: a chain never sees it, and a landscape
     /// shows it as a small part of its depth.
     pub leniency: f64,
-    /// Residual of the Newton systems over their right-hand side, before a last step that takes no pass; from 3e-3 on they are solved in single precision.
+    /// Residual of the Newton systems over their right-hand side, before a last step that takes no pass; from 3e-3 on they are solved
+    /// in single precision.
     pub cg_tolerance: f64,
     /// Most iterations of conjugate gradients for one Newton system.
     pub cg_iterations: usize,
