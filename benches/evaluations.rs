@@ -10,8 +10,6 @@ use common::stopwatch::{Candidate, by_criterion, criterion, quantile, seconds};
 use common::table::{Table, Target, thousands};
 use dimcmc::log_density::{LogDensity, Status};
 use dimcmc::maxent::SolverSettings;
-use dimcmc::objective::Posterior;
-use dimcmc::star::Response;
 use std::hint::black_box;
 
 /// An evaluation over its passes.
@@ -72,18 +70,18 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
     let (mut over_own, mut over_double) = (Vec::new(), Vec::new());
     let exact = bulk.posterior.clone().with_settings(SolverSettings::exact());
     for theta in &bulk.points {
-        let response = response(&bulk.posterior, theta);
-        let mut only_passes = Passes::new(&response);
         let evaluation = bulk.target.evaluate(theta);
         assert_eq!(evaluation.status, Status::Converged, "{theta:?}");
-        let single = bulk.target.posterior().reconstruct(theta).1.single_passes();
+        let problem = bulk.target.posterior().reconstruct(theta).1;
+        let (response, single) = (problem.response(), problem.single_passes());
+        let mut only_passes = Passes::new(response);
         let [mut time, mut double, mut own] = [f64::INFINITY; 3];
         for _ in 0..2 {
             time = time.min(seconds(|| bulk.target.evaluate(theta)));
-            double = double.min(seconds(|| only_passes.run(&response, evaluation.passes)));
+            double = double.min(seconds(|| only_passes.run(response, evaluation.passes)));
             own = own.min(seconds(|| {
-                only_passes.run(&response, evaluation.passes - single);
-                only_passes.run_single(&response, single);
+                only_passes.run(response, evaluation.passes - single);
+                only_passes.run_single(response, single);
             }));
         }
         errors.push(1e3 * (evaluation.log_prob - exact.evaluate(theta).log_prob));
@@ -104,8 +102,4 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
         ERROR.judge(errors.iter().fold(0.0, |most, error: &f64| most.max(error.abs())), 2),
         format!("{:.3}", errors.iter().sum::<f64>() / errors.len() as f64),
     ]);
-}
-
-fn response(posterior: &Posterior, theta: &[f64]) -> Response {
-    posterior.imager().response(&posterior.space().values_at(theta).state())
 }

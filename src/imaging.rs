@@ -10,7 +10,7 @@ use crate::maxent::entropy::Entropy;
 use crate::maxent::{Curvature, Problem};
 use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
-use crate::star::{Brightness, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
 use crate::vector::Number;
 
 pub use data::Data;
@@ -74,6 +74,16 @@ impl Imager {
     /// The response at one state of star and planet.
     pub fn response(&self, state: &StarState) -> Response {
         Response::new(&self.grid, &self.star, state, &self.sampling)
+    }
+
+    /// What responses close to a state have in common.
+    pub fn nearby(&self, state: &StarState) -> Nearby {
+        Nearby::new(&self.grid, &self.star, state, &self.sampling)
+    }
+
+    /// The response at a state, in half the time if it is close to another.
+    pub fn response_near(&self, nearby: &Nearby, state: &StarState) -> Response {
+        nearby.response(&self.grid, &self.star, state, &self.sampling).unwrap_or_else(|| self.response(state))
     }
 
     /// The misfit of maps seen through `response`.

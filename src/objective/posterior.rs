@@ -12,8 +12,8 @@ use super::reference::{Reference, precondition, start};
 use crate::imaging::{Imager, ImagingProblem};
 use crate::log_density::{Evaluation, Gradient, LogDensity, Status};
 use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
-use crate::star::Response;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
+use crate::star::{Nearby, Response};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -27,8 +27,8 @@ pub struct Posterior {
     settings: SolverSettings,
     /// Where evaluations start: the reference, and others.
     footholds: Vec<Foothold>,
-    /// Whether only orbit and systemic velocity are free, so that pixels are looked at once for all evaluations.
-    velocities_only: bool,
+    /// How pixels are looked at; nothing where only orbit and systemic velocity are free: then once for all evaluations.
+    pixels: Option<Arc<Nearby>>,
 }
 
 /// Fastest velocity of any latitude (km/s, projected) that is tried; beyond it a parameter vector is absurd.
@@ -51,8 +51,9 @@ impl Posterior {
         let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.agrees(&reference.values, p))
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
+        let pixels = (!velocities_only).then(|| Arc::new(imager.nearby(&here.state())));
         let footholds = Vec::new();
-        let mut posterior = Posterior { imager, space, kind, reference, settings, footholds, velocities_only };
+        let mut posterior = Posterior { imager, space, kind, reference, settings, footholds, pixels };
         let Posterior { space, reference, .. } = &posterior;
         let (theta, solution) = (space.theta_of(&reference.values), &reference.solution);
         let (response, preconditioner) = (&reference.response, reference.preconditioner.clone());
@@ -172,10 +173,9 @@ impl Posterior {
 
     fn response(&self, theta: &[f64]) -> Response {
         let state = self.space.values_at(theta).state();
-        if self.velocities_only {
-            self.reference.response.with_velocities(&self.imager.star, &state, &self.imager.sampling)
-        } else {
-            self.imager.response(&state)
+        match &self.pixels {
+            Some(nearby) => self.imager.response_near(nearby, &state),
+            None => self.reference.response.with_velocities(&self.imager.star, &state, &self.imager.sampling),
         }
     }
 

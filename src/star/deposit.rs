@@ -4,14 +4,16 @@
 //! that the sum over them is one of powers of the position within the cell (`kernel`); the cell's polynomials (`line_profile`)
 //! make node values of them, whatever the shape and width of the line. The pairs depend on the star's rotation, inclination
 //! and vsini alone; an orbit or a systemic velocity leaves them as they are. Left out: how pairs get into their cells
-//! (`placement`), the line itself (`convolution`).
+//! (`sorting`, `filling`), the line itself (`convolution`).
 
 use super::StarState;
+use super::filling::{Refill, Source};
 use super::grid::SurfaceGrid;
 use super::kernel;
 use super::limb_darkening::LimbDarkening;
 use super::line_profile::DEPOSIT_NODES;
-use super::placement::{Order, Place, Placement, Scale};
+use super::placement::{Placement, Scale};
+use super::sorting::{Order, Sort};
 use super::view::Viewer;
 use crate::vector::{self, Instructions, Number};
 
@@ -28,15 +30,32 @@ pub struct Deposit {
     placement: Placement,
 }
 
+/// A star as it is observed.
+#[derive(Clone, Copy)]
+pub struct Observed<'a> {
+    /// Its pixels.
+    pub grid: &'a SurfaceGrid,
+    /// Rotation, inclination and vsini.
+    pub state: &'a StarState,
+    /// Limb darkening.
+    pub limb: LimbDarkening,
+    /// Times of the observations since the star's epoch (d).
+    pub since_epoch_d: &'a [f64],
+}
+
 impl Deposit {
-    /// Deposits of all visible pixels at the given times since the star's epoch (d), on a grid of step `step_kms`.
-    pub fn new(
-        grid: &SurfaceGrid,
-        state: &StarState,
-        limb: LimbDarkening,
-        since_epoch_d: &[f64],
-        step_kms: f64,
-    ) -> Self {
+    /// Deposits of all visible pixels on a grid of step `step_kms`.
+    pub fn new(star: Observed, step_kms: f64) -> Self {
+        Deposit::sorted(star, step_kms, 0.0, false).0
+    }
+
+    /// Deposits of all pixels that are visible or nearly so, by `margin` (rad), with what [`Deposit::again`] needs.
+    pub fn for_others(star: Observed, step_kms: f64, margin: f64) -> (Self, Source) {
+        Deposit::sorted(star, step_kms, margin, true)
+    }
+
+    fn sorted(star: Observed, step_kms: f64, margin: f64, again: bool) -> (Self, Source) {
+        let Observed { grid, state, limb, since_epoch_d } = star;
         // what is said of pixels below holds for these
         assert!(grid.rings.iter().all(|ring| ring.pixels.end <= grid.len()));
         let order = match grid.len() {
@@ -44,23 +63,34 @@ impl Deposit {
             pixels if pixels <= LARGE_MAP => Order::ByVelocity,
             _ => Order::OneByOne,
         };
-        let viewer = Viewer::new(state, limb);
-        let reach = reach(&viewer, step_kms);
-        let (origin_kms, nodes) = (-reach * step_kms, 2 * reach as usize + 1);
-        let cells = nodes + 1 - DEPOSIT_NODES;
-        let scale = Scale { origin_kms, steps_per_kms: 1.0 / step_kms, cells, order };
-        let placement = vector::run(Place { grid, viewer, scale, since_epoch_d });
-        Deposit { origin_kms, step_kms, nodes, pixels: grid.len(), placement }
+        let viewer = Viewer::new(state, limb, step_kms);
+        let sight = viewer.sight(grid, margin);
+        let reach = reach(&viewer);
+        let nodes = 2 * reach as usize + 1;
+        let scale = Scale { first_node: -reach, cells: nodes + 1 - DEPOSIT_NODES };
+        let (placement, source) = vector::run(Sort { grid, viewer, sight, scale, order, since_epoch_d, again });
+        (Deposit { origin_kms: -reach * step_kms, step_kms, nodes, pixels: grid.len(), placement }, source)
+    }
+
+    /// Deposits of the same pixels as those of a star that differs little are seen at the same times. Pixels may be outside of
+    /// their cells.
+    pub fn again(&self, source: &Source, star: Observed) -> Self {
+        let Observed { grid, state, limb, since_epoch_d } = star;
+        assert!(grid.len() == self.pixels);
+        let viewer = Viewer::new(state, limb, self.step_kms);
+        let arrangement = self.placement.arrangement();
+        let placement = vector::run(Refill { grid, viewer, arrangement, source, since_epoch_d });
+        Deposit { placement, ..*self }
     }
 
     /// Number of nodes in steps of `step_kms` that a state takes.
     pub fn nodes_at(state: &StarState, limb: LimbDarkening, step_kms: f64) -> f64 {
-        2.0 * reach(&Viewer::new(state, limb), step_kms) + 1.0
+        2.0 * reach(&Viewer::new(state, limb, step_kms)) + 1.0
     }
 
     /// Number of visible (pixel, observation) pairs.
     pub fn pairs(&self) -> usize {
-        self.placement.pairs
+        self.placement.pairs()
     }
 
     /// Memory (bytes) that a pass over all pairs reads.
@@ -81,9 +111,9 @@ impl Deposit {
         assert!(x.len() == self.pixels && nodes.len() == self.nodes);
         assert!(left.is_empty() || left.len() == DEPOSIT_NODES * self.nodes);
         left.resize(DEPOSIT_NODES * self.nodes, N::default());
-        for (cells, blocks) in self.placement.groups_of(k) {
-            // safe: blocks hold pixels of the grid alone, and groups its cells
-            unsafe { kernel::gather(N::registers(i), blocks, cells, x, left) };
+        for group in self.placement.groups_of(k) {
+            // safe: groups hold pixels of the grid alone, and its cells
+            unsafe { kernel::gather(N::registers(i), group, x, left) };
         }
         nodes.fill(0.0);
         for two in left.chunks_exact(2 * self.nodes) {
@@ -97,9 +127,9 @@ impl Deposit {
     #[allow(unsafe_code)]
     pub fn scatter<N: Number>(&self, i: impl Instructions, k: usize, nodes: &[N], out: &mut [N]) {
         assert!(out.len() == self.pixels && nodes.len() == self.nodes);
-        for (cells, blocks) in self.placement.groups_of(k).filter(|(_, blocks)| !blocks.is_empty()) {
+        for group in self.placement.groups_of(k).filter(|group| !group.blocks.is_empty()) {
             // safe: as above
-            unsafe { kernel::scatter(N::registers(i), blocks, cells, nodes, out) };
+            unsafe { kernel::scatter(N::registers(i), group, nodes, out) };
         }
     }
 }
@@ -111,6 +141,6 @@ const MEDIUM_MAP: usize = 12_000;
 const LARGE_MAP: usize = 40_000;
 
 /// Nodes on either side of the line's centre.
-fn reach(viewer: &Viewer, step_kms: f64) -> f64 {
-    (viewer.largest_velocity_kms() / step_kms).ceil() + 3.0
+fn reach(viewer: &Viewer) -> f64 {
+    viewer.largest_velocity().ceil() + 3.0
 }

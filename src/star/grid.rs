@@ -57,19 +57,21 @@ pub struct SurfaceGrid {
 /// Cosines and sines of longitudes, with zeros behind them for loops over several pixels at a time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Directions {
-    pub cos: Vec<f64>,
-    pub sin: Vec<f64>,
-    /// The same in single precision.
-    pub cos_single: Vec<f32>,
-    pub sin_single: Vec<f32>,
+    cos: Vec<f32>,
+    sin: Vec<f32>,
 }
 
 impl Directions {
     fn of(longitude: &[f64]) -> Self {
         let behind = std::iter::repeat_n((0.0, 0.0), CHUNK - 1);
-        let (cos, sin): (Vec<f64>, Vec<f64>) = longitude.iter().map(|l| (l.cos(), l.sin())).chain(behind).unzip();
-        let single = |numbers: &[f64]| numbers.iter().map(|x| *x as f32).collect();
-        Directions { cos_single: single(&cos), sin_single: single(&sin), cos, sin }
+        let (cos, sin) = longitude.iter().map(|l| (l.cos() as f32, l.sin() as f32)).chain(behind).unzip();
+        Directions { cos, sin }
+    }
+
+    /// Cosines and sines of a chunk of pixels.
+    #[inline(always)]
+    pub fn chunk(&self, first: usize) -> [&[f32; CHUNK]; 2] {
+        [&self.cos, &self.sin].map(|all| all[first..].first_chunk().expect("zeros behind the last"))
     }
 }
 

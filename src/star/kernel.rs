@@ -5,7 +5,7 @@
 //! `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in registers however many pixels
 //! there are. Left out: which pixels lie in which cell, and which cells stand side by side (`placement`).
 
-use super::block::{Block, LANES};
+use super::block::{Group, LANES};
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
 use crate::vector::{self, Number, Registers, Scattered};
 
@@ -24,8 +24,7 @@ const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 #[allow(unsafe_code)]
 pub unsafe fn gather<R: Scattered>(
     r: R,
-    blocks: &[Block],
-    cells: &[u32; LANES],
+    Group { cells, blocks, pixels }: Group,
     x: &[R::Number],
     left: &mut [R::Number],
 ) {
@@ -35,12 +34,13 @@ pub unsafe fn gather<R: Scattered>(
     for first in (0..LANES).step_by(R::LANES).rev() {
         let mut sums = [r.splat(R::Number::default()); DEPOSIT_NODES];
         let mut spread_sums = [r.splat(R::Number::default()); SPREAD_FACTORS.len()];
-        for block in blocks {
+        for (block, pixels) in blocks.iter().zip(pixels) {
             if first == 0 {
                 vector::fetch_ahead(block, AHEAD);
+                vector::fetch_ahead(pixels, AHEAD);
             }
             // safe: the caller knows the pixels
-            let x = unsafe { r.pick(x, &block.pixel, first) };
+            let x = unsafe { r.pick(x, pixels, first) };
             let (t, spread) = (r.load(&block.position, first), r.load(&block.spread, first));
             let squared = r.multiply(t, t);
             // times 1, t, t^2 and t^3: no long chain of products, each of which waits for the one before
@@ -90,8 +90,7 @@ pub unsafe fn gather<R: Scattered>(
 #[allow(unsafe_code)]
 pub unsafe fn scatter<R: Scattered>(
     r: R,
-    blocks: &[Block],
-    cells: &[u32; LANES],
+    Group { cells, blocks, pixels }: Group,
     nodes: &[R::Number],
     out: &mut [R::Number],
 ) {
@@ -111,9 +110,10 @@ pub unsafe fn scatter<R: Scattered>(
         }
         let of_spread: [R::Lanes; SPREAD_FACTORS.len()] =
             std::array::from_fn(|k| r.multiply(r.splat(R::Number::of(SPREAD_FACTORS[k])), coefficients[k + 2]));
-        for block in blocks {
+        for (block, pixels) in blocks.iter().zip(pixels) {
             if first == 0 {
                 vector::fetch_ahead(block, AHEAD);
+                vector::fetch_ahead(pixels, AHEAD);
             }
             let (t, spread) = (r.load(&block.position, first), r.load(&block.spread, first));
             let squared = r.multiply(t, t);
@@ -121,8 +121,8 @@ pub unsafe fn scatter<R: Scattered>(
             let polynomial = r.multiply_add(of_spread, spread, rest);
             // safe: the caller knows the pixels
             unsafe {
-                let sums = r.multiply_add(polynomial, r.load(&block.weight, first), r.pick(out, &block.pixel, first));
-                r.put(sums, out, &block.pixel, first);
+                let sums = r.multiply_add(polynomial, r.load(&block.weight, first), r.pick(out, pixels, first));
+                r.put(sums, out, pixels, first);
             }
         }
     }
@@ -150,6 +150,7 @@ fn polynomial<R: Registers>(r: R, coefficients: &[R::Lanes], t: R::Lanes, square
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::star::block::{Block, Pixels};
     use crate::vector::{self, Instructions, Task};
 
     const PIXELS: usize = 190;
@@ -159,21 +160,25 @@ mod tests {
         0.5 + 0.5 * (12.9898 * i as f64).sin()
     }
 
-    /// Groups of cells: neither all of a group nor all rows of a cell are there.
-    fn groups() -> Vec<([u32; LANES], Vec<Block>)> {
-        let block = |b: usize, filled: usize| Block {
-            weight: std::array::from_fn(|l| if l < filled { number(8 * b + l) as f32 } else { 0.0 }),
-            position: std::array::from_fn(|l| if l < filled { number(100 + 8 * b + l) as f32 - 0.5 } else { 0.0 }),
-            spread: std::array::from_fn(|l| if l < filled { number(300 + 8 * b + l) as f32 } else { 0.0 }),
-            // what is empty lies on a pixel of the group that is not
-            pixel: std::array::from_fn(|l| if l < filled { 8 * b + l } else { 8 * b } as u32),
+    /// Groups of cells with their blocks: neither all of a group nor all rows of a cell are there.
+    fn groups() -> Vec<([u32; LANES], Vec<Block>, Vec<Pixels>)> {
+        let numbers = |first: usize, filled: usize, middle: f64| {
+            std::array::from_fn(|l| if l < filled { (number(first + l) - middle) as f32 } else { 0.0 })
         };
+        let block = |b: usize, filled: usize| Block {
+            weight: numbers(8 * b, filled, 0.0),
+            position: numbers(100 + 8 * b, filled, 0.5),
+            spread: numbers(300 + 8 * b, filled, 0.0),
+        };
+        // what is empty lies on a pixel of the group that is not
+        let pixels =
+            |b: usize, filled: usize| std::array::from_fn(|l| if l < filled { 8 * b + l } else { 8 * b } as u32);
         let filled = [vec![8, 8, 8, 8, 7, 6, 3, 1], vec![5, 5, 4], vec![8, 8, 8, 3], vec![]];
         let mut first = 0;
         let mut group = |filled: &Vec<usize>, cells: [u32; LANES]| {
-            let blocks = filled.iter().enumerate().map(|(row, filled)| block(first + row, *filled)).collect();
+            let rows = (first..).zip(filled.iter().copied());
             first += filled.len();
-            (cells, blocks)
+            (cells, rows.clone().map(|(b, n)| block(b, n)).collect(), rows.map(|(b, n)| pixels(b, n)).collect())
         };
         let cells = [[3, 0, 1, 9, 14, 2, 7, 5], [4, 6, 8, 10, 11, 4, 4, 4], [12; LANES], [13; LANES]];
         filled.iter().zip(cells).map(|(filled, cells)| group(filled, cells)).collect()
@@ -182,8 +187,9 @@ mod tests {
     /// Every pair, its weight on each node of its cell: the yardstick, a pixel after another.
     fn pairs() -> Vec<(usize, usize, f64)> {
         let mut pairs = Vec::new();
-        for (cells, blocks) in groups() {
-            for (block, lane) in blocks.iter().flat_map(|block| (0..LANES).map(move |lane| (block, lane))) {
+        for (cells, blocks, pixels) in groups() {
+            let rows = blocks.iter().zip(&pixels);
+            for ((block, pixels), lane) in rows.flat_map(|row| (0..LANES).map(move |lane| (row, lane))) {
                 let [weight, t, spread] = [block.weight, block.position, block.spread].map(|row| f64::from(row[lane]));
                 // P(t) + spread P''(t), the polynomial of node n by its coefficients
                 let power = |t: f64, k: usize| t.powi(k as i32);
@@ -194,7 +200,7 @@ mod tests {
                 for (n, weights) in DEPOSIT_WEIGHTS.iter().enumerate() {
                     for (n, t) in [(n, t), (DEPOSIT_NODES - 1 - n, -t)] {
                         let node = cells[lane] as usize + n;
-                        pairs.push((block.pixel[lane] as usize, node, weight * on_node(weights, t)));
+                        pairs.push((pixels[lane] as usize, node, weight * on_node(weights, t)));
                     }
                 }
             }
@@ -216,11 +222,12 @@ mod tests {
         #[allow(unsafe_code)]
         fn run<I: Instructions>(mut self, i: I) -> Self::Output {
             let r = N::registers(i);
-            for (cells, blocks) in groups() {
+            for (cells, blocks, pixels) in groups() {
+                let group = Group { cells: &cells, blocks: &blocks, pixels: &pixels };
                 // safe: pixels and cells of the test
                 unsafe {
-                    gather(r, &blocks, &cells, &self.x, &mut self.left);
-                    scatter(r, &blocks, &cells, &self.nodes, &mut self.out);
+                    gather(r, group, &self.x, &mut self.left);
+                    scatter(r, group, &self.nodes, &mut self.out);
                 }
             }
             let node = |node: usize| self.left.chunks(GRID).map(|row| row[node].into()).sum();

@@ -2,13 +2,12 @@
 //! across it (method section 1, moment matching).
 //!
 //! Pixels of a ring share their evaluation points but for the longitude, so that several of them are computed side by side, in
-//! single precision where it is enough: weights, and differences of velocities within a pixel. So are rings, as they turn. Left out:
-//! which pixels.
+//! single precision: weights, and velocities relative to the middle of the velocity grid's cell that they lie in. So are rings, as they
+//! turn. Left out: which pixels.
 
-use super::grid::Directions;
 use super::limb_darkening::LimbDarkening;
 use crate::vector::Instructions;
-use crate::vector::elementary::sin_cos;
+use crate::vector::elementary::{nearest, sin_cos};
 
 /// Numbers that are computed side by side: pixels of a ring, and rings.
 pub const CHUNK: usize = 16;
@@ -24,7 +23,7 @@ pub struct Point {
     pub mu_pole: f64,
     /// What turns of it.
     pub mu_equator: f64,
-    /// Velocity (km/s) at the limb of the equator's direction.
+    /// Velocity (steps of the velocity grid) at the limb of the equator's direction.
     pub amplitude: f64,
 }
 
@@ -45,33 +44,24 @@ pub struct Rings<const POINTS: usize> {
 #[derive(Clone, Debug)]
 struct Turned<const POINTS: usize> {
     mu: [[[f32; CHUNK]; POINTS]; 2],
-    /// Mean of the points' velocities (km/s), and what each has more.
-    middle: [[f64; CHUNK]; 2],
+    /// Mean of the points' velocities, what single precision leaves of it, and what each has more.
+    middle: [[f32; CHUNK]; 2],
+    rest: [[f32; CHUNK]; 2],
     velocity: [[[f32; CHUNK]; POINTS]; 2],
 }
 
-/// Moments of the velocity distributions of the pixels that are seen, weighted by projected area and limb darkening. There is
-/// room behind the last, whose content means nothing.
+/// Moments of the velocity distributions of pixels side by side, weighted by projected area and limb darkening. Velocities are in
+/// steps of the velocity grid.
+#[derive(Clone, Copy, Debug)]
 pub struct Moments {
-    /// Number of pixels.
-    pub pixels: usize,
-    /// Index of each.
-    pub pixel: Vec<u32>,
-    /// Weight of each; 0 for one that only just is not visible.
-    pub weight: Vec<f32>,
-    /// Mean velocity (km/s).
-    pub velocity: Vec<f64>,
-    /// Variance of the velocity (km^2/s^2).
-    pub variance: Vec<f32>,
-}
-
-impl Moments {
-    /// Room for the pixels of a map.
-    pub fn with_room_for(pixels: usize) -> Self {
-        let room = pixels + CHUNK;
-        let (pixel, weight, variance) = (vec![0; room], vec![0.0; room], vec![0.0; room]);
-        Moments { pixels: 0, pixel, weight, velocity: vec![0.0; room], variance }
-    }
+    /// Weight of each; 0 for one that is not visible.
+    pub weight: [f32; CHUNK],
+    /// Mean velocity, from the middle of a cell.
+    pub position: [f32; CHUNK],
+    /// Half the variance of the velocity.
+    pub spread: [f32; CHUNK],
+    /// Middle of that cell: half a step from an integer.
+    pub middle: [f32; CHUNK],
 }
 
 impl<const POINTS: usize> Rings<POINTS> {
@@ -81,6 +71,7 @@ impl<const POINTS: usize> Rings<POINTS> {
         let turned = Turned {
             mu: [[[0.0; CHUNK]; POINTS]; 2],
             middle: [[0.0; CHUNK]; 2],
+            rest: [[0.0; CHUNK]; 2],
             velocity: [[[0.0; CHUNK]; POINTS]; 2],
         };
         Rings {
@@ -136,39 +127,42 @@ impl<const POINTS: usize> Rings<POINTS> {
             for (relative, velocity) in self.turned.velocity[k].iter_mut().zip(&velocities) {
                 *relative = std::array::from_fn(|ring| (velocity[k][ring] - middle[ring]) as f32);
             }
-            self.turned.middle[k] = middle;
+            let single = middle.map(|v| v as f32);
+            self.turned.rest[k] = std::array::from_fn(|ring| (middle[ring] - f64::from(single[ring])) as f32);
+            self.turned.middle[k] = single;
         }
     }
 
-    /// Writes the moments of the pixels of a ring from `first` on to those from `place` on: a chunk of them, whether there are as
-    /// many or not.
+    /// What is seen of the pixels of a ring in these directions (cosines and sines of longitudes). Where no middles of cells are given,
+    /// pixels lie within theirs.
     #[inline(always)]
     pub fn look(
         &self,
         i: impl Instructions,
         ring: usize,
-        directions: &Directions,
-        first: usize,
-        place: usize,
-        moments: &mut Moments,
-    ) {
-        let Directions { cos, sin, cos_single, sin_single } = directions;
-        let [weight, deviation, variance] =
-            self.relative_moments(i, ring, chunk(cos_single, first), chunk(sin_single, first));
-        let (cos_l, sin_l) = (chunk(cos, first), chunk(sin, first));
-        let middle = [self.turned.middle[0][ring], self.turned.middle[1][ring]];
-        let mut velocity = [0.0; CHUNK];
+        [cos, sin]: [&[f32; CHUNK]; 2],
+        middles: Option<&[f32; CHUNK]>,
+    ) -> Moments {
+        let [weight, deviation, spread] = self.relative_moments(i, ring, *cos, *sin);
+        let Turned { middle, rest, .. } = &self.turned;
+        let mut moments = Moments { weight, position: [0.0; CHUNK], spread, middle: [0.0; CHUNK] };
         for lane in 0..CHUNK {
-            let rest = i.multiply_add(sin_l[lane], middle[1], f64::from(deviation[lane]));
-            velocity[lane] = i.multiply_add(cos_l[lane], middle[0], rest);
+            let (cos, sin) = (cos[lane], sin[lane]);
+            let less =
+                |x: f32| i.multiply_add_single(cos, middle[0][ring], i.multiply_add_single(sin, middle[1][ring], -x));
+            let small = i.multiply_add_single(sin, rest[1][ring], deviation[lane]);
+            let small = i.multiply_add_single(cos, rest[0][ring], small);
+            moments.middle[lane] = match middles {
+                Some(middles) => middles[lane],
+                None => nearest(less(0.0) + small - 0.5) + 0.5,
+            };
+            // the large numbers cancel first
+            moments.position[lane] = less(moments.middle[lane]) + small;
         }
-        *chunk_mut(&mut moments.pixel, place) = std::array::from_fn(|lane| (first + lane) as u32);
-        *chunk_mut(&mut moments.weight, place) = weight;
-        *chunk_mut(&mut moments.velocity, place) = velocity;
-        *chunk_mut(&mut moments.variance, place) = variance;
+        moments
     }
 
-    /// Weights, mean velocities over that of the middle of the points, and their variances.
+    /// Weights, mean velocities over that of the middle of the points, and halves of their variances.
     #[inline(always)]
     fn relative_moments(
         &self,
@@ -179,7 +173,7 @@ impl<const POINTS: usize> Rings<POINTS> {
     ) -> [[f32; CHUNK]; 3] {
         let Rings { mu_pole, limb, turned: Turned { mu, velocity, .. }, .. } = self;
         let limb = [limb[0][ring], limb[1][ring], limb[2][ring]];
-        let [mut weight, mut deviation, mut variance] = [[0.0; CHUNK]; 3];
+        let [mut weight, mut deviation, mut spread] = [[0.0; CHUNK]; 3];
         for lane in 0..CHUNK {
             let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
             for p in 0..POINTS {
@@ -196,23 +190,11 @@ impl<const POINTS: usize> Rings<POINTS> {
             }
             let per_weight = if sum > f32::MIN_POSITIVE { 1.0 / sum } else { 0.0 };
             let mean = first * per_weight;
-            let spread = i.multiply_add_single(second, per_weight, -mean * mean);
+            let variance = i.multiply_add_single(second, per_weight, -mean * mean);
             weight[lane] = sum;
             deviation[lane] = mean;
-            variance[lane] = if spread > 0.0 { spread } else { 0.0 };
+            spread[lane] = if variance > 0.0 { 0.5 * variance } else { 0.0 };
         }
-        [weight, deviation, variance]
+        [weight, deviation, spread]
     }
-}
-
-/// The chunk that begins at an entry.
-#[inline(always)]
-fn chunk<T: Copy>(all: &[T], first: usize) -> [T; CHUNK] {
-    *all[first..].first_chunk().expect("room behind the last")
-}
-
-/// The same, to be written.
-#[inline(always)]
-fn chunk_mut<T>(all: &mut [T], first: usize) -> &mut [T; CHUNK] {
-    all[first..].first_chunk_mut().expect("room behind the last")
 }

@@ -5,7 +5,7 @@
 //! (what x is), the division by the continuum, data.
 
 use super::convolution::{ProfileConvolution, Rows, VelocityGrid};
-use super::deposit::Deposit;
+use super::deposit::{Deposit, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
@@ -57,10 +57,9 @@ impl Response {
     /// The response at one state of star and planet.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
         let star = &star.with(&state.surface);
-        let steps_per_bin = LineKernel::steps_per_bin(star.line, sampling.step_kms);
-        let since_epoch: Vec<f64> = sampling.profiles.iter().map(|p| p.0 - star.epoch_d).collect();
-        let step = sampling.step_kms / steps_per_bin as f64;
-        let deposit = Deposit::new(grid, state, star.limb_darkening, &since_epoch, step);
+        let since_epoch_d = &since_epoch_d(star, sampling);
+        let observed = Observed { grid, state, limb: star.limb_darkening, since_epoch_d };
+        let deposit = Deposit::new(observed, step_kms(star, sampling));
         Response::shifted(Arc::new(deposit), star, state, sampling)
     }
 
@@ -77,7 +76,8 @@ impl Response {
         Response::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling)
     }
 
-    fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+    /// The response of deposits, which orbit and systemic velocity shift.
+    pub(super) fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
         let kernel = LineKernel::new(star.line, deposit.step_kms);
         let grid = VelocityGrid {
             nodes: deposit.nodes,
@@ -165,6 +165,16 @@ impl Response {
         }
         depths
     }
+}
+
+/// Times of the observations since the star's epoch (d).
+pub(super) fn since_epoch_d(star: &StarSettings, sampling: &Sampling) -> Vec<f64> {
+    sampling.profiles.iter().map(|p| p.0 - star.epoch_d).collect()
+}
+
+/// Step (km/s) of the velocity grid for a star's line.
+pub(super) fn step_kms(star: &StarSettings, sampling: &Sampling) -> f64 {
+    sampling.step_kms / LineKernel::steps_per_bin(star.line, sampling.step_kms) as f64
 }
 
 /// One profile after another, in one direction: the rows of the grid are left as that direction left them.

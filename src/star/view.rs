@@ -3,10 +3,10 @@
 //! Left out: what is seen of them (`moments`), brightness, lines, orbit. The orbit and vsys shift a whole profile and are added
 //! in `response`.
 
-use super::StarState;
 use super::grid::{Ring, RingPoint, SurfaceGrid};
 use super::limb_darkening::LimbDarkening;
 use super::moments::{CHUNK, Moments, Point, Rings};
+use super::{Rotation, StarState};
 use crate::vector::Instructions;
 use crate::vector::elementary::INTEGERS;
 use std::f64::consts::TAU;
@@ -14,25 +14,50 @@ use std::f64::consts::TAU;
 /// The star's orientation, shared by all observations.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewer {
-    state: StarState,
+    rotation: Rotation,
     sin_inclination: f64,
     cos_inclination: f64,
     limb: LimbDarkening,
+    /// vsini in steps of the velocity grid.
+    vsini: f64,
 }
 
-/// Rings of pixels, each with so many evaluation points, as they turn before the observer. Rings that are never visible are left out.
+/// Rings of pixels, each with so many evaluation points, as they turn before the observer.
 pub struct Views<'a, const POINTS: usize> {
     grid: &'a SurfaceGrid,
-    /// The rings, and where they are visible, a chunk of them at a time.
+    /// A chunk of rings at a time.
     rings: Vec<Rings<POINTS>>,
+}
+
+/// What one observation sees: of each pixel what [`Moments`] have of it. Behind the last there are so many of weight 0 as [`NOTHING`]
+/// says.
+pub struct Seen {
+    /// Number of pixels.
+    pub pixels: usize,
+    /// As in the moments.
+    pub weight: Vec<f32>,
+    /// As in the moments.
+    pub position: Vec<f32>,
+    /// As in the moments.
+    pub spread: Vec<f32>,
+    /// As in the moments.
+    pub middle: Vec<f32>,
+}
+
+/// Pixels of weight 0 behind those that are seen.
+pub const NOTHING: usize = 64;
+
+/// Where the rings of a grid are visible. Those that never are are left out.
+#[derive(Clone, Debug)]
+pub struct Sight {
+    /// Indices of the others.
+    pub rings: Vec<usize>,
+    /// Where they are, a chunk of them at a time.
     horizons: Vec<Horizons>,
-    /// Number of rings.
-    count: usize,
-    parts: Vec<Part>,
-    moments: Moments,
 }
 
 /// Where rings side by side are visible.
+#[derive(Clone, Debug)]
 struct Horizons {
     /// Of the two latitudes of their evaluation points, which are the same where there is one: angular velocity, ...
     angular_velocity: [[f64; CHUNK]; 2],
@@ -45,8 +70,8 @@ struct Horizons {
 }
 
 /// Pixels beside each other of which moments are computed at a time.
-#[derive(Clone, Copy, Default)]
-struct Part {
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Part {
     /// Chunk of rings, and ring in it.
     ring: [u32; 2],
     /// The first of them.
@@ -56,40 +81,51 @@ struct Part {
 }
 
 impl Viewer {
-    /// The view of a star in a given state.
-    pub fn new(state: &StarState, limb: LimbDarkening) -> Self {
+    /// The view of a star in a given state, its velocities in steps of `step_kms`.
+    pub fn new(state: &StarState, limb: LimbDarkening, step_kms: f64) -> Self {
         let (sin_inclination, cos_inclination) = state.inclination.sin_cos();
-        Viewer { state: *state, sin_inclination, cos_inclination, limb }
+        Viewer { rotation: state.rotation, sin_inclination, cos_inclination, limb, vsini: state.vsini_kms / step_kms }
     }
 
-    /// Largest velocity (km/s) that any pixel can have in the star's frame.
-    pub fn largest_velocity_kms(&self) -> f64 {
-        let relative = |sin_latitude: f64| self.state.rotation.relative(sin_latitude).abs();
-        self.state.vsini_kms * relative(0.0).max(relative(1.0))
+    /// Largest velocity (steps) that any pixel can have in the star's frame.
+    pub fn largest_velocity(&self) -> f64 {
+        let relative = |sin_latitude: f64| self.rotation.relative(sin_latitude).abs();
+        self.vsini * relative(0.0).max(relative(1.0))
     }
 
-    /// Views of the pixels of `grid`, each with so many evaluation points.
-    pub fn of<'a, const POINTS: usize>(&self, grid: &'a SurfaceGrid) -> Views<'a, POINTS> {
-        let (mut rings, mut horizons, mut count) = (Vec::new(), Vec::new(), 0);
-        for ring in &grid.rings {
-            let ends = [&ring.points[0], &ring.points[POINTS - 1]].map(|point| self.reach(point));
+    /// Where pixels of `grid` have an evaluation point within sight: `margin` (rad) beyond the limb, and nearer to the observer.
+    pub fn sight(&self, grid: &SurfaceGrid, margin: f64) -> Sight {
+        let (mut rings, mut horizons) = (Vec::new(), Vec::new());
+        for (index, ring) in grid.rings.iter().enumerate() {
+            let ends = [&ring.points[0], &ring.points[ring.points.len() - 1]].map(|point| self.reach(point, margin));
             let Some(reach) = ends[0].or(ends[1]) else { continue };
-            if count % CHUNK == 0 {
-                rings.push(Rings::new());
+            let place = rings.len() % CHUNK;
+            if place == 0 {
                 horizons.push(Horizons::none());
             }
-            let of_points = std::array::from_fn(|p| self.point(&ring.points[p]));
-            rings[count / CHUNK].set(count % CHUNK, of_points, self.limb, ring.points[0].area);
             // of two latitudes one of which is never visible the other says where the ring is
-            horizons[count / CHUNK].set(count % CHUNK, ring, ends.map(|end| end.unwrap_or(reach)));
-            count += 1;
+            horizons.last_mut().expect("one").set(place, ring, ends.map(|end| end.unwrap_or(reach)));
+            rings.push(index);
         }
-        let parts = Vec::with_capacity(grid.len() / CHUNK + 2 * count);
-        Views { grid, rings, horizons, count, parts, moments: Moments::with_room_for(grid.len()) }
+        Sight { rings, horizons }
+    }
+
+    /// Views of these rings of `grid`, whose pixels have so many evaluation points.
+    pub fn views<'a, const POINTS: usize>(&self, grid: &'a SurfaceGrid, rings: &[usize]) -> Views<'a, POINTS> {
+        let chunk = |indices: &[usize]| {
+            let mut chunk = Rings::new();
+            for (place, ring) in indices.iter().map(|index| &grid.rings[*index]).enumerate() {
+                let of_points = std::array::from_fn(|p| self.point(&ring.points[p]));
+                chunk.set(place, of_points, self.limb, ring.points[0].area);
+            }
+            chunk
+        };
+        let rings = rings.chunks(CHUNK).map(chunk).collect();
+        Views { grid, rings }
     }
 
     fn point(&self, point: &RingPoint) -> Point {
-        let (rotation, vsini) = (&self.state.rotation, self.state.vsini_kms);
+        let Viewer { rotation, vsini, .. } = self;
         Point {
             angular_velocity: rotation.angular_velocity(point.sin_latitude),
             offset: point.longitude_offset,
@@ -100,50 +136,88 @@ impl Viewer {
     }
 
     /// Angular velocity (rad/d) of a point's latitude, and half the range of longitudes (rad) of pixels in which one of its points
-    /// is visible; nothing where none ever is.
-    fn reach(&self, point: &RingPoint) -> Option<[f64; 2]> {
-        // mu = sin(latitude) cos(i) + cos(latitude) sin(i) cos(longitude) is positive; i is between 0 and 180 deg
-        let rises = -point.sin_latitude * self.cos_inclination / (point.cos_latitude * self.sin_inclination);
-        let angular_velocity = self.state.rotation.angular_velocity(point.sin_latitude);
+    /// is within sight; nothing where none ever is.
+    fn reach(&self, point: &RingPoint, margin: f64) -> Option<[f64; 2]> {
+        // mu = sin(latitude) cos(i) + cos(latitude) sin(i) cos(longitude) > -sin(margin); i is between 0 and 180 deg
+        let pole = point.sin_latitude * self.cos_inclination + margin.sin();
+        let rises = -pole / (point.cos_latitude * self.sin_inclination);
+        let angular_velocity = self.rotation.angular_velocity(point.sin_latitude);
         (rises < 1.0).then(|| [angular_velocity, rises.max(-1.0).acos() + point.longitude_offset.abs()])
     }
 }
 
 impl<const POINTS: usize> Views<'_, POINTS> {
-    /// What is seen `since_epoch_d` days after the star's epoch.
+    /// Turns the star to where it is `since_epoch_d` days after its epoch.
     #[inline(always)]
-    pub fn look<I: Instructions>(&mut self, i: I, since_epoch_d: f64) -> &Moments {
-        self.rings.iter_mut().for_each(|rings| rings.turn(i, since_epoch_d));
-        self.find_parts(since_epoch_d);
-        for part in &self.parts {
-            let [chunk, ring] = part.ring.map(|ring| ring as usize);
-            let (first, place) = (part.pixel as usize, part.place as usize);
-            // a part goes on beyond the last pixel: there is room, and the next one overwrites what comes of it
-            self.rings[chunk].look(i, ring, &self.grid.directions, first, place, &mut self.moments);
+    pub fn turn(&mut self, i: impl Instructions, since_epoch_d: f64) {
+        for rings in &mut self.rings {
+            rings.turn(i, since_epoch_d);
         }
-        &self.moments
     }
 
+    /// Looks at the pixels of all `parts`, so many altogether; in cells with these middles, or in those that they lie in.
     #[inline(always)]
-    fn find_parts(&mut self, since_epoch_d: f64) {
-        self.parts.clear();
+    pub fn look(&self, i: impl Instructions, parts: &[Part], pixels: usize, middles: Option<&[f32]>, seen: &mut Seen) {
+        for part in parts {
+            let ([chunk, ring], place) = (part.ring.map(|ring| ring as usize), part.place as usize);
+            let directions = self.grid.directions.chunk(part.pixel as usize);
+            let middles = middles.map(|middles| middles[place..].first_chunk().expect("a chunk of middles"));
+            // a part goes on beyond its last pixel: there is room, and the next one overwrites what comes of it
+            let moments = self.rings[chunk].look(i, ring, directions, middles);
+            let Seen { weight, position, spread, middle, .. } = &mut *seen;
+            let Moments { weight: w, position: p, spread: s, middle: m } = moments;
+            for (all, of_part) in [(weight, w), (position, p), (spread, s), (middle, m)] {
+                *all[place..].first_chunk_mut().expect("room for a chunk") = of_part;
+            }
+        }
+        seen.weight[pixels..][..NOTHING].fill(0.0);
+        seen.pixels = pixels;
+    }
+}
+
+impl Seen {
+    /// Room for the pixels of a map.
+    pub fn with_room_for(pixels: usize) -> Self {
+        let numbers = || vec![0.0; pixels + CHUNK.max(NOTHING)];
+        Seen { pixels: 0, weight: numbers(), position: numbers(), spread: numbers(), middle: numbers() }
+    }
+}
+
+impl Part {
+    /// Writes the indices of the pixels to their places, and on beyond the last of them.
+    pub fn list(&self, pixels: &mut [u32]) {
+        let pixels = pixels[self.place as usize..][..CHUNK].iter_mut();
+        pixels.zip(self.pixel..).for_each(|(pixel, index)| *pixel = index);
+    }
+}
+
+impl Sight {
+    /// Most parts that a map of so many pixels comes in.
+    pub fn most_parts(&self, pixels: usize) -> usize {
+        pixels / CHUNK + 2 * self.rings.len()
+    }
+
+    /// The pixels within sight `since_epoch_d` days after the star's epoch, and how many they are.
+    #[inline(always)]
+    pub fn find_parts(&self, since_epoch_d: f64, parts: &mut Vec<Part>) -> usize {
+        parts.clear();
         let mut place = 0;
         for (chunk, horizons) in self.horizons.iter().enumerate() {
             let [start, length] = horizons.visible(since_epoch_d);
-            for ring in 0..CHUNK.min(self.count - chunk * CHUNK) {
+            for ring in 0..CHUNK.min(self.rings.len() - chunk * CHUNK) {
                 let (first, count) = (horizons.first[ring], horizons.count[ring] as u32);
                 let (start, length) = (start[ring], length[ring]);
                 let before = length.min(count - start);
                 for (from, pixels) in [(start, before), (0, length - before)] {
                     for done in (0..pixels).step_by(CHUNK) {
                         let ring = [chunk as u32, ring as u32];
-                        self.parts.push(Part { ring, pixel: first + from + done, place: place + done });
+                        parts.push(Part { ring, pixel: first + from + done, place: place + done });
                     }
                     place += pixels;
                 }
             }
         }
-        self.moments.pixels = place as usize;
+        place as usize
     }
 }
 

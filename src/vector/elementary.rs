@@ -12,8 +12,14 @@ const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 /// 2^52: from here on neighbouring numbers are integers, which stand in their last bits.
 pub const INTEGERS: f64 = 4_503_599_627_370_496.0;
 
+/// 2^23: the same in single precision.
+pub const SINGLE_INTEGERS: f32 = 8_388_608.0;
+
 /// 2^52 and half as much: the sum with a number below 2^51 ends in that number, rounded to an integer.
 const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// The same in single precision, for numbers below 2^22.
+const SINGLE_ROUND: f32 = 12_582_912.0;
 
 /// Beyond it e^-x is no normal number.
 const LARGEST_EXPONENT: f64 = 708.0;
@@ -71,6 +77,12 @@ fn polynomial<const N: usize>(i: impl Instructions, coefficients: &[f64; N], x: 
         sum = i.multiply_add(sum, x, *c);
     }
     sum
+}
+
+/// The nearest integer of a number below 2^22.
+#[inline(always)]
+pub fn nearest(x: f32) -> f32 {
+    (x + SINGLE_ROUND) - SINGLE_ROUND
 }
 
 /// `e^-x` for x >= 0; that of 708 beyond it.

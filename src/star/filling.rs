@@ -1,0 +1,123 @@
+//! Fills blocks with what is seen of the pixels that stand there; and does it again for a star that differs little, without sorting
+//! its pixels, which is half of what a placement takes.
+//!
+//! A pixel may be outside of its cell then: the polynomials that say what it leaves on the cell's nodes (`line_profile`) go on beyond
+//! the border, and differ from those of the next cell by the fifth power of the way. Left out: how pixels are sorted (`sorting`),
+//! and which stars differ little (`nearby`).
+
+use super::block::{Block, LANES};
+use super::grid::SurfaceGrid;
+use super::moments::CHUNK;
+use super::placement::{Arrangement, Placement, spare_blocks};
+use super::view::{Part, Seen, Viewer};
+use crate::vector::{Instructions, Registers, Scattered, Task};
+use std::sync::Arc;
+
+/// Which of the pixels that an observation sees stand in the lanes of a block.
+pub type Standing = [u32; LANES];
+
+/// Fills an observation's blocks.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub fn fill<I: Instructions>(i: I, standing: &[Standing], seen: &Seen, blocks: &mut [Block]) {
+    let r = i.singles();
+    for (standing, block) in standing.iter().zip(blocks) {
+        let Block { weight, position, spread } = block;
+        for (row, numbers) in [(weight, &seen.weight), (position, &seen.position), (spread, &seen.spread)] {
+            for first in (0..LANES).step_by(I::Singles::LANES) {
+                // safe:
+                unsafe { r.store(r.pick(numbers, standing, first), row, first) };
+            }
+        }
+    }
+}
+
+/// Where the pixels of an arrangement come from.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Rings of the map that are looked at.
+    rings: Vec<usize>,
+    /// The pixels as they are looked at, of one observation after another.
+    parts: Vec<Part>,
+    /// Middles of the cells of their pixels (steps).
+    middles: Vec<f32>,
+    /// Who stands in each block.
+    standing: Vec<Standing>,
+    observations: Vec<Observation>,
+}
+
+/// An observation's end among all parts, pixels and blocks.
+#[derive(Clone, Copy, Debug)]
+struct Observation {
+    parts_end: usize,
+    pixels_end: usize,
+    blocks_end: usize,
+}
+
+impl Source {
+    /// One without any observation.
+    pub fn new(rings: &[usize]) -> Self {
+        let (parts, middles, standing, observations) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Source { rings: rings.to_vec(), parts, middles, standing, observations }
+    }
+
+    /// Adds an observation: its pixels in `parts`, and who stands in its blocks.
+    pub fn add(&mut self, parts: &[Part], seen: &Seen, standing: &[Standing]) {
+        self.parts.extend_from_slice(parts);
+        self.middles.truncate(self.observations.last().map_or(0, |last| last.pixels_end));
+        self.middles.extend_from_slice(&seen.middle[..seen.pixels + CHUNK]);
+        self.standing.extend_from_slice(standing);
+        let (parts_end, pixels_end, blocks_end) = (self.parts.len(), self.middles.len() - CHUNK, self.standing.len());
+        self.observations.push(Observation { parts_end, pixels_end, blocks_end });
+    }
+}
+
+/// The work that makes a [`Placement`] of an arrangement.
+pub struct Refill<'a> {
+    /// The pixels.
+    pub grid: &'a SurfaceGrid,
+    /// Who looks at them.
+    pub viewer: Viewer,
+    /// Which stand where, ...
+    pub arrangement: &'a Arc<Arrangement>,
+    /// ... and where they come from.
+    pub source: &'a Source,
+    /// Times of the observations since the star's epoch (d).
+    pub since_epoch_d: &'a [f64],
+}
+
+impl Task for Refill<'_> {
+    type Output = Placement;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, instructions: I) -> Placement {
+        match self.grid.points() {
+            1 => self.by_points::<1>(instructions),
+            4 => self.by_points::<4>(instructions),
+            points => unreachable!("{points} points in a pixel"),
+        }
+    }
+}
+
+impl Refill<'_> {
+    #[inline(always)]
+    fn by_points<const POINTS: usize>(self, instructions: impl Instructions) -> Placement {
+        let Refill { grid, viewer, arrangement, source, since_epoch_d } = self;
+        assert!(source.observations.len() == since_epoch_d.len());
+        let mut views = viewer.views::<POINTS>(grid, &source.rings);
+        let mut seen = Seen::with_room_for(grid.len());
+        let mut blocks = spare_blocks();
+        blocks.resize(source.standing.len(), Block::default());
+        let mut begin = Observation { parts_end: 0, pixels_end: 0, blocks_end: 0 };
+        for (&time, &end) in since_epoch_d.iter().zip(&source.observations) {
+            views.turn(instructions, time);
+            let parts = &source.parts[begin.parts_end..end.parts_end];
+            let (pixels, middles) = (end.pixels_end - begin.pixels_end, &source.middles[begin.pixels_end..]);
+            views.look(instructions, parts, pixels, Some(middles), &mut seen);
+            let rows = begin.blocks_end..end.blocks_end;
+            fill(instructions, &source.standing[rows.clone()], &seen, &mut blocks[rows]);
+            begin = end;
+        }
+        Placement::new(Arc::clone(arrangement), blocks)
+    }
+}

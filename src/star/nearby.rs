@@ -1,0 +1,150 @@
+//! Stars that differ little from one: their responses take the sorting of its pixels for theirs.
+//!
+//! Left out: pixels and cells (`filling`), and who asks for stars close to which.
+
+use super::deposit::{Deposit, Observed};
+use super::filling::Source;
+use super::grid::SurfaceGrid;
+use super::response::{Response, Sampling, since_epoch_d, step_kms};
+use super::{StarSettings, StarState};
+use std::sync::Arc;
+
+/// How far (rad) a point of the surface may be from where it was: so far beyond the limb pixels have places, for 2 % more of
+/// them to be gone through in every pass.
+const MARGIN: f64 = 0.02;
+
+/// How far its velocity may be from what it was, in steps of the velocity grid. What a pixel leaves on the grid is wrong by 8e-7 of its
+/// line's depth where it is so far outside of its cell, and as the fifth power of that; a cell itself is good to 3e-7.
+const LARGEST_MOVE: f64 = 0.4;
+
+/// A star, and how its pixels were sorted.
+#[derive(Clone, Debug)]
+pub struct Nearby {
+    state: StarState,
+    deposit: Deposit,
+    source: Source,
+}
+
+impl Nearby {
+    /// What responses close to a state of star and planet have in common.
+    pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+        let star = &star.with(&state.surface);
+        let since_epoch_d = &since_epoch_d(star, sampling);
+        let observed = Observed { grid, state, limb: star.limb_darkening, since_epoch_d };
+        let (deposit, source) = Deposit::for_others(observed, step_kms(star, sampling), MARGIN);
+        Nearby { state: *state, deposit, source }
+    }
+
+    /// The response at a state that is close by; nothing at any other. Everything but the state is to be the same as before.
+    pub fn response(
+        &self,
+        grid: &SurfaceGrid,
+        star: &StarSettings,
+        state: &StarState,
+        sampling: &Sampling,
+    ) -> Option<Response> {
+        let star = &star.with(&state.surface);
+        let since_epoch_d = &since_epoch_d(star, sampling);
+        if self.deposit.step_kms != step_kms(star, sampling) || !self.is_close(grid, state, since_epoch_d) {
+            return None;
+        }
+        let observed = Observed { grid, state, limb: star.limb_darkening, since_epoch_d };
+        let deposit = self.deposit.again(&self.source, observed);
+        Some(Response::shifted(Arc::new(deposit), star, state, sampling))
+    }
+
+    /// Whether all pixels are where they were, nearly.
+    fn is_close(&self, grid: &SurfaceGrid, state: &StarState, since_epoch_d: &[f64]) -> bool {
+        let longest = since_epoch_d.iter().fold(0.0, |longest: f64, time| longest.max(time.abs()));
+        let tilt = (state.inclination - self.state.inclination).abs();
+        grid.rings.iter().flat_map(|ring| &ring.points).all(|point| {
+            let (sin, cos) = (point.sin_latitude, point.cos_latitude);
+            let [was, is] = [&self.state, state].map(|s| s.vsini_kms * s.rotation.relative(sin) * cos);
+            let [before, now] = [&self.state, state].map(|s| s.rotation.angular_velocity(sin));
+            let turn = (now - before).abs() * longest;
+            let moved = (is - was).abs() + is.abs() * turn;
+            cos * turn + tilt <= MARGIN && moved <= LARGEST_MOVE * self.deposit.step_kms
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation};
+
+    const STAR: StarSettings = StarSettings {
+        rotation_period_d: 3.0,
+        epoch_d: 0.0,
+        limb_darkening: LimbDarkening::Linear(0.7),
+        contrast: 0.5,
+        line: LocalLine { sigma_kms: 3.0, instrumental_sigma_kms: 0.0, gamma_kms: 0.0, equivalent_width_kms: 5.8 },
+    };
+
+    /// The star, and so much another one.
+    fn star(rotation: f64, shear: f64, tilt: f64, vsini_kms: f64) -> StarState {
+        StarState {
+            rotation: Rotation { omega_eq_rad_d: 2.1 + rotation, domega_rad_d: 0.05 + shear },
+            inclination: 0.7 + tilt,
+            vsini_kms: 40.0 + vsini_kms,
+            vsys_kms: 0.3,
+            orbit: Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.4 },
+            surface: Default::default(),
+        }
+    }
+
+    fn sampling() -> Sampling {
+        Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (2.0 * k as f64, -50.0, 57)).collect() }
+    }
+
+    #[test]
+    fn stars_close_by_are_seen_as_if_they_had_been_sorted() {
+        let sampling = &sampling();
+        // as many pixels as make all orders of cells
+        for (pixels, quadrature) in [
+            (7, Quadrature::Centre),
+            (900, Quadrature::Gauss2x2),
+            (13_000, Quadrature::Centre),
+            (41_000, Quadrature::Centre),
+        ] {
+            let grid = &SurfaceGrid::equal_area(pixels, quadrature);
+            let nearby = Nearby::new(grid, &STAR, &star(0.0, 0.0, 0.0, 0.0), sampling);
+            let map: Vec<f64> = (0..grid.len()).map(|p| 0.8 + 0.2 * (0.7 * p as f64).sin()).collect();
+            let others = [star(0.0, 0.0, 0.0, 0.0), star(5e-4, 0.0, 0.01, 0.05), star(-2e-4, 5e-4, -0.015, -0.1)];
+            for state in others {
+                let sorted = Response::new(grid, &STAR, &state, sampling);
+                let again = nearby.response(grid, &STAR, &state, sampling).expect("a star close by");
+                let [(line, continuum), (line_again, continuum_again)] = [&sorted, &again].map(|response| {
+                    let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
+                    response.apply(&map, &mut line, &mut continuum);
+                    (line, continuum)
+                });
+                let off = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |off: f64, (a, b)| off.max((a - b).abs()));
+                let deepest = line.iter().fold(0.0, |deepest: f64, depth| deepest.max(*depth));
+                let line = off(&line, &line_again) / deepest;
+                assert!(line < 5e-7, "{pixels} pixels, {state:?}: {line:e}");
+                // no pixel at the limb is missing
+                let continuum = off(&continuum, &continuum_again);
+                assert!(continuum < 1e-12, "{pixels} pixels, {state:?}: {continuum:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn stars_farther_away_are_refused() {
+        let (grid, sampling) = (&SurfaceGrid::equal_area(900, Quadrature::Gauss2x2), &sampling());
+        let nearby = Nearby::new(grid, &STAR, &star(0.0, 0.0, 0.0, 0.0), sampling);
+        let is_close = |star: &StarSettings, state: StarState| nearby.response(grid, star, &state, sampling).is_some();
+        assert!(is_close(&STAR, star(0.0, 0.0, 0.0, 0.0)));
+        for far in
+            [star(2e-3, 0.0, 0.0, 0.0), star(0.0, 0.01, 0.0, 0.0), star(0.0, 0.0, -0.03, 0.0), star(0.0, 0.0, 0.0, 0.5)]
+        {
+            assert!(!is_close(&STAR, far), "{far:?}");
+        }
+        // not a number is never close
+        assert!(!is_close(&STAR, star(f64::NAN, 0.0, 0.0, 0.0)));
+        // another velocity grid
+        let narrow = StarSettings { line: LocalLine { sigma_kms: 2.0, ..STAR.line }, ..STAR };
+        assert!(!is_close(&narrow, star(0.0, 0.0, 0.0, 0.0)));
+    }
+}
