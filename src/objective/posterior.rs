@@ -27,8 +27,9 @@ pub struct Posterior {
     settings: SolverSettings,
     /// Where evaluations start: the reference, and others.
     footholds: Vec<Foothold>,
-    /// How pixels are looked at; nothing where only orbit and systemic velocity are free: then once for all evaluations.
-    pixels: Option<Arc<Nearby>>,
+    /// What responses of stars close to the reference have in common; nothing where only orbit and systemic velocity are free, so that
+    /// pixels are looked at once for all evaluations.
+    nearby: Option<Arc<Nearby>>,
 }
 
 /// Fastest velocity of any latitude (km/s, projected) that is tried; beyond it a parameter vector is absurd.
@@ -51,9 +52,9 @@ impl Posterior {
         let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.agrees(&reference.values, p))
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
-        let pixels = (!velocities_only).then(|| Arc::new(imager.nearby(&here.state())));
+        let nearby = (!velocities_only).then(|| Arc::new(imager.nearby(&here.state())));
         let footholds = Vec::new();
-        let mut posterior = Posterior { imager, space, kind, reference, settings, footholds, pixels };
+        let mut posterior = Posterior { imager, space, kind, reference, settings, footholds, nearby };
         let Posterior { space, reference, .. } = &posterior;
         let (theta, solution) = (space.theta_of(&reference.values), &reference.solution);
         let (response, preconditioner) = (&reference.response, reference.preconditioner.clone());
@@ -173,7 +174,7 @@ impl Posterior {
 
     fn response(&self, theta: &[f64]) -> Response {
         let state = self.space.values_at(theta).state();
-        match &self.pixels {
+        match &self.nearby {
             Some(nearby) => self.imager.response_near(nearby, &state),
             None => self.reference.response.with_velocities(&self.imager.star, &state, &self.imager.sampling),
         }

@@ -1,7 +1,7 @@
 //! Pairs of a visible pixel and an observation as the hot path reads them: a pixel of each of several cells side by side.
 //!
 //! Which pixels they are, and what is seen of them, are kept apart: stars that differ little have the same pixels in their cells. Left
-//! out: what is made of them (`kernel`), which stand side by side (`placement`).
+//! out: what is made of them (`kernel`), which stand side by side (`sorting`).
 
 /// Cells side by side: as many as the widest registers hold in double precision.
 pub const LANES: usize = 8;

@@ -12,10 +12,11 @@ use super::grid::SurfaceGrid;
 use super::kernel;
 use super::limb_darkening::LimbDarkening;
 use super::line_profile::DEPOSIT_NODES;
-use super::placement::{Placement, Scale};
+use super::placement::{Arrangement, Placement, Scale};
 use super::sorting::{Order, Sort};
 use super::view::Viewer;
 use crate::vector::{self, Instructions, Number};
+use std::sync::Arc;
 
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.
 #[derive(Clone, Debug)]
@@ -28,6 +29,18 @@ pub struct Deposit {
     pub nodes: usize,
     pixels: usize,
     placement: Placement,
+}
+
+/// Pixels in their cells, for deposits of several stars. They may be outside of them for any but the one that it was made for.
+#[derive(Clone, Debug)]
+pub struct Arranged {
+    origin_kms: f64,
+    /// Step of the grid (km/s).
+    pub step_kms: f64,
+    nodes: usize,
+    pixels: usize,
+    arrangement: Arc<Arrangement>,
+    source: Source,
 }
 
 /// A star as it is observed.
@@ -49,12 +62,8 @@ impl Deposit {
         Deposit::sorted(star, step_kms, 0.0, false).0
     }
 
-    /// Deposits of all pixels that are visible or nearly so, by `margin` (rad), with what [`Deposit::again`] needs.
-    pub fn for_others(star: Observed, step_kms: f64, margin: f64) -> (Self, Source) {
-        Deposit::sorted(star, step_kms, margin, true)
-    }
-
-    fn sorted(star: Observed, step_kms: f64, margin: f64, again: bool) -> (Self, Source) {
+    /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and where they come from, if they are to be seen again.
+    fn sorted(star: Observed, step_kms: f64, margin: f64, again: bool) -> (Self, Option<Source>) {
         let Observed { grid, state, limb, since_epoch_d } = star;
         // what is said of pixels below holds for these
         assert!(grid.rings.iter().all(|ring| ring.pixels.end <= grid.len()));
@@ -70,17 +79,6 @@ impl Deposit {
         let scale = Scale { first_node: -reach, cells: nodes + 1 - DEPOSIT_NODES };
         let (placement, source) = vector::run(Sort { grid, viewer, sight, scale, order, since_epoch_d, again });
         (Deposit { origin_kms: -reach * step_kms, step_kms, nodes, pixels: grid.len(), placement }, source)
-    }
-
-    /// Deposits of the same pixels as those of a star that differs little are seen at the same times. Pixels may be outside of
-    /// their cells.
-    pub fn again(&self, source: &Source, star: Observed) -> Self {
-        let Observed { grid, state, limb, since_epoch_d } = star;
-        assert!(grid.len() == self.pixels);
-        let viewer = Viewer::new(state, limb, self.step_kms);
-        let arrangement = self.placement.arrangement();
-        let placement = vector::run(Refill { grid, viewer, arrangement, source, since_epoch_d });
-        Deposit { placement, ..*self }
     }
 
     /// Number of nodes in steps of `step_kms` that a state takes.
@@ -131,6 +129,26 @@ impl Deposit {
             // safe: as above
             unsafe { kernel::scatter(N::registers(i), group, nodes, out) };
         }
+    }
+}
+
+impl Arranged {
+    /// Pixels as those of a star are seen on a grid of step `step_kms`, with a margin (rad) beyond the limb.
+    pub fn new(star: Observed, step_kms: f64, margin: f64) -> Self {
+        let (deposit, source) = Deposit::sorted(star, step_kms, margin, true);
+        let Deposit { origin_kms, nodes, pixels, ref placement, .. } = deposit;
+        let arrangement = Arc::clone(placement.arrangement());
+        Arranged { origin_kms, step_kms, nodes, pixels, arrangement, source: source.expect("asked for") }
+    }
+
+    /// Deposits of the same pixels as those of another star are seen at the same times.
+    pub fn deposit(&self, star: Observed) -> Deposit {
+        let &Arranged { origin_kms, step_kms, nodes, pixels, ref arrangement, ref source } = self;
+        let Observed { grid, state, limb, since_epoch_d } = star;
+        assert!(grid.len() == pixels);
+        let viewer = Viewer::new(state, limb, step_kms);
+        let placement = vector::run(Refill { grid, viewer, arrangement, source, since_epoch_d });
+        Deposit { origin_kms, step_kms, nodes, pixels, placement }
     }
 }
 

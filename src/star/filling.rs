@@ -2,7 +2,7 @@
 //! its pixels, which is half of what a placement takes.
 //!
 //! A pixel may be outside of its cell then: the polynomials that say what it leaves on the cell's nodes (`line_profile`) go on beyond
-//! the border, and differ from those of the next cell by the fifth power of the way. Left out: how pixels are sorted (`sorting`),
+//! the border, and differ from those of the next cell by the fifth power of the way, those of its spread by the third. Left out: how pixels are sorted (`sorting`),
 //! and which stars differ little (`nearby`).
 
 use super::block::{Block, LANES};
@@ -13,20 +13,22 @@ use super::view::{Part, Seen, Viewer};
 use crate::vector::{Instructions, Registers, Scattered, Task};
 use std::sync::Arc;
 
-/// Which of the pixels that an observation sees stand in the lanes of a block.
-pub type Standing = [u32; LANES];
+/// Which of the pixels that an observation sees are in the lanes of a block.
+pub type Seats = [u32; LANES];
 
 /// Fills an observation's blocks.
+///
+/// # Safety
+/// All seats are below the number of pixels that are seen and [`NOTHING`](super::view::NOTHING) more.
 #[inline(always)]
 #[allow(unsafe_code)]
-pub fn fill<I: Instructions>(i: I, standing: &[Standing], seen: &Seen, blocks: &mut [Block]) {
+pub unsafe fn fill<I: Instructions>(i: I, seats: &[Seats], seen: &Seen, blocks: &mut [Block]) {
     let r = i.singles();
-    for (standing, block) in standing.iter().zip(blocks) {
-        let Block { weight, position, spread } = block;
+    for (seats, Block { weight, position, spread }) in seats.iter().zip(blocks) {
         for (row, numbers) in [(weight, &seen.weight), (position, &seen.position), (spread, &seen.spread)] {
             for first in (0..LANES).step_by(I::Singles::LANES) {
-                // safe:
-                unsafe { r.store(r.pick(numbers, standing, first), row, first) };
+                // safe: the caller knows the seats
+                unsafe { r.store(r.pick(numbers, seats, first), row, first) };
             }
         }
     }
@@ -41,8 +43,8 @@ pub struct Source {
     parts: Vec<Part>,
     /// Middles of the cells of their pixels (steps).
     middles: Vec<f32>,
-    /// Who stands in each block.
-    standing: Vec<Standing>,
+    /// Who sits in each block.
+    seats: Vec<Seats>,
     observations: Vec<Observation>,
 }
 
@@ -57,17 +59,17 @@ struct Observation {
 impl Source {
     /// One without any observation.
     pub fn new(rings: &[usize]) -> Self {
-        let (parts, middles, standing, observations) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Source { rings: rings.to_vec(), parts, middles, standing, observations }
+        let (parts, middles, seats, observations) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Source { rings: rings.to_vec(), parts, middles, seats, observations }
     }
 
-    /// Adds an observation: its pixels in `parts`, and who stands in its blocks.
-    pub fn add(&mut self, parts: &[Part], seen: &Seen, standing: &[Standing]) {
+    /// Adds an observation: its pixels in `parts`, and who sits in its blocks.
+    pub fn add(&mut self, parts: &[Part], seen: &Seen, seats: &[Seats]) {
         self.parts.extend_from_slice(parts);
         self.middles.truncate(self.observations.last().map_or(0, |last| last.pixels_end));
         self.middles.extend_from_slice(&seen.middle[..seen.pixels + CHUNK]);
-        self.standing.extend_from_slice(standing);
-        let (parts_end, pixels_end, blocks_end) = (self.parts.len(), self.middles.len() - CHUNK, self.standing.len());
+        self.seats.extend_from_slice(seats);
+        let (parts_end, pixels_end, blocks_end) = (self.parts.len(), self.middles.len() - CHUNK, self.seats.len());
         self.observations.push(Observation { parts_end, pixels_end, blocks_end });
     }
 }
@@ -107,7 +109,7 @@ impl Refill<'_> {
         let mut views = viewer.views::<POINTS>(grid, &source.rings);
         let mut seen = Seen::with_room_for(grid.len());
         let mut blocks = spare_blocks();
-        blocks.resize(source.standing.len(), Block::default());
+        blocks.resize(source.seats.len(), Block::default());
         let mut begin = Observation { parts_end: 0, pixels_end: 0, blocks_end: 0 };
         for (&time, &end) in since_epoch_d.iter().zip(&source.observations) {
             views.turn(instructions, time);
@@ -115,7 +117,11 @@ impl Refill<'_> {
             let (pixels, middles) = (end.pixels_end - begin.pixels_end, &source.middles[begin.pixels_end..]);
             views.look(instructions, parts, pixels, Some(middles), &mut seen);
             let rows = begin.blocks_end..end.blocks_end;
-            fill(instructions, &source.standing[rows.clone()], &seen, &mut blocks[rows]);
+            // safe: as when they were sorted: as many pixels are seen
+            #[allow(unsafe_code)]
+            unsafe {
+                fill(instructions, &source.seats[rows.clone()], &seen, &mut blocks[rows]);
+            }
             begin = end;
         }
         Placement::new(Arc::clone(arrangement), blocks)

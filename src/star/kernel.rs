@@ -1,15 +1,15 @@
 //! The innermost loops: sums over the visible pixels that lie in a cell of the velocity grid, for several cells side by side,
 //! and their transpose.
 //!
-//! A pixel is a weight at a position t in [-1/2, 1/2] of its cell. What it leaves on the grid is a polynomial in t (see
+//! A pixel is a weight at a position t in [-1/2, 1/2] of its cell, or a little beyond. What it leaves on the grid is a polynomial in t (see
 //! `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in registers however many pixels
-//! there are. Left out: which pixels lie in which cell, and which cells stand side by side (`placement`).
+//! there are. Left out: which pixels lie in which cell, and which cells stand side by side (`sorting`).
 
 use super::block::{Group, LANES};
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
 use crate::vector::{self, Number, Registers, Scattered};
 
-/// Blocks (128 bytes each) from the one at work to the one that is asked for; all of an observation follow each other.
+/// Blocks (96 bytes each, and 32 of pixels) from the one at work to the one that is asked for; all of an observation follow each other.
 const AHEAD: usize = 32;
 
 /// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to 5.

@@ -7,7 +7,7 @@
 
 use super::limb_darkening::LimbDarkening;
 use crate::vector::Instructions;
-use crate::vector::elementary::{nearest, sin_cos};
+use crate::vector::elementary::{nearest_integer, sin_cos};
 
 /// Numbers that are computed side by side: pixels of a ring, and rings.
 pub const CHUNK: usize = 16;
@@ -44,7 +44,8 @@ pub struct Rings<const POINTS: usize> {
 #[derive(Clone, Debug)]
 struct Turned<const POINTS: usize> {
     mu: [[[f32; CHUNK]; POINTS]; 2],
-    /// Mean of the points' velocities, what single precision leaves of it, and what each has more.
+    /// Mean of the points' velocities, what single precision leaves of it (an error that a ring's pixels would have in common), and
+    /// what each has more.
     middle: [[f32; CHUNK]; 2],
     rest: [[f32; CHUNK]; 2],
     velocity: [[[f32; CHUNK]; POINTS]; 2],
@@ -144,20 +145,18 @@ impl<const POINTS: usize> Rings<POINTS> {
         middles: Option<&[f32; CHUNK]>,
     ) -> Moments {
         let [weight, deviation, spread] = self.relative_moments(i, ring, *cos, *sin);
-        let Turned { middle, rest, .. } = &self.turned;
+        let (middle, rest) = (self.turned.middle.map(|m| m[ring]), self.turned.rest.map(|r| r[ring]));
         let mut moments = Moments { weight, position: [0.0; CHUNK], spread, middle: [0.0; CHUNK] };
         for lane in 0..CHUNK {
             let (cos, sin) = (cos[lane], sin[lane]);
-            let less =
-                |x: f32| i.multiply_add_single(cos, middle[0][ring], i.multiply_add_single(sin, middle[1][ring], -x));
-            let small = i.multiply_add_single(sin, rest[1][ring], deviation[lane]);
-            let small = i.multiply_add_single(cos, rest[0][ring], small);
+            let small = i.multiply_add_single(sin, rest[1], deviation[lane]);
+            let small = i.multiply_add_single(cos, rest[0], small);
             moments.middle[lane] = match middles {
                 Some(middles) => middles[lane],
-                None => nearest(less(0.0) + small - 0.5) + 0.5,
+                None => nearest_integer(less(i, middle, [cos, sin], 0.0) + small - 0.5) + 0.5,
             };
             // the large numbers cancel first
-            moments.position[lane] = less(moments.middle[lane]) + small;
+            moments.position[lane] = less(i, middle, [cos, sin], moments.middle[lane]) + small;
         }
         moments
     }
@@ -197,4 +196,10 @@ impl<const POINTS: usize> Rings<POINTS> {
         }
         [weight, deviation, spread]
     }
+}
+
+/// Velocity in a direction (cosine and sine) less `x`, rounded once: what it is near `x` it is to all digits.
+#[inline(always)]
+fn less(i: impl Instructions, velocity: [f32; 2], [cos, sin]: [f32; 2], x: f32) -> f32 {
+    i.multiply_add_single(cos, velocity[0], i.multiply_add_single(sin, velocity[1], -x))
 }

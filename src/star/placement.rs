@@ -7,7 +7,7 @@ use super::block::{Block, Group, LANES, Pixels};
 use std::cell::Cell;
 use std::sync::Arc;
 
-/// The visible pixels of all observations.
+/// The visible pixels of all observations, and perhaps some of weight 0 that nearly are.
 #[derive(Clone, Debug)]
 pub struct Placement {
     arrangement: Arc<Arrangement>,
@@ -102,7 +102,7 @@ impl Drop for Arrangement {
 impl Placement {
     /// What is seen of the pixels of an arrangement, a block each.
     pub fn new(arrangement: Arc<Arrangement>, blocks: Vec<Block>) -> Self {
-        assert!(blocks.len() >= arrangement.pixels.len());
+        assert!(blocks.len() == arrangement.pixels.len());
         Placement { arrangement, blocks }
     }
 

@@ -5,7 +5,7 @@
 //! star that differs little (`filling`).
 
 use super::block::{Block, LANES, Pixels};
-use super::filling::{Source, Standing, fill};
+use super::filling::{Seats, Source, fill};
 use super::grid::SurfaceGrid;
 use super::placement::{Arrangement, Cells, Placement, Scale, spare_blocks, spare_pixels};
 use super::view::{NOTHING, Part, Seen, Sight, Viewer};
@@ -50,7 +50,7 @@ impl Order {
 }
 
 impl Task for Sort<'_> {
-    type Output = (Placement, Source);
+    type Output = (Placement, Option<Source>);
 
     #[inline(always)]
     fn run<I: Instructions>(self, instructions: I) -> Self::Output {
@@ -64,7 +64,7 @@ impl Task for Sort<'_> {
 
 impl Sort<'_> {
     #[inline(always)]
-    fn by_points<const POINTS: usize>(self, instructions: impl Instructions) -> (Placement, Source) {
+    fn by_points<const POINTS: usize>(self, instructions: impl Instructions) -> (Placement, Option<Source>) {
         let Sort { grid, viewer, sight, scale, order, since_epoch_d, again } = self;
         let mut views = viewer.views::<POINTS>(grid, &sight.rings);
         let room = since_epoch_d.len() * grid.len() * 3 / 4 / LANES;
@@ -75,7 +75,7 @@ impl Sort<'_> {
         pixels.reserve(room);
         let groups_each = scale.cells.div_ceil(order.side_by_side());
         let mut arrangement = Arrangement { pairs: 0, groups: Vec::new(), groups_each, pixels };
-        let mut source = Source::new(&sight.rings);
+        let mut source = again.then(|| Source::new(&sight.rings));
         let mut sorter = Sorter::new(scale, order, grid.len());
         let mut seen = Seen::with_room_for(grid.len());
         let mut parts = Vec::with_capacity(sight.most_parts(grid.len()));
@@ -87,10 +87,14 @@ impl Sort<'_> {
             let first_block = blocks.len();
             sorter.sort(&parts, &mut arrangement);
             blocks.resize(arrangement.pixels.len(), Block::default());
-            let standing = sorter.standing.as_chunks().0;
-            fill(instructions, standing, &seen, &mut blocks[first_block..]);
-            if again {
-                source.add(&parts, &seen, &standing[..blocks.len() - first_block]);
+            let seats = &sorter.seats.as_chunks().0[..blocks.len() - first_block];
+            // safe: whoever was sorted was seen, or is one of those of weight 0 behind the last
+            #[allow(unsafe_code)]
+            unsafe {
+                fill(instructions, seats, &seen, &mut blocks[first_block..]);
+            }
+            if let Some(source) = &mut source {
+                source.add(&parts, &seen, seats);
             }
         }
         (Placement::new(Arc::new(arrangement), blocks), source)
@@ -118,7 +122,7 @@ struct Sorter {
     /// Place of the first pixel of each cell among the sorted ones.
     firsts: Vec<u32>,
     /// The pixels of all cells of all groups one after another, as many places for each cell of a group.
-    standing: Vec<u32>,
+    seats: Vec<u32>,
 }
 
 impl Sorter {
@@ -134,10 +138,10 @@ impl Sorter {
             index: vec![0; room],
             cell: vec![0; room],
             rank: vec![0; room],
-            counts: vec![0; cells + 1],
+            counts: vec![0; cells],
             order: vec![0; cells],
-            firsts: vec![0; cells + 1],
-            standing: Vec::new(),
+            firsts: vec![0; cells],
+            seats: Vec::new(),
         }
     }
 
@@ -172,12 +176,12 @@ impl Sorter {
         self.sort_pixels(&arrangement.groups[first_group..]);
         parts.iter().for_each(|part| part.list(&mut self.index));
         for (k, index) in self.index[self.pixels..][..NOTHING].iter_mut().enumerate() {
-            *index = (k % self.map_pixels) as u32;
+            *index = (k % self.map_pixels.max(1)) as u32;
         }
-        let standing: &[Standing] = &self.standing.as_chunks().0[..first_block as usize - first_row];
+        let seats: &[Seats] = &self.seats.as_chunks().0[..first_block as usize - first_row];
         arrangement.pixels.resize(first_block as usize, Pixels::default());
-        for (pixels, standing) in arrangement.pixels[first_row..].iter_mut().zip(standing) {
-            for (pixel, k) in pixels.iter_mut().zip(standing) {
+        for (pixels, seats) in arrangement.pixels[first_row..].iter_mut().zip(seats) {
+            for (pixel, k) in pixels.iter_mut().zip(seats) {
                 *pixel = self.index[*k as usize];
             }
         }
@@ -187,9 +191,7 @@ impl Sorter {
     fn sort_cells(&mut self) {
         self.counts.fill(0);
         let step = self.order_of_cells.side_by_side() as u32;
-        let whole = self.pixels.next_multiple_of(LANES);
-        self.cell[self.pixels..whole].fill(self.scale.cells as u32);
-        for (cell, rank) in self.cell[..whole].iter().zip(&mut self.rank) {
+        for (cell, rank) in self.cell[..self.pixels].iter().zip(&mut self.rank) {
             let count = &mut self.counts[*cell as usize];
             *rank = *count;
             *count += step;
@@ -197,7 +199,7 @@ impl Sorter {
         const { assert!(LANES.is_power_of_two()) }
         let shift = step.trailing_zeros();
         self.counts.iter_mut().for_each(|count| *count >>= shift);
-        let counts = &self.counts[..self.scale.cells];
+        let counts = &self.counts;
         if self.order_of_cells != Order::BySize {
             self.order.iter_mut().enumerate().for_each(|(cell, place)| *place = cell as u32);
             for group in self.order.chunks_mut(self.order_of_cells.side_by_side()) {
@@ -229,10 +231,11 @@ impl Sorter {
         let mut end = 0;
         for (group, cells) in groups.iter().zip(self.order.chunks(step)) {
             let places = end..end + LANES * group.rows();
-            self.standing.resize(self.standing.len().max(places.end), 0);
-            // where cells have no pixels left: not one of the map in two blocks that follow each other, for no sum to wait for another
+            self.seats.resize(self.seats.len().max(places.end), 0);
+            // where cells have no pixels left: hardly ever one of the map in two blocks that follow each other, for no sum to wait
+            // for another
             let full = cells.get(step - 1).map_or(0, |last| step * self.counts[*last as usize] as usize);
-            for (k, place) in self.standing[places.clone()][full..].iter_mut().enumerate() {
+            for (k, place) in self.seats[places.clone()][full..].iter_mut().enumerate() {
                 *place = (self.pixels + k % NOTHING) as u32;
             }
             for (lane, cell) in cells.iter().enumerate() {
@@ -240,14 +243,12 @@ impl Sorter {
             }
             end = places.end;
         }
-        self.firsts[self.scale.cells] = end as u32;
-        self.standing.resize(self.standing.len().max(end + LANES * LANES), 0);
         for (k, (cell, rank)) in self.cell[..self.pixels].iter().zip(&self.rank).enumerate() {
             // safe: a cell is at most the last, and `firsts` has an entry for each; a rank is below what was counted of its cell, for
-            // which there is room in `standing`
+            // which there is room in `seats`
             unsafe {
                 let place = self.firsts.get_unchecked(*cell as usize) + rank;
-                *self.standing.get_unchecked_mut(place as usize) = k as u32;
+                *self.seats.get_unchecked_mut(place as usize) = k as u32;
             }
         }
     }

@@ -1,5 +1,5 @@
 //! Exponential, logarithm, sine and cosine for loops that are compiled into vector instructions: without branches, to two units
-//! in the last place.
+//! in the last place; and rounding.
 //!
 //! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for logarithm, sine and cosine, and the series to r^13
 //! over |r| < ln(2)/2 for the exponential. Left out: infinities, and results that are not normal numbers.
@@ -79,9 +79,9 @@ fn polynomial<const N: usize>(i: impl Instructions, coefficients: &[f64; N], x: 
     sum
 }
 
-/// The nearest integer of a number below 2^22.
+/// The nearest integer of a number between -2^22 and 2^22, the even one of two.
 #[inline(always)]
-pub fn nearest(x: f32) -> f32 {
+pub fn nearest_integer(x: f32) -> f32 {
     (x + SINGLE_ROUND) - SINGLE_ROUND
 }
 
@@ -183,6 +183,13 @@ mod tests {
         }
         assert_eq!(vector::run(Both(0.0)), [1.0, 0.0]);
         assert!(vector::run(Both(f64::NAN)).iter().all(|x| x.is_nan()));
+    }
+
+    #[test]
+    fn the_nearest_integer_is_that_of_the_standard_library() {
+        for x in (-4_000_000..4_000_000).step_by(997).map(|k| k as f32 + 0.37).chain([0.5, 1.5, -0.5, 32_767.5, 0.0]) {
+            assert_eq!(nearest_integer(x), x.round_ties_even(), "{x}");
+        }
     }
 
     #[test]
