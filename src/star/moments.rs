@@ -145,7 +145,8 @@ impl<const POINTS: usize> Rings<POINTS> {
         middles: Option<&[f32; CHUNK]>,
     ) -> Moments {
         let [weight, deviation, spread] = self.relative_moments(i, ring, *cos, *sin);
-        let (middle, rest) = (self.turned.middle.map(|m| m[ring]), self.turned.rest.map(|r| r[ring]));
+        let Turned { middle, rest, .. } = &self.turned;
+        let (middle, rest) = ([middle[0][ring], middle[1][ring]], [rest[0][ring], rest[1][ring]]);
         let mut moments = Moments { weight, position: [0.0; CHUNK], spread, middle: [0.0; CHUNK] };
         for lane in 0..CHUNK {
             let (cos, sin) = (cos[lane], sin[lane]);
