@@ -21,11 +21,9 @@ use std::sync::Arc;
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.
 #[derive(Clone, Debug)]
 pub struct Deposit {
-    /// Velocity of the grid's first node (km/s).
-    pub origin_kms: f64,
     /// Step of the grid (km/s).
     pub step_kms: f64,
-    /// Number of nodes.
+    /// Number of nodes, as many on either side of velocity 0.
     pub nodes: usize,
     pixels: usize,
     placement: Placement,
@@ -34,7 +32,6 @@ pub struct Deposit {
 /// Pixels in their cells, for deposits of several stars. They may be outside of them for any but the one that it was made for.
 #[derive(Clone, Debug)]
 pub struct Arranged {
-    origin_kms: f64,
     /// Step of the grid (km/s).
     pub step_kms: f64,
     nodes: usize,
@@ -44,7 +41,6 @@ pub struct Arranged {
 }
 
 /// A star as it is observed.
-#[derive(Clone, Copy)]
 pub struct Observed<'a> {
     /// Its pixels.
     pub grid: &'a SurfaceGrid,
@@ -53,18 +49,20 @@ pub struct Observed<'a> {
     /// Limb darkening.
     pub limb: LimbDarkening,
     /// Times of the observations since the star's epoch (d).
-    pub since_epoch_d: &'a [f64],
+    pub since_epoch_d: Vec<f64>,
+    /// Step (km/s) of the velocity grid that its line takes.
+    pub step_kms: f64,
 }
 
 impl Deposit {
-    /// Deposits of all visible pixels on a grid of step `step_kms`.
-    pub fn new(star: Observed, step_kms: f64) -> Self {
-        Deposit::sorted(star, step_kms, 0.0, false).0
+    /// Deposits of all visible pixels.
+    pub fn new(star: &Observed) -> Self {
+        Deposit::sorted(star, 0.0, false).0
     }
 
     /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and where they come from, if they are to be seen again.
-    fn sorted(star: Observed, step_kms: f64, margin: f64, again: bool) -> (Self, Option<Source>) {
-        let Observed { grid, state, limb, since_epoch_d } = star;
+    fn sorted(star: &Observed, margin: f64, again: bool) -> (Self, Option<Source>) {
+        let &Observed { grid, state, limb, ref since_epoch_d, step_kms } = star;
         // what is said of pixels below holds for these
         assert!(grid.rings.iter().all(|ring| ring.pixels.end <= grid.len()));
         let order = match grid.len() {
@@ -78,7 +76,12 @@ impl Deposit {
         let nodes = 2 * reach as usize + 1;
         let scale = Scale { first_node: -reach, cells: nodes + 1 - DEPOSIT_NODES };
         let (placement, source) = vector::run(Sort { grid, viewer, sight, scale, order, since_epoch_d, again });
-        (Deposit { origin_kms: -reach * step_kms, step_kms, nodes, pixels: grid.len(), placement }, source)
+        (Deposit { step_kms, nodes, pixels: grid.len(), placement }, source)
+    }
+
+    /// Velocity of the grid's first node (km/s).
+    pub fn origin_kms(&self) -> f64 {
+        -((self.nodes / 2) as f64) * self.step_kms
     }
 
     /// Number of nodes in steps of `step_kms` that a state takes.
@@ -133,22 +136,22 @@ impl Deposit {
 }
 
 impl Arranged {
-    /// Pixels as those of a star are seen on a grid of step `step_kms`, with a margin (rad) beyond the limb.
-    pub fn new(star: Observed, step_kms: f64, margin: f64) -> Self {
-        let (deposit, source) = Deposit::sorted(star, step_kms, margin, true);
-        let Deposit { origin_kms, nodes, pixels, ref placement, .. } = deposit;
+    /// Pixels as those of a star are seen, with a margin (rad) beyond the limb.
+    pub fn new(star: &Observed, margin: f64) -> Self {
+        let (deposit, source) = Deposit::sorted(star, margin, true);
+        let Deposit { step_kms, nodes, pixels, ref placement } = deposit;
         let arrangement = Arc::clone(placement.arrangement());
-        Arranged { origin_kms, step_kms, nodes, pixels, arrangement, source: source.expect("asked for") }
+        Arranged { step_kms, nodes, pixels, arrangement, source: source.expect("asked for") }
     }
 
-    /// Deposits of the same pixels as those of another star are seen at the same times.
-    pub fn deposit(&self, star: Observed) -> Deposit {
-        let &Arranged { origin_kms, step_kms, nodes, pixels, ref arrangement, ref source } = self;
-        let Observed { grid, state, limb, since_epoch_d } = star;
-        assert!(grid.len() == pixels);
+    /// Deposits of the same pixels as those of another star are seen at the same times, on the same grid.
+    pub fn deposit(&self, star: &Observed) -> Deposit {
+        let &Arranged { step_kms, nodes, pixels, ref arrangement, ref source } = self;
+        let &Observed { grid, state, limb, ref since_epoch_d, .. } = star;
+        assert!(grid.len() == pixels && star.step_kms == step_kms);
         let viewer = Viewer::new(state, limb, step_kms);
         let placement = vector::run(Refill { grid, viewer, arrangement, source, since_epoch_d });
-        Deposit { origin_kms, step_kms, nodes, pixels, placement }
+        Deposit { step_kms, nodes, pixels, placement }
     }
 }
 

@@ -4,7 +4,7 @@
 
 use super::deposit::{Arranged, Observed};
 use super::grid::SurfaceGrid;
-use super::response::{Response, Sampling, since_epoch_d, step_kms};
+use super::response::{Response, Sampling, observed};
 use super::{StarSettings, StarState};
 use std::sync::Arc;
 
@@ -16,8 +16,8 @@ const MARGIN: f64 = 0.02;
 const LARGEST_MOVE: f64 = 0.4;
 
 /// ... and its third power times the spread of a pixel's velocities, whose part of what a pixel leaves on the grid goes wrong so beyond
-/// the border of its cell. On the paper's setup log-probabilities are off by 1e-4 at these limits, and by less as the fourth power
-/// of the move.
+/// the border of its cell. On the paper's setup log-probabilities are off by 1.2e-4 at most at these limits, and by less where pixels
+/// move less (`results/performance.md`).
 const LARGEST_MOVE_OF_SPREAD: f64 = 0.01;
 
 /// Largest spread: a pixel that comes into sight point by point may move by as much.
@@ -34,9 +34,7 @@ impl Nearby {
     /// What responses close to a state of star and planet have in common.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
         let star = &star.with(&state.surface);
-        let since_epoch_d = &since_epoch_d(star, sampling);
-        let observed = Observed { grid, state, limb: star.limb_darkening, since_epoch_d };
-        Nearby { state: *state, pixels: Arranged::new(observed, step_kms(star, sampling), MARGIN) }
+        Nearby { state: *state, pixels: Arranged::new(&observed(grid, star, state, sampling), MARGIN) }
     }
 
     /// The response at a state that is close by; nothing at any other. Everything but the state is to be the same as before.
@@ -48,16 +46,17 @@ impl Nearby {
         sampling: &Sampling,
     ) -> Option<Response> {
         let star = &star.with(&state.surface);
-        let since_epoch_d = &since_epoch_d(star, sampling);
-        if self.pixels.step_kms != step_kms(star, sampling) || !self.is_close(grid, state, since_epoch_d) {
-            return None;
-        }
-        let observed = Observed { grid, state, limb: star.limb_darkening, since_epoch_d };
-        Some(Response::shifted(Arc::new(self.pixels.deposit(observed)), star, state, sampling))
+        let observed = observed(grid, star, state, sampling);
+        self.is_close(&observed)
+            .then(|| Response::shifted(Arc::new(self.pixels.deposit(&observed)), star, state, sampling))
     }
 
     /// Whether all pixels are where they were, nearly.
-    fn is_close(&self, grid: &SurfaceGrid, state: &StarState, since_epoch_d: &[f64]) -> bool {
+    fn is_close(&self, star: &Observed) -> bool {
+        let &Observed { grid, state, ref since_epoch_d, step_kms, .. } = star;
+        if step_kms != self.pixels.step_kms {
+            return false;
+        }
         let longest = since_epoch_d.iter().fold(0.0, |longest: f64, time| longest.max(time.abs()));
         let tilt = (state.inclination - self.state.inclination).abs();
         grid.rings.iter().flat_map(|ring| &ring.points).all(|point| {
@@ -65,8 +64,8 @@ impl Nearby {
             let [was, is] = [&self.state, state].map(|s| s.vsini_kms * s.rotation.relative(sin) * cos);
             let [before, now] = [&self.state, state].map(|s| s.rotation.angular_velocity(sin));
             let turn = (now - before).abs() * longest;
-            let moved = ((is - was).abs() + is.abs() * turn) / self.pixels.step_kms;
-            let spread = 0.5 * (is * point.longitude_offset / self.pixels.step_kms).powi(2);
+            let moved = ((is - was).abs() + is.abs() * turn) / step_kms;
+            let spread = 0.5 * (is * point.longitude_offset / step_kms).powi(2);
             cos * turn + tilt <= MARGIN
                 && moved <= LARGEST_MOVE
                 && moved.powi(3) * spread <= LARGEST_MOVE_OF_SPREAD

@@ -53,12 +53,12 @@ pub struct Scale {
 }
 
 /// Nodes of a cell before the one at its lower border.
-const NODES_BEFORE: u32 = 2;
+const NODES_BEFORE: f64 = 2.0;
 
 impl Scale {
-    /// Velocity in the middle of a cell.
-    pub fn middle_of(&self, cell: u32) -> f32 {
-        (self.first_node + f64::from(NODES_BEFORE + cell) + 0.5) as f32
+    /// Velocity in the middle of the first cell.
+    pub fn first_middle(&self) -> f32 {
+        (self.first_node + NODES_BEFORE + 0.5) as f32
     }
 }
 

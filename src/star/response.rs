@@ -57,9 +57,7 @@ impl Response {
     /// The response at one state of star and planet.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
         let star = &star.with(&state.surface);
-        let since_epoch_d = &since_epoch_d(star, sampling);
-        let observed = Observed { grid, state, limb: star.limb_darkening, since_epoch_d };
-        let deposit = Deposit::new(observed, step_kms(star, sampling));
+        let deposit = Deposit::new(&observed(grid, star, state, sampling));
         Response::shifted(Arc::new(deposit), star, state, sampling)
     }
 
@@ -88,7 +86,7 @@ impl Response {
         let mut convolutions = Vec::with_capacity(sampling.profiles.len());
         for &(time, first_velocity, bins) in &sampling.profiles {
             let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
-            let first_bin = first_velocity - shift - deposit.origin_kms;
+            let first_bin = first_velocity - shift - deposit.origin_kms();
             convolutions.push(ProfileConvolution::new(&kernel, grid, first_bin, bins));
             starts.push(starts[starts.len() - 1] + bins);
         }
@@ -167,14 +165,16 @@ impl Response {
     }
 }
 
-/// Times of the observations since the star's epoch (d).
-pub(super) fn since_epoch_d(star: &StarSettings, sampling: &Sampling) -> Vec<f64> {
-    sampling.profiles.iter().map(|p| p.0 - star.epoch_d).collect()
-}
-
-/// Step (km/s) of the velocity grid for a star's line.
-pub(super) fn step_kms(star: &StarSettings, sampling: &Sampling) -> f64 {
-    sampling.step_kms / LineKernel::steps_per_bin(star.line, sampling.step_kms) as f64
+/// A star, its surface that of the state, as it is observed.
+pub(super) fn observed<'a>(
+    grid: &'a SurfaceGrid,
+    star: &StarSettings,
+    state: &'a StarState,
+    sampling: &Sampling,
+) -> Observed<'a> {
+    let since_epoch_d = sampling.profiles.iter().map(|p| p.0 - star.epoch_d).collect();
+    let step_kms = sampling.step_kms / LineKernel::steps_per_bin(star.line, sampling.step_kms) as f64;
+    Observed { grid, state, limb: star.limb_darkening, since_epoch_d, step_kms }
 }
 
 /// One profile after another, in one direction: the rows of the grid are left as that direction left them.

@@ -150,7 +150,7 @@ impl Sorter {
     fn place(&mut self, seen: &Seen) {
         self.pixels = seen.pixels;
         let (whole, last) = (self.pixels.next_multiple_of(LANES), self.scale.cells as u32 - 1);
-        let first = self.scale.middle_of(0);
+        let first = self.scale.first_middle();
         for (cell, middle) in self.cell[..whole].iter_mut().zip(&seen.middle) {
             // from 2^23 on integers stand in the last bits; at angles beyond all meaning velocities are, too
             *cell = (middle - first + SINGLE_INTEGERS).to_bits().wrapping_sub(SINGLE_INTEGERS.to_bits()).min(last);
