@@ -1,4 +1,4 @@
-//! From the velocity grid to the bins of one observed profile: convolution with the local line, and its transpose.
+//! From the velocity grid to the bins of each observed profile: convolution with the local line, and its transpose.
 //!
 //! A bin is a whole number m of grid steps wide: kept as m interleaved rows (node i is entry i / m of row i mod m), the grid
 //! is turned into bins by one short filter a row. The orbit and the systemic velocity only shift the filters. Left out: pixels.
@@ -19,9 +19,11 @@ pub struct VelocityGrid {
     pub steps_per_bin: usize,
 }
 
-/// The local line, sampled for one profile: a filter for every row of the grid.
+/// The local line, sampled for every profile: a filter for every row of the grid.
 #[derive(Clone, Debug)]
-pub struct ProfileConvolution {
+pub struct Convolutions {
+    grid: VelocityGrid,
+    /// Of one profile after another.
     filters: Vec<Filter>,
     /// Taps of all filters one after another.
     taps: Vec<f64>,
@@ -37,28 +39,35 @@ struct Filter {
     taps: Range<usize>,
 }
 
-impl ProfileConvolution {
-    /// For a profile of so many bins, the first of which lies `first_bin_kms` above the grid's first node, in the star's frame.
+impl Convolutions {
+    /// For profiles the first bins of which lie so far (km/s) above the grid's first node, in the star's frame, with their numbers of bins.
     ///
-    /// Left out of the filters are nodes that lie beyond the grid for every bin, however far the profile is from the grid.
-    pub fn new(kernel: &LineKernel, grid: VelocityGrid, first_bin_kms: f64, bins: usize) -> Self {
+    /// Left out of the filters are nodes that lie beyond the grid for every bin, however far a profile is from the grid.
+    pub fn new(kernel: &LineKernel, grid: VelocityGrid, profiles: impl Iterator<Item = (f64, usize)>) -> Self {
         let VelocityGrid { nodes, step_kms, steps_per_bin } = grid;
-        let position = first_bin_kms / step_kms;
         let reach = kernel.reach_kms() / step_kms;
         let (m, end) = (steps_per_bin as isize, nodes as isize);
-        let lowest = -m * bins as isize;
-        let first = ((position - reach).ceil() as isize).clamp(lowest, end);
-        let last = ((position + reach).floor() as isize).min(end - 1);
-        let mut taps = Vec::with_capacity((last - first + 1).max(0) as usize);
-        let filter = |row: isize| {
-            let (begin, column) = (taps.len(), (first - row + m - 1).div_euclid(m));
-            let nodes = (row + m * column..=last).step_by(steps_per_bin);
-            taps.extend(nodes.map(|node| kernel.at((position - node as f64) * step_kms)));
-            Filter { first: column, taps: begin..taps.len() }
-        };
-        let filters = (0..m).map(filter).collect();
+        let (mut filters, mut taps, mut of_nodes) = (Vec::new(), Vec::new(), Vec::new());
+        for (first_bin_kms, bins) in profiles {
+            let position = first_bin_kms / step_kms;
+            let first = ((position - reach).ceil() as isize).clamp(-m * bins as isize, end);
+            let last = ((position + reach).floor() as isize).min(end - 1);
+            of_nodes.resize((last - first + 1).max(0) as usize, 0.0);
+            kernel.sample(position - first as f64, step_kms, &mut of_nodes);
+            for row in 0..m {
+                let (begin, column) = (taps.len(), (first - row + m - 1).div_euclid(m));
+                let first_node = (row + m * column - first) as usize;
+                taps.extend(of_nodes.iter().skip(first_node).step_by(steps_per_bin));
+                filters.push(Filter { first: column, taps: begin..taps.len() });
+            }
+        }
         let reversed = taps.iter().rev().copied().collect();
-        ProfileConvolution { filters, taps, reversed }
+        Convolutions { grid, filters, taps, reversed }
+    }
+
+    /// Filters of profile `k`.
+    fn filters(&self, k: usize) -> &[Filter] {
+        &self.filters[k * self.grid.steps_per_bin..][..self.grid.steps_per_bin]
     }
 
     /// A filter's taps in reverse order.
@@ -66,31 +75,35 @@ impl ProfileConvolution {
         &self.reversed[self.taps.len() - taps.end..self.taps.len() - taps.start]
     }
 
-    /// Columns before the rows' first, and bins' worth of them from the first on, that the filters reach.
-    fn reach(&self) -> (usize, usize) {
-        let before = self.filters.iter().map(|f| f.first.min(0).unsigned_abs()).max();
-        let after = self.filters.iter().map(|f| (f.first + f.taps.len() as isize).max(0) as usize).max();
-        (before.unwrap_or(0), after.unwrap_or(0))
+    /// Rows for profiles of at most so many bins.
+    pub fn rows(&self, bins: usize) -> Rows {
+        let VelocityGrid { nodes, steps_per_bin, .. } = self.grid;
+        // columns before the first, and those from the first on that filters reach
+        let margin = self.filters.iter().map(|f| f.first.min(0).unsigned_abs()).max().unwrap_or(0);
+        let after = self.filters.iter().map(|f| (f.first + f.taps.len() as isize).max(0) as usize).max().unwrap_or(0);
+        let stride = margin + nodes.div_ceil(steps_per_bin).max(after + bins + CHUNK);
+        Rows { margin, stride, steps_per_bin, values: vec![0.0; stride * steps_per_bin], padded: Vec::new() }
     }
 
-    /// Line depth in every bin (overwritten) from the rows of the grid.
+    /// Line depth in every bin (overwritten) of profile `k` from the rows of the grid.
     #[inline(always)]
-    pub fn sum_to_bins(&self, i: impl Instructions, rows: &Rows, bins: &mut [f64]) {
-        for (k, chunk) in bins.chunks_mut(CHUNK).enumerate() {
+    pub fn sum_to_bins(&self, i: impl Instructions, k: usize, rows: &Rows, bins: &mut [f64]) {
+        let filters = self.filters(k);
+        for (n, chunk) in bins.chunks_mut(CHUNK).enumerate() {
             let mut sums = [0.0; CHUNK];
-            for (row, filter) in self.filters.iter().enumerate() {
-                let first = (filter.first + rows.margin as isize) as usize + k * CHUNK;
+            for (row, filter) in filters.iter().enumerate() {
+                let first = (filter.first + rows.margin as isize) as usize + n * CHUNK;
                 correlate(i, &self.taps[filter.taps.clone()], &rows.row(row)[first..], &mut sums);
             }
             correlate::put(&sums, chunk);
         }
     }
 
-    /// Transpose of [`ProfileConvolution::sum_to_bins`]: sets the rows of the grid from the bins.
+    /// Transpose of [`Convolutions::sum_to_bins`]: sets the rows of the grid from the bins.
     #[inline(always)]
-    pub fn spread_bins(&self, i: impl Instructions, bins: &[f64], rows: &mut Rows) {
+    pub fn spread_bins(&self, i: impl Instructions, k: usize, bins: &[f64], rows: &mut Rows) {
         rows.values.fill(0.0);
-        for (row, filter) in self.filters.iter().enumerate() {
+        for (row, filter) in self.filters(k).iter().enumerate() {
             let Some(margin) = filter.taps.len().checked_sub(1) else { continue };
             // bins with as many zeros on either side as the filter reaches
             rows.padded.clear();
@@ -99,9 +112,9 @@ impl ProfileConvolution {
             rows.padded.resize(bins.len() + 2 * margin + CHUNK, 0.0);
             let first = (filter.first + rows.margin as isize) as usize;
             let targets = &mut rows.values[row * rows.stride + first..][..bins.len() + margin];
-            for (k, chunk) in targets.chunks_mut(CHUNK).enumerate() {
+            for (n, chunk) in targets.chunks_mut(CHUNK).enumerate() {
                 let mut sums = [0.0; CHUNK];
-                correlate(i, self.reversed(filter), &rows.padded[k * CHUNK..], &mut sums);
+                correlate(i, self.reversed(filter), &rows.padded[n * CHUNK..], &mut sums);
                 correlate::put(&sums, chunk);
             }
         }
@@ -121,19 +134,6 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Rows for a grid and profiles of the given numbers of bins.
-    pub fn new<'a>(grid: VelocityGrid, profiles: impl Iterator<Item = (&'a ProfileConvolution, usize)>) -> Self {
-        let VelocityGrid { nodes, steps_per_bin, .. } = grid;
-        let (mut margin, mut end) = (0, nodes.div_ceil(steps_per_bin));
-        for (convolution, bins) in profiles {
-            let (before, after) = convolution.reach();
-            margin = margin.max(before);
-            end = end.max(after + bins + CHUNK);
-        }
-        let stride = margin + end;
-        Rows { margin, stride, steps_per_bin, values: vec![0.0; stride * steps_per_bin], padded: Vec::new() }
-    }
-
     fn row(&self, row: usize) -> &[f64] {
         &self.values[row * self.stride..(row + 1) * self.stride]
     }

@@ -25,10 +25,15 @@ pub type Seats = [u32; LANES];
 pub unsafe fn fill<I: Instructions>(i: I, seats: &[Seats], seen: &Seen, blocks: &mut [Block]) {
     let r = i.singles();
     for (seats, Block { weight, position, spread }) in seats.iter().zip(blocks) {
-        for (row, numbers) in [(weight, &seen.weight), (position, &seen.position), (spread, &seen.spread)] {
-            for first in (0..LANES).step_by(I::Singles::LANES) {
-                // safe: the caller knows the seats
-                unsafe { r.store(r.pick(numbers, seats, first), row, first) };
+        for first in (0..LANES).step_by(I::Singles::LANES) {
+            // safe: the caller knows the seats
+            unsafe {
+                let weights = r.pick(&seen.weight, seats, first);
+                let positions = r.pick(&seen.position, seats, first);
+                let spreads = r.pick(&seen.spread, seats, first);
+                r.store(weights, weight, first);
+                r.store(positions, position, first);
+                r.store(spreads, spread, first);
             }
         }
     }

@@ -4,7 +4,7 @@
 //! Method section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile. Left out: brightness
 //! (what x is), the division by the continuum, data.
 
-use super::convolution::{ProfileConvolution, Rows, VelocityGrid};
+use super::convolution::{Convolutions, Rows, VelocityGrid};
 use super::deposit::{Deposit, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
@@ -46,8 +46,7 @@ pub const MOST_STEPS_PER_BIN: f64 = 200.0;
 #[derive(Clone, Debug)]
 pub struct Response {
     deposit: Arc<Deposit>,
-    convolutions: Vec<ProfileConvolution>,
-    grid: VelocityGrid,
+    convolutions: Convolutions,
     /// First bin of each profile, and the end.
     starts: Vec<usize>,
     contrast: f64,
@@ -83,19 +82,18 @@ impl Response {
             steps_per_bin: LineKernel::steps_per_bin(star.line, sampling.step_kms),
         };
         let mut starts = vec![0];
-        let mut convolutions = Vec::with_capacity(sampling.profiles.len());
-        for &(time, first_velocity, bins) in &sampling.profiles {
-            let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
-            let first_bin = first_velocity - shift - deposit.origin_kms();
-            convolutions.push(ProfileConvolution::new(&kernel, grid, first_bin, bins));
+        let profiles = sampling.profiles.iter().map(|&(time, first_velocity, bins)| {
             starts.push(starts[starts.len() - 1] + bins);
-        }
-        Response { deposit, convolutions, grid, starts, contrast: star.contrast }
+            let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
+            (first_velocity - shift - deposit.origin_kms(), bins)
+        });
+        let convolutions = Convolutions::new(&kernel, grid, profiles);
+        Response { deposit, convolutions, starts, contrast: star.contrast }
     }
 
     fn rows(&self) -> Rows {
         let bins = self.starts.windows(2).map(|s| s[1] - s[0]);
-        Rows::new(self.grid, self.convolutions.iter().zip(bins))
+        self.convolutions.rows(bins.max().unwrap_or(0))
     }
 
     /// Brightness of a spot over that of the photosphere in the state that it was made at.
@@ -110,7 +108,7 @@ impl Response {
 
     /// Number of profiles.
     pub fn profiles(&self) -> usize {
-        self.convolutions.len()
+        self.starts.len() - 1
     }
 
     /// Number of visible (pixel, profile) pairs.
@@ -197,7 +195,7 @@ impl<'a, N: Number> Pass<'a, N> {
         let Pass { response, nodes, of_cells, rows } = self;
         response.deposit.gather(i, k, x, of_cells, nodes);
         rows.interleave(nodes);
-        response.convolutions[k].sum_to_bins(i, rows, line);
+        response.convolutions.sum_to_bins(i, k, rows, line);
         total(nodes)
     }
 
@@ -205,7 +203,7 @@ impl<'a, N: Number> Pass<'a, N> {
     #[inline(always)]
     fn back<I: Instructions>(&mut self, i: I, k: usize, line: &[f64], continuum: f64, out: &mut [N]) {
         let Pass { response, nodes, of_cells, rows } = self;
-        response.convolutions[k].spread_bins(i, line, rows);
+        response.convolutions.spread_bins(i, k, line, rows);
         rows.deinterleave(nodes);
         of_cells.resize(nodes.len(), N::default());
         of_cells.iter_mut().zip(&*nodes).for_each(|(of_cell, node)| *of_cell = N::of(node + continuum));
