@@ -5,13 +5,15 @@
 //! Left out: which parameters are tried, and why.
 
 mod data;
+mod profile;
 
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Curvature, Problem};
 use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
 use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
-use crate::vector::Number;
+use crate::vector::{self, Number};
+use profile::{Bend, Misfit, Pull};
 
 pub use data::Data;
 
@@ -194,14 +196,10 @@ impl<'a> ImagingProblem<'a> {
     }
 
     /// What profile `k` hands to the transpose for the gradient: its bins, and the constant that comes with them.
-    fn pull(&self, k: usize, bins: &mut [f64]) -> f64 {
-        let scale = self.brightness_of.slope / self.continuum[k];
-        let mut constant = 0.0;
-        for j in self.response.bins(k) {
-            bins[j] = scale * self.weighted_residual[j];
-            constant -= bins[j] * self.model[j];
-        }
-        constant
+    fn pull(&self, k: usize, back: &mut [f64]) -> f64 {
+        let (bins, scale) = (self.response.bins(k), self.brightness_of.slope / self.continuum[k]);
+        let (model, weighted_residual) = (&self.model[bins.clone()], &self.weighted_residual[bins.clone()]);
+        vector::run(Pull { scale, model, weighted_residual, back: &mut back[bins] })
     }
 
     /// Change of every bin's model depth to first order in the change `v` of the map, at the current map.
@@ -235,20 +233,12 @@ impl Problem for ImagingProblem<'_> {
         self.passes += 1;
         self.brightness.iter_mut().zip(s).for_each(|(b, s)| *b = self.brightness_of.at(*s));
         self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
-        let mut chi2 = 0.0;
-        for k in 0..self.response.profiles() {
-            let (bins, continuum) = (self.response.bins(k), self.continuum[k]);
-            let residuals = self.differences[bins.clone()].iter_mut().zip(&self.data.depth[bins.clone()]);
-            for (model, (residual, depth)) in self.model[bins.clone()].iter_mut().zip(residuals) {
-                *model /= continuum;
-                *residual = *model - depth;
-            }
-            self.data.weigh(bins.clone(), &self.differences, &mut self.weighted_residual);
-            for (residual, weighted) in self.differences[bins.clone()].iter().zip(&self.weighted_residual[bins]) {
-                chi2 += residual * weighted;
-            }
-        }
-        chi2
+        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
+        let chi2_of = |(k, continuum): (usize, &f64)| {
+            let (bins, continuum) = (response.bins(k), *continuum);
+            vector::run(Misfit { data, bins, continuum, model, differences, weighted_residual })
+        };
+        continuum.iter().enumerate().map(chi2_of).sum()
     }
 
     fn gradient(&mut self, out: &mut [f64]) {
@@ -261,34 +251,27 @@ impl Problem for ImagingProblem<'_> {
         self.response.apply_transpose(&self.bins, &self.constants, out);
     }
 
-    /// `J^T W J v` plus the curvature of the model: with `dD = (line(dB) - D dC) / C`, the second derivative of `D = N/C`
-    /// in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`.
     fn curvature<N: Number>(&mut self, which: Curvature, v: &[N], out: &mut [N]) {
         self.passes += 2;
         self.single_passes += if N::SINGLE { 2 } else { 0 };
-        let second_order = if which == Curvature::Exact { 1.0 } else { 0.0 };
+        let exact = which == Curvature::Exact;
         let ImagingProblem { response, data, model, weighted_residual, continuum, differences, bins: weighed, .. } =
             self;
         let slope = self.brightness_of.slope;
         response.apply_and_back(v, out, |k, line, d_continuum| {
-            let bins = response.bins(k);
-            let (scale, model, residuals) =
-                (slope / continuum[k], &model[bins.clone()], &weighted_residual[bins.clone()]);
-            let d_continuum = scale * d_continuum;
-            for ((d_model, line), model) in differences[bins.clone()].iter_mut().zip(&*line).zip(model) {
-                *d_model = scale * line - model * d_continuum;
-            }
-            data.weigh(bins.clone(), differences, weighed);
-            let mut constant = 0.0;
-            let changes = weighed[bins.clone()].iter().zip(&differences[bins]);
-            for (((back, model), residual), (weighed, d_model)) in
-                line.iter_mut().zip(model).zip(residuals).zip(changes)
-            {
-                let residual = second_order * residual;
-                *back = scale * (weighed - residual * d_continuum);
-                constant -= *back * model + scale * residual * d_model;
-            }
-            constant
+            let (bins, scale) = (response.bins(k), slope / continuum[k]);
+            vector::run(Bend {
+                data,
+                bins,
+                scale,
+                exact,
+                model,
+                weighted_residual,
+                differences,
+                weighed,
+                d_continuum,
+                line,
+            })
         });
     }
 

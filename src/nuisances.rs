@@ -11,6 +11,8 @@
 //! and numbers that all profiles share (the equivalent width of the star's line may be a free parameter).
 
 use crate::observation::{Observations, Profile};
+use crate::vector::Instructions;
+use crate::vector::linear::short_dot;
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -102,10 +104,11 @@ impl Nuisances {
     }
 
     /// From `out = x / sigma^2` to `out = W x` in the `bins` of one profile.
-    pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+    #[inline(always)]
+    pub fn weigh(&self, i: impl Instructions, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
         for correction in &self.corrections {
             let full = &correction.full[bins.clone()];
-            let along = dot(full, &x[bins.clone()]);
+            let along = short_dot(i, full, &x[bins.clone()]);
             out[bins.clone()].iter_mut().zip(full).for_each(|(out, full)| *out -= along * full);
         }
     }

@@ -41,7 +41,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
     ("maxent", &["units", "vector"]),
-    ("nuisances", &["observation"]),
+    ("nuisances", &["observation", "vector"]),
     ("imaging", &["maxent", "nuisances", "observation", "star", "units", "vector"]),
     ("chain", &["log_density", "text"]),
     ("landscape", &["log_density", "text"]),

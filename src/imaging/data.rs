@@ -4,6 +4,7 @@
 
 use crate::nuisances::Nuisances;
 use crate::observation::Observations;
+use crate::vector::Instructions;
 use std::ops::Range;
 
 /// Data in the form that the misfit needs.
@@ -41,10 +42,11 @@ impl Data {
     }
 
     /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
-    pub fn weigh(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+    #[inline(always)]
+    pub fn weigh(&self, i: impl Instructions, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
         let weights = x[bins.clone()].iter().zip(&self.inverse_variance[bins.clone()]);
         out[bins.clone()].iter_mut().zip(weights).for_each(|(out, (x, weight))| *out = x * weight);
-        self.nuisances.weigh(bins, x, out);
+        self.nuisances.weigh(i, bins, x, out);
     }
 
     /// Sets `out = R x` in the `bins` of one profile, `R^t R = W`.

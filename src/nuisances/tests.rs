@@ -1,6 +1,7 @@
 //! The weights against a dense inverse, and their limits.
 
 use super::*;
+use crate::vector::Portable;
 use nalgebra::DVector;
 
 fn profile(first_velocity_kms: f64, phase: f64) -> Profile {
@@ -30,7 +31,7 @@ fn dense(nuisances: &Nuisances, k: usize, power: i32, root: bool) -> DMatrix<f64
         if root {
             nuisances.weigh_root(bins.clone(), &x, &mut out)
         } else {
-            nuisances.weigh(bins.clone(), &x, &mut out)
+            nuisances.weigh(Portable, bins.clone(), &x, &mut out)
         }
         matrix.column_mut(j).copy_from_slice(&out[bins.clone()]);
     }
@@ -95,7 +96,7 @@ fn fewer_profiles_or_larger_errors_are_as_if_made_so() {
     let second = all.of_profiles(std::slice::from_ref(&(20..40)), &sigma);
     let x: Vec<f64> = (0..20).map(|j| (j as f64).cos()).collect();
     let mut weighted: Vec<f64> = x.iter().zip(&sigma).map(|(x, s)| x / (s * s)).collect();
-    second.weigh(0..20, &x, &mut weighted);
+    second.weigh(Portable, 0..20, &x, &mut weighted);
     let noise = DMatrix::from_diagonal(&DVector::from_iterator(20, sigma.iter().map(|s| s * s)));
     let quoted = observations().profiles[1].sigma.iter().map(|s| s * s).collect::<Vec<f64>>();
     let dense = covariance(priors, 1) - DMatrix::from_diagonal(&DVector::from_vec(quoted)) + noise;

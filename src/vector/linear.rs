@@ -7,6 +7,9 @@ use super::{Instructions, Number, Task};
 /// Numbers that are summed side by side, whatever the instructions.
 const PARTS: usize = 32;
 
+/// The same for rows that are not much longer than that.
+const FEW_PARTS: usize = 8;
+
 /// Scalar product of rows of one length.
 pub fn dot<N: Number>(a: &[N], b: &[N]) -> f64 {
     assert_eq!(a.len(), b.len());
@@ -48,16 +51,27 @@ impl<N: Number> Task for Dot<'_, N> {
 
     #[inline(always)]
     fn run<I: Instructions>(self, i: I) -> f64 {
-        let mut sums = [N::default(); PARTS];
-        let ((a, rest_a), (b, rest_b)) = (self.a.as_chunks::<PARTS>(), self.b.as_chunks::<PARTS>());
-        for (a, b) in a.iter().zip(b) {
-            for k in 0..PARTS {
-                sums[k] = N::multiply_add(i, a[k], b[k], sums[k]);
-            }
-        }
-        let rest = rest_a.iter().zip(rest_b).map(|(a, b)| *a * *b);
-        sums.into_iter().map(Into::into).sum::<f64>() + rest.map(Into::into).sum::<f64>()
+        in_parts::<N, PARTS>(i, self.a, self.b)
     }
+}
+
+/// Scalar product of short rows within a task.
+#[inline(always)]
+pub fn short_dot(i: impl Instructions, a: &[f64], b: &[f64]) -> f64 {
+    in_parts::<f64, FEW_PARTS>(i, a, b)
+}
+
+#[inline(always)]
+fn in_parts<N: Number, const PARTS: usize>(i: impl Instructions, a: &[N], b: &[N]) -> f64 {
+    let mut sums = [N::default(); PARTS];
+    let ((a, rest_a), (b, rest_b)) = (a.as_chunks::<PARTS>(), b.as_chunks::<PARTS>());
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..PARTS {
+            sums[k] = N::multiply_add(i, a[k], b[k], sums[k]);
+        }
+    }
+    let rest = rest_a.iter().zip(rest_b).map(|(a, b)| *a * *b);
+    sums.into_iter().map(Into::into).sum::<f64>() + rest.map(Into::into).sum::<f64>()
 }
 
 struct Combine<'a, N, F> {
