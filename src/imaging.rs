@@ -12,6 +12,7 @@ use crate::maxent::{Curvature, Problem};
 use crate::nuisances::{LineAndContinuum, Nuisances};
 use crate::observation::Observations;
 use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use crate::vector::linear::combine;
 use crate::vector::{self, Number};
 use profile::{Bend, Misfit, Pull};
 
@@ -231,7 +232,8 @@ impl Problem for ImagingProblem<'_> {
 
     fn linearise(&mut self, s: &[f64]) -> f64 {
         self.passes += 1;
-        self.brightness.iter_mut().zip(s).for_each(|(b, s)| *b = self.brightness_of.at(*s));
+        let brightness_of = self.brightness_of;
+        combine(&mut self.brightness, s, |_, s| brightness_of.at(s));
         self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
         let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
         let chi2_of = |(k, continuum): (usize, &f64)| {

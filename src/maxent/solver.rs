@@ -12,9 +12,9 @@ use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
-use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing, lambda_step};
+use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing};
 use crate::vector::Number;
-use crate::vector::linear::{axpy, combine_two, dot};
+use crate::vector::linear::{combine, combine_two, dot, rounded, widen};
 
 /// Largest change of a coordinate in one step.
 const STEP_CAP: f64 = 2.0;
@@ -94,13 +94,16 @@ impl Solver<'_> {
             // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be; and that of a
             // solution near by serves: lambda goes wrong by as much as the path, and the next step sees it
             let near_by = !start.adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && standing.chi2_path < 0.0;
+            let mut move_lambda = standing.move_lambda;
             if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound && !near_by {
                 self.solve_path(problem, &at, &standing, curvature, &mut path);
+                move_lambda = standing.move_lambda_by(&path, &at, goal);
             }
-            let newton = self.newton(problem, &at, &standing, goal, curvature, &path);
-            at = self.advance(problem, &at, &standing.scale, &newton);
+            let newton = self.newton(problem, &at, &standing, move_lambda, curvature);
+            let decrement = newton.decrement;
+            at = self.advance(problem, &at, &standing.scale, newton);
             // far away the curvature of the model may make the system indefinite, near by it makes the steps exact
-            let near = 0.5 * newton.decrement < EXACT_BELOW * at.lambda;
+            let near = 0.5 * decrement < EXACT_BELOW * at.lambda;
             curvature = if near { Curvature::Exact } else { Curvature::GaussNewton };
         }
         unreachable!("the loop returns")
@@ -149,7 +152,7 @@ impl Solver<'_> {
             return at;
         }
         let mut ds = self.entropy.metric(&at.s, problem.area());
-        ds.iter_mut().zip(&start.path).for_each(|(d, z)| *d *= z);
+        combine(&mut ds, &start.path, |scale, z| scale * z);
         let mut u = vec![0.0; at.u.len()];
         self.entropy.step(&at.u, &at.s, &ds, move_lambda, STEP_CAP, &mut u);
         self.arrive(problem, u, at.lambda * move_lambda.exp())
@@ -169,26 +172,17 @@ impl Solver<'_> {
         self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &pull, path);
     }
 
-    /// The Newton step to where lambda is to go by the path; it stays where there is none, and if it is the goal.
+    /// The Newton step to where lambda is to go.
     fn newton(
         &self,
         problem: &mut impl Problem,
         at: &Point,
         standing: &Standing,
-        goal: Goal,
+        move_lambda: f64,
         curvature: Curvature,
-        path: &[f64],
     ) -> Newton {
-        let Standing { scale, chi2_gradient, right, .. } = standing;
-        let mut right = right.clone();
-        let mut move_lambda = 0.0;
-        if !path.is_empty() {
-            let (chi2_path, chi2_step) = (2.0 * dot(chi2_gradient, path), -2.0 * dot(path, &right) / at.lambda);
-            move_lambda = lambda_step(at, chi2_path, chi2_step, goal);
-            axpy(-move_lambda * at.lambda, chi2_gradient, &mut right);
-        }
-        let mut step = vec![0.0; right.len()];
-        self.solve_system(problem, System { lambda: at.lambda, scale, curvature }, &right, &mut step);
+        let (right, mut step) = (standing.right_after(move_lambda, at), vec![0.0; at.u.len()]);
+        self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &right, &mut step);
         Newton { decrement: dot(&step, &right).max(0.0), step, move_lambda }
     }
 
@@ -200,12 +194,11 @@ impl Solver<'_> {
         // right-hand sides come with a norm of 1, for nothing to be too small or too large
         let norm = dot(right, right).sqrt();
         let per_norm = if norm == 0.0 { 0.0 } else { norm.recip() };
-        let single = |x: &[f64], unit: f64| x.iter().map(|x| (unit * x) as f32).collect::<Vec<f32>>();
-        let scale = &single(system.scale, 1.0);
-        let mut of_unit = single(z, per_norm);
+        let scale = &rounded(system.scale, 1.0);
+        let mut of_unit = rounded(z, per_norm);
         let System { lambda, curvature, .. } = system;
-        self.solve_with(problem, System { lambda, scale, curvature }, &single(right, per_norm), &mut of_unit);
-        z.iter_mut().zip(of_unit).for_each(|(z, of_unit)| *z = norm * f64::from(of_unit));
+        self.solve_with(problem, System { lambda, scale, curvature }, &rounded(right, per_norm), &mut of_unit);
+        widen(&of_unit, norm, z);
     }
 
     /// The same in the precision of its numbers.
@@ -224,10 +217,11 @@ impl Solver<'_> {
     }
 
     /// Takes the step, halved until the merit function at the new lambda does not grow.
-    fn advance(&self, problem: &mut impl Problem, at: &Point, scale: &[f64], newton: &Newton) -> Point {
+    fn advance(&self, problem: &mut impl Problem, at: &Point, scale: &[f64], newton: Newton) -> Point {
         let lambda = at.lambda * newton.move_lambda.exp();
         let merit = |p: &Point| -p.entropy + 0.5 * lambda * p.chi2;
-        let ds: Vec<f64> = newton.step.iter().zip(scale).map(|(z, scale)| z * scale).collect();
+        let mut ds = newton.step;
+        combine(&mut ds, scale, |z, scale| z * scale);
         let before = merit(at);
         let mut length = 1.0;
         loop {

@@ -10,7 +10,8 @@ use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::Problem;
 use super::solution::{Best, Goal};
-use crate::vector::linear::{axpy, combine, combine_two, combined, dot};
+use crate::vector::linear::{combine, combined, dot, weighted_dots};
+use crate::vector::{self, Instructions, Task};
 
 /// Largest change of ln(lambda) in one step.
 const LN_LAMBDA_CAP: f64 = 1.5;
@@ -64,8 +65,8 @@ pub(super) struct Standing {
     pub spottedness_path: f64,
     /// What spottedness has left to change at this chi2.
     pub spottedness_left: f64,
-    /// How far ln(lambda) has to move to the target.
-    move_lambda: f64,
+    /// How far ln(lambda) has to move to the target (0 without a path).
+    pub move_lambda: f64,
     /// Of the error left all but what takes the preconditioner to tell.
     known_error: f64,
     /// Error from what the preconditioner's eigenvectors span, and from the rest, over the merit of each.
@@ -87,12 +88,10 @@ impl Standing {
     /// Takes the gradient at a point (one pass) and judges it by the guide.
     pub fn of(problem: &mut impl Problem, entropy: Entropy, at: &Point, goal: Goal, guide: Guide) -> Self {
         let n = at.u.len();
-        let scale = entropy.metric(&at.s, problem.area());
-        let mut right = entropy.gradient(&at.u, problem.area());
-        let mut chi2_gradient = vec![0.0; n];
+        let (mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n]);
         problem.gradient(&mut chi2_gradient);
-        combine(&mut chi2_gradient, &scale, |g, scale| g * scale);
-        combine_two(&mut right, &scale, &chi2_gradient, |right, scale, g| -(right * scale + at.lambda * g));
+        let (area, scale, default) = (problem.area(), entropy.metric(&at.s, problem.area()), entropy.default_coordinate());
+        vector::run(IntoMetric { at, area, default, scale: &scale, chi2_gradient: &mut chi2_gradient, right: &mut right });
         let (chi2_path, spottedness_path, spottedness_left) = (0.0, 0.0, 0.0);
         let (move_lambda, known_error, merit_errors, at_bound) = (0.0, 0.0, [1.0; 2], false);
         let mut standing = Standing {
@@ -122,12 +121,10 @@ impl Standing {
     /// `weights` is the gradient of spottedness with respect to the image.
     fn forecast(&mut self, weights: &[f64], at: &Point, goal: Goal, guide: Guide) {
         let Guide { path, adjoint } = guide;
-        let (g, right) = (&self.chi2_gradient, &self.right);
-        self.chi2_path = 2.0 * dot(g, path);
-        self.spottedness_path = dot(&combined(weights, &self.scale, |weight, scale| weight * scale), path);
-        let chi2_step = -2.0 * dot(path, right) / at.lambda;
-        let move_lambda = lambda_step(at, self.chi2_path, chi2_step, goal);
-        self.move_lambda = move_lambda;
+        let (chi2_path, chi2_step) = self.slopes(path, at);
+        let move_lambda = lambda_step(at, chi2_path, chi2_step, goal);
+        (self.chi2_path, self.move_lambda) = (chi2_path, move_lambda);
+        [self.spottedness_path] = weighted_dots(path, &self.scale, [weights]);
         if let Goal::Chi2 { target, largest_lambda } = goal {
             let to_bound = (largest_lambda / at.lambda).ln();
             self.at_bound = to_bound < AT_BOUND && move_lambda.abs() < AT_BOUND && at.chi2 + chi2_step > target;
@@ -138,19 +135,34 @@ impl Standing {
         }
         // what is left of the way to the target where the move of lambda is cut short
         if let Goal::Chi2 { target, .. } = goal {
-            self.known_error += 0.5 * (target - at.chi2 - chi2_step - self.chi2_path * move_lambda).abs();
+            self.known_error += 0.5 * (target - at.chi2 - chi2_step - chi2_path * move_lambda).abs();
             self.known_error += 0.5 * PATH_ERROR * (target - at.chi2).abs();
         }
         // of second order in the move along the path
-        self.known_error += 0.5 * (self.chi2_path * move_lambda * move_lambda).abs();
+        self.known_error += 0.5 * (chi2_path * move_lambda * move_lambda).abs();
         if adjoint.len() == path.len() {
-            let adjoint = combined(adjoint, &self.scale, |y, scale| y * scale);
+            let [of_step, of_chi2] = weighted_dots(adjoint, &self.scale, [&self.right, &self.chi2_gradient]);
             // no component along the path: the move of lambda is accounted for by chi2
-            let along = -2.0 * dot(g, &adjoint) / self.chi2_path;
-            self.spottedness_left = dot(&adjoint, right) + along * dot(path, right);
+            self.spottedness_left = of_step + of_chi2 * at.lambda * chi2_step / chi2_path;
             self.known_error += FORECAST_ERROR * (self.spottedness_left * self.worth()).abs();
             self.merit_errors = [SPANNED_ERROR, REST_ERROR];
         }
+    }
+
+    /// What the path changes of chi2, and what the Newton step at fixed lambda does.
+    fn slopes(&self, path: &[f64], at: &Point) -> (f64, f64) {
+        (2.0 * dot(&self.chi2_gradient, path), -2.0 * dot(path, &self.right) / at.lambda)
+    }
+
+    /// How far ln(lambda) has to move to the target by another path than that of the guide.
+    pub fn move_lambda_by(&self, path: &[f64], at: &Point, goal: Goal) -> f64 {
+        let (chi2_path, chi2_step) = self.slopes(path, at);
+        lambda_step(at, chi2_path, chi2_step, goal)
+    }
+
+    /// Minus the gradient of the merit once ln(lambda) has moved so far, in the metric.
+    pub fn right_after(&self, move_lambda: f64, at: &Point) -> Vec<f64> {
+        combined(&self.right, &self.chi2_gradient, |right, g| right - move_lambda * at.lambda * g)
     }
 
     /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be below
@@ -168,15 +180,11 @@ impl Standing {
         if self.known_error >= tolerance {
             return false;
         }
-        let (mut left, lowest) = (self.right.clone(), entropy.lowest_coordinate());
+        let mut left = self.right_after(self.move_lambda, at);
         if matches!(goal, Goal::Chi2 { .. }) {
-            axpy(-self.move_lambda * at.lambda, &self.chi2_gradient, &mut left);
             // a pixel at its bound that would go beyond stays where it is: no error that steps could make smaller
-            for (left, u) in left.iter_mut().zip(&at.u) {
-                if *u <= lowest && *left < 0.0 {
-                    *left = 0.0;
-                }
-            }
+            let lowest = entropy.lowest_coordinate();
+            combine(&mut left, &at.u, |left, u| if u <= lowest && left < 0.0 { 0.0 } else { left });
         }
         let (spanned, rest) = preconditioner.norms(at.lambda, &left);
         let [of_spanned, of_rest] = self.merit_errors;
@@ -214,6 +222,32 @@ impl Standing {
                 // along the path a misfit of chi2 is worth as much spottedness
                 misfit - more * self.worth()
             }
+        }
+    }
+}
+
+/// The gradients of chi2 / 2 and of the merit, the former given, in the metric of this scale.
+struct IntoMetric<'a> {
+    at: &'a Point,
+    area: &'a [f64],
+    /// Coordinate of the default.
+    default: f64,
+    scale: &'a [f64],
+    chi2_gradient: &'a mut [f64],
+    /// Minus the gradient of the merit.
+    right: &'a mut [f64],
+}
+
+impl Task for IntoMetric<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, _: I) {
+        let IntoMetric { at: Point { u, lambda, .. }, area, default, scale, chi2_gradient, right } = self;
+        let image = u.iter().zip(area).zip(scale);
+        for ((g, right), ((u, area), scale)) in chi2_gradient.iter_mut().zip(right).zip(image) {
+            *g *= scale;
+            *right = -(area * (u - default) * scale + lambda * *g);
         }
     }
 }

@@ -11,7 +11,7 @@ use super::kind::ObjectiveKind;
 use crate::imaging::Imager;
 use crate::maxent::{Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start};
 use crate::star::Response;
-use crate::vector::linear::axpy;
+use crate::vector::linear::{axpy, widen};
 
 /// Derivatives of a solution with respect to internal coordinates.
 #[derive(Clone, Debug)]
@@ -199,7 +199,8 @@ impl Prediction {
             ln_lambda += shrink * shift * along;
             axpy(shrink * shift, image, &mut step);
         }
-        let ds: Vec<f64> = step.into_iter().map(f64::from).collect();
+        let mut ds = vec![0.0; n];
+        widen(&step, 1.0, &mut ds);
         let here = &known.image.coordinates;
         imager.entropy.step(here, &self.map, &ds, 1.0, LARGEST_STEP, &mut start.image.coordinates);
         if !self.bends.is_empty() {

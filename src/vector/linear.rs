@@ -16,6 +16,25 @@ pub fn dot<N: Number>(a: &[N], b: &[N]) -> f64 {
     super::run(Dot { a, b })
 }
 
+/// Scalar products of `x`, its numbers times `weights`, with rows of its length.
+pub fn weighted_dots<const ROWS: usize>(x: &[f64], weights: &[f64], rows: [&[f64]; ROWS]) -> [f64; ROWS] {
+    assert!(x.len() == weights.len() && rows.iter().all(|row| row.len() == x.len()));
+    super::run(WeightedDots { x, weights, rows })
+}
+
+/// `unit x` in single precision.
+pub fn rounded(x: &[f64], unit: f64) -> Vec<f32> {
+    let mut single = vec![0.0; x.len()];
+    super::run(Round { x, unit, single: &mut single });
+    single
+}
+
+/// `unit x` in double precision.
+pub fn widen(x: &[f32], unit: f64, double: &mut [f64]) {
+    assert_eq!(x.len(), double.len());
+    super::run(Widen { x, unit, double });
+}
+
 /// `y += scale x`.
 pub fn axpy<N: Number>(scale: f64, x: &[N], y: &mut [N]) {
     let scale = N::of(scale);
@@ -72,6 +91,71 @@ fn in_parts<N: Number, const PARTS: usize>(i: impl Instructions, a: &[N], b: &[N
     }
     let rest = rest_a.iter().zip(rest_b).map(|(a, b)| *a * *b);
     sums.into_iter().map(Into::into).sum::<f64>() + rest.map(Into::into).sum::<f64>()
+}
+
+struct WeightedDots<'a, const ROWS: usize> {
+    x: &'a [f64],
+    weights: &'a [f64],
+    rows: [&'a [f64]; ROWS],
+}
+
+impl<const ROWS: usize> Task for WeightedDots<'_, ROWS> {
+    type Output = [f64; ROWS];
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, i: I) -> Self::Output {
+        let WeightedDots { x, weights, rows } = self;
+        let (mut sums, whole) = ([[0.0; FEW_PARTS]; ROWS], x.len() / FEW_PARTS * FEW_PARTS);
+        for first in (0..whole).step_by(FEW_PARTS) {
+            let chunk = first..first + FEW_PARTS;
+            let (x, weights, mut product) = (&x[chunk.clone()], &weights[chunk.clone()], [0.0; FEW_PARTS]);
+            for k in 0..FEW_PARTS {
+                product[k] = x[k] * weights[k];
+            }
+            for (sums, row) in sums.iter_mut().zip(&rows) {
+                let row = &row[chunk.clone()];
+                for k in 0..FEW_PARTS {
+                    sums[k] = i.multiply_add(product[k], row[k], sums[k]);
+                }
+            }
+        }
+        let mut totals = [0.0; ROWS];
+        for ((total, sums), row) in totals.iter_mut().zip(sums).zip(rows) {
+            let rest = (whole..x.len()).map(|p| x[p] * weights[p] * row[p]);
+            *total = sums.into_iter().sum::<f64>() + rest.sum::<f64>();
+        }
+        totals
+    }
+}
+
+struct Round<'a> {
+    x: &'a [f64],
+    unit: f64,
+    single: &'a mut [f32],
+}
+
+impl Task for Round<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, _: I) {
+        self.single.iter_mut().zip(self.x).for_each(|(single, x)| *single = (self.unit * x) as f32);
+    }
+}
+
+struct Widen<'a> {
+    x: &'a [f32],
+    unit: f64,
+    double: &'a mut [f64],
+}
+
+impl Task for Widen<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, _: I) {
+        self.double.iter_mut().zip(self.x).for_each(|(double, x)| *double = self.unit * f64::from(*x));
+    }
 }
 
 struct Combine<'a, N, F> {

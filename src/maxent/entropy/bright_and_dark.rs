@@ -21,11 +21,6 @@ pub(super) fn image(u: &[f64]) -> Vec<f64> {
     u.iter().map(|u| u.exp()).collect()
 }
 
-/// Gradient of -S with respect to B.
-pub(super) fn gradient(u: &[f64], area: &[f64]) -> Vec<f64> {
-    u.iter().zip(area).map(|(u, a)| a * u).collect()
-}
-
 /// Scale of the metric, `sqrt(B / a)`.
 pub(super) fn metric(b: &[f64], area: &[f64]) -> Vec<f64> {
     combined(b, area, |b, a| (b / a).sqrt())

@@ -7,7 +7,8 @@
 mod bright_and_dark;
 mod spots;
 
-use crate::vector::{self, linear::dot};
+use crate::vector;
+use crate::vector::linear::{combined, dot};
 use std::borrow::Cow;
 
 /// The entropy with its default image.
@@ -88,12 +89,10 @@ impl Entropy {
         }
     }
 
-    /// Gradient of -S with respect to the image.
+    /// Gradient of -S with respect to the image: by either entropy the distance of the coordinate from that of the default, per area.
     pub fn gradient(&self, u: &[f64], area: &[f64]) -> Vec<f64> {
-        match *self {
-            Entropy::Spots { default_logit } => spots::gradient(default_logit, u, area),
-            Entropy::BrightAndDark => bright_and_dark::gradient(u, area),
-        }
+        let default = self.default_coordinate();
+        combined(u, area, |u, area| area * (u - default))
     }
 
     /// Scale of the metric: a step z in it is the image step `scale * z`.

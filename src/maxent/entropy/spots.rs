@@ -16,11 +16,6 @@ pub(super) fn image(u: &[f64]) -> Vec<f64> {
     u.iter().map(|u| 1.0 / (1.0 + (-u).exp())).collect()
 }
 
-/// Gradient of -S with respect to s.
-pub(super) fn gradient(default_logit: f64, u: &[f64], area: &[f64]) -> Vec<f64> {
-    u.iter().zip(area).map(|(u, a)| a * (u - default_logit)).collect()
-}
-
 /// Scale of the metric, `sqrt(s (1-s) / a)`.
 pub(super) fn metric(s: &[f64], area: &[f64]) -> Vec<f64> {
     combined(s, area, |s, a| (s * (1.0 - s) / a).sqrt())
