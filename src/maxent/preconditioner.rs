@@ -44,7 +44,7 @@ struct Row([i16; LANES]);
 const MOST_SUBTRACTED: f64 = 1.0 - 1e-4;
 
 /// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
-const DROPPED_ENERGY: f64 = 1e-3;
+const DROPPED_ENERGY: f64 = 2e-3;
 
 /// Vectors beyond the wanted rank that the Krylov space has.
 const OVERSAMPLING: usize = 60;
