@@ -16,7 +16,7 @@ pub fn parallelism(problem: &mut impl Problem, entropy: Entropy, coordinates: &[
     problem.linearise(&image);
     problem.gradient(&mut misfit);
     // the gradient of -S, so that the sum is what vanishes
-    let product = |a: &[f64], b: &[f64]| -> f64 { (0..n).map(|p| a[p] * b[p] * scale[p] * scale[p]).sum() };
+    let product = |a: &[f64], b: &[f64]| -> f64 { (0..n).map(|p| a[p] * b[p] * f64::from(scale[p]).powi(2)).sum() };
     let (s, c) = (product(&towards_default, &towards_default).sqrt(), product(&misfit, &misfit).sqrt());
-    (0..n).map(|p| (scale[p] * (towards_default[p] / s + misfit[p] / c)).powi(2)).sum::<f64>() / 2.0
+    (0..n).map(|p| (f64::from(scale[p]) * (towards_default[p] / s + misfit[p] / c)).powi(2)).sum::<f64>() / 2.0
 }

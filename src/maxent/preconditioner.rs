@@ -148,7 +148,7 @@ impl Preconditioner {
     }
 
     /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
-    pub fn norms(&self, lambda: f64, r: &[f64]) -> (f64, f64) {
+    pub fn norms(&self, lambda: f64, r: &[f32]) -> (f64, f64) {
         let mut components = vector::run(Components { basis: self, r });
         components.iter_mut().zip(&self.units).for_each(|(c, unit)| *c *= unit);
         let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));

@@ -93,13 +93,13 @@ pub struct Start {
     pub image: Image,
     /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none. With an adjoint
     /// it is taken for that of a solution near by, and not solved for again in the first steps.
-    pub path: Vec<f64>,
+    pub path: Vec<f32>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,
     /// The adjoint of spottedness at fixed chi2: how much of it a residual of the Newton system is worth. In the entropy's
     /// metric, over the scale of the metric. Empty for none: then what is left of spottedness when the solver stops is not
     /// forecast.
-    pub adjoint: Vec<f64>,
+    pub adjoint: Vec<f32>,
     /// The best solution there is, so that effort is spared far below it; none to be precise everywhere.
     pub best: Option<Best>,
 }
@@ -148,7 +148,7 @@ pub struct Solution {
     /// `dz / d ln(lambda)`: that of the start if it came with one and an adjoint, or if there was no step; else as last computed,
     /// before the last step, in the entropy's metric there. Where `find_path` was asked, as it is at the image. Of no meaning if
     /// the goal was a lambda.
-    pub path: Vec<f64>,
+    pub path: Vec<f32>,
     /// Newton steps taken.
     pub newton_steps: usize,
 }

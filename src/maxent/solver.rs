@@ -14,10 +14,10 @@ use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing};
 use crate::vector::Number;
-use crate::vector::linear::{combine, combine_two, dot, rounded, widen};
+use crate::vector::linear::{combine, combine_two, dot, rounded, scale_by, widened};
 
 /// Largest change of a coordinate in one step.
-const STEP_CAP: f64 = 2.0;
+const STEP_CAP: f32 = 2.0;
 
 /// Largest change of ln(lambda) that is made before the first Newton step.
 const RESTORE_REACH: f64 = 0.3;
@@ -47,7 +47,7 @@ pub struct Solver<'a> {
 
 /// A Newton system in the entropy's metric.
 #[derive(Clone, Copy)]
-struct System<'a, N = f64> {
+struct System<'a, N = f32> {
     lambda: f64,
     scale: &'a [N],
     curvature: Curvature,
@@ -56,7 +56,7 @@ struct System<'a, N = f64> {
 /// A Newton step.
 struct Newton {
     /// Change of the image, in the metric.
-    step: Vec<f64>,
+    step: Vec<f32>,
     /// Change of ln(lambda).
     move_lambda: f64,
     /// Newton decrement squared.
@@ -113,11 +113,14 @@ impl Solver<'_> {
     /// linearised there. For derivatives of solutions by adjoints.
     pub fn apply_inverse(&self, problem: &mut impl Problem, image: &Image, right: &[f64]) -> Vec<f64> {
         let scale = self.entropy.metric(&self.entropy.image(&image.coordinates), problem.area());
-        let scaled: Vec<f64> = right.iter().zip(&scale).map(|(r, d)| r * d).collect();
+        let mut scaled = right.to_vec();
+        combine(&mut scaled, &scale, |right, scale| right * f64::from(scale));
+        let (norm, per_norm) = norm_of(dot(&scaled, &scaled));
         let mut z = vec![0.0; right.len()];
         let system = System { lambda: image.lambda, scale: &scale, curvature: Curvature::Exact };
-        self.solve_system(problem, system, &scaled, &mut z);
-        z.iter().zip(&scale).map(|(z, d)| z * d).collect()
+        self.solve_system(problem, system, &rounded(&scaled, per_norm), &mut z);
+        combine_two(&mut scaled, &z, &scale, |_, z, scale| norm * f64::from(z) * f64::from(scale));
+        scaled
     }
 
     /// The path along lambda from a solution, and the slopes along it: at the bound of lambda, where the solver needs none, or as
@@ -130,7 +133,8 @@ impl Solver<'_> {
         problem.gradient(&mut gradient);
         let pull: Vec<f64> = gradient.iter().map(|g| -solution.image.lambda * g).collect();
         let step = self.apply_inverse(problem, &solution.image, &pull);
-        solution.path = step.iter().zip(&scale).map(|(step, scale)| step / scale).collect();
+        solution.path = rounded(&step, 1.0);
+        combine(&mut solution.path, &scale, |step, scale| step / scale);
         solution.chi2_slope = 2.0 * dot(&gradient, &step);
         solution.spottedness_slope = dot(&self.entropy.spottedness_gradient(&s, problem.area()), &step);
     }
@@ -154,7 +158,7 @@ impl Solver<'_> {
         let mut ds = self.entropy.metric(&at.s, problem.area());
         combine(&mut ds, &start.path, |scale, z| scale * z);
         let mut u = vec![0.0; at.u.len()];
-        self.entropy.step(&at.u, &at.s, &ds, move_lambda, STEP_CAP, &mut u);
+        self.entropy.step(&at.u, &at.s, &ds, move_lambda as f32, STEP_CAP, &mut u);
         self.arrive(problem, u, at.lambda * move_lambda.exp())
     }
 
@@ -165,10 +169,10 @@ impl Solver<'_> {
         at: &Point,
         standing: &Standing,
         curvature: Curvature,
-        path: &mut Vec<f64>,
+        path: &mut Vec<f32>,
     ) {
         path.resize(at.u.len(), 0.0);
-        let pull: Vec<f64> = standing.chi2_gradient.iter().map(|g| -at.lambda * g).collect();
+        let pull: Vec<f32> = standing.chi2_gradient.iter().map(|g| -at.lambda as f32 * g).collect();
         self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &pull, path);
     }
 
@@ -187,18 +191,21 @@ impl Solver<'_> {
     }
 
     /// Solves a system from the start `z`.
-    fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f64], z: &mut [f64]) {
+    fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f32], z: &mut [f32]) {
+        let System { lambda, scale, curvature } = system;
         if self.settings.cg_tolerance < LOOSE {
-            return self.solve_with(problem, system, right, z);
+            let mut double = widened(z);
+            let system = System { lambda, scale: &widened(scale), curvature };
+            self.solve_with(problem, system, &widened(right), &mut double);
+            return combine(z, &double, |_, double| double as f32);
         }
         // right-hand sides come with a norm of 1, for nothing to be too small or too large
-        let norm = dot(right, right).sqrt();
-        let per_norm = if norm == 0.0 { 0.0 } else { norm.recip() };
-        let scale = &rounded(system.scale, 1.0);
-        let mut of_unit = rounded(z, per_norm);
-        let System { lambda, curvature, .. } = system;
-        self.solve_with(problem, System { lambda, scale, curvature }, &rounded(right, per_norm), &mut of_unit);
-        widen(&of_unit, norm, z);
+        let (norm, per_norm) = norm_of(dot(right, right));
+        let mut of_unit = right.to_vec();
+        scale_by(per_norm, &mut of_unit);
+        scale_by(per_norm, z);
+        self.solve_with(problem, system, &of_unit, z);
+        scale_by(norm, z);
     }
 
     /// The same in the precision of its numbers.
@@ -217,7 +224,7 @@ impl Solver<'_> {
     }
 
     /// Takes the step, halved until the merit function at the new lambda does not grow.
-    fn advance(&self, problem: &mut impl Problem, at: &Point, scale: &[f64], newton: Newton) -> Point {
+    fn advance(&self, problem: &mut impl Problem, at: &Point, scale: &[f32], newton: Newton) -> Point {
         let lambda = at.lambda * newton.move_lambda.exp();
         let merit = |p: &Point| -p.entropy + 0.5 * lambda * p.chi2;
         let mut ds = newton.step;
@@ -226,7 +233,7 @@ impl Solver<'_> {
         let mut length = 1.0;
         loop {
             let mut u = vec![0.0; at.u.len()];
-            self.entropy.step(&at.u, &at.s, &ds, length, STEP_CAP, &mut u);
+            self.entropy.step(&at.u, &at.s, &ds, length as f32, STEP_CAP, &mut u);
             let next = self.arrive(problem, u, lambda);
             let small = 1e-9 * before.abs() + self.settings.tolerance * lambda;
             if merit(&next) <= before + small || length < 1e-4 {
@@ -240,7 +247,7 @@ impl Solver<'_> {
         &self,
         at: Point,
         standing: Option<Standing>,
-        path: Vec<f64>,
+        path: Vec<f32>,
         termination: Termination,
         newton_steps: usize,
     ) -> Solution {
@@ -260,4 +267,10 @@ impl Solver<'_> {
             newton_steps,
         }
     }
+}
+
+/// A norm, from its square, and its inverse, 0 for that of nothing.
+fn norm_of(square: f64) -> (f64, f64) {
+    let norm = square.sqrt();
+    (norm, if norm == 0.0 { 0.0 } else { norm.recip() })
 }

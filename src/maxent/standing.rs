@@ -55,11 +55,11 @@ pub(super) struct Point {
 /// What the gradient at a point says.
 pub(super) struct Standing {
     /// Scale of the entropy's metric.
-    pub scale: Vec<f64>,
+    pub scale: Vec<f32>,
     /// Gradient of chi2 / 2, in the metric.
-    pub chi2_gradient: Vec<f64>,
+    pub chi2_gradient: Vec<f32>,
     /// Minus the gradient of the merit `-S + lambda/2 chi2`, in the metric.
-    pub right: Vec<f64>,
+    pub right: Vec<f32>,
     /// Slopes of chi2 and of spottedness along the path (0 without one).
     pub chi2_path: f64,
     pub spottedness_path: f64,
@@ -79,19 +79,27 @@ pub(super) struct Standing {
 #[derive(Clone, Copy)]
 pub(super) struct Guide<'a> {
     /// `dz / d ln(lambda)` in the metric; empty for unknown.
-    pub path: &'a [f64],
+    pub path: &'a [f32],
     /// Adjoint of spottedness at fixed chi2, in the metric, over the scale of the metric; empty for unknown.
-    pub adjoint: &'a [f64],
+    pub adjoint: &'a [f32],
 }
 
 impl Standing {
     /// Takes the gradient at a point (one pass) and judges it by the guide.
     pub fn of(problem: &mut impl Problem, entropy: Entropy, at: &Point, goal: Goal, guide: Guide) -> Self {
         let n = at.u.len();
-        let (mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n]);
-        problem.gradient(&mut chi2_gradient);
-        let (area, scale, default) = (problem.area(), entropy.metric(&at.s, problem.area()), entropy.default_coordinate());
-        vector::run(IntoMetric { at, area, default, scale: &scale, chi2_gradient: &mut chi2_gradient, right: &mut right });
+        let (mut gradient, mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        problem.gradient(&mut gradient);
+        let (area, scale) = (problem.area(), entropy.metric(&at.s, problem.area()));
+        vector::run(IntoMetric {
+            at,
+            area,
+            default: entropy.default_coordinate(),
+            scale: &scale,
+            gradient: &gradient,
+            chi2_gradient: &mut chi2_gradient,
+            right: &mut right,
+        });
         let (chi2_path, spottedness_path, spottedness_left) = (0.0, 0.0, 0.0);
         let (move_lambda, known_error, merit_errors, at_bound) = (0.0, 0.0, [1.0; 2], false);
         let mut standing = Standing {
@@ -150,19 +158,20 @@ impl Standing {
     }
 
     /// What the path changes of chi2, and what the Newton step at fixed lambda does.
-    fn slopes(&self, path: &[f64], at: &Point) -> (f64, f64) {
+    fn slopes(&self, path: &[f32], at: &Point) -> (f64, f64) {
         (2.0 * dot(&self.chi2_gradient, path), -2.0 * dot(path, &self.right) / at.lambda)
     }
 
     /// How far ln(lambda) has to move to the target by another path than that of the guide.
-    pub fn move_lambda_by(&self, path: &[f64], at: &Point, goal: Goal) -> f64 {
+    pub fn move_lambda_by(&self, path: &[f32], at: &Point, goal: Goal) -> f64 {
         let (chi2_path, chi2_step) = self.slopes(path, at);
         lambda_step(at, chi2_path, chi2_step, goal)
     }
 
     /// Minus the gradient of the merit once ln(lambda) has moved so far, in the metric.
-    pub fn right_after(&self, move_lambda: f64, at: &Point) -> Vec<f64> {
-        combined(&self.right, &self.chi2_gradient, |right, g| right - move_lambda * at.lambda * g)
+    pub fn right_after(&self, move_lambda: f64, at: &Point) -> Vec<f32> {
+        let change = (move_lambda * at.lambda) as f32;
+        combined(&self.right, &self.chi2_gradient, |right, g| right - change * g)
     }
 
     /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be below
@@ -194,11 +203,11 @@ impl Standing {
 
     /// What the squared norm of `left` lacks of twice the merit to be gained by pixels that are to come back to the default. The metric
     /// knows changes of second order: next to nothing where a pixel has been pushed into the dark.
-    fn faint(&self, left: &[f64], at: &Point, entropy: Entropy, area: &[f64]) -> f64 {
+    fn faint(&self, left: &[f32], at: &Point, entropy: Entropy, area: &[f64]) -> f64 {
         let (mut lacking, default) = (0.0, entropy.default_coordinate());
         for (((left, scale), area), u) in left.iter().zip(&self.scale).zip(area).zip(&at.u) {
-            let per_change = scale * area;
-            if *left > per_change && *u < default {
+            let (left, per_change) = (f64::from(*left), f64::from(*scale) * area);
+            if left > per_change && *u < default {
                 // beyond the default it is for the data to say what a pixel gains
                 let change = (left / per_change).min(default - u);
                 lacking += (2.0 * area * entropy.gain(*u, change) - left * left).max(0.0);
@@ -226,16 +235,19 @@ impl Standing {
     }
 }
 
-/// The gradients of chi2 / 2 and of the merit, the former given, in the metric of this scale.
+/// The gradients of chi2 / 2 and of the merit in the metric, computed in double precision.
 struct IntoMetric<'a> {
     at: &'a Point,
     area: &'a [f64],
     /// Coordinate of the default.
     default: f64,
-    scale: &'a [f64],
-    chi2_gradient: &'a mut [f64],
+    scale: &'a [f32],
+    /// Of chi2 / 2, with respect to the image.
+    gradient: &'a [f64],
+    /// The same in the metric.
+    chi2_gradient: &'a mut [f32],
     /// Minus the gradient of the merit.
-    right: &'a mut [f64],
+    right: &'a mut [f32],
 }
 
 impl Task for IntoMetric<'_> {
@@ -243,11 +255,12 @@ impl Task for IntoMetric<'_> {
 
     #[inline(always)]
     fn run<I: Instructions>(self, _: I) {
-        let IntoMetric { at: Point { u, lambda, .. }, area, default, scale, chi2_gradient, right } = self;
-        let image = u.iter().zip(area).zip(scale);
-        for ((g, right), ((u, area), scale)) in chi2_gradient.iter_mut().zip(right).zip(image) {
-            *g *= scale;
-            *right = -(area * (u - default) * scale + lambda * *g);
+        let IntoMetric { at: Point { u, lambda, .. }, area, default, scale, gradient, chi2_gradient, right } = self;
+        let given = u.iter().zip(area).zip(scale.iter().zip(gradient));
+        for ((g, right), ((u, area), (scale, gradient))) in chi2_gradient.iter_mut().zip(right).zip(given) {
+            let scale = f64::from(*scale);
+            *g = (scale * gradient) as f32;
+            *right = (-scale * (area * (u - default) + lambda * gradient)) as f32;
         }
     }
 }

@@ -293,7 +293,7 @@ impl Posterior {
                 let mu = solution.spottedness_slope / solution.chi2_slope;
                 let weight = -0.5 * curve_slope * lambda;
                 let adjoint =
-                    |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * (solution.path[p] * scale[p])) };
+                    |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * f64::from(solution.path[p]) * f64::from(scale[p])) };
                 let direction = inverse.iter().enumerate().map(adjoint).collect();
                 (-0.5 * curve_slope * mu, Some(direction))
             }

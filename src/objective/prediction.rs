@@ -11,7 +11,7 @@ use super::kind::ObjectiveKind;
 use crate::imaging::Imager;
 use crate::maxent::{Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start};
 use crate::star::Response;
-use crate::vector::linear::{axpy, widen};
+use crate::vector::linear::axpy;
 
 /// Derivatives of a solution with respect to internal coordinates.
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ pub struct Prediction {
     /// Change of ln(lambda) per natural scale of each coordinate.
     ln_lambda: Vec<f64>,
     /// Adjoint of spottedness at fixed chi2, as [`Start::adjoint`]; empty where spottedness does not matter.
-    adjoint: Vec<f64>,
+    adjoint: Vec<f32>,
     /// Second order, pair by pair of coordinates; empty where it is not known.
     bends: Vec<Bend>,
 }
@@ -53,7 +53,7 @@ const BEND_STEP: f64 = 0.4;
 const BEND_REACH: f64 = 1.5;
 
 /// Largest change of a coordinate of the image by either order.
-const LARGEST_STEP: f64 = 1.0;
+const LARGEST_STEP: f32 = 1.0;
 
 /// Beyond it a change of an image per natural scale is absurd.
 const LARGEST_CHANGE: f32 = 1e30;
@@ -104,7 +104,8 @@ impl Prediction {
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
                 let adjoint = inverse.iter().zip(&scale).zip(&solution.path);
-                adjoint.map(|((y, scale), path)| (y / scale + along_path * path) / scale).collect()
+                let adjoint = adjoint.map(|((y, scale), path)| (y / f64::from(*scale) + along_path * f64::from(*path)) / f64::from(*scale));
+                adjoint.map(|y| y as f32).collect()
             }
         };
         let (mut image, mut ln_lambda) = (Vec::new(), Vec::new());
@@ -128,7 +129,7 @@ impl Prediction {
                 let chi2_step: f64 = 2.0 * gradient.iter().zip(&step).map(|(g, s)| g * s).sum::<f64>();
                 let chi2_change = (chi2_plus - chi2_minus) / (2.0 * h) + chi2_step;
                 along = -chi2_change / solution.chi2_slope;
-                let path = solution.path.iter().zip(&scale).map(|(z, d)| z * d);
+                let path = solution.path.iter().zip(&scale).map(|(z, d)| f64::from(*z) * f64::from(*d));
                 step.iter_mut().zip(path).for_each(|(s, p)| *s += along * p);
             }
             image.push(step.iter().map(|step| (scale_i * step) as f32).collect());
@@ -177,7 +178,7 @@ impl Prediction {
     pub fn is_finite(&self) -> bool {
         // in single precision sums of them have to be finite, too
         let image = self.image.iter().flatten().all(|x| x.abs() < LARGEST_CHANGE);
-        image && self.ln_lambda.iter().chain(&self.adjoint).all(|x| x.is_finite())
+        image && self.ln_lambda.iter().all(|x| x.is_finite()) && self.adjoint.iter().all(|x| x.is_finite())
     }
 
     /// Bytes that it takes in memory, all but a few; the second order, which the reference alone has, is not counted.
@@ -199,10 +200,8 @@ impl Prediction {
             ln_lambda += shrink * shift * along;
             axpy(shrink * shift, image, &mut step);
         }
-        let mut ds = vec![0.0; n];
-        widen(&step, 1.0, &mut ds);
         let here = &known.image.coordinates;
-        imager.entropy.step(here, &self.map, &ds, 1.0, LARGEST_STEP, &mut start.image.coordinates);
+        imager.entropy.step(here, &self.map, &step, 1.0, LARGEST_STEP, &mut start.image.coordinates);
         if !self.bends.is_empty() {
             let mut change = vec![0.0f32; n + 1];
             let shrink = (BEND_REACH / farthest).min(1.0);
@@ -212,7 +211,7 @@ impl Prediction {
             }
             let lowest = imager.entropy.lowest_coordinate();
             for (u, change) in start.image.coordinates.iter_mut().zip(&change) {
-                *u = (*u + f64::from(*change).clamp(-LARGEST_STEP, LARGEST_STEP)).clamp(lowest, -lowest);
+                *u = (*u + f64::from(change.clamp(-LARGEST_STEP, LARGEST_STEP))).clamp(lowest, -lowest);
             }
             ln_lambda += f64::from(change[n]);
         }

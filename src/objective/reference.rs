@@ -267,9 +267,9 @@ pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Sol
     let (n, mut scaled, mut curved) = (s.len(), vec![0.0f32; s.len()], vec![0.0f32; s.len()]);
     problem.linearise(&s);
     Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
-        scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = (v * d) as f32);
+        scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = *v as f32 * d);
         problem.curvature(Curvature::Exact, &scaled, &mut curved);
-        out.iter_mut().zip(&curved).zip(&scale).for_each(|((out, x), d)| *out = f64::from(*x) * d);
+        out.iter_mut().zip(&curved).zip(&scale).for_each(|((out, x), d)| *out = f64::from(*x * d));
     })
 }
 

@@ -9,6 +9,9 @@ use super::Instructions;
 /// ln 2 in two parts: the first is exact times any exponent.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 
+/// The same for single precision.
+const SINGLE_LN_2: [f32; 2] = [6.931_381e-1, 9.058_001e-6];
+
 /// 2^52: from here on neighbouring numbers are integers, which stand in their last bits.
 pub const INTEGERS: f64 = 4_503_599_627_370_496.0;
 
@@ -57,6 +60,9 @@ const LOGARITHM: [f64; 7] = [
     1.531_383_769_920_937_3e-1,
     1.479_819_860_511_658_6e-1,
 ];
+
+/// The same for single precision.
+const SINGLE_LOGARITHM: [f32; 4] = [6.666_666_3e-1, 4.000_097e-1, 2.849_879e-1, 2.427_908e-1];
 
 /// 1/2!, 1/3!, ... 1/13!.
 const EXPONENTIAL: [f64; 12] = {
@@ -114,6 +120,27 @@ pub fn ln_1p(i: impl Instructions, x: f64) -> f64 {
     let (square, half) = (s * s, 0.5 * f * f);
     let rest = s * (half + square * polynomial(i, &LOGARITHM, square)) + (exponent * LN_2[1] + lost);
     exponent * LN_2[0] - ((half - rest) - f)
+}
+
+/// The same in single precision.
+#[inline(always)]
+pub fn ln_1p_single(i: impl Instructions, x: f32) -> f32 {
+    const HALF_ROOT: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
+    const MANTISSA: u32 = (1 << 23) - 1;
+    let y = 1.0 + x;
+    let bits = y.to_bits().wrapping_add(1.0_f32.to_bits() - HALF_ROOT);
+    let exponent = f32::from_bits((bits >> 23) | SINGLE_INTEGERS.to_bits()) - (SINGLE_INTEGERS + 127.0);
+    let mantissa = f32::from_bits((bits & MANTISSA) + HALF_ROOT);
+    let lost = if x > 1.0 { 1.0 - (y - x) } else { x - (y - 1.0) } / y;
+    let (f, lost) = if exponent == 0.0 { (x, 0.0) } else { (mantissa - 1.0, lost) };
+    let s = f / (2.0 + f);
+    let (square, half) = (s * s, 0.5 * f * f);
+    let mut sum = SINGLE_LOGARITHM[SINGLE_LOGARITHM.len() - 1];
+    for c in SINGLE_LOGARITHM[..SINGLE_LOGARITHM.len() - 1].iter().rev() {
+        sum = i.multiply_add_single(sum, square, *c);
+    }
+    let rest = s * (half + square * sum) + (exponent * SINGLE_LN_2[1] + lost);
+    exponent * SINGLE_LN_2[0] - ((half - rest) - f)
 }
 
 /// Sine and cosine of x (rad); beyond some 10^6, as precise as x is, and beyond 10^15 without a meaning.

@@ -16,8 +16,8 @@ pub fn dot<N: Number>(a: &[N], b: &[N]) -> f64 {
     super::run(Dot { a, b })
 }
 
-/// Scalar products of `x`, its numbers times `weights`, with rows of its length.
-pub fn weighted_dots<const ROWS: usize>(x: &[f64], weights: &[f64], rows: [&[f64]; ROWS]) -> [f64; ROWS] {
+/// Scalar products of `x`, its numbers times `weights`, with rows of its length, in double precision.
+pub fn weighted_dots<N: Number, const ROWS: usize>(x: &[f32], weights: &[f32], rows: [&[N]; ROWS]) -> [f64; ROWS] {
     assert!(x.len() == weights.len() && rows.iter().all(|row| row.len() == x.len()));
     super::run(WeightedDots { x, weights, rows })
 }
@@ -25,14 +25,20 @@ pub fn weighted_dots<const ROWS: usize>(x: &[f64], weights: &[f64], rows: [&[f64
 /// `unit x` in single precision.
 pub fn rounded(x: &[f64], unit: f64) -> Vec<f32> {
     let mut single = vec![0.0; x.len()];
-    super::run(Round { x, unit, single: &mut single });
+    combine(&mut single, x, |_, x| (unit * x) as f32);
     single
 }
 
-/// `unit x` in double precision.
-pub fn widen(x: &[f32], unit: f64, double: &mut [f64]) {
-    assert_eq!(x.len(), double.len());
-    super::run(Widen { x, unit, double });
+/// `x` in double precision.
+pub fn widened(x: &[f32]) -> Vec<f64> {
+    let mut double = vec![0.0; x.len()];
+    combine(&mut double, x, |_, x| f64::from(x));
+    double
+}
+
+/// `x = factor x`.
+pub fn scale_by<N: Number>(factor: f64, x: &mut [N]) {
+    super::run(Scale { factor: N::of(factor), x });
 }
 
 /// `y += scale x`.
@@ -42,7 +48,7 @@ pub fn axpy<N: Number>(scale: f64, x: &[N], y: &mut [N]) {
 }
 
 /// `y = f(y, x)`, number by number.
-pub fn combine<N: Number>(y: &mut [N], x: &[N], f: impl Fn(N, N) -> N) {
+pub fn combine<N: Number, M: Number>(y: &mut [N], x: &[M], f: impl Fn(N, M) -> N) {
     assert_eq!(y.len(), x.len());
     super::run(Combine { y, x, f });
 }
@@ -55,7 +61,7 @@ pub fn combined<N: Number>(x: &[N], y: &[N], f: impl Fn(N, N) -> N) -> Vec<N> {
 }
 
 /// `z = f(z, x, y)`, number by number.
-pub fn combine_two<N: Number>(z: &mut [N], x: &[N], y: &[N], f: impl Fn(N, N, N) -> N) {
+pub fn combine_two<N: Number, M: Number>(z: &mut [N], x: &[M], y: &[M], f: impl Fn(N, M, M) -> N) {
     assert!(z.len() == x.len() && z.len() == y.len());
     super::run(CombineTwo { z, x, y, f });
 }
@@ -93,13 +99,13 @@ fn in_parts<N: Number, const PARTS: usize>(i: impl Instructions, a: &[N], b: &[N
     sums.into_iter().map(Into::into).sum::<f64>() + rest.map(Into::into).sum::<f64>()
 }
 
-struct WeightedDots<'a, const ROWS: usize> {
-    x: &'a [f64],
-    weights: &'a [f64],
-    rows: [&'a [f64]; ROWS],
+struct WeightedDots<'a, N, const ROWS: usize> {
+    x: &'a [f32],
+    weights: &'a [f32],
+    rows: [&'a [N]; ROWS],
 }
 
-impl<const ROWS: usize> Task for WeightedDots<'_, ROWS> {
+impl<N: Number, const ROWS: usize> Task for WeightedDots<'_, N, ROWS> {
     type Output = [f64; ROWS];
 
     #[inline(always)]
@@ -110,61 +116,45 @@ impl<const ROWS: usize> Task for WeightedDots<'_, ROWS> {
             let chunk = first..first + FEW_PARTS;
             let (x, weights, mut product) = (&x[chunk.clone()], &weights[chunk.clone()], [0.0; FEW_PARTS]);
             for k in 0..FEW_PARTS {
-                product[k] = x[k] * weights[k];
+                product[k] = f64::from(x[k] * weights[k]);
             }
             for (sums, row) in sums.iter_mut().zip(&rows) {
                 let row = &row[chunk.clone()];
                 for k in 0..FEW_PARTS {
-                    sums[k] = i.multiply_add(product[k], row[k], sums[k]);
+                    sums[k] = i.multiply_add(product[k], row[k].into(), sums[k]);
                 }
             }
         }
         let mut totals = [0.0; ROWS];
         for ((total, sums), row) in totals.iter_mut().zip(sums).zip(rows) {
-            let rest = (whole..x.len()).map(|p| x[p] * weights[p] * row[p]);
+            let rest = (whole..x.len()).map(|p| f64::from(x[p] * weights[p]) * row[p].into());
             *total = sums.into_iter().sum::<f64>() + rest.sum::<f64>();
         }
         totals
     }
 }
 
-struct Round<'a> {
-    x: &'a [f64],
-    unit: f64,
-    single: &'a mut [f32],
+struct Scale<'a, N> {
+    factor: N,
+    x: &'a mut [N],
 }
 
-impl Task for Round<'_> {
+impl<N: Number> Task for Scale<'_, N> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Instructions>(self, _: I) {
-        self.single.iter_mut().zip(self.x).for_each(|(single, x)| *single = (self.unit * x) as f32);
+        self.x.iter_mut().for_each(|x| *x = self.factor * *x);
     }
 }
 
-struct Widen<'a> {
-    x: &'a [f32],
-    unit: f64,
-    double: &'a mut [f64],
-}
-
-impl Task for Widen<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Instructions>(self, _: I) {
-        self.double.iter_mut().zip(self.x).for_each(|(double, x)| *double = self.unit * f64::from(*x));
-    }
-}
-
-struct Combine<'a, N, F> {
+struct Combine<'a, N, M, F> {
     y: &'a mut [N],
-    x: &'a [N],
+    x: &'a [M],
     f: F,
 }
 
-impl<N: Number, F: Fn(N, N) -> N> Task for Combine<'_, N, F> {
+impl<N: Number, M: Number, F: Fn(N, M) -> N> Task for Combine<'_, N, M, F> {
     type Output = ();
 
     #[inline(always)]
@@ -173,14 +163,14 @@ impl<N: Number, F: Fn(N, N) -> N> Task for Combine<'_, N, F> {
     }
 }
 
-struct CombineTwo<'a, N, F> {
+struct CombineTwo<'a, N, M, F> {
     z: &'a mut [N],
-    x: &'a [N],
-    y: &'a [N],
+    x: &'a [M],
+    y: &'a [M],
     f: F,
 }
 
-impl<N: Number, F: Fn(N, N, N) -> N> Task for CombineTwo<'_, N, F> {
+impl<N: Number, M: Number, F: Fn(N, M, M) -> N> Task for CombineTwo<'_, N, M, F> {
     type Output = ();
 
     #[inline(always)]

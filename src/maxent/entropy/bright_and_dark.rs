@@ -9,8 +9,8 @@
 //! Left out: which entropy an image has (`entropy`), data.
 
 use super::Step;
-use crate::vector::elementary::{exp_minus, ln_1p};
-use crate::vector::linear::{combined, dot};
+use crate::vector::elementary::{exp_minus, ln_1p_single};
+use crate::vector::linear::dot;
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: a pixel that bright outshines, and one that dark is nothing beside, all the others.
@@ -22,8 +22,9 @@ pub(super) fn image(u: &[f64]) -> Vec<f64> {
 }
 
 /// Scale of the metric, `sqrt(B / a)`.
-pub(super) fn metric(b: &[f64], area: &[f64]) -> Vec<f64> {
-    combined(b, area, |b, a| (b / a).sqrt())
+#[inline(always)]
+pub(super) fn metric(b: f64, area: f64) -> f32 {
+    (b as f32 / area as f32).sqrt()
 }
 
 /// Gain by a change of the logarithm: the divergence of the two images.
@@ -54,11 +55,11 @@ impl Task for LogarithmStep<'_> {
         let Step { u, image, step, scale, cap, out } = self.0;
         let mut capped = false;
         for (((out, u), b), step) in out.iter_mut().zip(u).zip(image).zip(step) {
-            let relative = scale * step / b;
+            let relative = scale * step / *b as f32;
             let straight = relative.max(-0.5);
-            let du = ln_1p(i, straight) + 2.0 * (relative - straight);
+            let du = ln_1p_single(i, straight) + 2.0 * (relative - straight);
             capped |= du.abs() > cap;
-            *out = (u + du.clamp(-cap, cap)).clamp(-LN_LIMIT, LN_LIMIT);
+            *out = (u + f64::from(du.clamp(-cap, cap))).clamp(-LN_LIMIT, LN_LIMIT);
         }
         capped
     }

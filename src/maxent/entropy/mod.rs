@@ -8,7 +8,7 @@ mod bright_and_dark;
 mod spots;
 
 use crate::vector;
-use crate::vector::linear::{combined, dot};
+use crate::vector::linear::{combine_two, combined, dot};
 use std::borrow::Cow;
 
 /// The entropy with its default image.
@@ -27,9 +27,9 @@ pub enum Entropy {
 struct Step<'a> {
     u: &'a [f64],
     image: &'a [f64],
-    step: &'a [f64],
-    scale: f64,
-    cap: f64,
+    step: &'a [f32],
+    scale: f32,
+    cap: f32,
     out: &'a mut [f64],
 }
 
@@ -73,7 +73,7 @@ impl Entropy {
     }
 
     /// Coordinates moved by `scale` times the image step `step`, none by more than `cap`; whether any reached the cap.
-    pub fn step(&self, u: &[f64], image: &[f64], step: &[f64], scale: f64, cap: f64, out: &mut [f64]) -> bool {
+    pub fn step(&self, u: &[f64], image: &[f64], step: &[f32], scale: f32, cap: f32, out: &mut [f64]) -> bool {
         let step = Step { u, image, step, scale, cap, out };
         match self {
             Entropy::Spots { .. } => vector::run(spots::LogitStep(step)),
@@ -95,12 +95,14 @@ impl Entropy {
         combined(u, area, |u, area| area * (u - default))
     }
 
-    /// Scale of the metric: a step z in it is the image step `scale * z`.
-    pub fn metric(&self, image: &[f64], area: &[f64]) -> Vec<f64> {
+    /// Scale of the metric: a step z in it is the image step `scale * z`. Single precision suffices for coordinates to take steps in.
+    pub fn metric(&self, image: &[f64], area: &[f64]) -> Vec<f32> {
+        let mut scale = vec![0.0; image.len()];
         match self {
-            Entropy::Spots { .. } => spots::metric(image, area),
-            Entropy::BrightAndDark => bright_and_dark::metric(image, area),
+            Entropy::Spots { .. } => combine_two(&mut scale, image, area, |_, s, area| spots::metric(s, area)),
+            Entropy::BrightAndDark => combine_two(&mut scale, image, area, |_, b, area| bright_and_dark::metric(b, area)),
         }
+        scale
     }
 
     /// What a pixel gains, per area, by a change of its coordinate from `u` to the best for a misfit that is linear in the image.

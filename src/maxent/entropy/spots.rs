@@ -4,8 +4,8 @@
 //! The coordinate is `u = logit(s)`, which keeps s inside (0, 1). Left out: which entropy an image has (`entropy`), data.
 
 use super::Step;
-use crate::vector::elementary::{exp_minus, ln_1p};
-use crate::vector::linear::{combined, dot};
+use crate::vector::elementary::{exp_minus, ln_1p, ln_1p_single};
+use crate::vector::linear::dot;
 use crate::vector::{Instructions, Task};
 
 /// Largest |u|: beyond it s (1-s) would lose its precision.
@@ -17,8 +17,9 @@ pub(super) fn image(u: &[f64]) -> Vec<f64> {
 }
 
 /// Scale of the metric, `sqrt(s (1-s) / a)`.
-pub(super) fn metric(s: &[f64], area: &[f64]) -> Vec<f64> {
-    combined(s, area, |s, a| (s * (1.0 - s) / a).sqrt())
+#[inline(always)]
+pub(super) fn metric(s: f64, area: f64) -> f32 {
+    ((s * (1.0 - s)) as f32 / area as f32).sqrt()
 }
 
 /// Gain by a change of the logit: the divergence of the two images.
@@ -40,7 +41,7 @@ impl Task for LogitStep<'_> {
         for (((out, u), s), ds) in out.iter_mut().zip(u).zip(image).zip(step) {
             let du = logit_step(i, *s, scale * ds);
             capped |= du.abs() > cap;
-            *out = (u + du.clamp(-cap, cap)).clamp(-LOGIT_LIMIT, LOGIT_LIMIT);
+            *out = (u + f64::from(du.clamp(-cap, cap))).clamp(-LOGIT_LIMIT, LOGIT_LIMIT);
         }
         capped
     }
@@ -75,14 +76,14 @@ impl Task for NegativeValue<'_> {
 /// Change of the logit that moves s by `ds`: exact up to half way to 0 or 1, beyond that along the tangent.
 ///
 /// Data are nearly linear in s, so that a step straight in s keeps what the stiff directions have gained; a step straight in
-/// the logit, equal to first order, would undo it to second order.
+/// the logit, equal to first order, would undo it to second order. To single precision: where a step leads is computed anew.
 #[inline(always)]
-fn logit_step(i: impl Instructions, s: f64, ds: f64) -> f64 {
-    let room = if ds < 0.0 { s } else { 1.0 - s };
+fn logit_step(i: impl Instructions, s: f64, ds: f32) -> f32 {
+    let (s, above) = (s as f32, (1.0 - s) as f32);
+    let room = if ds < 0.0 { s } else { above };
     let straight = ds.abs().min(0.5 * room) * ds.signum();
-    let (there, rest) = (s + straight, ds - straight);
-    let left = 1.0 - there;
-    ln_1p(i, straight / (s * left)) + rest / (there * left)
+    let (there, left) = (s + straight, above - straight);
+    ln_1p_single(i, straight / (s * left)) + (ds - straight) / (there * left)
 }
 
 /// `ln(1 + e^u)`, given `e^-|u|`.
