@@ -145,7 +145,7 @@ fn the_solution_meets_its_optimality_conditions() {
     let solver = Solver { entropy: imager.entropy, preconditioner: &none, settings: SolverSettings::exact() };
     let target = 0.97 * imager.data.depth.len() as f64;
     let blank = Start::blank(&imager.entropy, imager.grid.len(), 1e-6);
-    let solution = solver.solve(&mut problem, Goal::Chi2 { target, largest_lambda: 1.0 }, &blank);
+    let solution = solver.solve(&mut problem, Goal::Chi2 { target, largest_lambda: 1.0 }, blank);
     assert_eq!(solution.termination, Termination::Converged);
     assert!((solution.chi2 - target).abs() < 1e-5);
     let s = imager.entropy.image(&solution.image.coordinates);
@@ -180,7 +180,7 @@ fn the_answer_does_not_depend_on_start_and_preconditioner() {
     let settings = SolverSettings::exact();
     let solver = Solver { entropy: imager.entropy, preconditioner: &there.preconditioner, settings };
     let goal = Goal::Chi2 { target: here.chi2_target, largest_lambda: 1.0 };
-    same(&solver.solve(&mut problem, goal, &there.start()), &here.solution, 1e-6);
+    same(&solver.solve(&mut problem, goal, there.start()), &here.solution, 1e-6);
 }
 
 /// A pixel of next to nothing that should have something: its gradient, in a metric that has shrunk with it, is next to nothing, too.
@@ -197,7 +197,7 @@ fn a_pixel_in_the_dark_is_not_taken_for_solved() {
     let settings = SolverSettings { tolerance: 1e-7, ..SolverSettings::default() };
     let solver = Solver { entropy: imager.entropy, preconditioner: &reference.preconditioner, settings };
     let goal = Goal::Chi2 { target: reference.chi2_target, largest_lambda: 1.0 };
-    let solution = solver.solve(&mut problem, goal, &start);
+    let solution = solver.solve(&mut problem, goal, start);
     assert_eq!(solution.termination, Termination::Converged);
     let worth = 0.5 * solution.chi2_slope / solution.spottedness_slope;
     let error = (solution.spottedness - reference.solution.spottedness) * worth;

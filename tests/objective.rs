@@ -159,7 +159,7 @@ fn prediction_errors(posterior: &Posterior, theta: &[f64]) -> [f64; 2] {
     };
     let scale = imager.entropy.metric(&map(&exact, &exact.space().start()).0, &imager.grid.area);
     let ((a, lambda_a), (b, lambda_b)) = (map(&predicted, theta), map(&exact, theta));
-    let image = (0..a.len()).map(|p| ((a[p] - b[p]) / scale[p]).powi(2)).sum::<f64>().sqrt();
+    let image = (0..a.len()).map(|p| ((a[p] - b[p]) / f64::from(scale[p])).powi(2)).sum::<f64>().sqrt();
     [image, (lambda_a - lambda_b).abs()]
 }
 

@@ -57,7 +57,7 @@ fn solve(oracle: &common::Oracle, theta: &Value, goal: Goal) -> Solution {
     let none = Preconditioner::identity();
     let solver =
         Solver { entropy: Entropy::new(oracle.default_spot), preconditioner: &none, settings: SolverSettings::exact() };
-    let solution = solver.solve(&mut problem, goal, &Start::blank(&solver.entropy, oracle.grid.len(), 1e-6));
+    let solution = solver.solve(&mut problem, goal, Start::blank(&solver.entropy, oracle.grid.len(), 1e-6));
     println!("{theta}: {:?} {} Newton steps, {} passes", solution.termination, solution.newton_steps, problem.passes());
     assert_eq!(solution.termination, Termination::Converged);
     solution

@@ -65,24 +65,24 @@ struct Newton {
 
 impl Solver<'_> {
     /// Solves `problem` for `goal` from `start`.
-    pub fn solve(&self, problem: &mut impl Problem, goal: Goal, start: &Start) -> Solution {
-        let mut at = self.arrive(problem, start.image.coordinates.clone(), start.image.lambda);
+    pub fn solve(&self, problem: &mut impl Problem, goal: Goal, start: Start) -> Solution {
+        let Start { image, mut path, chi2_slope, adjoint, best } = start;
+        let mut at = self.arrive(problem, image.coordinates, image.lambda);
         if let Goal::Lambda(lambda) = goal {
             at.lambda = lambda;
         }
-        let mut at = self.restore(problem, at, goal, start);
+        let mut at = self.restore(problem, at, goal, &path, chi2_slope);
         if let Goal::Chi2 { largest_lambda, .. } = goal {
             at.lambda = at.lambda.min(largest_lambda);
         }
-        let mut path = start.path.clone();
         let mut curvature = Curvature::GaussNewton;
         for newton_steps in 0.. {
             if !(at.chi2.is_finite() && at.entropy.is_finite()) {
                 return self.finish(at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
-            let guide = Guide { path: &path, adjoint: &start.adjoint };
+            let guide = Guide { path: &path, adjoint: &adjoint };
             let standing = Standing::of(problem, self.entropy, &at, goal, guide);
-            let drop = start.best.map_or(0.0, |best| standing.below(&best, &at, goal));
+            let drop = best.map_or(0.0, |best| standing.below(&best, &at, goal));
             let tolerance = self.settings.tolerance_at(drop).max(ROUNDING * at.chi2);
             if standing.is_within(tolerance, &at, goal, self.preconditioner, self.entropy, problem.area()) {
                 let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
@@ -93,7 +93,7 @@ impl Solver<'_> {
             }
             // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be; and that of a
             // solution near by serves: lambda goes wrong by as much as the path, and the next step sees it
-            let near_by = !start.adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && standing.chi2_path < 0.0;
+            let near_by = !adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && standing.chi2_path < 0.0;
             let mut move_lambda = standing.move_lambda;
             if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound && !near_by {
                 self.solve_path(problem, &at, &standing, curvature, &mut path);
@@ -147,16 +147,16 @@ impl Solver<'_> {
         Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy, spottedness }
     }
 
-    /// Moves along the start's path to where its slope says that chi2 meets the goal: one pass that spares a Newton step.
-    fn restore(&self, problem: &mut impl Problem, at: Point, goal: Goal, start: &Start) -> Point {
+    /// Moves along the path to where its slope says that chi2 meets the goal: one pass that spares a Newton step.
+    fn restore(&self, problem: &mut impl Problem, at: Point, goal: Goal, path: &[f32], chi2_slope: f64) -> Point {
         let Goal::Chi2 { target, .. } = goal else { return at };
-        let move_lambda = (target - at.chi2) / start.chi2_slope;
+        let move_lambda = (target - at.chi2) / chi2_slope;
         let worth_it = 0.5 * (target - at.chi2).abs() * self.settings.cg_tolerance > self.settings.tolerance;
-        if start.path.len() != at.u.len() || !worth_it || move_lambda.is_nan() || move_lambda.abs() > RESTORE_REACH {
+        if path.len() != at.u.len() || !worth_it || move_lambda.is_nan() || move_lambda.abs() > RESTORE_REACH {
             return at;
         }
         let mut ds = self.entropy.metric(&at.s, problem.area());
-        combine(&mut ds, &start.path, |scale, z| scale * z);
+        combine(&mut ds, path, |scale, z| scale * z);
         let mut u = vec![0.0; at.u.len()];
         self.entropy.step(&at.u, &at.s, &ds, move_lambda as f32, STEP_CAP, &mut u);
         self.arrive(problem, u, at.lambda * move_lambda.exp())

@@ -102,7 +102,7 @@ impl Posterior {
         // precise, even far below the best
         let settings = SolverSettings { leniency: 0.0, ..SolverSettings::patient() };
         let solver = Solver { entropy: self.imager.entropy, preconditioner: &preconditioner, settings };
-        let mut solution = solver.solve(&mut problem, self.goal(), &start(&solution));
+        let mut solution = solver.solve(&mut problem, self.goal(), start(&solution));
         match solution.termination {
             // evaluations nearby take it from here, whether this one reaches the target or not
             Termination::Converged | Termination::Unreachable => {
@@ -218,7 +218,7 @@ impl Posterior {
         let none = Preconditioner::identity();
         let settings = SolverSettings { cg_iterations: SolverSettings::patient().cg_iterations, ..self.settings };
         let far = Solver { preconditioner: &none, settings, entropy: self.imager.entropy };
-        let solution = far.solve(&mut problem, self.goal(), &self.reference.blank(&self.imager));
+        let solution = far.solve(&mut problem, self.goal(), self.reference.blank(&self.imager));
         (solution, problem)
     }
 
@@ -234,7 +234,7 @@ impl Posterior {
         let near = Solver { preconditioner: &foothold.preconditioner, settings, entropy: self.imager.entropy };
         let internal = self.space.to_internal(theta);
         let start = foothold.prediction.start(&self.imager, &foothold.start, &internal);
-        near.solve(problem, self.goal(), &start)
+        near.solve(problem, self.goal(), start)
     }
 
     /// The evaluation that a reconstruction of so many passes makes with its prior.
@@ -292,8 +292,9 @@ impl Posterior {
                     exact.apply_inverse(problem, &solution.image, &entropy.spottedness_gradient(&image, area));
                 let mu = solution.spottedness_slope / solution.chi2_slope;
                 let weight = -0.5 * curve_slope * lambda;
-                let adjoint =
-                    |(p, h): (usize, &f64)| -> f64 { weight * (h + 2.0 * mu / lambda * f64::from(solution.path[p]) * f64::from(scale[p])) };
+                let adjoint = |(p, h): (usize, &f64)| -> f64 {
+                    weight * (h + 2.0 * mu / lambda * f64::from(solution.path[p]) * f64::from(scale[p]))
+                };
                 let direction = inverse.iter().enumerate().map(adjoint).collect();
                 (-0.5 * curve_slope * mu, Some(direction))
             }

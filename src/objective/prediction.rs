@@ -104,7 +104,9 @@ impl Prediction {
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
                 let adjoint = inverse.iter().zip(&scale).zip(&solution.path);
-                let adjoint = adjoint.map(|((y, scale), path)| (y / f64::from(*scale) + along_path * f64::from(*path)) / f64::from(*scale));
+                let adjoint = adjoint.map(|((y, scale), path)| {
+                    (y / f64::from(*scale) + along_path * f64::from(*path)) / f64::from(*scale)
+                });
                 adjoint.map(|y| y as f32).collect()
             }
         };
@@ -189,19 +191,18 @@ impl Prediction {
 
     /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
     pub fn start(&self, imager: &Imager, known: &Start, x: &[f64]) -> Start {
-        let mut start = Start { adjoint: self.adjoint.clone(), ..known.clone() };
         let away = x.iter().zip(&self.origin).zip(&self.scales);
         let shifts: Vec<f64> = away.map(|((x, x0), scale)| (x - x0) / scale).collect();
         let farthest = shifts.iter().fold(0.0, |farthest: f64, shift| farthest.max(shift.abs()));
         let shrink = (REACH / farthest).min(1.0);
-        let n = start.image.coordinates.len();
-        let (mut step, mut ln_lambda) = (vec![0.0f32; n], 0.0);
+        let n = self.map.len();
+        let (mut coordinates, mut step, mut ln_lambda) = (vec![0.0; n], vec![0.0f32; n], 0.0);
         for ((shift, image), along) in shifts.iter().zip(&self.image).zip(&self.ln_lambda) {
             ln_lambda += shrink * shift * along;
             axpy(shrink * shift, image, &mut step);
         }
         let here = &known.image.coordinates;
-        imager.entropy.step(here, &self.map, &step, 1.0, LARGEST_STEP, &mut start.image.coordinates);
+        imager.entropy.step(here, &self.map, &step, 1.0, LARGEST_STEP, &mut coordinates);
         if !self.bends.is_empty() {
             let mut change = vec![0.0f32; n + 1];
             let shrink = (BEND_REACH / farthest).min(1.0);
@@ -210,12 +211,19 @@ impl Prediction {
                 axpy(bent[*i] * bent[*j], per_product, &mut change);
             }
             let lowest = imager.entropy.lowest_coordinate();
-            for (u, change) in start.image.coordinates.iter_mut().zip(&change) {
+            for (u, change) in coordinates.iter_mut().zip(&change) {
                 *u = (*u + f64::from(change.clamp(-LARGEST_STEP, LARGEST_STEP))).clamp(lowest, -lowest);
             }
             ln_lambda += f64::from(change[n]);
         }
-        start.image.lambda *= ln_lambda.clamp(-LN_LAMBDA_REACH, LN_LAMBDA_REACH).exp();
-        start
+        let lambda = known.image.lambda * ln_lambda.clamp(-LN_LAMBDA_REACH, LN_LAMBDA_REACH).exp();
+        let &Start { ref path, chi2_slope, best, .. } = known;
+        Start {
+            image: Image { coordinates, lambda },
+            path: path.clone(),
+            chi2_slope,
+            adjoint: self.adjoint.clone(),
+            best,
+        }
     }
 }

@@ -139,7 +139,7 @@ impl Reference {
             settings: SolverSettings::exact(),
         };
         let goal = Goal::Chi2 { target: reference.chi2_target, largest_lambda: f64::INFINITY };
-        let mut solution = solver.solve(&mut problem, goal, &reference.start());
+        let mut solution = solver.solve(&mut problem, goal, reference.start());
         if solution.termination != Termination::Converged {
             return Err(ReferenceError::Solver(solution.termination));
         }
@@ -168,7 +168,7 @@ impl Reference {
         let settings = SolverSettings { tolerance: PROVISIONAL_TOLERANCE, ..SolverSettings::patient() };
         let solver = Solver { entropy: imager.entropy, preconditioner: &reference.preconditioner, settings };
         let goal = Goal::Chi2 { target: reference.chi2_target, largest_lambda: reference.largest_lambda };
-        let precise = solver.solve(&mut problem, goal, &reference.start());
+        let precise = solver.solve(&mut problem, goal, reference.start());
         if matches!(precise.termination, Termination::Converged | Termination::Unreachable) {
             reference.solution = precise;
         }
@@ -215,11 +215,11 @@ impl Reference {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
         }
         let goal = |target| Goal::Chi2 { target, largest_lambda };
-        let easy = coarse.solve(&mut problem, goal((FIRST_CHI2 * chi2_target).min(blank_chi2)), &blank);
+        let easy = coarse.solve(&mut problem, goal((FIRST_CHI2 * chi2_target).min(blank_chi2)), blank);
         let preconditioner = precondition(imager, &mut problem, &easy);
         let fine =
             Solver { preconditioner: &preconditioner, settings: SolverSettings::patient(), entropy: imager.entropy };
-        let solution = fine.solve(&mut problem, goal(chi2_target), &start(&easy));
+        let solution = fine.solve(&mut problem, goal(chi2_target), start(&easy));
         let preconditioner = Arc::new(precondition(imager, &mut problem, &solution));
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
         let passes = problem.passes();
@@ -266,7 +266,7 @@ pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Sol
     let scale = imager.entropy.metric(&s, problem.area());
     let (n, mut scaled, mut curved) = (s.len(), vec![0.0f32; s.len()], vec![0.0f32; s.len()]);
     problem.linearise(&s);
-    Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
+    Preconditioner::build(n, PRECONDITIONER_RANK, at.image.lambda, SMALLEST_CURVATURE, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = *v as f32 * d);
         problem.curvature(Curvature::Exact, &scaled, &mut curved);
         out.iter_mut().zip(&curved).zip(&scale).for_each(|((out, x), d)| *out = f64::from(*x * d));
@@ -283,7 +283,7 @@ fn follow(solver: &Solver, problem: &mut impl Problem, reference: &Solution) -> 
         while (at.image.lambda / reference.image.lambda).ln() * direction < reach {
             let target = at.chi2 + direction * CURVE_STEP * at.chi2_slope;
             let goal = Goal::Chi2 { target, largest_lambda: f64::INFINITY };
-            let mut next = rough.solve(problem, goal, &start(&at));
+            let mut next = rough.solve(problem, goal, start(&at));
             if next.termination != Termination::Converged {
                 break;
             }

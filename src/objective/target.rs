@@ -119,7 +119,7 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
         let lambda = unit * last_lambda / data * (f64::from(k) / IMAGES as f64).exp2();
         let start =
             Start { image: at.image.clone(), path: Vec::new(), chi2_slope: 0.0, adjoint: Vec::new(), best: None };
-        at = solver.solve(&mut work, Goal::Lambda(lambda), &start);
+        at = solver.solve(&mut work, Goal::Lambda(lambda), start);
         places.push(place(&at));
     }
     match places.iter().all(|place| place.chi2.is_finite() && place.rms_kms > 0.0) {

@@ -62,7 +62,7 @@ const LOGARITHM: [f64; 7] = [
 ];
 
 /// The same for single precision.
-const SINGLE_LOGARITHM: [f32; 4] = [6.666_666_3e-1, 4.000_097e-1, 2.849_879e-1, 2.427_908e-1];
+const SINGLE_LOGARITHM: [f32; 4] = [6.666_666e-1, 4.000_097e-1, 2.849_879e-1, 2.427_908e-1];
 
 /// 1/2!, 1/3!, ... 1/13!.
 const EXPONENTIAL: [f64; 12] = {
@@ -210,6 +210,31 @@ mod tests {
         }
         assert_eq!(vector::run(Both(0.0)), [1.0, 0.0]);
         assert!(vector::run(Both(f64::NAN)).iter().all(|x| x.is_nan()));
+    }
+
+    struct Single(f32);
+
+    impl Task for Single {
+        type Output = f32;
+
+        #[inline(always)]
+        fn run<I: Instructions>(self, i: I) -> f32 {
+            ln_1p_single(i, self.0)
+        }
+    }
+
+    #[test]
+    fn the_logarithm_in_single_precision_is_that_of_the_standard_library_to_two_units_in_the_last_place() {
+        let decades = (-300..300).map(|k| 10_f32.powf(0.1 * k as f32 + 0.037));
+        let near_minus_one = (1..24).map(|k| 0.5_f32.powi(k) - 1.0).chain((1..1000).map(|k| -1e-3 * k as f32));
+        for x in decades.chain((0..400_000).map(|k| 1e-4 * k as f32)).chain(near_minus_one) {
+            for got in vector::by_each(|| Single(x)) {
+                let wanted = f64::from(x).ln_1p();
+                let ulp = f64::from(f32::EPSILON) * wanted.abs().max(f64::from(f32::MIN_POSITIVE));
+                assert!((f64::from(got) - wanted).abs() <= 2.0 * ulp, "{x:e}: {got:e} instead of {wanted:e}");
+            }
+        }
+        assert!(vector::run(Single(f32::NAN)).is_nan() && vector::run(Single(0.0)) == 0.0);
     }
 
     #[test]

@@ -190,6 +190,29 @@ mod tests {
         of_any_length::<f32>();
     }
 
+    #[test]
+    fn weighted_scalar_products_of_any_length() {
+        for n in [0, 1, 7, 8, 9, 100] {
+            let x: Vec<f32> = (0..n).map(|k| k as f32).collect();
+            let (twos, rows) = (vec![2.0; n], [vec![1.0; n], (0..n).map(|k| 0.1 * k as f64).collect::<Vec<f64>>()]);
+            let [sum, of_squares] = weighted_dots(&x, &twos, [&rows[0], &rows[1]]);
+            let squares: f64 = (0..n).map(|k| (k * k) as f64).sum();
+            assert!(
+                sum == (n * n.saturating_sub(1)) as f64
+                    && (of_squares - 0.2 * squares).abs() < 1e-12 * squares.max(1.0)
+            );
+        }
+    }
+
+    #[test]
+    fn from_one_precision_to_the_other() {
+        let x: Vec<f64> = (0..33).map(|k| 0.1 * f64::from(k)).collect();
+        let mut single = rounded(&x, 3.0);
+        assert!(single.iter().zip(&x).all(|(single, x)| *single == (3.0 * x) as f32));
+        scale_by(0.5, &mut single);
+        assert!(widened(&single).iter().zip(&x).all(|(wide, x)| *wide == f64::from(0.5 * (3.0 * x) as f32)));
+    }
+
     fn of_any_length<N: Number>() {
         for n in [0, 1, 31, 32, 33, 100] {
             let x: Vec<N> = (0..n).map(|i| N::of(f64::from(i))).collect();

@@ -5,8 +5,11 @@
 
 use super::Step;
 use crate::vector::elementary::{exp_minus, ln_1p, ln_1p_single};
-use crate::vector::linear::dot;
+use crate::vector::linear::short_dot;
 use crate::vector::{Instructions, Task};
+
+/// Pixels whose terms are summed at a time.
+const CHUNK: usize = 512;
 
 /// Largest |u|: beyond it s (1-s) would lose its precision.
 pub(super) const LOGIT_LIMIT: f64 = 30.0;
@@ -63,13 +66,16 @@ impl Task for NegativeValue<'_> {
         let NegativeValue { default_logit, u, area, s } = self;
         // s u - ln(1 + e^u) is s ln s + (1-s) ln(1-s); both parts from one exponential
         let at_default = softplus(i, default_logit, exp_minus(i, default_logit.abs()));
-        let mut terms = vec![0.0; u.len()];
-        for ((s, &u), term) in s.iter_mut().zip(u).zip(&mut terms) {
-            let small = exp_minus(i, u.abs());
-            *s = if u > 0.0 { 1.0 } else { small } / (1.0 + small);
-            *term = *s * (u - default_logit) - softplus(i, u, small) + at_default;
+        let (mut total, mut terms) = (0.0, [0.0; CHUNK]);
+        for ((s, u), area) in s.chunks_mut(CHUNK).zip(u.chunks(CHUNK)).zip(area.chunks(CHUNK)) {
+            for ((s, &u), term) in s.iter_mut().zip(u).zip(&mut terms) {
+                let small = exp_minus(i, u.abs());
+                *s = if u > 0.0 { 1.0 } else { small } / (1.0 + small);
+                *term = *s * (u - default_logit) - softplus(i, u, small) + at_default;
+            }
+            total += short_dot(i, area, &terms[..area.len()]);
         }
-        dot(area, &terms)
+        total
     }
 }
 
