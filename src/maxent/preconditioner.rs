@@ -10,25 +10,18 @@ use crate::vector::{self, Instructions, Number, Registers, Task};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use std::ops::Range;
 
 /// `(1 + lambda M)^-1` on the span of M's largest eigenvectors, the identity elsewhere.
 #[derive(Clone, Debug, Default)]
 pub struct Preconditioner {
     /// Largest eigenvalues of M.
     eigenvalues: Vec<f64>,
-    /// Of the component along each eigenvector at least so much is left.
-    least_left: Vec<f64>,
     /// Pixels on which the basis lives, and others, whose rows are zero, to make their number a multiple of [`LANES`].
     pixels: Vec<u32>,
     /// How many of them are not there to fill up.
     active: usize,
-    /// How many of them are strong.
-    strong: usize,
-    /// Of [`LANES`] pixels after [`LANES`] pixels, every strong eigenvector, ...
-    rows: Vec<Row<i16>>,
-    /// ... and every other.
-    weak_rows: Vec<Row<i8>>,
+    /// Of [`LANES`] pixels after [`LANES`] pixels, every eigenvector.
+    rows: Vec<Row>,
     /// Unit in which each eigenvector is written.
     units: Vec<f32>,
 }
@@ -40,60 +33,15 @@ const LANES: usize = 64;
 /// Sums over pixels that are kept apart.
 const PARTS: usize = 16;
 
-/// What an eigenvector has on pixels side by side, in whole units: a half and a quarter of the bytes of numbers in single precision. Bytes
-/// are what the time goes into on large maps, and it takes as few iterations.
+/// What an eigenvector has on pixels side by side, in whole units: half the bytes of a number in single precision, which are what the time
+/// goes into, and as few iterations.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct Row<W>([W; LANES]);
+struct Row([i16; LANES]);
 
-/// Whole numbers of some size.
-trait Whole: Copy + Default {
-    /// The largest.
-    const LARGEST: f64;
-
-    /// The nearest one.
-    fn of(x: f64) -> Self;
-
-    /// As many of a row as the broadest registers hold, from one on.
-    fn load<I: Instructions>(i: I, row: &Row<Self>, first: usize) -> <I::Broad as Registers>::Lanes;
-}
-
-impl Whole for i16 {
-    const LARGEST: f64 = 32_767.0;
-
-    fn of(x: f64) -> Self {
-        x.round() as i16
-    }
-
-    #[inline(always)]
-    fn load<I: Instructions>(i: I, Row(row): &Row<i16>, first: usize) -> <I::Broad as Registers>::Lanes {
-        i.load_whole(row, first)
-    }
-}
-
-impl Whole for i8 {
-    const LARGEST: f64 = 127.0;
-
-    fn of(x: f64) -> Self {
-        x.round() as i8
-    }
-
-    #[inline(always)]
-    fn load<I: Instructions>(i: I, Row(row): &Row<i8>, first: usize) -> <I::Broad as Registers>::Lanes {
-        i.load_small(row, first)
-    }
-}
-
-/// Most that rounding the weak eigenvectors may do to the system with what is left of strong and weak ones: from 1 on the inverse may not
-/// be positive.
-const MOST_ROUNDED: f64 = 0.1;
-
-/// What is left of a component is this part at least of what is left at the lambda that the basis was made for: at a larger one it would
-/// drown in the rounding.
-const LEAST_LEFT: f64 = 0.5;
-
-/// Less of a component is not left: it would drown in the rounding of the strong eigenvectors.
-const DROWNED: f64 = 1e-4;
+/// Of a component at most so much is subtracted: what is left must not drown in the rounding of the eigenvectors, or the inverse is no
+/// longer positive.
+const MOST_SUBTRACTED: f64 = 1.0 - 1e-4;
 
 /// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
 const DROPPED_ENERGY: f64 = 2e-3;
@@ -116,21 +64,21 @@ impl Preconditioner {
         Preconditioner::default()
     }
 
-    /// From the operator M (`apply(v, out)`) on vectors of length `n`, for about this `lambda`: at most `rank` eigenvectors, those
-    /// with eigenvalues above `smallest` over lambda.
-    pub fn build(n: usize, rank: usize, lambda: f64, smallest: f64, apply: impl FnMut(&[f64], &mut [f64])) -> Self {
+    /// From the operator M (`apply(v, out)`) on vectors of length `n`: at most `rank` eigenvectors, those with eigenvalues
+    /// above `smallest`.
+    pub fn build(n: usize, rank: usize, smallest: f64, apply: impl FnMut(&[f64], &mut [f64])) -> Self {
         let (basis, image) = krylov(n, rank + OVERSAMPLING, apply);
         let projected = basis.transpose() * image;
         let eigen = SymmetricEigen::new(0.5 * (&projected + projected.transpose()));
-        let mut order: Vec<usize> = (0..basis.ncols()).filter(|&i| lambda * eigen.eigenvalues[i] > smallest).collect();
+        let mut order: Vec<usize> = (0..basis.ncols()).filter(|&i| eigen.eigenvalues[i] > smallest).collect();
         order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
         order.truncate(rank);
         let vectors = basis * eigen.eigenvectors.select_columns(&order);
         let eigenvalues: Vec<f64> = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
-        Preconditioner::on_active_pixels(eigenvalues, &vectors, lambda)
+        Preconditioner::on_active_pixels(eigenvalues, &vectors)
     }
 
-    fn on_active_pixels(eigenvalues: Vec<f64>, vectors: &DMatrix<f64>, lambda: f64) -> Self {
+    fn on_active_pixels(eigenvalues: Vec<f64>, vectors: &DMatrix<f64>) -> Self {
         let energy: Vec<f64> = vectors.row_iter().map(|row| row.norm_squared()).collect();
         let mut by_energy: Vec<u32> = (0..energy.len() as u32).collect();
         by_energy.sort_by(|&p, &q| energy[p as usize].total_cmp(&energy[q as usize]));
@@ -144,19 +92,23 @@ impl Preconditioner {
         let mut pixels = by_energy.split_off(first);
         pixels.sort_unstable();
         let active = pixels.len();
-        let strong = how_many_strong(&eigenvalues, vectors, lambda);
-        let least_left = eigenvalues.iter().map(|e| LEAST_LEFT / (1.0 + lambda * e)).collect();
         // a number that is not finite is none in units of anything: the unit shows it
-        let units = vectors.column_iter().enumerate().map(|(k, vector)| match vector.iter().all(|x| x.is_finite()) {
-            true => vector.amax() / if k < strong { i16::LARGEST } else { i8::LARGEST },
+        let units = vectors.column_iter().map(|vector| match vector.iter().all(|x| x.is_finite()) {
+            true => vector.amax() / f64::from(i16::MAX),
             false => f64::NAN,
         });
         let units: Vec<f64> = units.collect();
-        let rows = in_units(vectors, &units, &pixels, 0..strong);
-        let weak_rows = in_units(vectors, &units, &pixels, strong..eigenvalues.len());
+        let mut rows = vec![Row([0; LANES]); active.div_ceil(LANES) * eigenvalues.len()];
+        for (pixels, rows) in pixels.chunks(LANES).zip(rows.chunks_mut(eigenvalues.len().max(1))) {
+            for (k, Row(row)) in rows.iter_mut().enumerate() {
+                row.iter_mut()
+                    .zip(pixels)
+                    .for_each(|(x, p)| *x = (vectors[(*p as usize, k)] / units[k]).round() as i16);
+            }
+        }
         let units = units.iter().map(|unit| *unit as f32).collect();
         pixels.resize(active.next_multiple_of(LANES), 0);
-        Preconditioner { eigenvalues, least_left, pixels, active, strong, rows, weak_rows, units }
+        Preconditioner { eigenvalues, pixels, active, rows, units }
     }
 
     /// Number of eigenvectors.
@@ -171,16 +123,13 @@ impl Preconditioner {
 
     /// Bytes that it takes in memory, all but a few.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.rows[..]) + size_of_val(&self.weak_rows[..])
+        size_of_val(&self.rows[..])
     }
 
-    /// Pixels side by side and what every eigenvector has there, the strong ones and the others.
+    /// Pixels side by side and what every eigenvector has there.
     #[inline(always)]
-    fn groups(&self) -> impl DoubleEndedIterator<Item = (&[u32; LANES], &[Row<i16>], &[Row<i8>])> {
-        let (strong, weak) = (self.strong, self.rank() - self.strong);
-        let of_group =
-            move |(g, pixels)| (pixels, &self.rows[g * strong..][..strong], &self.weak_rows[g * weak..][..weak]);
-        self.pixels.as_chunks::<LANES>().0.iter().enumerate().map(of_group)
+    fn groups(&self) -> impl DoubleEndedIterator<Item = (&[u32; LANES], &[Row])> {
+        self.pixels.as_chunks::<LANES>().0.iter().zip(self.rows.chunks_exact(self.rank().max(1)))
     }
 
     /// Eigenvalues of M, largest first.
@@ -192,10 +141,8 @@ impl Preconditioner {
     pub fn apply<N: Number>(&self, lambda: f64, r: &[N], out: &mut [N]) {
         out.copy_from_slice(r);
         let mut components = vector::run(Components { basis: self, r });
-        let factors = self.eigenvalues.iter().zip(&self.least_left).zip(&self.units);
-        for (c, ((e, least_left), unit)) in components.iter_mut().zip(factors) {
-            let left = (1.0 / (1.0 + lambda * e)).max(*least_left).max(DROWNED);
-            *c *= (1.0 - left) as f32 * unit * unit;
+        for ((c, e), unit) in components.iter_mut().zip(&self.eigenvalues).zip(&self.units) {
+            *c *= (lambda * e / (1.0 + lambda * e)).min(MOST_SUBTRACTED) as f32 * unit * unit;
         }
         vector::run(Subtract { basis: self, components: &components, out });
     }
@@ -211,36 +158,6 @@ impl Preconditioner {
         vector::run(Subtract { basis: self, components: &components, out: &mut rest });
         (spanned, dot(&rest, &rest))
     }
-}
-
-/// How many eigenvectors are to be written in large numbers. Rounding puts a random part of every strong eigenvector into every weak one,
-/// some unit / sqrt(12), and what is left of both by the inverse has to outweigh it.
-fn how_many_strong(eigenvalues: &[f64], vectors: &DMatrix<f64>, lambda: f64) -> usize {
-    let rank = eigenvalues.len();
-    let inverse_left = |k: usize| 1.0 + lambda * eigenvalues[k];
-    // variances of the entries' errors, summed from each vector to the last
-    let mut weak: Vec<f64> = vectors.column_iter().map(|v| (v.amax() / i8::LARGEST).powi(2) / 12.0).collect();
-    (1..rank).rev().for_each(|k| weak[k - 1] += weak[k]);
-    let harmless = |&strong: &usize| {
-        let count = (rank - strong) as f64;
-        // squared norm of a random matrix
-        let harm = ((strong as f64).sqrt() + count.sqrt()).powi(2) * weak[strong] / count;
-        harm * inverse_left(0) * inverse_left(strong) < MOST_ROUNDED
-    };
-    (0..rank).find(harmless).unwrap_or(rank)
-}
-
-/// Some of the vectors on these pixels, [`LANES`] pixels after [`LANES`] pixels, in units of each.
-fn in_units<W: Whole>(vectors: &DMatrix<f64>, units: &[f64], pixels: &[u32], which: Range<usize>) -> Vec<Row<W>> {
-    let mut rows = Vec::with_capacity(pixels.len().div_ceil(LANES) * which.len());
-    for pixels in pixels.chunks(LANES) {
-        for k in which.clone() {
-            let mut row = [W::default(); LANES];
-            row.iter_mut().zip(pixels).for_each(|(x, p)| *x = W::of(vectors[(*p as usize, k)] / units[k]));
-            rows.push(Row(row));
-        }
-    }
-    rows
 }
 
 /// An orthonormal basis of the block Krylov space of an operator from a fixed random start, with about so many columns, and what the
@@ -289,8 +206,7 @@ impl<N: Number> Task for Components<'_, N> {
     fn run<I: Instructions>(self, i: I) -> Vec<f32> {
         let singles = i.broad();
         let mut sums = vec![Sums([0.0; PARTS]); self.basis.rank()];
-        for (pixels, rows, weak_rows) in self.basis.groups() {
-            let (of_strong, of_weak) = sums.split_at_mut(rows.len());
+        for (pixels, rows) in self.basis.groups() {
             let mut r = [0.0; LANES];
             for (r, p) in r.iter_mut().zip(pixels) {
                 let number: f64 = self.r[*p as usize].into();
@@ -301,30 +217,16 @@ impl<N: Number> Task for Components<'_, N> {
                 for (k, part) in parts.iter_mut().enumerate() {
                     *part = singles.load(&r, k * PARTS + first);
                 }
-                add_products(i, parts, rows, of_strong, first);
-                add_products(i, parts, weak_rows, of_weak, first);
+                for (Sums(sum), Row(row)) in sums.iter_mut().zip(rows) {
+                    let mut total = singles.load(sum, first);
+                    for (k, part) in parts.into_iter().enumerate() {
+                        total = singles.multiply_add(i.load_whole(row, k * PARTS + first), part, total);
+                    }
+                    singles.store(total, sum, first);
+                }
             }
         }
         sums.iter().map(|Sums(sum)| sum.iter().sum()).collect()
-    }
-}
-
-/// Adds products of rows with `parts`, from the sums from `first` on.
-#[inline(always)]
-fn add_products<I: Instructions, W: Whole>(
-    i: I,
-    parts: [<I::Broad as Registers>::Lanes; LANES / PARTS],
-    rows: &[Row<W>],
-    sums: &mut [Sums],
-    first: usize,
-) {
-    let singles = i.broad();
-    for (Sums(sum), row) in sums.iter_mut().zip(rows) {
-        let mut total = singles.load(sum, first);
-        for (k, part) in parts.into_iter().enumerate() {
-            total = singles.multiply_add(W::load(i, row, k * PARTS + first), part, total);
-        }
-        singles.store(total, sum, first);
     }
 }
 
@@ -346,13 +248,16 @@ impl<N: Number> Task for Subtract<'_, N> {
     fn run<I: Instructions>(self, i: I) {
         let (singles, lanes) = (i.broad(), I::Broad::LANES);
         // backwards: the last rows are still in the cache
-        for (pixels, rows, weak_rows) in self.basis.groups().rev() {
-            let (of_strong, of_weak) = self.components.split_at(rows.len());
+        for (pixels, rows) in self.basis.groups().rev() {
             let mut subtracted = [0.0; LANES];
             for first in (0..LANES).step_by(WIDE * lanes) {
                 let mut sums = [singles.splat(0.0); WIDE];
-                combine_rows(i, rows, of_strong, first, &mut sums);
-                combine_rows(i, weak_rows, of_weak, first, &mut sums);
+                for (Row(row), component) in rows.iter().zip(self.components) {
+                    let component = singles.splat(*component);
+                    for (k, sum) in sums.iter_mut().enumerate() {
+                        *sum = singles.multiply_add(i.load_whole(row, first + k * lanes), component, *sum);
+                    }
+                }
                 for (k, sum) in sums.into_iter().enumerate() {
                     singles.store(sum, &mut subtracted, first + k * lanes);
                 }
@@ -365,33 +270,12 @@ impl<N: Number> Task for Subtract<'_, N> {
     }
 }
 
-/// Adds rows times `components`, on pixels from `first` on.
-#[inline(always)]
-fn combine_rows<I: Instructions, W: Whole>(
-    i: I,
-    rows: &[Row<W>],
-    components: &[f32],
-    first: usize,
-    sums: &mut [<I::Broad as Registers>::Lanes; WIDE],
-) {
-    let singles = i.broad();
-    for (row, component) in rows.iter().zip(components) {
-        let component = singles.splat(*component);
-        for (k, sum) in sums.iter_mut().enumerate() {
-            *sum = singles.multiply_add(W::load(i, row, first + k * I::Broad::LANES), component, *sum);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Up to 12 eigenvectors of up to 83 entries, each off by 2e-5 of the largest, ...
+    /// Eigenvectors of up to 83 entries, each off by 2e-5 of the largest.
     const ROUNDED: f64 = 2e-4;
-
-    /// ... or by 4e-3.
-    const ROUNDED_COARSELY: f64 = 5e-2;
 
     #[test]
     fn inverts_a_low_rank_system() {
@@ -404,7 +288,7 @@ mod tests {
             out[10] = 8.0 * c;
             out[20] = 8.0 * c;
         };
-        let preconditioner = Preconditioner::build(n, 10, 0.7, 1e-6, apply);
+        let preconditioner = Preconditioner::build(n, 10, 1e-6, apply);
         assert_eq!(preconditioner.rank(), 2);
         assert_eq!(preconditioner.active_pixels(), 3);
         let x: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
@@ -442,35 +326,27 @@ mod tests {
             (-falls).exp() * (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin()
         });
         let vectors = noise.qr().q();
-        let mut strong = Vec::new();
-        for (strongest, lambda) in
-            [1e2, 1e3, 1e5, 1e7, 1e12].into_iter().flat_map(|e| [1.0, 5.0, 1e3].map(|lambda| (e, lambda)))
-        {
+        for strongest in [1e3, 1e5, 1e7, 1e12] {
             let eigenvalues: Vec<f64> = (0..rank).map(|k| strongest * 10f64.powf(-0.02 * k as f64)).collect();
-            let preconditioner = Preconditioner::on_active_pixels(eigenvalues, &vectors, 1.0);
-            strong.push(preconditioner.strong);
+            let preconditioner = Preconditioner::on_active_pixels(eigenvalues, &vectors);
             let mut applied = DMatrix::zeros(n, rank);
             for k in 0..rank {
-                preconditioner.apply(lambda, vectors.column(k).as_slice(), applied.column_mut(k).as_mut_slice());
+                preconditioner.apply(1.0, vectors.column(k).as_slice(), applied.column_mut(k).as_mut_slice());
             }
             let within = vectors.transpose() * applied;
             let smallest = SymmetricEigen::new(0.5 * (&within + within.transpose())).eigenvalues.min();
-            assert!(smallest > 0.0, "{strongest:e}, lambda {lambda}: {smallest:e}");
+            assert!(smallest > 0.0, "{strongest:e}: {smallest:e}");
         }
-        assert!(strong[0] < rank && strong[strong.len() - 1] == rank, "{strong:?}");
     }
 
     #[test]
     fn any_rank_on_any_number_of_pixels_by_all_instructions() {
-        // for the larger lambda all of them are strong
-        for ((n, rank), made_for) in
-            [(1, 1), (16, 4), (40, 7), (83, 12)].into_iter().flat_map(|size| [0.4, 1e9].map(|l| (size, l)))
-        {
+        for (n, rank) in [(1, 1), (16, 4), (40, 7), (83, 12)] {
             // orthonormal columns that live on all pixels
             let noise = DMatrix::from_fn(n, rank, |i, k| (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin());
             let vectors = noise.qr().q();
             let eigenvalues: Vec<f64> = (0..rank).map(|k| 100.0 / (1.0 + k as f64)).collect();
-            let preconditioner = Preconditioner::on_active_pixels(eigenvalues.clone(), &vectors, made_for);
+            let preconditioner = Preconditioner::on_active_pixels(eigenvalues.clone(), &vectors);
             let r: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
             let (dense_r, lambda) = (nalgebra::DVector::from_column_slice(&r), 0.4);
             let along = vectors.transpose() * &dense_r;
@@ -479,10 +355,9 @@ mod tests {
             });
             let (wanted, mut out) = (&dense_r - &vectors * kept, vec![0.0; n]);
             preconditioner.apply(lambda, &r, &mut out);
-            let off = if preconditioner.strong == rank { ROUNDED } else { ROUNDED_COARSELY };
             assert!(
-                out.iter().zip(wanted.iter()).all(|(a, b)| (a - b).abs() < off),
-                "{n} {rank} {made_for}: {out:?} {wanted}"
+                out.iter().zip(wanted.iter()).all(|(a, b)| (a - b).abs() < ROUNDED),
+                "{n} {rank}: {out:?} {wanted}"
             );
             let basis = &preconditioner;
             let components = vector::by_each(|| Components { basis, r: &r });

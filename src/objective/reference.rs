@@ -266,7 +266,7 @@ pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Sol
     let scale = imager.entropy.metric(&s, problem.area());
     let (n, mut scaled, mut curved) = (s.len(), vec![0.0f32; s.len()], vec![0.0f32; s.len()]);
     problem.linearise(&s);
-    Preconditioner::build(n, PRECONDITIONER_RANK, at.image.lambda, SMALLEST_CURVATURE, |v, out| {
+    Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = *v as f32 * d);
         problem.curvature(Curvature::Exact, &scaled, &mut curved);
         out.iter_mut().zip(&curved).zip(&scale).for_each(|((out, x), d)| *out = f64::from(*x * d));
