@@ -28,7 +28,7 @@ pub struct SolverSettings {
     /// shows it as a small part of its depth.
     pub leniency: f64,
     /// Residual of the Newton systems over their right-hand side, before a last step that takes no pass; from 3e-3 on they are solved
-    /// in single precision.
+    /// in single precision, below in double precision for numbers that are in single precision.
     pub cg_tolerance: f64,
     /// Most iterations of conjugate gradients for one Newton system.
     pub cg_iterations: usize,

@@ -14,7 +14,7 @@ use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing};
 use crate::vector::Number;
-use crate::vector::linear::{combine, combine_two, dot, rounded, scale_by, widened};
+use crate::vector::linear::{combine, combine_two, dot, norm, rounded, scale_by, widened};
 
 /// Largest change of a coordinate in one step.
 const STEP_CAP: f32 = 2.0;
@@ -115,7 +115,7 @@ impl Solver<'_> {
         let scale = self.entropy.metric(&self.entropy.image(&image.coordinates), problem.area());
         let mut scaled = right.to_vec();
         combine(&mut scaled, &scale, |right, scale| right * f64::from(scale));
-        let (norm, per_norm) = norm_of(dot(&scaled, &scaled));
+        let (norm, per_norm) = norm_of(&scaled);
         let mut z = vec![0.0; right.len()];
         let system = System { lambda: image.lambda, scale: &scale, curvature: Curvature::Exact };
         self.solve_system(problem, system, &rounded(&scaled, per_norm), &mut z);
@@ -190,7 +190,8 @@ impl Solver<'_> {
         Newton { decrement: dot(&step, &right).max(0.0), step, move_lambda }
     }
 
-    /// Solves a system from the start `z`.
+    /// Solves a system from the start `z`: in double precision where it is to be precise, but right-hand side and solution are in
+    /// single precision even then, and the steps make up for it.
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f32], z: &mut [f32]) {
         let System { lambda, scale, curvature } = system;
         if self.settings.cg_tolerance < LOOSE {
@@ -200,7 +201,7 @@ impl Solver<'_> {
             return combine(z, &double, |_, double| double as f32);
         }
         // right-hand sides come with a norm of 1, for nothing to be too small or too large
-        let (norm, per_norm) = norm_of(dot(right, right));
+        let (norm, per_norm) = norm_of(right);
         let mut of_unit = right.to_vec();
         scale_by(per_norm, &mut of_unit);
         scale_by(per_norm, z);
@@ -269,8 +270,8 @@ impl Solver<'_> {
     }
 }
 
-/// A norm, from its square, and its inverse, 0 for that of nothing.
-fn norm_of(square: f64) -> (f64, f64) {
-    let norm = square.sqrt();
+/// The norm and its inverse, 0 for that of nothing.
+fn norm_of<N: Number>(right: &[N]) -> (f64, f64) {
+    let norm = norm(right);
     (norm, if norm == 0.0 { 0.0 } else { norm.recip() })
 }

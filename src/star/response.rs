@@ -82,8 +82,11 @@ impl Response {
             steps_per_bin: LineKernel::steps_per_bin(star.line, sampling.step_kms),
         };
         let mut starts = vec![0];
+        starts.extend(sampling.profiles.iter().scan(0, |end, &(.., bins)| {
+            *end += bins;
+            Some(*end)
+        }));
         let profiles = sampling.profiles.iter().map(|&(time, first_velocity, bins)| {
-            starts.push(starts[starts.len() - 1] + bins);
             let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
             (first_velocity - shift - deposit.origin_kms(), bins)
         });

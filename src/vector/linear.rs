@@ -16,6 +16,11 @@ pub fn dot<N: Number>(a: &[N], b: &[N]) -> f64 {
     super::run(Dot { a, b })
 }
 
+/// Euclidean norm, summed in double precision.
+pub fn norm<N: Number>(x: &[N]) -> f64 {
+    super::run(Norm { x })
+}
+
 /// Scalar products of `x`, its numbers times `weights`, with rows of its length, in double precision.
 pub fn weighted_dots<N: Number, const ROWS: usize>(x: &[f32], weights: &[f32], rows: [&[N]; ROWS]) -> [f64; ROWS] {
     assert!(x.len() == weights.len() && rows.iter().all(|row| row.len() == x.len()));
@@ -99,6 +104,27 @@ fn in_parts<N: Number, const PARTS: usize>(i: impl Instructions, a: &[N], b: &[N
     sums.into_iter().map(Into::into).sum::<f64>() + rest.map(Into::into).sum::<f64>()
 }
 
+struct Norm<'a, N> {
+    x: &'a [N],
+}
+
+impl<N: Number> Task for Norm<'_, N> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, i: I) -> f64 {
+        let (mut sums, (x, rest)) = ([0.0; PARTS], self.x.as_chunks::<PARTS>());
+        for x in x {
+            for k in 0..PARTS {
+                let x: f64 = x[k].into();
+                sums[k] = i.multiply_add(x, x, sums[k]);
+            }
+        }
+        let rest = rest.iter().map(|&x| Into::<f64>::into(x).powi(2));
+        (sums.into_iter().sum::<f64>() + rest.sum::<f64>()).sqrt()
+    }
+}
+
 struct WeightedDots<'a, N, const ROWS: usize> {
     x: &'a [f32],
     weights: &'a [f32],
@@ -116,7 +142,7 @@ impl<N: Number, const ROWS: usize> Task for WeightedDots<'_, N, ROWS> {
             let chunk = first..first + FEW_PARTS;
             let (x, weights, mut product) = (&x[chunk.clone()], &weights[chunk.clone()], [0.0; FEW_PARTS]);
             for k in 0..FEW_PARTS {
-                product[k] = f64::from(x[k] * weights[k]);
+                product[k] = f64::from(x[k]) * f64::from(weights[k]);
             }
             for (sums, row) in sums.iter_mut().zip(&rows) {
                 let row = &row[chunk.clone()];
@@ -127,7 +153,7 @@ impl<N: Number, const ROWS: usize> Task for WeightedDots<'_, N, ROWS> {
         }
         let mut totals = [0.0; ROWS];
         for ((total, sums), row) in totals.iter_mut().zip(sums).zip(rows) {
-            let rest = (whole..x.len()).map(|p| f64::from(x[p] * weights[p]) * row[p].into());
+            let rest = (whole..x.len()).map(|p| f64::from(x[p]) * f64::from(weights[p]) * row[p].into());
             *total = sums.into_iter().sum::<f64>() + rest.sum::<f64>();
         }
         totals
@@ -217,6 +243,10 @@ mod tests {
         for n in [0, 1, 31, 32, 33, 100] {
             let x: Vec<N> = (0..n).map(|i| N::of(f64::from(i))).collect();
             assert_eq!(dot(&x, &vec![N::of(2.0); x.len()]), f64::from(n * (n - 1)));
+            // squares beyond the range of single precision
+            let large: Vec<N> = x.iter().map(|x| N::of(1e30) * *x).collect();
+            let squares: f64 = x.iter().map(|&x| Into::<f64>::into(x).powi(2)).sum();
+            assert!((norm(&large) - 1e30 * squares.sqrt()).abs() <= 1e-6 * norm(&large));
             let mut y = vec![N::of(1.0); x.len()];
             axpy(3.0, &x, &mut y);
             assert!(y.iter().zip(&x).all(|(y, x)| (*y).into() == 1.0 + 3.0 * (*x).into()));

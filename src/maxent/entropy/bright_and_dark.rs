@@ -8,13 +8,33 @@
 //! modulus within 22 % (softened at 0.003 to 0.1: 12 to 21 %), because -S is the mean square to lowest order. It has no kink either.
 //! Left out: which entropy an image has (`entropy`), data.
 
-use super::Step;
+use super::pixels::Pixel;
+use crate::vector::Instructions;
 use crate::vector::elementary::{exp_minus, ln_1p_single};
-use crate::vector::linear::dot;
-use crate::vector::{Instructions, Task};
 
-/// Largest |u|: a pixel that bright outshines, and one that dark is nothing beside, all the others.
-pub(super) const LN_LIMIT: f64 = 30.0;
+/// A pixel.
+#[derive(Clone, Copy)]
+pub(super) struct Brightness;
+
+impl Pixel for Brightness {
+    /// A pixel that bright outshines, and one that dark is nothing beside, all the others.
+    const LIMIT: f64 = 30.0;
+
+    #[inline(always)]
+    fn value(self, i: impl Instructions, u: f64) -> (f64, f64) {
+        let small = exp_minus(i, u.abs());
+        let b = if u > 0.0 { 1.0 / small } else { small };
+        (b, b * (u - 1.0) + 1.0)
+    }
+
+    /// Exact up to half of a pixel's brightness taken away, beyond that along the tangent.
+    #[inline(always)]
+    fn step(self, i: impl Instructions, b: f64, db: f32) -> f32 {
+        let relative = db / b as f32;
+        let straight = relative.max(-0.5);
+        ln_1p_single(i, straight) + 2.0 * (relative - straight)
+    }
+}
 
 /// The image B.
 pub(super) fn image(u: &[f64]) -> Vec<f64> {
@@ -41,49 +61,4 @@ pub(super) fn spottedness(b: &[f64], area: &[f64]) -> f64 {
 pub(super) fn spottedness_gradient(b: &[f64], area: &[f64]) -> Vec<f64> {
     let size = spottedness(b, area).max(f64::MIN_POSITIVE);
     b.iter().zip(area).map(|(b, a)| a * (b - 1.0) / size).collect()
-}
-
-/// Logarithms moved by an image step: straight in B, in which data are nearly linear, but for what takes more than half of a
-/// pixel's brightness away, which goes on along the tangent.
-pub(super) struct LogarithmStep<'a>(pub Step<'a>);
-
-impl Task for LogarithmStep<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<I: Instructions>(self, i: I) -> bool {
-        let Step { u, image, step, scale, cap, out } = self.0;
-        let mut capped = false;
-        for (((out, u), b), step) in out.iter_mut().zip(u).zip(image).zip(step) {
-            let relative = scale * step / *b as f32;
-            let straight = relative.max(-0.5);
-            let du = ln_1p_single(i, straight) + 2.0 * (relative - straight);
-            capped |= du.abs() > cap;
-            *out = (u + f64::from(du.clamp(-cap, cap))).clamp(-LN_LIMIT, LN_LIMIT);
-        }
-        capped
-    }
-}
-
-/// `-S` of the image with logarithms `u`, and the image B itself.
-pub(super) struct NegativeValue<'a> {
-    pub u: &'a [f64],
-    pub area: &'a [f64],
-    pub b: &'a mut [f64],
-}
-
-impl Task for NegativeValue<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn run<I: Instructions>(self, i: I) -> f64 {
-        let NegativeValue { u, area, b } = self;
-        let mut terms = vec![0.0; u.len()];
-        for ((b, &u), term) in b.iter_mut().zip(u).zip(&mut terms) {
-            let small = exp_minus(i, u.abs());
-            *b = if u > 0.0 { 1.0 / small } else { small };
-            *term = *b * (u - 1.0) + 1.0;
-        }
-        dot(area, &terms)
-    }
 }

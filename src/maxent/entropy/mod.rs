@@ -5,10 +5,14 @@
 //! metric, in which -S has the unit matrix as its second derivative. Left out: data.
 
 mod bright_and_dark;
+mod pixels;
 mod spots;
 
 use crate::vector;
 use crate::vector::linear::{combine_two, combined, dot};
+use bright_and_dark::Brightness;
+use pixels::{NegativeValue, Pixel, Step};
+use spots::Filling;
 use std::borrow::Cow;
 
 /// The entropy with its default image.
@@ -21,16 +25,6 @@ pub enum Entropy {
     },
     /// Of brightnesses B, with the default 1; the coordinate is ln B.
     BrightAndDark,
-}
-
-/// A step of the image, to be taken in the coordinates.
-struct Step<'a> {
-    u: &'a [f64],
-    image: &'a [f64],
-    step: &'a [f32],
-    scale: f32,
-    cap: f32,
-    out: &'a mut [f64],
 }
 
 impl Entropy {
@@ -59,8 +53,8 @@ impl Entropy {
     /// Bound of the coordinates, below which no step leads: the image is as good as 0 there. The upper bound is as far from 0.
     pub fn lowest_coordinate(&self) -> f64 {
         match self {
-            Entropy::Spots { .. } => -spots::LOGIT_LIMIT,
-            Entropy::BrightAndDark => -bright_and_dark::LN_LIMIT,
+            Entropy::Spots { .. } => -Filling::LIMIT,
+            Entropy::BrightAndDark => -Brightness::LIMIT,
         }
     }
 
@@ -74,18 +68,21 @@ impl Entropy {
 
     /// Coordinates moved by `scale` times the image step `step`, none by more than `cap`; whether any reached the cap.
     pub fn step(&self, u: &[f64], image: &[f64], step: &[f32], scale: f32, cap: f32, out: &mut [f64]) -> bool {
-        let step = Step { u, image, step, scale, cap, out };
-        match self {
-            Entropy::Spots { .. } => vector::run(spots::LogitStep(step)),
-            Entropy::BrightAndDark => vector::run(bright_and_dark::LogarithmStep(step)),
+        match *self {
+            Entropy::Spots { default_logit } => {
+                vector::run(Step { pixel: Filling::new(default_logit), u, image, step, scale, cap, out })
+            }
+            Entropy::BrightAndDark => vector::run(Step { pixel: Brightness, u, image, step, scale, cap, out }),
         }
     }
 
     /// Entropy of the image with coordinates `u` (at most 0, and 0 at the default), and the image itself.
     pub fn value(&self, u: &[f64], area: &[f64], image: &mut [f64]) -> f64 {
         -match *self {
-            Entropy::Spots { default_logit } => vector::run(spots::NegativeValue { default_logit, u, area, s: image }),
-            Entropy::BrightAndDark => vector::run(bright_and_dark::NegativeValue { u, area, b: image }),
+            Entropy::Spots { default_logit } => {
+                vector::run(NegativeValue { pixel: Filling::new(default_logit), u, area, image })
+            }
+            Entropy::BrightAndDark => vector::run(NegativeValue { pixel: Brightness, u, area, image }),
         }
     }
 
