@@ -26,19 +26,20 @@ pub(super) fn solve<N: Number>(
 ) -> usize {
     let n = b.len();
     let (mut residual, mut applied, mut preconditioned) = (b.to_vec(), vec![N::default(); n], vec![N::default(); n]);
-    let mut scale = dot(b, z);
-    if scale <= 0.0 {
-        precondition(b, &mut preconditioned);
-        scale = dot(b, &preconditioned);
-    }
-    let goal = limits.tolerance * limits.tolerance * scale;
-    if z.iter().any(|&z| z != N::default()) {
+    let is_start = z.iter().any(|&z| z != N::default());
+    if is_start {
         apply(z, &mut applied);
         axpy(-1.0, &applied, &mut residual);
-        precondition(&residual, &mut preconditioned);
     }
-    let mut direction = preconditioned.clone();
+    precondition(&residual, &mut preconditioned);
     let mut rho = dot(&residual, &preconditioned);
+    let mut scale = if is_start { dot(b, z) } else { rho };
+    if is_start && scale <= 0.0 {
+        precondition(b, &mut applied);
+        scale = dot(b, &applied);
+    }
+    let goal = limits.tolerance * limits.tolerance * scale;
+    let mut direction = preconditioned.clone();
     // no longer than where the preconditioner is the inverse
     let mut shortest = 1.0_f64;
     for iteration in 0..limits.iterations {
@@ -56,7 +57,7 @@ pub(super) fn solve<N: Number>(
             return iteration + 1;
         }
         if curvature <= 0.0 {
-            if iteration == 0 && z.iter().all(|&z| z == N::default()) {
+            if iteration == 0 && !is_start {
                 z.copy_from_slice(&direction);
             }
             return iteration + 1;

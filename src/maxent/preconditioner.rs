@@ -30,6 +30,9 @@ pub struct Preconditioner {
 /// eigenvectors do not wait for each other.
 const LANES: usize = 64;
 
+/// Rows from the one at work to the one that is asked for.
+const AHEAD: usize = 24;
+
 /// Sums over pixels that are kept apart.
 const PARTS: usize = 16;
 
@@ -217,7 +220,9 @@ impl<N: Number> Task for Components<'_, N> {
                 for (k, part) in parts.iter_mut().enumerate() {
                     *part = singles.load(&r, k * PARTS + first);
                 }
-                for (Sums(sum), Row(row)) in sums.iter_mut().zip(rows) {
+                for (Sums(sum), row) in sums.iter_mut().zip(rows) {
+                    vector::fetch_ahead(row, AHEAD);
+                    let Row(row) = row;
                     let mut total = singles.load(sum, first);
                     for (k, part) in parts.into_iter().enumerate() {
                         total = singles.multiply_add(i.load_whole(row, k * PARTS + first), part, total);

@@ -8,7 +8,7 @@
 //! function of problem and start. Left out: what the image shows.
 
 use super::cg::{self, CgLimits};
-use super::entropy::Entropy;
+use super::entropy::{Entropy, MetricStep};
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
@@ -75,13 +75,13 @@ impl Solver<'_> {
         if let Goal::Chi2 { largest_lambda, .. } = goal {
             at.lambda = at.lambda.min(largest_lambda);
         }
-        let mut curvature = Curvature::GaussNewton;
+        let (mut curvature, mut gradient) = (Curvature::GaussNewton, vec![0.0; at.u.len()]);
         for newton_steps in 0.. {
             if !(at.chi2.is_finite() && at.entropy.is_finite()) {
                 return self.finish(at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
             let guide = Guide { path: &path, adjoint: &adjoint };
-            let standing = Standing::of(problem, self.entropy, &at, goal, guide);
+            let standing = Standing::of(problem, self.entropy, &at, goal, guide, &mut gradient);
             let drop = best.map_or(0.0, |best| standing.below(&best, &at, goal));
             let tolerance = self.settings.tolerance_at(drop).max(ROUNDING * at.chi2);
             if standing.is_within(tolerance, &at, goal, self.preconditioner, self.entropy, problem.area()) {
@@ -116,9 +116,9 @@ impl Solver<'_> {
         let mut scaled = right.to_vec();
         combine(&mut scaled, &scale, |right, scale| right * f64::from(scale));
         let (norm, per_norm) = norm_of(&scaled);
-        let mut z = vec![0.0; right.len()];
+        let (mut of_unit, mut z) = (rounded(&scaled, per_norm), vec![0.0; right.len()]);
         let system = System { lambda: image.lambda, scale: &scale, curvature: Curvature::Exact };
-        self.solve_system(problem, system, &rounded(&scaled, per_norm), &mut z);
+        self.solve_system(problem, system, &mut of_unit, &mut z);
         combine_two(&mut scaled, &z, &scale, |_, z, scale| norm * f64::from(z) * f64::from(scale));
         scaled
     }
@@ -142,6 +142,25 @@ impl Solver<'_> {
     fn arrive(&self, problem: &mut impl Problem, u: Vec<f64>, lambda: f64) -> Point {
         let mut s = vec![0.0; u.len()];
         let entropy = self.entropy.value(&u, problem.area(), &mut s);
+        self.stand(problem, u, s, lambda, entropy)
+    }
+
+    /// Arrives by the step `length * z` in the metric of `scale`.
+    fn step(
+        &self,
+        problem: &mut impl Problem,
+        at: &Point,
+        (z, scale): (&[f32], &[f32]),
+        length: f64,
+        lambda: f64,
+    ) -> Point {
+        let (mut u, mut s) = (vec![0.0; at.u.len()], vec![0.0; at.u.len()]);
+        let step = MetricStep { u: &at.u, image: &at.s, z, scale, length: length as f32, cap: STEP_CAP };
+        let entropy = self.entropy.advance(step, problem.area(), &mut u, &mut s);
+        self.stand(problem, u, s, lambda, entropy)
+    }
+
+    fn stand(&self, problem: &mut impl Problem, u: Vec<f64>, s: Vec<f64>, lambda: f64, entropy: f64) -> Point {
         let chi2 = problem.linearise(&s);
         let spottedness = self.entropy.spottedness(&s, problem.area());
         Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy, spottedness }
@@ -155,11 +174,8 @@ impl Solver<'_> {
         if path.len() != at.u.len() || !worth_it || move_lambda.is_nan() || move_lambda.abs() > RESTORE_REACH {
             return at;
         }
-        let mut ds = self.entropy.metric(&at.s, problem.area());
-        combine(&mut ds, path, |scale, z| scale * z);
-        let mut u = vec![0.0; at.u.len()];
-        self.entropy.step(&at.u, &at.s, &ds, move_lambda as f32, STEP_CAP, &mut u);
-        self.arrive(problem, u, at.lambda * move_lambda.exp())
+        let scale = self.entropy.metric(&at.s, problem.area());
+        self.step(problem, &at, (path, &scale), move_lambda, at.lambda * move_lambda.exp())
     }
 
     /// The path along lambda, from a guess of it or nothing.
@@ -172,8 +188,8 @@ impl Solver<'_> {
         path: &mut Vec<f32>,
     ) {
         path.resize(at.u.len(), 0.0);
-        let pull: Vec<f32> = standing.chi2_gradient.iter().map(|g| -at.lambda as f32 * g).collect();
-        self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &pull, path);
+        let mut pull: Vec<f32> = standing.chi2_gradient.iter().map(|g| -at.lambda as f32 * g).collect();
+        self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &mut pull, path);
     }
 
     /// The Newton step to where lambda is to go.
@@ -185,28 +201,30 @@ impl Solver<'_> {
         move_lambda: f64,
         curvature: Curvature,
     ) -> Newton {
-        let (right, mut step) = (standing.right_after(move_lambda, at), vec![0.0; at.u.len()]);
-        self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &right, &mut step);
-        Newton { decrement: dot(&step, &right).max(0.0), step, move_lambda }
+        let (mut right, mut step) = (standing.right_after(move_lambda, at), vec![0.0; at.u.len()]);
+        let system = System { lambda: at.lambda, scale: &standing.scale, curvature };
+        let norm = self.solve_system(problem, system, &mut right, &mut step);
+        Newton { decrement: (norm * dot(&step, &right)).max(0.0), step, move_lambda }
     }
 
-    /// Solves a system from the start `z`: in double precision where it is to be precise, but right-hand side and solution are in
+    /// Solves a system from the start `z`, and returns the norm of its right-hand side, which is made that of a vector of unit length
+    /// for nothing to be too small or too large. In double precision where it is to be precise, but right-hand side and solution are in
     /// single precision even then, and the steps make up for it.
-    fn solve_system(&self, problem: &mut impl Problem, system: System, right: &[f32], z: &mut [f32]) {
+    fn solve_system(&self, problem: &mut impl Problem, system: System, right: &mut [f32], z: &mut [f32]) -> f64 {
+        let (norm, per_norm) = norm_of(right);
+        scale_by(per_norm, right);
         let System { lambda, scale, curvature } = system;
         if self.settings.cg_tolerance < LOOSE {
-            let mut double = widened(z);
-            let system = System { lambda, scale: &widened(scale), curvature };
-            self.solve_with(problem, system, &widened(right), &mut double);
-            return combine(z, &double, |_, double| double as f32);
+            let (mut double, scale) = (widened(z), widened(scale));
+            scale_by(per_norm, &mut double);
+            self.solve_with(problem, System { lambda, scale: &scale, curvature }, &widened(right), &mut double);
+            combine(z, &double, |_, double| (norm * double) as f32);
+        } else {
+            scale_by(per_norm, z);
+            self.solve_with(problem, system, right, z);
+            scale_by(norm, z);
         }
-        // right-hand sides come with a norm of 1, for nothing to be too small or too large
-        let (norm, per_norm) = norm_of(right);
-        let mut of_unit = right.to_vec();
-        scale_by(per_norm, &mut of_unit);
-        scale_by(per_norm, z);
-        self.solve_with(problem, system, &of_unit, z);
-        scale_by(norm, z);
+        norm
     }
 
     /// The same in the precision of its numbers.
@@ -228,14 +246,10 @@ impl Solver<'_> {
     fn advance(&self, problem: &mut impl Problem, at: &Point, scale: &[f32], newton: Newton) -> Point {
         let lambda = at.lambda * newton.move_lambda.exp();
         let merit = |p: &Point| -p.entropy + 0.5 * lambda * p.chi2;
-        let mut ds = newton.step;
-        combine(&mut ds, scale, |z, scale| z * scale);
         let before = merit(at);
         let mut length = 1.0;
         loop {
-            let mut u = vec![0.0; at.u.len()];
-            self.entropy.step(&at.u, &at.s, &ds, length as f32, STEP_CAP, &mut u);
-            let next = self.arrive(problem, u, lambda);
+            let next = self.step(problem, at, (&newton.step, scale), length, lambda);
             let small = 1e-9 * before.abs() + self.settings.tolerance * lambda;
             if merit(&next) <= before + small || length < 1e-4 {
                 return next;

@@ -85,18 +85,25 @@ pub(super) struct Guide<'a> {
 }
 
 impl Standing {
-    /// Takes the gradient at a point (one pass) and judges it by the guide.
-    pub fn of(problem: &mut impl Problem, entropy: Entropy, at: &Point, goal: Goal, guide: Guide) -> Self {
+    /// Takes the gradient at a point (one pass) and judges it by the guide. `gradient` is memory for it.
+    pub fn of(
+        problem: &mut impl Problem,
+        entropy: Entropy,
+        at: &Point,
+        goal: Goal,
+        guide: Guide,
+        gradient: &mut [f64],
+    ) -> Self {
         let n = at.u.len();
-        let (mut gradient, mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        problem.gradient(&mut gradient);
+        let (mut chi2_gradient, mut right) = (vec![0.0; n], vec![0.0; n]);
+        problem.gradient(gradient);
         let (area, scale) = (problem.area(), entropy.metric(&at.s, problem.area()));
         vector::run(IntoMetric {
             at,
             area,
             default: entropy.default_coordinate(),
             scale: &scale,
-            gradient: &gradient,
+            gradient,
             chi2_gradient: &mut chi2_gradient,
             right: &mut right,
         });

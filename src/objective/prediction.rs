@@ -202,7 +202,7 @@ impl Prediction {
             axpy(shrink * shift, image, &mut step);
         }
         let here = &known.image.coordinates;
-        imager.entropy.step(here, &self.map, &step, 1.0, LARGEST_STEP, &mut coordinates);
+        imager.entropy.step(here, &self.map, &step, LARGEST_STEP, &mut coordinates);
         if !self.bends.is_empty() {
             let mut change = vec![0.0f32; n + 1];
             let shrink = (BEND_REACH / farthest).min(1.0);

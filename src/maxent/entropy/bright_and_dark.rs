@@ -27,10 +27,15 @@ impl Pixel for Brightness {
         (b, b * (u - 1.0) + 1.0)
     }
 
+    #[inline(always)]
+    fn in_single(b: f64) -> [f32; 2] {
+        [b as f32, f32::INFINITY]
+    }
+
     /// Exact up to half of a pixel's brightness taken away, beyond that along the tangent.
     #[inline(always)]
-    fn step(self, i: impl Instructions, b: f64, db: f32) -> f32 {
-        let relative = db / b as f32;
+    fn step(self, i: impl Instructions, [b, _]: [f32; 2], db: f32) -> f32 {
+        let relative = db / b;
         let straight = relative.max(-0.5);
         ln_1p_single(i, straight) + 2.0 * (relative - straight)
     }

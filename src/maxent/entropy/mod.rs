@@ -11,7 +11,7 @@ mod spots;
 use crate::vector;
 use crate::vector::linear::{combine_two, combined, dot};
 use bright_and_dark::Brightness;
-use pixels::{NegativeValue, Pixel, Step};
+use pixels::{Advance, NegativeValue, Pixel, Step};
 use spots::Filling;
 use std::borrow::Cow;
 
@@ -25,6 +25,23 @@ pub enum Entropy {
     },
     /// Of brightnesses B, with the default 1; the coordinate is ln B.
     BrightAndDark,
+}
+
+/// A step of an image in the metric.
+#[derive(Clone, Copy, Debug)]
+pub struct MetricStep<'a> {
+    /// Coordinates before it.
+    pub u: &'a [f64],
+    /// The image before it.
+    pub image: &'a [f64],
+    /// The step, ...
+    pub z: &'a [f32],
+    /// ... the scale of the metric, ...
+    pub scale: &'a [f32],
+    /// ... and how far it is to go.
+    pub length: f32,
+    /// Largest change of a coordinate.
+    pub cap: f32,
 }
 
 impl Entropy {
@@ -66,13 +83,23 @@ impl Entropy {
         }
     }
 
-    /// Coordinates moved by `scale` times the image step `step`, none by more than `cap`; whether any reached the cap.
-    pub fn step(&self, u: &[f64], image: &[f64], step: &[f32], scale: f32, cap: f32, out: &mut [f64]) -> bool {
+    /// Coordinates moved by the image step `step`, none by more than `cap`.
+    pub fn step(&self, u: &[f64], image: &[f64], step: &[f32], cap: f32, out: &mut [f64]) {
         match *self {
             Entropy::Spots { default_logit } => {
-                vector::run(Step { pixel: Filling::new(default_logit), u, image, step, scale, cap, out })
+                vector::run(Step { pixel: Filling::new(default_logit), u, image, step, cap, out });
             }
-            Entropy::BrightAndDark => vector::run(Step { pixel: Brightness, u, image, step, scale, cap, out }),
+            Entropy::BrightAndDark => vector::run(Step { pixel: Brightness, u, image, step, cap, out }),
+        }
+    }
+
+    /// Takes a step: coordinates and image there, and its entropy.
+    pub fn advance(&self, step: MetricStep, area: &[f64], u: &mut [f64], image: &mut [f64]) -> f64 {
+        -match *self {
+            Entropy::Spots { default_logit } => {
+                vector::run(Advance { pixel: Filling::new(default_logit), step, area, u, image })
+            }
+            Entropy::BrightAndDark => vector::run(Advance { pixel: Brightness, step, area, u, image }),
         }
     }
 
@@ -223,12 +250,31 @@ mod tests {
     }
 
     #[test]
+    fn a_step_in_the_metric_is_one_of_the_image_and_its_value_that_of_where_it_leads() {
+        for (entropy, few) in MODELS {
+            // more than one chunk, and part of another
+            let u: Vec<f64> = few.into_iter().cycle().take(1030).collect();
+            let area: Vec<f64> = AREA.into_iter().cycle().take(u.len()).collect();
+            let map = entropy.image(&u);
+            let scale = entropy.metric(&map, &area);
+            let z: Vec<f32> = (0..u.len()).map(|p| (0.7 * p as f32).sin()).collect();
+            let (mut there, mut image) = (vec![f64::NAN; u.len()], vec![f64::NAN; u.len()]);
+            let step = MetricStep { u: &u, image: &map, z: &z, scale: &scale, length: 0.5, cap: 2.0 };
+            let value = entropy.advance(step, &area, &mut there, &mut image);
+            let changes: Vec<f32> = z.iter().zip(&scale).map(|(z, scale)| 0.5 * (z * scale)).collect();
+            let (mut moved, mut of_moved) = (vec![f64::NAN; u.len()], vec![f64::NAN; u.len()]);
+            entropy.step(&u, &map, &changes, 2.0, &mut moved);
+            assert!(there == moved && value == entropy.value(&moved, &area, &mut of_moved) && image == of_moved);
+        }
+    }
+
+    #[test]
     fn steps_are_straight_in_the_image_as_long_as_they_are_small() {
         for (entropy, u) in MODELS {
             let (map, mut moved) = (entropy.image(&u), [0.0; 4]);
             for part in [-0.45, 0.3] {
                 let step: Vec<f32> = map.iter().map(|x| (part * x.min((1.0 - x).abs())) as f32).collect();
-                assert!(!entropy.step(&u, &map, &step, 1.0, 2.0, &mut moved));
+                entropy.step(&u, &map, &step, 2.0, &mut moved);
                 let there = entropy.image(&moved);
                 // single precision
                 let off = |p: usize| (there[p] - map[p]) / f64::from(step[p]) - 1.0;
@@ -236,7 +282,7 @@ mod tests {
             }
             // what would lead out of the domain does not
             for step in [-1e9, 1e9] {
-                assert!(entropy.step(&u, &map, &[step; 4], 1.0, 2.0, &mut moved));
+                entropy.step(&u, &map, &[step; 4], 2.0, &mut moved);
                 assert!(
                     (0..4).all(|p| ((moved[p] - u[p]).abs() - 2.0).abs() < 1e-12 && (moved[p] > u[p]) == (step > 0.0))
                 );

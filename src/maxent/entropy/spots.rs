@@ -5,7 +5,7 @@
 
 use super::pixels::Pixel;
 use crate::vector::Instructions;
-use crate::vector::elementary::{exp_minus, ln_1p, ln_1p_single};
+use crate::vector::elementary::{exp_minus, ln_1p_and_inverse, ln_1p_single};
 
 /// A pixel with its default.
 #[derive(Clone, Copy)]
@@ -30,18 +30,26 @@ impl Pixel for Filling {
     fn value(self, i: impl Instructions, u: f64) -> (f64, f64) {
         // s u - ln(1 + e^u) is s ln s + (1-s) ln(1-s); both parts from one exponential
         let small = exp_minus(i, u.abs());
-        let s = if u > 0.0 { 1.0 } else { small } / (1.0 + small);
-        (s, s * (u - self.default_logit) - (u.max(0.0) + ln_1p(i, small)) + self.at_default)
+        let (logarithm, inverse) = ln_1p_and_inverse(i, small);
+        let s = if u > 0.0 { 1.0 } else { small } * inverse;
+        (s, s * (u - self.default_logit) - (u.max(0.0) + logarithm) + self.at_default)
+    }
+
+    #[inline(always)]
+    fn in_single(s: f64) -> [f32; 2] {
+        [s as f32, (1.0 - s) as f32]
     }
 
     /// Exact up to half way to 0 or 1, beyond that along the tangent.
     #[inline(always)]
-    fn step(self, i: impl Instructions, s: f64, ds: f32) -> f32 {
-        let (s, above) = (s as f32, (1.0 - s) as f32);
+    fn step(self, i: impl Instructions, [s, above]: [f32; 2], ds: f32) -> f32 {
         let room = if ds < 0.0 { s } else { above };
         let straight = ds.abs().min(0.5 * room) * ds.signum();
         let (there, left) = (s + straight, above - straight);
-        ln_1p_single(i, straight / (s * left)) + (ds - straight) / (there * left)
+        // one division for two
+        let (here, there) = (s * left, there * left);
+        let per_both = 1.0 / (here * there);
+        ln_1p_single(i, straight * (there * per_both)) + (ds - straight) * (here * per_both)
     }
 }
 
