@@ -8,7 +8,7 @@
 //! function of problem and start. Left out: what the image shows.
 
 use super::cg::{self, CgLimits};
-use super::entropy::{Entropy, MetricStep};
+use super::entropy::{Entropy, MetricStep, Worth};
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
@@ -141,8 +141,8 @@ impl Solver<'_> {
 
     fn arrive(&self, problem: &mut impl Problem, u: Vec<f64>, lambda: f64) -> Point {
         let mut s = vec![0.0; u.len()];
-        let entropy = self.entropy.value(&u, problem.area(), &mut s);
-        self.stand(problem, u, s, lambda, entropy)
+        let worth = self.entropy.value(&u, problem.area(), &mut s);
+        stand(problem, u, s, lambda, worth)
     }
 
     /// Arrives by the step `length * z` in the metric of `scale`.
@@ -156,14 +156,8 @@ impl Solver<'_> {
     ) -> Point {
         let (mut u, mut s) = (vec![0.0; at.u.len()], vec![0.0; at.u.len()]);
         let step = MetricStep { u: &at.u, image: &at.s, z, scale, length: length as f32, cap: STEP_CAP };
-        let entropy = self.entropy.advance(step, problem.area(), &mut u, &mut s);
-        self.stand(problem, u, s, lambda, entropy)
-    }
-
-    fn stand(&self, problem: &mut impl Problem, u: Vec<f64>, s: Vec<f64>, lambda: f64, entropy: f64) -> Point {
-        let chi2 = problem.linearise(&s);
-        let spottedness = self.entropy.spottedness(&s, problem.area());
-        Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy, spottedness }
+        let worth = self.entropy.advance(step, problem.area(), &mut u, &mut s);
+        stand(problem, u, s, lambda, worth)
     }
 
     /// Moves along the path to where its slope says that chi2 meets the goal: one pass that spares a Newton step.
@@ -282,6 +276,11 @@ impl Solver<'_> {
             newton_steps,
         }
     }
+}
+
+fn stand(problem: &mut impl Problem, u: Vec<f64>, s: Vec<f64>, lambda: f64, worth: Worth) -> Point {
+    let (chi2, Worth { entropy, spottedness }) = (problem.linearise(&s), worth);
+    Point { u, s, lambda: lambda.max(SMALLEST_LAMBDA), chi2, entropy, spottedness }
 }
 
 /// The norm and its inverse, 0 for that of nothing.

@@ -137,23 +137,22 @@ impl<N: Number, const ROWS: usize> Task for WeightedDots<'_, N, ROWS> {
     #[inline(always)]
     fn run<I: Instructions>(self, i: I) -> Self::Output {
         let WeightedDots { x, weights, rows } = self;
-        let (mut sums, whole) = ([[0.0; FEW_PARTS]; ROWS], x.len() / FEW_PARTS * FEW_PARTS);
-        for first in (0..whole).step_by(FEW_PARTS) {
-            let chunk = first..first + FEW_PARTS;
-            let (x, weights, mut product) = (&x[chunk.clone()], &weights[chunk.clone()], [0.0; FEW_PARTS]);
-            for k in 0..FEW_PARTS {
-                product[k] = f64::from(x[k]) * f64::from(weights[k]);
-            }
-            for (sums, row) in sums.iter_mut().zip(&rows) {
-                let row = &row[chunk.clone()];
-                for k in 0..FEW_PARTS {
-                    sums[k] = i.multiply_add(product[k], row[k].into(), sums[k]);
+        let ((chunks, rest), (chunk_weights, rest_weights)) = (x.as_chunks::<PARTS>(), weights.as_chunks::<PARTS>());
+        let (chunk_rows, rest_rows) =
+            (rows.map(|row| row.as_chunks::<PARTS>().0), rows.map(|row| row.as_chunks::<PARTS>().1));
+        let mut sums = [[0.0; PARTS]; ROWS];
+        for (c, (x, weights)) in chunks.iter().zip(chunk_weights).enumerate() {
+            for (sums, row) in sums.iter_mut().zip(chunk_rows) {
+                let row = &row[c];
+                for k in 0..PARTS {
+                    sums[k] = i.multiply_add(f64::from(x[k]) * f64::from(weights[k]), row[k].into(), sums[k]);
                 }
             }
         }
         let mut totals = [0.0; ROWS];
-        for ((total, sums), row) in totals.iter_mut().zip(sums).zip(rows) {
-            let rest = (whole..x.len()).map(|p| f64::from(x[p]) * f64::from(weights[p]) * row[p].into());
+        for ((total, sums), row) in totals.iter_mut().zip(sums).zip(rest_rows) {
+            let rest = rest.iter().zip(rest_weights).zip(row);
+            let rest = rest.map(|((x, weight), row)| f64::from(*x) * f64::from(*weight) * (*row).into());
             *total = sums.into_iter().sum::<f64>() + rest.sum::<f64>();
         }
         totals

@@ -8,7 +8,7 @@
 //! modulus within 22 % (softened at 0.003 to 0.1: 12 to 21 %), because -S is the mean square to lowest order. It has no kink either.
 //! Left out: which entropy an image has (`entropy`), data.
 
-use super::pixels::Pixel;
+use super::pixels::{Pixel, spottedness};
 use crate::vector::Instructions;
 use crate::vector::elementary::{exp_minus, ln_1p_single};
 
@@ -25,6 +25,16 @@ impl Pixel for Brightness {
         let small = exp_minus(i, u.abs());
         let b = if u > 0.0 { 1.0 / small } else { small };
         (b, b * (u - 1.0) + 1.0)
+    }
+
+    #[inline(always)]
+    fn spot(b: f64) -> f64 {
+        (b - 1.0) * (b - 1.0)
+    }
+
+    /// Root mean square deviation from the default.
+    fn spottedness(squares: f64) -> f64 {
+        squares.sqrt()
     }
 
     #[inline(always)]
@@ -57,13 +67,8 @@ pub(super) fn gain(u: f64, change: f64) -> f64 {
     u.exp() * (change.exp_m1() - change)
 }
 
-/// Root mean square deviation from the default.
-pub(super) fn spottedness(b: &[f64], area: &[f64]) -> f64 {
-    b.iter().zip(area).map(|(b, a)| a * (b - 1.0).powi(2)).sum::<f64>().sqrt()
-}
-
-/// Its gradient with respect to B; nought at the default, where it has none.
+/// Gradient of the spottedness with respect to B; nought at the default, where it has none.
 pub(super) fn spottedness_gradient(b: &[f64], area: &[f64]) -> Vec<f64> {
-    let size = spottedness(b, area).max(f64::MIN_POSITIVE);
+    let size = spottedness::<Brightness>(b, area).max(f64::MIN_POSITIVE);
     b.iter().zip(area).map(|(b, a)| a * (b - 1.0) / size).collect()
 }

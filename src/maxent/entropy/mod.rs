@@ -9,9 +9,9 @@ mod pixels;
 mod spots;
 
 use crate::vector;
-use crate::vector::linear::{combine_two, combined, dot};
+use crate::vector::linear::{combine_two, combined};
 use bright_and_dark::Brightness;
-use pixels::{Advance, NegativeValue, Pixel, Step};
+use pixels::{Advance, Pixel, Step, Value, spottedness};
 use spots::Filling;
 use std::borrow::Cow;
 
@@ -25,6 +25,15 @@ pub enum Entropy {
     },
     /// Of brightnesses B, with the default 1; the coordinate is ln B.
     BrightAndDark,
+}
+
+/// What an image is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worth {
+    /// Entropy: at most 0, and 0 at the default.
+    pub entropy: f64,
+    /// Spottedness: how far the image is from one without spots.
+    pub spottedness: f64,
 }
 
 /// A step of an image in the metric.
@@ -93,9 +102,9 @@ impl Entropy {
         }
     }
 
-    /// Takes a step: coordinates and image there, and its entropy.
-    pub fn advance(&self, step: MetricStep, area: &[f64], u: &mut [f64], image: &mut [f64]) -> f64 {
-        -match *self {
+    /// Takes a step: coordinates and image there, and what they are worth.
+    pub fn advance(&self, step: MetricStep, area: &[f64], u: &mut [f64], image: &mut [f64]) -> Worth {
+        match *self {
             Entropy::Spots { default_logit } => {
                 vector::run(Advance { pixel: Filling::new(default_logit), step, area, u, image })
             }
@@ -103,13 +112,13 @@ impl Entropy {
         }
     }
 
-    /// Entropy of the image with coordinates `u` (at most 0, and 0 at the default), and the image itself.
-    pub fn value(&self, u: &[f64], area: &[f64], image: &mut [f64]) -> f64 {
-        -match *self {
+    /// What the image with coordinates `u` is worth, and the image itself.
+    pub fn value(&self, u: &[f64], area: &[f64], image: &mut [f64]) -> Worth {
+        match *self {
             Entropy::Spots { default_logit } => {
-                vector::run(NegativeValue { pixel: Filling::new(default_logit), u, area, image })
+                vector::run(Value { pixel: Filling::new(default_logit), u, area, image })
             }
-            Entropy::BrightAndDark => vector::run(NegativeValue { pixel: Brightness, u, area, image }),
+            Entropy::BrightAndDark => vector::run(Value { pixel: Brightness, u, area, image }),
         }
     }
 
@@ -139,11 +148,11 @@ impl Entropy {
         }
     }
 
-    /// Spottedness: how far the image is from one without spots.
+    /// Spottedness of an image.
     pub fn spottedness(&self, image: &[f64], area: &[f64]) -> f64 {
         match self {
-            Entropy::Spots { .. } => dot(image, area),
-            Entropy::BrightAndDark => bright_and_dark::spottedness(image, area),
+            Entropy::Spots { .. } => spottedness::<Filling>(image, area),
+            Entropy::BrightAndDark => spottedness::<Brightness>(image, area),
         }
     }
 
@@ -188,12 +197,12 @@ mod tests {
         assert_eq!(Entropy::new(1e-3), MODELS[0].0);
         for (entropy, u) in MODELS {
             let mut map = [0.0; 4];
-            let value = entropy.value(&u, &AREA, &mut map);
+            let value = entropy.value(&u, &AREA, &mut map).entropy;
             let wanted: f64 = u.iter().zip(AREA).map(|(u, a)| a * formula(entropy, image(entropy, *u))).sum();
             assert!((value + wanted).abs() < 1e-13, "{entropy:?}: {value} {wanted}");
             assert!(map.iter().zip(entropy.image(&u)).all(|(a, b)| (a / b - 1.0).abs() < 1e-14));
             assert!(map.iter().zip(u).all(|(x, u)| (x / image(entropy, u) - 1.0).abs() < 1e-14));
-            assert!(entropy.value(&[entropy.default_coordinate(); 4], &AREA, &mut map).abs() < 1e-15);
+            assert!(entropy.value(&[entropy.default_coordinate(); 4], &AREA, &mut map).entropy.abs() < 1e-15);
         }
     }
 
@@ -265,6 +274,7 @@ mod tests {
             let (mut moved, mut of_moved) = (vec![f64::NAN; u.len()], vec![f64::NAN; u.len()]);
             entropy.step(&u, &map, &changes, 2.0, &mut moved);
             assert!(there == moved && value == entropy.value(&moved, &area, &mut of_moved) && image == of_moved);
+            assert!((value.spottedness / entropy.spottedness(&image, &area) - 1.0).abs() < 1e-13);
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! Left out: what an entropy is (`spots`, `bright_and_dark`).
 
-use super::MetricStep;
+use super::{MetricStep, Worth};
 use crate::vector::linear::short_dot;
 use crate::vector::{Instructions, Task};
 
@@ -17,6 +17,12 @@ pub(super) trait Pixel: Copy {
     /// The image at coordinate `u`, and its -S per area; to be marked `#[inline(always)]`, as is the step.
     fn value(self, i: impl Instructions, u: f64) -> (f64, f64);
 
+    /// What a pixel adds, per area, to the sum of which spottedness is a function.
+    fn spot(x: f64) -> f64;
+
+    /// Spottedness by that sum.
+    fn spottedness(sum: f64) -> f64;
+
     /// The image in single precision, and what it lacks of the end of its domain.
     fn in_single(x: f64) -> [f32; 2];
 
@@ -27,22 +33,25 @@ pub(super) trait Pixel: Copy {
     fn step(self, i: impl Instructions, image: [f32; 2], dx: f32) -> f32;
 }
 
-/// `-S` of the image with coordinates `u`, and the image itself.
-pub(super) struct NegativeValue<'a, P> {
+/// Entropy and spottedness of the image with coordinates `u`, and the image itself.
+pub(super) struct Value<'a, P> {
     pub pixel: P,
     pub u: &'a [f64],
     pub area: &'a [f64],
     pub image: &'a mut [f64],
 }
 
-impl<P: Pixel> Task for NegativeValue<'_, P> {
-    type Output = f64;
+impl<P: Pixel> Task for Value<'_, P> {
+    type Output = Worth;
 
     #[inline(always)]
-    fn run<I: Instructions>(self, i: I) -> f64 {
-        let NegativeValue { pixel, u, area, image } = self;
-        let chunks = image.chunks_mut(CHUNK).zip(u.chunks(CHUNK)).zip(area.chunks(CHUNK));
-        chunks.map(|((image, u), area)| negative_value(i, pixel, u, area, image)).sum()
+    fn run<I: Instructions>(self, i: I) -> Worth {
+        let Value { pixel, u, area, image } = self;
+        let mut sums = [0.0; 2];
+        for ((image, u), area) in image.chunks_mut(CHUNK).zip(u.chunks(CHUNK)).zip(area.chunks(CHUNK)) {
+            add_values(i, pixel, u, area, image, &mut sums);
+        }
+        worth::<P>(sums)
     }
 }
 
@@ -67,7 +76,7 @@ impl<P: Pixel> Task for Step<'_, P> {
     }
 }
 
-/// A step in the metric, and `-S` and the image where it leads to: a chunk of pixels after another, because most of the time goes into
+/// A step in the metric, and image, entropy and spottedness where it leads to: a chunk of pixels after another, because most of the time goes into
 /// fetching them.
 pub(super) struct Advance<'a, P> {
     pub pixel: P,
@@ -78,12 +87,12 @@ pub(super) struct Advance<'a, P> {
 }
 
 impl<P: Pixel> Task for Advance<'_, P> {
-    type Output = f64;
+    type Output = Worth;
 
     #[inline(always)]
-    fn run<I: Instructions>(self, i: I) -> f64 {
+    fn run<I: Instructions>(self, i: I) -> Worth {
         let Advance { pixel, step, area, u, image } = self;
-        let (mut total, mut changes) = (0.0, [0.0; CHUNK]);
+        let (mut sums, mut changes) = ([0.0; 2], [0.0; CHUNK]);
         for first in (0..u.len()).step_by(CHUNK) {
             let chunk = first..u.len().min(first + CHUNK);
             let changes = &mut changes[..chunk.len()];
@@ -92,20 +101,38 @@ impl<P: Pixel> Task for Advance<'_, P> {
             }
             let (from, u) = ((&step.u[chunk.clone()], &step.image[chunk.clone()]), &mut u[chunk.clone()]);
             take(i, pixel, from, changes, step.cap, u);
-            total += negative_value(i, pixel, u, &area[chunk.clone()], &mut image[chunk]);
+            add_values(i, pixel, u, &area[chunk.clone()], &mut image[chunk], &mut sums);
         }
-        total
+        worth::<P>(sums)
     }
 }
 
-/// Of at most [`CHUNK`] pixels.
+/// Spottedness of an image.
+pub(super) fn spottedness<P: Pixel>(image: &[f64], area: &[f64]) -> f64 {
+    P::spottedness(image.iter().zip(area).map(|(x, area)| area * P::spot(*x)).sum())
+}
+
+/// Adds -S and what spottedness is a function of to two sums, for at most [`CHUNK`] pixels.
 #[inline(always)]
-fn negative_value(i: impl Instructions, pixel: impl Pixel, u: &[f64], area: &[f64], image: &mut [f64]) -> f64 {
-    let mut terms = [0.0; CHUNK];
-    for ((x, &u), term) in image.iter_mut().zip(u).zip(&mut terms) {
+fn add_values<P: Pixel>(
+    i: impl Instructions,
+    pixel: P,
+    u: &[f64],
+    area: &[f64],
+    image: &mut [f64],
+    [negative, spotted]: &mut [f64; 2],
+) {
+    let (mut terms, mut spots) = ([0.0; CHUNK], [0.0; CHUNK]);
+    for ((x, &u), (term, spot)) in image.iter_mut().zip(u).zip(terms.iter_mut().zip(&mut spots)) {
         (*x, *term) = pixel.value(i, u);
+        *spot = P::spot(*x);
     }
-    short_dot(i, area, &terms[..area.len()])
+    *negative += short_dot(i, area, &terms[..area.len()]);
+    *spotted += short_dot(i, area, &spots[..area.len()]);
+}
+
+fn worth<P: Pixel>([negative, spotted]: [f64; 2]) -> Worth {
+    Worth { entropy: -negative, spottedness: P::spottedness(spotted) }
 }
 
 /// Of at most [`CHUNK`] pixels.

@@ -36,6 +36,16 @@ impl Pixel for Filling {
     }
 
     #[inline(always)]
+    fn spot(s: f64) -> f64 {
+        s
+    }
+
+    /// The part of the surface that is covered.
+    fn spottedness(covered: f64) -> f64 {
+        covered
+    }
+
+    #[inline(always)]
     fn in_single(s: f64) -> [f32; 2] {
         [s as f32, (1.0 - s) as f32]
     }
