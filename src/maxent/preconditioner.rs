@@ -16,12 +16,23 @@ use rand_distr::{Distribution, StandardNormal};
 pub struct Preconditioner {
     /// Largest eigenvalues of M.
     eigenvalues: Vec<f64>,
-    /// Pixels on which the basis lives, and others, whose rows are zero, to make their number a multiple of [`LANES`].
+    /// The eigenvectors where most of them is, ...
+    spotted: Rows<i16>,
+    /// ... and on pixels that carry less than [`FAINT_ENERGY`] together: the time goes into fetching rows.
+    faint: Rows<i8>,
+    /// Of a component at most so much is subtracted: less than everything, because rounded eigenvectors are not quite orthonormal.
+    most_subtracted: f64,
+}
+
+/// Eigenvectors on some of the pixels.
+#[derive(Clone, Debug)]
+struct Rows<W> {
+    /// The pixels, and others, whose rows are zero, to make their number a multiple of [`LANES`].
     pixels: Vec<u32>,
     /// How many of them are not there to fill up.
     active: usize,
     /// Of [`LANES`] pixels after [`LANES`] pixels, every eigenvector.
-    rows: Vec<Row>,
+    rows: Vec<Row<W>>,
     /// Unit in which each eigenvector is written.
     units: Vec<f32>,
 }
@@ -36,18 +47,19 @@ const AHEAD: usize = 24;
 /// Sums over pixels that are kept apart.
 const PARTS: usize = 16;
 
-/// What an eigenvector has on pixels side by side, in whole units: half the bytes of a number in single precision, which are what the time
-/// goes into, and as few iterations.
+/// What an eigenvector has on pixels side by side, in whole units.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct Row([i16; LANES]);
+struct Row<W>([W; LANES]);
 
-/// Of a component at most so much is subtracted: what is left must not drown in the rounding of the eigenvectors, or the inverse is no
-/// longer positive.
+/// Of anything at most so much is subtracted: what is left must not drown in rounding, or the inverse is no longer positive.
 const MOST_SUBTRACTED: f64 = 1.0 - 1e-4;
 
 /// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
 const DROPPED_ENERGY: f64 = 2e-3;
+
+/// So are others put among the faint ones, whose entries are rounded to 1/127 of the largest.
+const FAINT_ENERGY: f64 = 0.1;
 
 /// Vectors beyond the wanted rank that the Krylov space has.
 const OVERSAMPLING: usize = 60;
@@ -86,32 +98,19 @@ impl Preconditioner {
         let mut by_energy: Vec<u32> = (0..energy.len() as u32).collect();
         by_energy.sort_by(|&p, &q| energy[p as usize].total_cmp(&energy[q as usize]));
         let total: f64 = energy.iter().sum();
-        let mut dropped = 0.0;
-        let faint = by_energy.iter().take_while(|&&p| {
-            dropped += energy[p as usize];
-            dropped < DROPPED_ENERGY * total
+        let mut below = 0.0;
+        let [dropped, faint] = [DROPPED_ENERGY, FAINT_ENERGY].map(|share| {
+            below = 0.0;
+            let carry_less = by_energy.iter().take_while(|&&p| {
+                below += energy[p as usize];
+                below < share * total
+            });
+            carry_less.count()
         });
-        let first = faint.count();
-        let mut pixels = by_energy.split_off(first);
-        pixels.sort_unstable();
-        let active = pixels.len();
-        // a number that is not finite is none in units of anything: the unit shows it
-        let units = vectors.column_iter().map(|vector| match vector.iter().all(|x| x.is_finite()) {
-            true => vector.amax() / f64::from(i16::MAX),
-            false => f64::NAN,
-        });
-        let units: Vec<f64> = units.collect();
-        let mut rows = vec![Row([0; LANES]); active.div_ceil(LANES) * eigenvalues.len()];
-        for (pixels, rows) in pixels.chunks(LANES).zip(rows.chunks_mut(eigenvalues.len().max(1))) {
-            for (k, Row(row)) in rows.iter_mut().enumerate() {
-                row.iter_mut()
-                    .zip(pixels)
-                    .for_each(|(x, p)| *x = (vectors[(*p as usize, k)] / units[k]).round() as i16);
-            }
-        }
-        let units = units.iter().map(|unit| *unit as f32).collect();
-        pixels.resize(active.next_multiple_of(LANES), 0);
-        Preconditioner { eigenvalues, pixels, active, rows, units }
+        let spotted = Rows::new(vectors, by_energy.split_off(faint));
+        let faint = Rows::new(vectors, by_energy.split_off(dropped));
+        let longest = largest_eigenvalue(spotted.products() + faint.products());
+        Preconditioner { eigenvalues, spotted, faint, most_subtracted: MOST_SUBTRACTED / longest.max(1.0) }
     }
 
     /// Number of eigenvectors.
@@ -121,18 +120,12 @@ impl Preconditioner {
 
     /// Number of pixels on which they live.
     pub fn active_pixels(&self) -> usize {
-        self.active
+        self.spotted.active + self.faint.active
     }
 
     /// Bytes that it takes in memory, all but a few.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.rows[..])
-    }
-
-    /// Pixels side by side and what every eigenvector has there.
-    #[inline(always)]
-    fn groups(&self) -> impl DoubleEndedIterator<Item = (&[u32; LANES], &[Row])> {
-        self.pixels.as_chunks::<LANES>().0.iter().zip(self.rows.chunks_exact(self.rank().max(1)))
+        size_of_val(&self.spotted.rows[..]) + size_of_val(&self.faint.rows[..])
     }
 
     /// Eigenvalues of M, largest first.
@@ -143,24 +136,146 @@ impl Preconditioner {
     /// Approximates `out = (1 + lambda M)^-1 r`.
     pub fn apply<N: Number>(&self, lambda: f64, r: &[N], out: &mut [N]) {
         out.copy_from_slice(r);
-        let mut components = vector::run(Components { basis: self, r });
-        for ((c, e), unit) in components.iter_mut().zip(&self.eigenvalues).zip(&self.units) {
-            *c *= (lambda * e / (1.0 + lambda * e)).min(MOST_SUBTRACTED) as f32 * unit * unit;
+        let mut components = self.components(r);
+        for (c, e) in components.iter_mut().zip(&self.eigenvalues) {
+            *c *= (lambda * e / (1.0 + lambda * e)).min(self.most_subtracted) as f32;
         }
-        vector::run(Subtract { basis: self, components: &components, out });
+        self.subtract(&components, out);
     }
 
     /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
     pub fn norms(&self, lambda: f64, r: &[f32]) -> (f64, f64) {
+        let components = self.components(r);
+        let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));
+        let mut rest = r.to_vec();
+        self.subtract(&components, &mut rest);
+        (spanned.sum(), dot(&rest, &rest))
+    }
+
+    /// Scalar products of `r` with the eigenvectors.
+    fn components<N: Number>(&self, r: &[N]) -> Vec<f32> {
+        let (mut components, of_faint) = (self.spotted.components(r), self.faint.components(r));
+        components.iter_mut().zip(of_faint).for_each(|(c, of_faint)| *c += of_faint);
+        components
+    }
+
+    /// Subtracts a combination of the eigenvectors; in the order that has the last rows of the components, which are still in the
+    /// cache, first.
+    fn subtract<N: Number>(&self, components: &[f32], out: &mut [N]) {
+        self.faint.subtract(components, out);
+        self.spotted.subtract(components, out);
+    }
+}
+
+/// Nothing on no pixels.
+impl<W> Default for Rows<W> {
+    fn default() -> Self {
+        Rows { pixels: Vec::new(), active: 0, rows: Vec::new(), units: Vec::new() }
+    }
+}
+
+impl<W: Whole> Rows<W> {
+    /// Of the columns of `vectors` what they have on these pixels.
+    fn new(vectors: &DMatrix<f64>, mut pixels: Vec<u32>) -> Self {
+        pixels.sort_unstable();
+        let (active, rank) = (pixels.len(), vectors.ncols());
+        // a number that is not finite is none in units of anything: the unit shows it
+        let units = vectors.column_iter().map(|vector| {
+            let numbers = pixels.iter().map(|p| vector[*p as usize].abs());
+            match numbers.clone().all(f64::is_finite) {
+                true => numbers.fold(0.0, f64::max) / W::LARGEST,
+                false => f64::NAN,
+            }
+        });
+        let units: Vec<f64> = units.collect();
+        let mut rows = vec![Row([W::default(); LANES]); active.div_ceil(LANES) * rank];
+        for (pixels, rows) in pixels.chunks(LANES).zip(rows.chunks_mut(rank.max(1))) {
+            for (k, Row(row)) in rows.iter_mut().enumerate() {
+                row.iter_mut().zip(pixels).for_each(|(x, p)| *x = W::nearest(vectors[(*p as usize, k)] / units[k]));
+            }
+        }
+        let units = units.iter().map(|unit| *unit as f32).collect();
+        pixels.resize(active.next_multiple_of(LANES), 0);
+        Rows { pixels, active, rows, units }
+    }
+
+    /// Pixels side by side and what every eigenvector has there.
+    #[inline(always)]
+    fn groups(&self) -> impl DoubleEndedIterator<Item = (&[u32; LANES], &[Row<W>])> {
+        self.pixels.as_chunks::<LANES>().0.iter().zip(self.rows.chunks_exact(self.units.len().max(1)))
+    }
+
+    /// The eigenvectors as they are written here, a pixel in each row.
+    fn rounded(&self) -> DMatrix<f64> {
+        let rank = self.units.len();
+        DMatrix::from_fn(self.active, rank, |i, k| {
+            let Row(row) = &self.rows[i / LANES * rank + k];
+            f64::from(self.units[k]) * row[i % LANES].into()
+        })
+    }
+
+    /// Scalar products of them with each other.
+    fn products(&self) -> DMatrix<f64> {
+        let rounded = self.rounded();
+        rounded.transpose() * rounded
+    }
+
+    /// Scalar products of `r` with the eigenvectors, on these pixels.
+    fn components<N: Number>(&self, r: &[N]) -> Vec<f32> {
         let mut components = vector::run(Components { basis: self, r });
         components.iter_mut().zip(&self.units).for_each(|(c, unit)| *c *= unit);
-        let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));
-        let spanned: f64 = spanned.sum();
-        components.iter_mut().zip(&self.units).for_each(|(c, unit)| *c *= unit);
-        let mut rest = r.to_vec();
-        vector::run(Subtract { basis: self, components: &components, out: &mut rest });
-        (spanned, dot(&rest, &rest))
+        components
     }
+
+    /// Subtracts a combination of the eigenvectors on these pixels.
+    fn subtract<N: Number>(&self, components: &[f32], out: &mut [N]) {
+        let components: Vec<f32> = components.iter().zip(&self.units).map(|(c, unit)| c * unit).collect();
+        vector::run(Subtract { basis: self, components: &components, out });
+    }
+}
+
+/// Whole numbers of which rows are made.
+trait Whole: Copy + Default + Into<f64> {
+    /// The largest of them.
+    const LARGEST: f64;
+
+    /// The nearest to a number.
+    fn nearest(x: f64) -> Self;
+
+    /// Those from entry `first` on, side by side.
+    fn load<I: Instructions>(i: I, from: &[Self], first: usize) -> <I::Broad as Registers>::Lanes;
+}
+
+impl Whole for i16 {
+    const LARGEST: f64 = i16::MAX as f64;
+
+    fn nearest(x: f64) -> Self {
+        x.round() as i16
+    }
+
+    #[inline(always)]
+    fn load<I: Instructions>(i: I, from: &[i16], first: usize) -> <I::Broad as Registers>::Lanes {
+        i.load_whole(from, first)
+    }
+}
+
+impl Whole for i8 {
+    const LARGEST: f64 = i8::MAX as f64;
+
+    fn nearest(x: f64) -> Self {
+        x.round() as i8
+    }
+
+    #[inline(always)]
+    fn load<I: Instructions>(i: I, from: &[i8], first: usize) -> <I::Broad as Registers>::Lanes {
+        i.load_bytes(from, first)
+    }
+}
+
+/// The largest eigenvalue of a symmetric matrix; 0 of one that is empty or not finite.
+fn largest_eigenvalue(matrix: DMatrix<f64>) -> f64 {
+    let is_one = !matrix.is_empty() && matrix.iter().all(|x| x.is_finite());
+    if is_one { matrix.symmetric_eigenvalues().max() } else { 0.0 }
 }
 
 /// An orthonormal basis of the block Krylov space of an operator from a fixed random start, with about so many columns, and what the
@@ -197,18 +312,18 @@ fn krylov(n: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -
 struct Sums([f32; PARTS]);
 
 /// Scalar products of `r` with the eigenvectors, in units of each; single precision suffices for an approximate inverse.
-struct Components<'a, N> {
-    basis: &'a Preconditioner,
+struct Components<'a, W, N> {
+    basis: &'a Rows<W>,
     r: &'a [N],
 }
 
-impl<N: Number> Task for Components<'_, N> {
+impl<W: Whole, N: Number> Task for Components<'_, W, N> {
     type Output = Vec<f32>;
 
     #[inline(always)]
     fn run<I: Instructions>(self, i: I) -> Vec<f32> {
         let singles = i.broad();
-        let mut sums = vec![Sums([0.0; PARTS]); self.basis.rank()];
+        let mut sums = vec![Sums([0.0; PARTS]); self.basis.units.len()];
         for (pixels, rows) in self.basis.groups() {
             let mut r = [0.0; LANES];
             for (r, p) in r.iter_mut().zip(pixels) {
@@ -225,7 +340,7 @@ impl<N: Number> Task for Components<'_, N> {
                     let Row(row) = row;
                     let mut total = singles.load(sum, first);
                     for (k, part) in parts.into_iter().enumerate() {
-                        total = singles.multiply_add(i.load_whole(row, k * PARTS + first), part, total);
+                        total = singles.multiply_add(W::load(i, row, k * PARTS + first), part, total);
                     }
                     singles.store(total, sum, first);
                 }
@@ -239,14 +354,14 @@ impl<N: Number> Task for Components<'_, N> {
 const WIDE: usize = 4;
 
 /// Subtracts a combination of the eigenvectors from `out`.
-struct Subtract<'a, N> {
-    basis: &'a Preconditioner,
+struct Subtract<'a, W, N> {
+    basis: &'a Rows<W>,
     /// In units of each eigenvector.
     components: &'a [f32],
     out: &'a mut [N],
 }
 
-impl<N: Number> Task for Subtract<'_, N> {
+impl<W: Whole, N: Number> Task for Subtract<'_, W, N> {
     type Output = ();
 
     #[inline(always)]
@@ -260,7 +375,7 @@ impl<N: Number> Task for Subtract<'_, N> {
                 for (Row(row), component) in rows.iter().zip(self.components) {
                     let component = singles.splat(*component);
                     for (k, sum) in sums.iter_mut().enumerate() {
-                        *sum = singles.multiply_add(i.load_whole(row, first + k * lanes), component, *sum);
+                        *sum = singles.multiply_add(W::load(i, row, first + k * lanes), component, *sum);
                     }
                 }
                 for (k, sum) in sums.into_iter().enumerate() {
@@ -278,9 +393,6 @@ impl<N: Number> Task for Subtract<'_, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Eigenvectors of up to 83 entries, each off by 2e-5 of the largest.
-    const ROUNDED: f64 = 2e-4;
 
     #[test]
     fn inverts_a_low_rank_system() {
@@ -350,30 +462,39 @@ mod tests {
             // orthonormal columns that live on all pixels
             let noise = DMatrix::from_fn(n, rank, |i, k| (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin());
             let vectors = noise.qr().q();
-            let eigenvalues: Vec<f64> = (0..rank).map(|k| 100.0 / (1.0 + k as f64)).collect();
-            let preconditioner = Preconditioner::on_active_pixels(eigenvalues.clone(), &vectors);
             let r: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
-            let (dense_r, lambda) = (nalgebra::DVector::from_column_slice(&r), 0.4);
-            let along = vectors.transpose() * &dense_r;
-            let kept = nalgebra::DVector::from_fn(rank, |k, _| {
-                along[k] * lambda * eigenvalues[k] / (1.0 + lambda * eigenvalues[k])
-            });
-            let (wanted, mut out) = (&dense_r - &vectors * kept, vec![0.0; n]);
+            let along = vectors.transpose() * nalgebra::DVector::from_column_slice(&r);
+            components_are(along.as_slice(), &r, &Rows::<i16>::new(&vectors, (0..n as u32).collect()));
+            components_are(along.as_slice(), &r, &Rows::<i8>::new(&vectors, (0..n as u32).collect()));
+            let eigenvalues: Vec<f64> = (0..rank).map(|k| 100.0 / (1.0 + k as f64)).collect();
+            let (preconditioner, lambda) = (Preconditioner::on_active_pixels(eigenvalues, &vectors), 0.4);
+            assert!(preconditioner.active_pixels() == n && preconditioner.rank() == rank);
+            let (wanted, mut out) = (inverse_by_the_rounded(&preconditioner, lambda, &r), vec![0.0; n]);
             preconditioner.apply(lambda, &r, &mut out);
-            assert!(
-                out.iter().zip(wanted.iter()).all(|(a, b)| (a - b).abs() < ROUNDED),
-                "{n} {rank}: {out:?} {wanted}"
-            );
-            let basis = &preconditioner;
-            let components = vector::by_each(|| Components { basis, r: &r });
-            for components in &components {
-                for ((component, unit), along) in components.iter().zip(&basis.units).zip(along.iter()) {
-                    // every entry is off by half a unit at most, and sums are in single precision
-                    let off = f64::from(*unit) * 0.5 * r.iter().map(|r| r.abs()).sum::<f64>() + 1e-5;
-                    assert!((f64::from(component * unit) - along).abs() < off, "{n} {rank}: {component} {along}");
-                }
-            }
-            assert!(components[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
+            assert!(out.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-6), "{n} {rank}: {out:?} {wanted:?}");
         }
+    }
+
+    fn inverse_by_the_rounded(preconditioner: &Preconditioner, lambda: f64, r: &[f64]) -> Vec<f64> {
+        let Preconditioner { eigenvalues, spotted, faint, .. } = preconditioner;
+        let mut vectors = DMatrix::zeros(r.len(), eigenvalues.len());
+        for (pixels, rounded) in [(&spotted.pixels, spotted.rounded()), (&faint.pixels, faint.rounded())] {
+            rounded.row_iter().zip(pixels).for_each(|(row, p)| vectors.set_row(*p as usize, &row));
+        }
+        let mut kept = vectors.transpose() * nalgebra::DVector::from_column_slice(r);
+        kept.iter_mut().zip(eigenvalues).for_each(|(c, e)| *c *= lambda * e / (1.0 + lambda * e));
+        r.iter().zip(&(vectors * kept)).map(|(r, back)| r - back).collect()
+    }
+
+    fn components_are<W: Whole>(wanted: &[f64], r: &[f64], basis: &Rows<W>) {
+        let components = vector::by_each(|| Components { basis, r });
+        for components in &components {
+            for ((component, unit), wanted) in components.iter().zip(&basis.units).zip(wanted) {
+                // every entry is off by half a unit at most, and sums are in single precision
+                let off = f64::from(*unit) * 0.5 * r.iter().map(|r| r.abs()).sum::<f64>() + 1e-5;
+                assert!((f64::from(component * unit) - wanted).abs() < off, "{component} {wanted}");
+            }
+        }
+        assert!(components[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
     }
 }

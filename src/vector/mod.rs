@@ -44,6 +44,9 @@ pub trait Instructions: Copy + sealed::Sealed {
     /// The whole numbers from entry `first` on.
     fn load_whole(self, from: &[i16], first: usize) -> <Self::Broad as Registers>::Lanes;
 
+    /// The same of bytes.
+    fn load_bytes(self, from: &[i8], first: usize) -> <Self::Broad as Registers>::Lanes;
+
     /// `a b + c`, fused where the processor can.
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64;
 

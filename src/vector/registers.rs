@@ -156,6 +156,12 @@ impl Instructions for Portable {
     }
 
     #[inline(always)]
+    fn load_bytes(self, from: &[i8], first: usize) -> [f32; 4] {
+        let numbers: &[i8; 4] = from[first..].first_chunk().expect("as many numbers");
+        numbers.map(f32::from)
+    }
+
+    #[inline(always)]
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
         a * b + c
     }

@@ -34,6 +34,12 @@ impl Instructions for Avx2 {
     }
 
     #[inline(always)]
+    fn load_bytes(self, from: &[i8], first: usize) -> __m256 {
+        let eight: &[i8; 8] = from[first..].first_chunk().expect("as many numbers");
+        unsafe { _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64(eight.as_ptr().cast()))) }
+    }
+
+    #[inline(always)]
     fn multiply_add(self, a: f64, b: f64, c: f64) -> f64 {
         a.mul_add(b, c)
     }
@@ -69,6 +75,12 @@ impl Instructions for Avx512 {
     fn load_whole(self, from: &[i16], first: usize) -> __m512 {
         let sixteen: &[i16; 16] = from[first..].first_chunk().expect("as many numbers");
         unsafe { _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(sixteen.as_ptr().cast()))) }
+    }
+
+    #[inline(always)]
+    fn load_bytes(self, from: &[i8], first: usize) -> __m512 {
+        let sixteen: &[i8; 16] = from[first..].first_chunk().expect("as many numbers");
+        unsafe { _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(_mm_loadu_si128(sixteen.as_ptr().cast()))) }
     }
 
     #[inline(always)]
