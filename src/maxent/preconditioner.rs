@@ -98,9 +98,8 @@ impl Preconditioner {
         let mut by_energy: Vec<u32> = (0..energy.len() as u32).collect();
         by_energy.sort_by(|&p, &q| energy[p as usize].total_cmp(&energy[q as usize]));
         let total: f64 = energy.iter().sum();
-        let mut below = 0.0;
         let [dropped, faint] = [DROPPED_ENERGY, FAINT_ENERGY].map(|share| {
-            below = 0.0;
+            let mut below = 0.0;
             let carry_less = by_energy.iter().take_while(|&&p| {
                 below += energy[p as usize];
                 below < share * total
@@ -446,12 +445,14 @@ mod tests {
         for strongest in [1e3, 1e5, 1e7, 1e12] {
             let eigenvalues: Vec<f64> = (0..rank).map(|k| strongest * 10f64.powf(-0.02 * k as f64)).collect();
             let preconditioner = Preconditioner::on_active_pixels(eigenvalues, &vectors);
-            let mut applied = DMatrix::zeros(n, rank);
-            for k in 0..rank {
-                preconditioner.apply(1.0, vectors.column(k).as_slice(), applied.column_mut(k).as_mut_slice());
+            let mut applied = DMatrix::zeros(n, n);
+            for k in 0..n {
+                let unit: Vec<f32> = (0..n).map(|p| f32::from(p == k)).collect();
+                let mut column = vec![0.0f32; n];
+                preconditioner.apply(1.0, &unit, &mut column);
+                applied.column_mut(k).iter_mut().zip(column).for_each(|(x, single)| *x = f64::from(single));
             }
-            let within = vectors.transpose() * applied;
-            let smallest = SymmetricEigen::new(0.5 * (&within + within.transpose())).eigenvalues.min();
+            let smallest = (0.5 * (&applied + applied.transpose())).symmetric_eigenvalues().min();
             assert!(smallest > 0.0, "{strongest:e}: {smallest:e}");
         }
     }

@@ -198,11 +198,12 @@ impl Solver<'_> {
         let (mut right, mut step) = (standing.right_after(move_lambda, at), vec![0.0; at.u.len()]);
         let system = System { lambda: at.lambda, scale: &standing.scale, curvature };
         let norm = self.solve_system(problem, system, &mut right, &mut step);
+        // the right-hand side has unit length now
         Newton { decrement: (norm * dot(&step, &right)).max(0.0), step, move_lambda }
     }
 
-    /// Solves a system from the start `z`, and returns the norm of its right-hand side, which is made that of a vector of unit length
-    /// for nothing to be too small or too large. In double precision where it is to be precise, but right-hand side and solution are in
+    /// Solves a system from the start `z`. The right-hand side is scaled to unit length, so that nothing is too small or too large for
+    /// single precision; returns how long it was. In double precision where it is to be precise, but right-hand side and solution are in
     /// single precision even then, and the steps make up for it.
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &mut [f32], z: &mut [f32]) -> f64 {
         let (norm, per_norm) = norm_of(right);

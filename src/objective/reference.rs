@@ -14,7 +14,7 @@ use crate::star::Response;
 use std::sync::Arc;
 
 /// Rank of the preconditioner; directions beyond it have lambda x curvature below 1 on the paper's setup.
-const PRECONDITIONER_RANK: usize = 120;
+const PRECONDITIONER_RANK: usize = 112;
 
 /// Directions with lambda x curvature below this need no preconditioning.
 const SMALLEST_CURVATURE: f64 = 0.2;

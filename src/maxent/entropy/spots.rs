@@ -56,12 +56,17 @@ impl Pixel for Filling {
         let room = if ds < 0.0 { s } else { above };
         let straight = ds.abs().min(0.5 * room) * ds.signum();
         let (there, left) = (s + straight, above - straight);
-        // one division for two
+        // one division for two, of a product that vanishes where the default is nearer to 0 than pixels may be
         let (here, there) = (s * left, there * left);
-        let per_both = 1.0 / (here * there);
-        ln_1p_single(i, straight * (there * per_both)) + (ds - straight) * (here * per_both)
+        let per_both = 1.0 / (here * there).max(f32::MIN_POSITIVE);
+        // next to s = 1 rounding makes -1 of it, or less
+        let relative = (straight * (there * per_both)).max(LOWEST_RELATIVE);
+        ln_1p_single(i, relative) + (ds - straight) * (here * per_both)
     }
 }
+
+/// Its logarithm is a change beyond any that a step may make.
+const LOWEST_RELATIVE: f32 = -0.99;
 
 /// The image s.
 pub(super) fn image(u: &[f64]) -> Vec<f64> {
