@@ -465,8 +465,8 @@ mod tests {
             let vectors = noise.qr().q();
             let r: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
             let along = vectors.transpose() * nalgebra::DVector::from_column_slice(&r);
-            components_are(along.as_slice(), &r, &Rows::<i16>::new(&vectors, (0..n as u32).collect()));
-            components_are(along.as_slice(), &r, &Rows::<i8>::new(&vectors, (0..n as u32).collect()));
+            check_rows(along.as_slice(), &r, &Rows::<i16>::new(&vectors, (0..n as u32).collect()));
+            check_rows(along.as_slice(), &r, &Rows::<i8>::new(&vectors, (0..n as u32).collect()));
             let eigenvalues: Vec<f64> = (0..rank).map(|k| 100.0 / (1.0 + k as f64)).collect();
             let (preconditioner, lambda) = (Preconditioner::on_active_pixels(eigenvalues, &vectors), 0.4);
             assert!(preconditioner.active_pixels() == n && preconditioner.rank() == rank);
@@ -487,7 +487,27 @@ mod tests {
         r.iter().zip(&(vectors * kept)).map(|(r, back)| r - back).collect()
     }
 
-    fn components_are<W: Whole>(wanted: &[f64], r: &[f64], basis: &Rows<W>) {
+    /// What is left of `r` without a combination of the eigenvectors.
+    struct Without<'a, W> {
+        basis: &'a Rows<W>,
+        components: &'a [f32],
+        r: &'a [f64],
+    }
+
+    impl<W: Whole> Task for Without<'_, W> {
+        type Output = Vec<f64>;
+
+        #[inline(always)]
+        fn run<I: Instructions>(self, i: I) -> Vec<f64> {
+            let Without { basis, components, r } = self;
+            let mut out = r.to_vec();
+            Subtract { basis, components, out: &mut out }.run(i);
+            out
+        }
+    }
+
+    /// Holds components and what is left without them to what the eigenvectors say.
+    fn check_rows<W: Whole>(wanted: &[f64], r: &[f64], basis: &Rows<W>) {
         let components = vector::by_each(|| Components { basis, r });
         for components in &components {
             for ((component, unit), wanted) in components.iter().zip(&basis.units).zip(wanted) {
@@ -497,5 +517,15 @@ mod tests {
             }
         }
         assert!(components[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
+        let in_units: Vec<f32> = components[0].iter().zip(&basis.units).map(|(c, unit)| c * unit * unit).collect();
+        let combined = basis.rounded()
+            * nalgebra::DVector::from_fn(in_units.len(), |k, _| f64::from(in_units[k] / basis.units[k]));
+        let left = vector::by_each(|| Without { basis, components: &in_units, r });
+        for left in &left {
+            for (pixel, combined) in basis.pixels.iter().map(|p| *p as usize).zip(&combined) {
+                assert!((left[pixel] - (r[pixel] - combined)).abs() < 1e-5, "{pixel}: {left:?}");
+            }
+        }
+        assert!(left[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
     }
 }
