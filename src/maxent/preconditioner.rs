@@ -517,13 +517,15 @@ mod tests {
             }
         }
         assert!(components[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
-        let in_units: Vec<f32> = components[0].iter().zip(&basis.units).map(|(c, unit)| c * unit * unit).collect();
-        let combined = basis.rounded()
-            * nalgebra::DVector::from_fn(in_units.len(), |k, _| f64::from(in_units[k] / basis.units[k]));
+        let along: Vec<f32> = components[0].iter().zip(&basis.units).map(|(c, unit)| c * unit).collect();
+        let combined = basis.rounded() * nalgebra::DVector::from_fn(along.len(), |k, _| f64::from(along[k]));
+        // rows of whole numbers: their components have the units
+        let in_units: Vec<f32> = along.iter().zip(&basis.units).map(|(c, unit)| c * unit).collect();
         let left = vector::by_each(|| Without { basis, components: &in_units, r });
         for left in &left {
-            for (pixel, combined) in basis.pixels.iter().map(|p| *p as usize).zip(&combined) {
-                assert!((left[pixel] - (r[pixel] - combined)).abs() < 1e-5, "{pixel}: {left:?}");
+            for (pixel, taken) in basis.pixels.iter().map(|p| *p as usize).zip(&combined) {
+                let (left, wanted) = (left[pixel], r[pixel] - taken);
+                assert!((left - wanted).abs() < 1e-5, "{pixel}: {left} {wanted}");
             }
         }
         assert!(left[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
