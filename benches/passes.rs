@@ -54,8 +54,8 @@ fn main() {
          {OTHER_ROUNDS} rounds, one run. `read` sums as many bytes as the response stores for its pairs, by the same instructions, \
          `plain read` by those that the plain loop is compiled for ({} bytes a pair in the plain loop, whose windows have {WINDOW} \
          bins). `build` is a response for new stellar parameters, `shift` one for a new orbit; there and back are two passes, and \
-         the time is that of one. Ratios are of whole passes: the plain loop looks at the middle of a pixel alone, and has 2 to 3 % \
-         fewer pairs.",
+         the time is that of one. Ratios are of whole passes: the plain loop looks at the middle of a pixel alone, and has fewer \
+         pairs.",
         PlainLoop::<WINDOW>::PAIR_BYTES,
     ));
 }

@@ -3,13 +3,16 @@
 //!
 //! In the entropy's metric the system is `1 + lambda M`, and M has a few hundred eigenvalues above 0.01 whatever the number
 //! of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and lives on the
-//! pixels that carry it: the spotted part of the star. Left out: when to rebuild it.
+//! pixels that carry it: the spotted part of the star. Left out: how it is stored and multiplied (`rows`), when to rebuild it.
 
+mod rows;
+
+use crate::vector::Number;
 use crate::vector::linear::dot;
-use crate::vector::{self, Instructions, Number, Registers, Task};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+use rows::Rows;
 
 /// `(1 + lambda M)^-1` on the span of M's largest eigenvectors, the identity elsewhere.
 #[derive(Clone, Debug, Default)]
@@ -23,34 +26,6 @@ pub struct Preconditioner {
     /// Of a component at most so much is subtracted: less than everything, because rounded eigenvectors are not quite orthonormal.
     most_subtracted: f64,
 }
-
-/// Eigenvectors on some of the pixels.
-#[derive(Clone, Debug)]
-struct Rows<W> {
-    /// The pixels, and others, whose rows are zero, to make their number a multiple of [`LANES`].
-    pixels: Vec<u32>,
-    /// How many of them are not there to fill up.
-    active: usize,
-    /// Of [`LANES`] pixels after [`LANES`] pixels, every eigenvector.
-    rows: Vec<Row<W>>,
-    /// Unit in which each eigenvector is written.
-    units: Vec<f32>,
-}
-
-/// Pixels side by side: four of the widest registers, so that a sum over pixels is stored once for four products, and sums over
-/// eigenvectors do not wait for each other.
-const LANES: usize = 64;
-
-/// Rows from the one at work to the one that is asked for.
-const AHEAD: usize = 24;
-
-/// Sums over pixels that are kept apart.
-const PARTS: usize = 16;
-
-/// What an eigenvector has on pixels side by side, in whole units.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-struct Row<W>([W; LANES]);
 
 /// Of anything at most so much is subtracted: what is left must not drown in rounding, or the inverse is no longer positive.
 const MOST_SUBTRACTED: f64 = 1.0 - 1e-4;
@@ -119,12 +94,12 @@ impl Preconditioner {
 
     /// Number of pixels on which they live.
     pub fn active_pixels(&self) -> usize {
-        self.spotted.active + self.faint.active
+        self.spotted.pixels() + self.faint.pixels()
     }
 
     /// Bytes that it takes in memory, all but a few.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.spotted.rows[..]) + size_of_val(&self.faint.rows[..])
+        self.spotted.bytes() + self.faint.bytes()
     }
 
     /// Eigenvalues of M, largest first.
@@ -166,111 +141,6 @@ impl Preconditioner {
     }
 }
 
-/// Nothing on no pixels.
-impl<W> Default for Rows<W> {
-    fn default() -> Self {
-        Rows { pixels: Vec::new(), active: 0, rows: Vec::new(), units: Vec::new() }
-    }
-}
-
-impl<W: Whole> Rows<W> {
-    /// Of the columns of `vectors` what they have on these pixels.
-    fn new(vectors: &DMatrix<f64>, mut pixels: Vec<u32>) -> Self {
-        pixels.sort_unstable();
-        let (active, rank) = (pixels.len(), vectors.ncols());
-        // a number that is not finite is none in units of anything: the unit shows it
-        let units = vectors.column_iter().map(|vector| {
-            let numbers = pixels.iter().map(|p| vector[*p as usize].abs());
-            match numbers.clone().all(f64::is_finite) {
-                true => numbers.fold(0.0, f64::max) / W::LARGEST,
-                false => f64::NAN,
-            }
-        });
-        let units: Vec<f64> = units.collect();
-        let mut rows = vec![Row([W::default(); LANES]); active.div_ceil(LANES) * rank];
-        for (pixels, rows) in pixels.chunks(LANES).zip(rows.chunks_mut(rank.max(1))) {
-            for (k, Row(row)) in rows.iter_mut().enumerate() {
-                row.iter_mut().zip(pixels).for_each(|(x, p)| *x = W::nearest(vectors[(*p as usize, k)] / units[k]));
-            }
-        }
-        let units = units.iter().map(|unit| *unit as f32).collect();
-        pixels.resize(active.next_multiple_of(LANES), 0);
-        Rows { pixels, active, rows, units }
-    }
-
-    /// Pixels side by side and what every eigenvector has there.
-    #[inline(always)]
-    fn groups(&self) -> impl DoubleEndedIterator<Item = (&[u32; LANES], &[Row<W>])> {
-        self.pixels.as_chunks::<LANES>().0.iter().zip(self.rows.chunks_exact(self.units.len().max(1)))
-    }
-
-    /// The eigenvectors as they are written here, a pixel in each row.
-    fn rounded(&self) -> DMatrix<f64> {
-        let rank = self.units.len();
-        DMatrix::from_fn(self.active, rank, |i, k| {
-            let Row(row) = &self.rows[i / LANES * rank + k];
-            f64::from(self.units[k]) * row[i % LANES].into()
-        })
-    }
-
-    /// Scalar products of them with each other.
-    fn products(&self) -> DMatrix<f64> {
-        let rounded = self.rounded();
-        rounded.transpose() * rounded
-    }
-
-    /// Scalar products of `r` with the eigenvectors, on these pixels.
-    fn components<N: Number>(&self, r: &[N]) -> Vec<f32> {
-        let mut components = vector::run(Components { basis: self, r });
-        components.iter_mut().zip(&self.units).for_each(|(c, unit)| *c *= unit);
-        components
-    }
-
-    /// Subtracts a combination of the eigenvectors on these pixels.
-    fn subtract<N: Number>(&self, components: &[f32], out: &mut [N]) {
-        let components: Vec<f32> = components.iter().zip(&self.units).map(|(c, unit)| c * unit).collect();
-        vector::run(Subtract { basis: self, components: &components, out });
-    }
-}
-
-/// Whole numbers of which rows are made.
-trait Whole: Copy + Default + Into<f64> {
-    /// The largest of them.
-    const LARGEST: f64;
-
-    /// The nearest to a number.
-    fn nearest(x: f64) -> Self;
-
-    /// Those from entry `first` on, side by side.
-    fn load<I: Instructions>(i: I, from: &[Self], first: usize) -> <I::Broad as Registers>::Lanes;
-}
-
-impl Whole for i16 {
-    const LARGEST: f64 = i16::MAX as f64;
-
-    fn nearest(x: f64) -> Self {
-        x.round() as i16
-    }
-
-    #[inline(always)]
-    fn load<I: Instructions>(i: I, from: &[i16], first: usize) -> <I::Broad as Registers>::Lanes {
-        i.load_whole(from, first)
-    }
-}
-
-impl Whole for i8 {
-    const LARGEST: f64 = i8::MAX as f64;
-
-    fn nearest(x: f64) -> Self {
-        x.round() as i8
-    }
-
-    #[inline(always)]
-    fn load<I: Instructions>(i: I, from: &[i8], first: usize) -> <I::Broad as Registers>::Lanes {
-        i.load_bytes(from, first)
-    }
-}
-
 /// The largest eigenvalue of a symmetric matrix; 0 of one that is empty or not finite.
 fn largest_eigenvalue(matrix: DMatrix<f64>) -> f64 {
     let is_one = !matrix.is_empty() && matrix.iter().all(|x| x.is_finite());
@@ -303,90 +173,6 @@ fn krylov(n: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -
         block.copy_from(&image.columns(first, width));
     }
     (basis, image)
-}
-
-/// Sums on a cache line of their own.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-struct Sums([f32; PARTS]);
-
-/// Scalar products of `r` with the eigenvectors, in units of each; single precision suffices for an approximate inverse.
-struct Components<'a, W, N> {
-    basis: &'a Rows<W>,
-    r: &'a [N],
-}
-
-impl<W: Whole, N: Number> Task for Components<'_, W, N> {
-    type Output = Vec<f32>;
-
-    #[inline(always)]
-    fn run<I: Instructions>(self, i: I) -> Vec<f32> {
-        let singles = i.broad();
-        let mut sums = vec![Sums([0.0; PARTS]); self.basis.units.len()];
-        for (pixels, rows) in self.basis.groups() {
-            let mut r = [0.0; LANES];
-            for (r, p) in r.iter_mut().zip(pixels) {
-                let number: f64 = self.r[*p as usize].into();
-                *r = number as f32;
-            }
-            for first in (0..PARTS).step_by(I::Broad::LANES) {
-                let mut parts = [singles.splat(0.0); LANES / PARTS];
-                for (k, part) in parts.iter_mut().enumerate() {
-                    *part = singles.load(&r, k * PARTS + first);
-                }
-                for (Sums(sum), row) in sums.iter_mut().zip(rows) {
-                    vector::fetch_ahead(row, AHEAD);
-                    let Row(row) = row;
-                    let mut total = singles.load(sum, first);
-                    for (k, part) in parts.into_iter().enumerate() {
-                        total = singles.multiply_add(W::load(i, row, k * PARTS + first), part, total);
-                    }
-                    singles.store(total, sum, first);
-                }
-            }
-        }
-        sums.iter().map(|Sums(sum)| sum.iter().sum()).collect()
-    }
-}
-
-/// Registers of sums over eigenvectors.
-const WIDE: usize = 4;
-
-/// Subtracts a combination of the eigenvectors from `out`.
-struct Subtract<'a, W, N> {
-    basis: &'a Rows<W>,
-    /// In units of each eigenvector.
-    components: &'a [f32],
-    out: &'a mut [N],
-}
-
-impl<W: Whole, N: Number> Task for Subtract<'_, W, N> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Instructions>(self, i: I) {
-        let (singles, lanes) = (i.broad(), I::Broad::LANES);
-        // backwards: the last rows are still in the cache
-        for (pixels, rows) in self.basis.groups().rev() {
-            let mut subtracted = [0.0; LANES];
-            for first in (0..LANES).step_by(WIDE * lanes) {
-                let mut sums = [singles.splat(0.0); WIDE];
-                for (Row(row), component) in rows.iter().zip(self.components) {
-                    let component = singles.splat(*component);
-                    for (k, sum) in sums.iter_mut().enumerate() {
-                        *sum = singles.multiply_add(W::load(i, row, first + k * lanes), component, *sum);
-                    }
-                }
-                for (k, sum) in sums.into_iter().enumerate() {
-                    singles.store(sum, &mut subtracted, first + k * lanes);
-                }
-            }
-            for (subtracted, pixel) in subtracted.into_iter().zip(pixels) {
-                let out = &mut self.out[*pixel as usize];
-                *out = *out - N::of(f64::from(subtracted));
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -458,15 +244,10 @@ mod tests {
     }
 
     #[test]
-    fn any_rank_on_any_number_of_pixels_by_all_instructions() {
+    fn any_rank_on_any_number_of_pixels() {
         for (n, rank) in [(1, 1), (16, 4), (40, 7), (83, 12)] {
-            // orthonormal columns that live on all pixels
-            let noise = DMatrix::from_fn(n, rank, |i, k| (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin());
-            let vectors = noise.qr().q();
+            let vectors = orthonormal(n, rank);
             let r: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
-            let along = vectors.transpose() * nalgebra::DVector::from_column_slice(&r);
-            check_rows(along.as_slice(), &r, &Rows::<i16>::new(&vectors, (0..n as u32).collect()));
-            check_rows(along.as_slice(), &r, &Rows::<i8>::new(&vectors, (0..n as u32).collect()));
             let eigenvalues: Vec<f64> = (0..rank).map(|k| 100.0 / (1.0 + k as f64)).collect();
             let (preconditioner, lambda) = (Preconditioner::on_active_pixels(eigenvalues, &vectors), 0.4);
             assert!(preconditioner.active_pixels() == n && preconditioner.rank() == rank);
@@ -476,58 +257,16 @@ mod tests {
         }
     }
 
+    /// Orthonormal columns that live on all pixels.
+    pub(super) fn orthonormal(n: usize, rank: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(n, rank, |i, k| (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin()).qr().q()
+    }
+
     fn inverse_by_the_rounded(preconditioner: &Preconditioner, lambda: f64, r: &[f64]) -> Vec<f64> {
         let Preconditioner { eigenvalues, spotted, faint, .. } = preconditioner;
-        let mut vectors = DMatrix::zeros(r.len(), eigenvalues.len());
-        for (pixels, rounded) in [(&spotted.pixels, spotted.rounded()), (&faint.pixels, faint.rounded())] {
-            rounded.row_iter().zip(pixels).for_each(|(row, p)| vectors.set_row(*p as usize, &row));
-        }
+        let vectors = spotted.on_all(r.len()) + faint.on_all(r.len());
         let mut kept = vectors.transpose() * nalgebra::DVector::from_column_slice(r);
         kept.iter_mut().zip(eigenvalues).for_each(|(c, e)| *c *= lambda * e / (1.0 + lambda * e));
         r.iter().zip(&(vectors * kept)).map(|(r, back)| r - back).collect()
-    }
-
-    /// What is left of `r` without a combination of the eigenvectors.
-    struct Without<'a, W> {
-        basis: &'a Rows<W>,
-        components: &'a [f32],
-        r: &'a [f64],
-    }
-
-    impl<W: Whole> Task for Without<'_, W> {
-        type Output = Vec<f64>;
-
-        #[inline(always)]
-        fn run<I: Instructions>(self, i: I) -> Vec<f64> {
-            let Without { basis, components, r } = self;
-            let mut out = r.to_vec();
-            Subtract { basis, components, out: &mut out }.run(i);
-            out
-        }
-    }
-
-    /// Holds components and what is left without them to what the eigenvectors say.
-    fn check_rows<W: Whole>(wanted: &[f64], r: &[f64], basis: &Rows<W>) {
-        let components = vector::by_each(|| Components { basis, r });
-        for components in &components {
-            for ((component, unit), wanted) in components.iter().zip(&basis.units).zip(wanted) {
-                // every entry is off by half a unit at most, and sums are in single precision
-                let off = f64::from(*unit) * 0.5 * r.iter().map(|r| r.abs()).sum::<f64>() + 1e-5;
-                assert!((f64::from(component * unit) - wanted).abs() < off, "{component} {wanted}");
-            }
-        }
-        assert!(components[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
-        let along: Vec<f32> = components[0].iter().zip(&basis.units).map(|(c, unit)| c * unit).collect();
-        let combined = basis.rounded() * nalgebra::DVector::from_fn(along.len(), |k, _| f64::from(along[k]));
-        // rows of whole numbers: their components have the units
-        let in_units: Vec<f32> = along.iter().zip(&basis.units).map(|(c, unit)| c * unit).collect();
-        let left = vector::by_each(|| Without { basis, components: &in_units, r });
-        for left in &left {
-            for (pixel, taken) in basis.pixels.iter().map(|p| *p as usize).zip(&combined) {
-                let (left, wanted) = (left[pixel], r[pixel] - taken);
-                assert!((left - wanted).abs() < 1e-5, "{pixel}: {left} {wanted}");
-            }
-        }
-        assert!(left[1..].windows(2).all(|two| two[0] == two[1]), "wider registers change the sums");
     }
 }
