@@ -6,8 +6,10 @@
 //! around the image that it implies, and so on until K stays. A second planet is searched for in the last expansion, where the
 //! first is small. Left out: what is written (`io::periodogram`).
 
+mod remarks;
 mod robustness;
 
+pub use remarks::Evidence;
 pub use robustness::{AtTarget, Robustness, WithoutNight, robustness};
 
 use crate::expansion::{Expansion, Nuisance, STELLAR};
@@ -18,13 +20,12 @@ use crate::periodogram::eccentric::keplerian;
 use crate::periodogram::offset::{Offset, offset};
 use crate::periodogram::peaks::refined;
 use crate::periodogram::two_planets::{both, without};
-use crate::periodogram::window::{Alias, alias, window_peaks};
 use crate::periodogram::{
-    CircularOrbit, DETECTION_FAP, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
-    co_rotation_penalty,
+    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
 };
 use crate::star::Orbit;
 use crate::velocities::VelocityQuadratic;
+use crate::verdict::CANDIDATE_FAP;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -86,8 +87,6 @@ pub struct Detection {
     /// The blind search there, by which a planet is found or not. The planet itself counts among the spots left over, which
     /// makes the false-alarm probability a cautious one.
     pub blind: Search,
-    /// The same search, where a planet is found, with spots left over as large as they are beside it.
-    pub beside: Option<Search>,
     /// At the best orbit; `None` if it was not imaged, because its period lies on the edge of the search.
     pub at_best: Option<View>,
     /// Expansions that it took to get there.
@@ -128,6 +127,14 @@ pub enum Stage {
     BestOrbit(usize),
     /// The second planet.
     SecondPlanet,
+}
+
+impl DetectionSettings {
+    /// The usual search: circular orbits, one planet.
+    pub fn of(chi2_target: f64, nuisances: Vec<Nuisance>) -> Self {
+        let search = SearchSettings::default();
+        DetectionSettings { chi2_target, nuisances, search, eccentric: false, second_planet: false }
+    }
 }
 
 impl View {
@@ -173,7 +180,6 @@ impl Detection {
             best: *blind.best(),
             planet_free,
             blind,
-            beside: None,
             frequencies,
             at_best: None,
             rounds: 0,
@@ -184,7 +190,8 @@ impl Detection {
             co_rotation_penalty: None,
         };
         found.close(imager, values, settings, report)?;
-        found.look_beside(settings)?;
+        found.co_rotation_penalty =
+            co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies, &found.blind.rows);
         if settings.eccentric {
             found.keplerian = found.eccentric();
         }
@@ -209,42 +216,14 @@ impl Detection {
         regularised.log_likelihood(&velocities)
     }
 
-    /// Whether the blind search found a planet.
-    pub fn is_planet(&self) -> bool {
-        self.blind.false_alarm.probability(self.blind.best().orbit.delta_ln_l).value() < DETECTION_FAP
+    /// The number that verdicts rest on: how often stars without a planet show as high a peak in the blind search.
+    pub fn false_alarm_probability(&self) -> f64 {
+        self.blind.false_alarm.probability(self.blind.best().orbit.delta_ln_l).value()
     }
 
-    /// n, if the time base does not tell the best period from `Prot/n`, n up to 4.
-    pub fn fraction_of_rotation(&self) -> Option<u32> {
-        let frequency = 1.0 / self.best.porb_over_prot;
-        (1..=4).find(|&n| (frequency - f64::from(n)).abs() * self.frequencies.time_base_cycles < 0.5)
-    }
-
-    /// n and the peak of the window function by which the best period is an alias of `Prot/n`, n up to 4: there spots imitate
-    /// orbits as they do at the rotation period.
-    pub fn alias_of_rotation(&self) -> Option<(u32, Alias)> {
-        let window = window_peaks(&self.planet_free.quadratic.cycles, &self.frequencies);
-        let base = self.frequencies.time_base_cycles;
-        let alias = |n: u32| Some((n, alias(1.0 / self.best.porb_over_prot, f64::from(n), &window, base)?));
-        (1..=4).find_map(alias)
-    }
-
-    /// The search that periods are judged by.
-    pub fn search(&self) -> &Search {
-        self.beside.as_ref().unwrap_or(&self.blind)
-    }
-
-    /// Where a planet is found: the search with spots left over as large as they are beside it. And what is said of co-rotation.
-    fn look_beside(&mut self, settings: &DetectionSettings) -> Result<(), Unbounded> {
-        if let Some(at_best) = self.at_best.as_ref().filter(|_| self.is_planet()) {
-            let factor = at_best.spots_left.min(self.planet_free.spots_left);
-            let expansion = self.planet_free.expansion.with_spots_left(factor).ok_or(Unbounded)?;
-            self.planet_free.quadratic = expansion.velocities(&settings.nuisances);
-            self.beside = Some(Search::new(&self.planet_free.quadratic, &self.frequencies, settings.search)?);
-        }
-        let rows = &self.search().rows;
-        self.co_rotation_penalty = co_rotation_penalty(&self.planet_free.quadratic, &self.frequencies, rows);
-        Ok(())
+    /// Whether that is rare enough for a candidate.
+    pub fn is_candidate(&self) -> bool {
+        self.false_alarm_probability() < CANDIDATE_FAP
     }
 
     /// Images the star with the best orbit until that orbit stays.
@@ -262,7 +241,8 @@ impl Detection {
             values[Parameter::PorbOverProt] = self.best.porb_over_prot;
             values[Parameter::Phi] = self.best.orbit.phi;
             let view = View::new(imager, values, settings)?;
-            let next = refined(&view.quadratic, &self.frequencies, &self.best);
+            let mut next = refined(&view.quadratic, &self.frequencies, &self.best);
+            next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();
             self.closed = moved < STAYS * next.orbit.sigma_k_kms;
             self.best = next;
@@ -273,7 +253,7 @@ impl Detection {
 
     /// The Keplerian orbits of all peaks.
     fn eccentric(&self) -> Vec<Option<KeplerianOrbit>> {
-        let others = self.search().peaks[1..].iter().map(|peak| (&self.planet_free, peak));
+        let others = self.blind.peaks[1..].iter().map(|peak| (&self.planet_free, peak));
         let all = std::iter::once((self.last(), &self.best)).chain(others);
         all.map(|(view, peak)| keplerian(&view.quadratic, &self.frequencies, peak)).collect()
     }

@@ -44,6 +44,7 @@
 //! ```
 
 pub mod batch;
+pub mod blind_search;
 pub mod chain;
 #[cfg(feature = "mpi")]
 pub mod cluster;
@@ -90,6 +91,7 @@ pub mod text;
 pub mod units;
 pub mod vector;
 pub mod velocities;
+pub mod verdict;
 
 pub use fit::Fit;
 pub use log_density::LogDensity;

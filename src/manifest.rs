@@ -3,6 +3,9 @@
 //! Written before the first step; afterwards only length and goals of the run change (`--extend`, or `steps`, `rhat` and `ess`
 //! of the config). Everything that a chain is a function of is in it or checked against it. Left out: the chain itself (`io::journal`).
 
+mod conclusions;
+
+use crate::blind_search::BlindSearch;
 use crate::chain::{Goals, ParameterKind, Shape, Summary};
 use crate::config::{self, Settings};
 use crate::ensemble::Positions;
@@ -40,6 +43,9 @@ pub struct Manifest {
     /// Seeds of the runs that were joined, where this is several joined ones, which cannot go on.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub merged_seeds: Vec<u64>,
+    /// The blind search that the verdict rests on; absent where no orbit was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blind_search: Option<BlindSearch>,
     /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
     pub start: Positions,
 }

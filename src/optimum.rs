@@ -1,5 +1,6 @@
 //! What `optimise` found: `optimum.json`, and the same as a table.
 
+use crate::blind_search::BlindSearch;
 use crate::io::provenance::Provenance;
 use crate::origin::{OptimumRecord, ReferenceRecord, by_name};
 use crate::scene::Scene;
@@ -29,6 +30,9 @@ pub struct OptimumFile {
     /// Minus the Hessian of the log-probability in internal coordinates, where K and phi (if both are free) are K cos and
     /// K sin of the orbital phase at mid-time.
     pub internal_curvature: Vec<Vec<f64>>,
+    /// The blind search that the verdict rests on; absent where no orbit was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind_search: Option<BlindSearch>,
     /// Injected values, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
     /// The reference image.
@@ -69,6 +73,7 @@ impl OptimumFile {
             converged: optimum.converged,
             covariance: rows(&optimum.written_covariance),
             internal_curvature: rows(&optimum.curvature),
+            blind_search: BlindSearch::of(scene),
             truth: scene.truth.map(|values| by_name(&values)),
             reference: ReferenceRecord::of(found.posterior.reference()),
             starts: found.attempts.iter().map(StartRecord::of).collect(),
@@ -79,7 +84,9 @@ impl OptimumFile {
     /// A table of the parameters and a verdict.
     pub fn table(&self) -> String {
         let width = self.names.iter().map(String::len).max().unwrap_or(0).max("parameter".len());
-        let mut table = format!("{:width$}  {:>12}  {:>10}", "parameter", "best", "sd");
+        let sentence = self.blind_search.as_ref().map(|search| format!("{}\n\n", search.verdict.sentence));
+        let mut table = sentence.unwrap_or_default();
+        let _ = write!(table, "{:width$}  {:>12}  {:>10}", "parameter", "best", "sd");
         if self.truth.is_some() {
             let _ = write!(table, "  {:>12}", "injected");
         }
@@ -92,14 +99,15 @@ impl OptimumFile {
             }
             table.push('\n');
         }
-        let verdict = match (self.well_defined, self.converged) {
+        let maximum = match (self.well_defined, self.converged) {
             (true, true) => "a well-defined maximum",
             (true, false) => "the search ran out of steps; the values may be improved from there",
             (false, _) => "no well-defined maximum: on the edge of a prior, or the data leave some direction open",
         };
-        let _ = writeln!(table, "{verdict}; ln P = {:.3}, spottedness {:.5}", self.optimum.log_prob, self.spottedness);
-        if let Some(warning) = self.reference.warning() {
-            let _ = writeln!(table, "note: {warning}");
+        let _ = writeln!(table, "{maximum}; ln P = {:.3}, spottedness {:.5}", self.optimum.log_prob, self.spottedness);
+        let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
+        for note in remarks.chain(self.reference.warning()) {
+            let _ = writeln!(table, "note: {note}");
         }
         table
     }

@@ -141,6 +141,12 @@ impl Origin {
         }
     }
 
+    /// The rotation period (d) that orbits are measured by; NaN where a file has none.
+    pub fn rotation_period_d(&self) -> f64 {
+        let period = self.config.pointer("/star/rotation_period_d");
+        period.and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN)
+    }
+
     /// Whether what began in `folder` can go on in `scene`.
     ///
     /// # Errors

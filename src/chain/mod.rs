@@ -7,6 +7,7 @@
 pub mod advice;
 pub mod autocorrelation;
 pub mod convergence;
+pub mod modes;
 pub mod moves;
 pub mod record;
 pub mod statistics;
@@ -15,6 +16,7 @@ pub mod summary;
 pub mod table;
 
 pub use convergence::{Convergence, Diagnostic, Goals, ParameterKind};
+pub use modes::PeriodMode;
 pub use moves::MoveSummary;
 pub use record::{MoveKind, Record, Shape};
 pub use store::{Chain, Series};

@@ -8,15 +8,23 @@
 //! - Statistics are of the steps kept after the burn-in (`convergence`); `evaluations`, `failures`, `passes_median` and
 //!   `best` are of the whole chain, the start included.
 //!
-//! Left out: what to do about it (`advice`) and how it looks (`table`).
+//! What is said of a planet, and which parameters are constrained, is not the chain's to know: whoever knows the priors and the blind
+//! search fills it in (`manifest::conclusions`). Left out: what to do about it (`advice`) and how it looks (`table`).
 
 use crate::chain::autocorrelation::mean;
 use crate::chain::statistics::{mode, periodic_mode, quantile, shortest_interval, unwrap_around, wrap};
-use crate::chain::{Chain, ChainError, Convergence, Diagnostic, Goals, MoveSummary, ParameterKind, advice, moves};
+use crate::chain::{
+    Chain, ChainError, Convergence, Diagnostic, Goals, MoveSummary, ParameterKind, PeriodMode, advice, moves,
+};
 use crate::log_density::Status;
+use crate::verdict::Verdict;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
 
 /// Share of a standard deviation within which an amplitude touches zero.
 const TOUCH: f64 = 0.1;
@@ -46,6 +54,9 @@ pub struct ParameterSummary {
     pub ess: Option<f64>,
     /// Integrated autocorrelation time (steps); null where the chain is too short.
     pub tau: Option<f64>,
+    /// Whether the data hardly say more of it than its prior, so that its median means nothing.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub unconstrained: bool,
     /// Upper limit (95 %), for an amplitude that touches zero.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upper95: Option<f64>,
@@ -92,6 +103,15 @@ pub struct Summary {
     pub best: Best,
     /// What to do, where the chain has not converged or something looks wrong.
     pub advice: Vec<String>,
+    /// What is said of a planet; absent where no orbit was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+    /// The modes of the period, from the heaviest on; empty where it was not sampled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub period_modes: Vec<PeriodMode>,
+    /// What has to be known beside the verdict.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 /// Summarises a chain; `kinds` has one entry a parameter.
@@ -128,6 +148,9 @@ pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Resul
         passes_median: passes_median(chain),
         best: Best { log_prob: best.log_prob, parameters: names.iter().cloned().zip(best.theta.clone()).collect() },
         advice: advice::advice(chain, &convergence, goals),
+        verdict: None,
+        period_modes: Vec::new(),
+        remarks: Vec::new(),
         names,
     })
 }
@@ -164,6 +187,7 @@ fn parameter_summary(mut values: Vec<f64>, kind: ParameterKind, diagnostic: &Dia
         rhat: diagnostic.rhat,
         ess: diagnostic.ess,
         tau: diagnostic.tau,
+        unconstrained: false,
         upper95: touches_zero.then(|| quantile(&values, 0.95)),
     }
 }

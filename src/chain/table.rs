@@ -4,6 +4,9 @@ use crate::chain::{MoveSummary, ParameterSummary, Summary};
 use crate::text::aligned;
 use std::collections::BTreeMap;
 
+/// Modes of the period that are shown.
+const MODES_SHOWN: usize = 6;
+
 /// The table. With `truth` (injected values by name) there is a column for it.
 pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
     let mut head = vec!["parameter", "median", "- 68%", "+ 68%", "95% interval", "95% HDI", "R-hat", "ESS", "tau"];
@@ -20,7 +23,9 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
         }
         rows.push(row);
     }
-    let mut text = aligned(&rows);
+    let head = summary.verdict.as_ref().map(|verdict| format!("{}\n\n", verdict.sentence)).unwrap_or_default();
+    let mut text = head + &aligned(&rows);
+    text += &period_modes(summary);
     for name in &summary.names {
         if let Some((one, upper)) = summary.parameters.get(name).and_then(|one| Some((one, one.upper95?))) {
             text += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
@@ -36,7 +41,7 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
         summary.passes_median,
         summary.best.log_prob
     );
-    text + &moves(summary) + &verdict(summary) + "\n"
+    text + &moves(summary) + &convergence(summary) + "\n"
 }
 
 /// A line on the moves, where the chain names them.
@@ -53,13 +58,44 @@ fn moves(summary: &Summary) -> String {
     format!("{} effective samples an evaluation; accepted: {}\n", share(summary.ess_per_evaluation), each.join(", "))
 }
 
-fn verdict(summary: &Summary) -> String {
+fn convergence(summary: &Summary) -> String {
     let advice = summary.advice.join("; ");
     match (summary.converged, advice.is_empty()) {
-        (true, true) => "converged".to_owned(),
-        (true, false) => format!("converged, but {advice}"),
-        (false, _) => format!("NOT converged: {advice}"),
+        (true, true) => "the chain has converged".to_owned(),
+        (true, false) => format!("the chain has converged, but {advice}"),
+        (false, _) => format!("the chain has NOT converged: {advice}"),
     }
+}
+
+/// The period where it has several modes, or one that spots may make.
+fn period_modes(summary: &Summary) -> String {
+    let mut text = String::new();
+    for (name, one) in summary.parameters.iter().filter(|(_, one)| one.unconstrained) {
+        let [low, high] = one.ci95;
+        let digits = decimals(one);
+        text += &format!(
+            "{name} is not constrained: anything from {low:.digits$} to {high:.digits$}, as its prior has it\n"
+        );
+    }
+    if summary.period_modes.len() < 2 && summary.period_modes.iter().all(|mode| mode.rotation.is_none()) {
+        return text;
+    }
+    let mut rows = vec![
+        ["mode of the period", "weight", "porb_over_prot", "68% interval", "k_kms", ""].map(str::to_owned).to_vec(),
+    ];
+    for (k, mode) in summary.period_modes.iter().enumerate().take(MODES_SHOWN) {
+        let [low, high] = mode.ci68;
+        let digits = (1.0 - (high - low).log10().floor()).clamp(2.0, 9.0) as usize;
+        rows.push(vec![
+            (k + 1).to_string(),
+            format!("{:.2}", mode.weight),
+            number(mode.porb_over_prot, digits),
+            format!("[{low:.digits$}, {high:.digits$}]"),
+            format!("{:.3}", mode.k_kms),
+            mode.rotation.clone().unwrap_or_default(),
+        ]);
+    }
+    text + &aligned(&rows)
 }
 
 fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
@@ -67,12 +103,14 @@ fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
     let interval = |[low, high]: [f64; 2]| format!("[{}, {}]", number(low, digits), number(high, digits));
     let optional =
         |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
+    let median = if one.unconstrained { "any".to_owned() } else { number(one.median, digits) };
+    let side = |width: f64| if one.unconstrained { "-".to_owned() } else { number(width, digits) };
     // Differences from the median as the interval has it: a periodic one may be in another turn than a wrapped estimate.
     vec![
         name.to_owned(),
-        number(one.median, digits),
-        number(one.median - one.ci68[0], digits),
-        number(one.ci68[1] - one.median, digits),
+        median,
+        side(one.median - one.ci68[0]),
+        side(one.ci68[1] - one.median),
         interval(one.ci95),
         interval(one.hdi95),
         optional(one.rhat, 3),

@@ -2,7 +2,7 @@
 
 use super::output::Output;
 use super::{Failure, Global, progress};
-use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Stage, robustness};
+use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
 use dimcmc::expansion::nuisances;
 use dimcmc::fit::Fit;
 use dimcmc::io::periodogram::PeriodogramResult;
@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 ///
 /// The star is imaged without a planet, and how much better the profiles fit with an orbit of each period follows in closed
 /// form, together with radial velocities that are free of spots. K at the best period is given for a target chi2 3 % lower and
-/// higher, too, and without each night. Other parameters are those of the config. Writes rv.csv and
+/// higher, too, and without each night. Systemic velocity and stellar parameters are those of the config, or integrated out
+/// within their priors where it leaves them free. Writes rv.csv and
 /// covariance.csv (velocities for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, false alarms).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc periodogram configs/demo.json --out runs/demo_periodogram")]
@@ -39,9 +40,12 @@ pub struct Args {
     /// Number of planets to search for
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     planets: u8,
-    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors
-    #[arg(long, alias = "marginalize")]
+    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors: the default
+    #[arg(long, alias = "marginalize", conflicts_with = "fixed")]
     marginalise: bool,
+    /// Hold them at the config's values
+    #[arg(long)]
+    fixed: bool,
     /// Number of stars without a planet
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1000..=10_000_000))]
     draws: u32,
@@ -66,13 +70,18 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     spinner.finish_and_clear();
     let choices = choices.map_err(|e| failure(&args.config, *e))?;
     let detection = found.map_err(|e| failure(&args.config, e))?;
-    let fit = Fit::new(&scene.imager, &scene.observations, &detection.planet_free.reference);
+    let fit = |view: &View| Fit::new(&scene.imager, &scene.observations, &view.reference);
+    let misfit = fit(detection.last()).checks.warnings;
+    let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
+    let remarks = detection.remarks(&evidence);
     let result = PeriodogramResult {
         imager: &scene.imager,
         detection: &detection,
+        verdict: &detection.verdict(&remarks),
+        remarks: &remarks,
         robustness: &choices,
         settings: &settings,
-        fit: &fit,
+        fit: &fit(&detection.planet_free),
         truth: scene.truth,
         provenance: &scene.provenance(),
     };
@@ -97,7 +106,7 @@ fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
 fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
     DetectionSettings {
         chi2_target: scene.settings.imaging.chi2_target.value(),
-        nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
+        nuisances: if args.fixed { Vec::new() } else { nuisances(&scene.settings.free) },
         search: SearchSettings { draws: args.draws as usize, seed: args.seed },
         eccentric: args.eccentric,
         second_planet: args.planets == 2,

@@ -16,9 +16,8 @@ pub use draws::Distance;
 pub use pair::{Pair, PairError};
 
 use crate::chain::statistics::wrap;
-use crate::chain::{ChainError, Summary, summarise};
+use crate::chain::{ChainError, Summary};
 use crate::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
-use crate::manifest::kinds_and_goals;
 use crate::objective::{Parameter, SpotsLeft};
 use draws::Draws;
 use serde::Serialize;
@@ -122,8 +121,7 @@ impl Comparison {
     /// # Errors
     /// A chain without steps.
     pub fn of(pair: &Pair, rule: Rule) -> Result<Self, ChainError> {
-        let (kinds, goals) = kinds_and_goals(&pair.settings);
-        let summary = summarise(&pair.chain, &kinds, &goals)?;
+        let summary = pair.manifest.summarise(&pair.settings, &pair.chain)?;
         let found = paraboloid(&pair.landscape, rule);
         let draws = Draws::of(pair, &summary);
         let compared = |(i, name): (usize, &String)| (name.clone(), parameter(pair, &summary, &found, &draws, i));

@@ -6,7 +6,7 @@
 use super::laboratory::ExperimentError;
 use super::outcome::{Estimate, Outcome, Route};
 use super::star::with;
-use crate::chain::{Summary, summarise};
+use crate::chain::Summary;
 use crate::config::GridSettings;
 use crate::detection::{Detection, DetectionSettings};
 use crate::ensemble::StopReason;
@@ -14,7 +14,6 @@ use crate::expansion::nuisances;
 use crate::io::atomic::write_json;
 use crate::io::paraboloid::ParaboloidFile;
 use crate::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
-use crate::manifest::kinds_and_goals;
 use crate::objective::{Parameter, Reference, ReferenceError};
 use crate::optimise::Optimum;
 use crate::origin::by_name;
@@ -238,8 +237,7 @@ pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<
     if run.go(pool, |_, _| ())? == StopReason::Interrupted {
         return Err(ExperimentError::Interrupted);
     }
-    let (kinds, goals) = kinds_and_goals(&scene.settings);
-    let summary = summarise(&run.chain, &kinds, &goals)?;
+    let summary = run.manifest.summarise(&scene.settings, &run.chain)?;
     let estimate =
         |one: &crate::chain::summary::ParameterSummary| Estimate { value: one.median, ci68: one.ci68, ci95: one.ci95 };
     let route = Route {

@@ -3,7 +3,7 @@
 //! Steps to be left out are those that `summary.json` leaves out.
 
 use super::ExportError;
-use crate::chain::{Chain, Summary, statistics::unwrap_around, summarise};
+use crate::chain::{Chain, Summary, statistics::unwrap_around};
 use crate::io::journal;
 use crate::manifest::{Manifest, kinds_and_goals};
 use crate::objective::{FreeParameter, Prior};
@@ -63,9 +63,10 @@ impl Contents {
         let settings = manifest.settings(run)?;
         let path = run.join(CHAIN);
         let chain = journal::read(&path, &manifest.shape())?;
-        let (kinds, goals) = kinds_and_goals(&settings);
-        let summary =
-            summarise(&chain, &kinds, &goals).map_err(|source| ExportError::Chain { path: path.clone(), source })?;
+        let (kinds, _) = kinds_and_goals(&settings);
+        let summary = manifest
+            .summarise(&settings, &chain)
+            .map_err(|source| ExportError::Chain { path: path.clone(), source })?;
         let quantity = |(free, kind): (&FreeParameter, &crate::chain::ParameterKind)| {
             let name = free.parameter.name();
             let periodic = *kind == crate::chain::ParameterKind::Periodic;

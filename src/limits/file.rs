@@ -5,9 +5,9 @@ use super::{Cell, Comparison, Limit, Orbits, Outcome, Shortcut};
 use crate::io::atomic::{WriteError, write, write_json};
 use crate::io::csv::Table;
 use crate::io::provenance::Provenance;
-use crate::periodogram::DETECTION_FAP;
 use crate::star::Orbit;
 use crate::text::aligned;
+use crate::verdict::CANDIDATE_FAP;
 use serde::Serialize;
 use std::path::Path;
 
@@ -129,7 +129,7 @@ impl LimitsFile {
             full: c.full.as_ref().map(OutcomeRecord::of),
         };
         let mut file = LimitsFile {
-            false_alarm_probability: DETECTION_FAP,
+            false_alarm_probability: CANDIDATE_FAP,
             level: shortcut.level,
             removed: shortcut.removed,
             before: BeforeRecord {
@@ -151,7 +151,7 @@ impl LimitsFile {
 
     fn doubts(&self, shortcut: &Shortcut) -> Vec<String> {
         let mut doubts = Vec::new();
-        if self.before.false_alarm_probability < DETECTION_FAP {
+        if self.before.false_alarm_probability < CANDIDATE_FAP {
             doubts.push(format!(
                 "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: --without-best takes it \
                  out first",

@@ -4,9 +4,10 @@ use super::shortcut::{Outcome, Shortcut};
 use super::{Limit, LimitSettings};
 use crate::detection::View;
 use crate::objective::Parameter;
-use crate::periodogram::{DETECTION_FAP, Search};
+use crate::periodogram::Search;
 use crate::scene::{Scene, SceneError};
 use crate::star::Orbit;
+use crate::verdict::CANDIDATE_FAP;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -128,7 +129,7 @@ impl WholeWay {
             let search = Search::new(&view.quadratic, &settings.frequencies, settings.detection.search).ok()?;
             let best = search.best();
             let peak = (1.0 / best.porb_over_prot, best.orbit.delta_ln_l, best.orbit.k_kms);
-            let level = search.false_alarm.level(DETECTION_FAP);
+            let level = search.false_alarm.level(CANDIDATE_FAP);
             Some(Outcome::of(peak, level, orbit, settings.frequencies.time_base_cycles))
         })
     }

@@ -6,9 +6,10 @@ use crate::imaging::Imager;
 use crate::limits::LimitSettings;
 use crate::objective::{Parameter, ParameterValues};
 use crate::periodogram::orbits::scan;
-use crate::periodogram::{CircularOrbit, DETECTION_FAP, Search, Unbounded};
+use crate::periodogram::{CircularOrbit, Search, Unbounded};
 use crate::star::Orbit;
 use crate::velocities::VelocityQuadratic;
+use crate::verdict::CANDIDATE_FAP;
 
 /// A period is right when its frequency is off by less than this many inverse time bases.
 const RIGHT: f64 = 0.5;
@@ -76,7 +77,7 @@ impl<'a> Shortcut<'a> {
             before = search(&view)?;
             removed = Some(orbit);
         }
-        let level = before.false_alarm.level(DETECTION_FAP);
+        let level = before.false_alarm.level(CANDIDATE_FAP);
         Ok(Shortcut { settings, view, removed, before, level })
     }
 

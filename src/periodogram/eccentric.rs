@@ -159,7 +159,14 @@ mod tests {
     fn peak_of(quadratic: &VelocityQuadratic, period: f64) -> (Frequencies, Peak) {
         let frequencies = Frequencies::new(&quadratic.cycles, 1.0, FrequencySettings::default()).unwrap();
         let orbit = at(quadratic, 1.0 / period).orbit.unwrap();
-        let start = Peak { porb_over_prot: period, sigma_porb_over_prot: None, orbit, on_edge: false, alias: None };
+        let start = Peak {
+            porb_over_prot: period,
+            sigma_porb_over_prot: None,
+            orbit,
+            on_edge: false,
+            alias: None,
+            imitation: None,
+        };
         let peak = refined(quadratic, &frequencies, &start);
         (frequencies, peak)
     }

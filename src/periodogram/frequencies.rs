@@ -40,6 +40,8 @@ pub struct Frequencies {
     pub per_cycle: Vec<f64>,
     /// Time base in rotation cycles.
     pub time_base_cycles: f64,
+    /// The rotation period (d) that a cycle is.
+    pub rotation_period_d: f64,
 }
 
 /// Periods that make no sense, or sampling that shows none.
@@ -108,7 +110,8 @@ impl Frequencies {
             return Err(FrequencyError::TooMany { name, count: intervals + 1.0 });
         }
         let frequency = |k| lo + (hi - lo) * k as f64 / intervals;
-        Ok(Frequencies { per_cycle: (0..=intervals as usize).map(frequency).collect(), time_base_cycles: time_base })
+        let per_cycle = (0..=intervals as usize).map(frequency).collect();
+        Ok(Frequencies { per_cycle, time_base_cycles: time_base, rotation_period_d })
     }
 
     /// Lowest and highest frequency.

@@ -16,6 +16,7 @@ pub mod offset;
 pub mod orbits;
 pub mod peaks;
 mod refine;
+pub mod rotation;
 #[cfg(test)]
 mod sample;
 pub mod two_planets;
@@ -26,9 +27,11 @@ pub use false_alarm::FalseAlarm;
 pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
 pub use orbits::{CircularOrbit, Trial};
 pub use peaks::Peak;
+pub use rotation::{Imitation, RotationPeriods};
 pub use two_planets::TwoOrbits;
 
 use crate::velocities::VelocityQuadratic;
+use crate::verdict::CANDIDATE_FAP;
 use limits::{detection_limit_kms, upper_limit_kms};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -37,9 +40,6 @@ use window::{window, window_peaks};
 /// Probability of the upper limit on K.
 const CREDENCE: f64 = 0.95;
 
-/// A detection is a peak with this false-alarm probability.
-pub const DETECTION_FAP: f64 = 0.01;
-
 /// How a search is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchSettings {
@@ -47,6 +47,12 @@ pub struct SearchSettings {
     pub draws: usize,
     /// Seed of the draws.
     pub seed: u64,
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        SearchSettings { draws: 10_000, seed: 1 }
+    }
 }
 
 /// One trial period with all that is said of it.
@@ -58,7 +64,7 @@ pub struct Row {
     pub k_upper95_kms: Option<f64>,
     /// The window function at this frequency.
     pub window: f64,
-    /// The K (km/s) that reaches a false-alarm probability of 1 % with a chance of 50 %.
+    /// The K (km/s) that makes a candidate ([`CANDIDATE_FAP`]) with a chance of 50 %.
     pub k_limit50_kms: Option<f64>,
     /// The same with a chance of 95 %.
     pub k_limit95_kms: Option<f64>,
@@ -71,6 +77,8 @@ pub struct Search {
     pub rows: Vec<Row>,
     /// The peaks, from high to low; there is one at least.
     pub peaks: Vec<Peak>,
+    /// The star's own periods, where spots imitate orbits.
+    pub rotation: RotationPeriods,
     /// Judges them.
     pub false_alarm: FalseAlarm,
 }
@@ -91,12 +99,15 @@ impl Search {
         settings: SearchSettings,
     ) -> Result<Self, Unbounded> {
         let trials = orbits::scan(quadratic, &frequencies.per_cycle);
-        let peaks = peaks::peaks(quadratic, frequencies, &trials, &window_peaks(&quadratic.cycles, frequencies));
+        let Frequencies { time_base_cycles, rotation_period_d, .. } = *frequencies;
+        let window_peaks = window_peaks(&quadratic.cycles, frequencies);
+        let rotation = RotationPeriods::new(&quadratic.cycles, rotation_period_d, &window_peaks, time_base_cycles);
+        let peaks = peaks::peaks(quadratic, frequencies, &trials, &rotation);
         if peaks.is_empty() {
             return Err(Unbounded);
         }
         let false_alarm = FalseAlarm::draw(quadratic, &trials, settings.draws, settings.seed);
-        let level = false_alarm.level(DETECTION_FAP);
+        let level = false_alarm.level(CANDIDATE_FAP);
         let row = |trial: &Trial| Row {
             trial: *trial,
             k_upper95_kms: upper_limit_kms(trial, CREDENCE),
@@ -105,7 +116,7 @@ impl Search {
             k_limit95_kms: detection_limit_kms(trial, level, 0.95),
         };
         let rows = trials.par_iter().map(row).collect();
-        Ok(Search { rows, peaks, false_alarm })
+        Ok(Search { rows, peaks, rotation, false_alarm })
     }
 
     /// The highest peak.

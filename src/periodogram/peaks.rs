@@ -6,7 +6,8 @@
 use super::frequencies::Frequencies;
 use super::orbits::{CircularOrbit, SIGMA_OF_UNKNOWN_PHASE, Trial, amplitudes, mid_cycle, phi, velocities};
 use super::refine::{Maximum, Model};
-use super::window::{Alias, WindowPeak, alias};
+use super::rotation::{Imitation, RotationPeriods};
+use super::window::{Alias, SAME, alias};
 use crate::velocities::VelocityQuadratic;
 use nalgebra::{DVector, Matrix3, Vector2, Vector3};
 use std::f64::consts::TAU;
@@ -33,6 +34,8 @@ pub struct Peak {
     pub on_edge: bool,
     /// How it is an alias of the highest peak.
     pub alias: Option<Alias>,
+    /// The period of the star that it is not told from: spots imitate orbits there.
+    pub imitation: Option<Imitation>,
 }
 
 /// Parameters (a, b, frequency) of a circular orbit.
@@ -67,6 +70,7 @@ pub(super) fn peak(cycles: &[f64], theta: Vector3<f64>, covariance: Option<Matri
         orbit,
         on_edge: false,
         alias: None,
+        imitation: None,
     }
 }
 
@@ -95,7 +99,7 @@ pub fn peaks(
     quadratic: &VelocityQuadratic,
     frequencies: &Frequencies,
     trials: &[Trial],
-    window: &[WindowPeak],
+    rotation: &RotationPeriods,
 ) -> Vec<Peak> {
     let height = |k: usize| trials[k].orbit.map_or(f64::NEG_INFINITY, |orbit| orbit.delta_ln_l);
     let last = trials.len() - 1;
@@ -112,7 +116,7 @@ pub fn peaks(
         let Trial { frequency, orbit: Some(orbit), .. } = trials[k] else { continue };
         let on_edge = k == 0 || k == last;
         let porb_over_prot = 1.0 / frequency;
-        let start = Peak { porb_over_prot, sigma_porb_over_prot: None, orbit, on_edge, alias: None };
+        let start = Peak { porb_over_prot, sigma_porb_over_prot: None, orbit, on_edge, alias: None, imitation: None };
         let peak = if on_edge { start } else { refined(quadratic, frequencies, &start) };
         let near = |other: &Peak| {
             let apart = (1.0 / other.porb_over_prot - 1.0 / peak.porb_over_prot).abs();
@@ -125,7 +129,11 @@ pub fn peaks(
     peaks.sort_by(|a, b| b.orbit.delta_ln_l.total_cmp(&a.orbit.delta_ln_l));
     let best = 1.0 / peaks[0].porb_over_prot;
     for peak in &mut peaks[1..] {
-        peak.alias = alias(1.0 / peak.porb_over_prot, best, window, frequencies.time_base_cycles);
+        let within = SAME / frequencies.time_base_cycles;
+        peak.alias = alias(1.0 / peak.porb_over_prot, best, &rotation.window, within);
+    }
+    for peak in &mut peaks {
+        peak.imitation = rotation.imitated(peak.porb_over_prot, peak.sigma_porb_over_prot);
     }
     peaks
 }
@@ -141,7 +149,9 @@ mod tests {
     fn search(quadratic: &VelocityQuadratic, settings: FrequencySettings) -> Vec<Peak> {
         let frequencies = Frequencies::new(&quadratic.cycles, 1.0, settings).unwrap();
         let trials = scan(quadratic, &frequencies.per_cycle);
-        peaks(quadratic, &frequencies, &trials, &window_peaks(&quadratic.cycles, &frequencies))
+        let window = window_peaks(&quadratic.cycles, &frequencies);
+        let rotation = RotationPeriods::new(&quadratic.cycles, 1.0, &window, frequencies.time_base_cycles);
+        peaks(quadratic, &frequencies, &trials, &rotation)
     }
 
     #[test]
@@ -169,7 +179,14 @@ mod tests {
             let quadratic = sample::independent(&cycles, &rv, &DVector::from_element(40, 0.05));
             let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
             let orbit = super::super::orbits::at(&quadratic, 1.0 / 1.7).orbit.unwrap();
-            let start = Peak { porb_over_prot: 1.7, sigma_porb_over_prot: None, orbit, on_edge: false, alias: None };
+            let start = Peak {
+                porb_over_prot: 1.7,
+                sigma_porb_over_prot: None,
+                orbit,
+                on_edge: false,
+                alias: None,
+                imitation: None,
+            };
             let found = refined(&quadratic, &frequencies, &start);
             pulls[0] += ((found.orbit.k_kms - 0.1) / found.orbit.sigma_k_kms).powi(2) / n as f64;
             pulls[1] += ((found.porb_over_prot - 1.7) / found.sigma_porb_over_prot.unwrap()).powi(2) / n as f64;

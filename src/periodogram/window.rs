@@ -5,6 +5,7 @@
 
 use super::frequencies::Frequencies;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A window peak of at least this height makes aliases.
@@ -14,10 +15,10 @@ const STRONG: f64 = 0.25;
 const SAMPLES: f64 = 10.0;
 
 /// Frequencies closer than this many inverse time bases are the same.
-const SAME: f64 = 0.5;
+pub(super) const SAME: f64 = 0.5;
 
 /// A peak of the window function.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WindowPeak {
     /// Frequency (inverse rotation cycles).
     pub frequency: f64,
@@ -26,7 +27,7 @@ pub struct WindowPeak {
 }
 
 /// How a frequency is the alias of another.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Alias {
     /// The peak of the window function that joins them.
     pub window: WindowPeak,
@@ -57,10 +58,10 @@ pub fn window_peaks(cycles: &[f64], frequencies: &Frequencies) -> Vec<WindowPeak
         .collect()
 }
 
-/// How `frequency` is an alias of `of`, if it is; by the strongest window peak that joins them.
-pub fn alias(frequency: f64, of: f64, peaks: &[WindowPeak], time_base_cycles: f64) -> Option<Alias> {
+/// How `frequency` is an alias of `of`, to `within` that much, if it is; by the strongest window peak that joins them.
+pub fn alias(frequency: f64, of: f64, peaks: &[WindowPeak], within: f64) -> Option<Alias> {
     let joins = |peak: &WindowPeak| {
-        let fits = |f: f64| (f - peak.frequency).abs() < SAME / time_base_cycles;
+        let fits = |f: f64| (f - peak.frequency).abs() < within;
         match (fits((frequency - of).abs()), fits(frequency + of)) {
             (true, _) => Some(Alias { window: *peak, mirrored: false }),
             (false, true) => Some(Alias { window: *peak, mirrored: true }),
@@ -83,7 +84,7 @@ mod tests {
         let peaks = window_peaks(&cycles, &frequencies);
         assert!(peaks.iter().all(|p| (p.frequency - p.frequency.round()).abs() < 0.01), "{peaks:?}");
         assert_eq!(peaks.len(), 2, "once and twice a day: {peaks:?}");
-        let mirrored = |f: f64| alias(f, 0.3, &peaks, 24.0).map(|alias| alias.mirrored);
+        let mirrored = |f: f64| alias(f, 0.3, &peaks, SAME / 24.0).map(|alias| alias.mirrored);
         assert_eq!(mirrored(0.7), Some(true));
         assert_eq!(mirrored(1.3), Some(false));
         assert_eq!(mirrored(0.5), None);

@@ -4,7 +4,7 @@ use super::PlotError;
 use super::symbols::{label, nearest_turn, symbol};
 use crate::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
 use crate::chain::statistics::{quantile, unwrap_around};
-use crate::chain::{Chain, ParameterKind, Series, Summary, summarise};
+use crate::chain::{Chain, ParameterKind, Series, Summary};
 use crate::figure::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figure::panel::Sides;
 use crate::figure::{Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
@@ -34,9 +34,10 @@ impl Sampled {
     pub fn read(folder: &Path) -> Result<Self, PlotError> {
         let manifest = Manifest::read(folder)?;
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
-        let (kinds, goals) = kinds_and_goals(&manifest.settings(folder)?);
+        let settings = manifest.settings(folder)?;
+        let (kinds, _) = kinds_and_goals(&settings);
         let wrong = |problem: String| PlotError::Content { path: folder.join(CHAIN), problem };
-        let summary = summarise(&chain, &kinds, &goals).map_err(|e| wrong(e.to_string()))?;
+        let summary = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
         Ok(Sampled { manifest, chain, kinds, summary })
     }
 

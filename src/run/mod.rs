@@ -8,6 +8,7 @@ mod start;
 
 pub use error::RunError;
 
+use crate::blind_search::BlindSearch;
 use crate::chain::{Chain, Convergence, Goals, ParameterKind, Record};
 use crate::ensemble::{self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason};
 use crate::io::journal::{Journal, JournalError};
@@ -88,7 +89,7 @@ impl Run {
         let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
         // what was not evaluated looks like a start that is none
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
-        let manifest = manifest(scene, origin, start);
+        let manifest = manifest(scene, origin, BlindSearch::of(scene), start);
         std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
         // the chain first: whoever holds it may write the manifest
         let mut journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
@@ -206,7 +207,7 @@ impl Run {
     }
 }
 
-fn manifest(scene: &Scene, origin: Origin, start: Positions) -> Manifest {
+fn manifest(scene: &Scene, origin: Origin, blind_search: Option<BlindSearch>, start: Positions) -> Manifest {
     let prior = |f: &crate::objective::FreeParameter| {
         (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
     };
@@ -219,6 +220,7 @@ fn manifest(scene: &Scene, origin: Origin, start: Positions) -> Manifest {
         seed: scene.settings.sampler.seed,
         extend_to: None,
         merged_seeds: Vec::new(),
+        blind_search,
         start,
     }
 }

@@ -5,9 +5,10 @@
 
 mod alarm;
 mod record;
-mod remarks;
 mod report;
 mod robustness;
+
+pub use record::{OrbitRecord, PeakRecord};
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
@@ -18,6 +19,7 @@ use crate::imaging::Imager;
 use crate::objective::ParameterValues;
 use crate::periodogram::Search;
 use crate::periodogram::orbits::scan;
+use crate::verdict::{Remark, Verdict};
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 
@@ -28,7 +30,11 @@ pub struct PeriodogramResult<'a> {
     pub imager: &'a Imager,
     /// What was found.
     pub detection: &'a Detection,
-    /// Whether that hangs on a choice.
+    /// What is said of it.
+    pub verdict: &'a Verdict,
+    /// What has to be known beside the verdict.
+    pub remarks: &'a [Remark],
+    /// Whether that depends on a choice.
     pub robustness: &'a Robustness,
     /// How it was asked for.
     pub settings: &'a DetectionSettings,
@@ -102,7 +108,7 @@ impl PeriodogramResult<'_> {
         let found = self.detection;
         let regularised = scan(&found.planet_free.regularised, &found.frequencies.per_cycle);
         let mut table = Table::new(&[&COLUMNS[..], &["regularised_delta_ln_l"]].concat());
-        for (mut numbers, trial) in self.rows(found.search()).zip(regularised) {
+        for (mut numbers, trial) in self.rows(&found.blind).zip(regularised) {
             numbers.push(trial.orbit.map_or(f64::NAN, |orbit| orbit.delta_ln_l));
             table.row(&numbers);
         }

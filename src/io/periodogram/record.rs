@@ -9,10 +9,13 @@ use crate::objective::ParameterValues;
 use crate::periodogram::offset::Offset;
 use crate::periodogram::peaks::Peak;
 use crate::periodogram::{KeplerianOrbit, Search};
-use serde::Serialize;
+use crate::verdict::Verdict;
+use serde::{Deserialize, Serialize};
 
 #[derive(Serialize)]
 pub(super) struct Record<'a> {
+    /// What is said of the best orbit.
+    pub verdict: &'a Verdict,
     /// In the expansion around its own image; its errors count the period's.
     pub best: OrbitRecord,
     pub truth: Option<ParameterValues>,
@@ -30,13 +33,15 @@ pub(super) struct Record<'a> {
     pub co_rotation: CoRotationRecord,
     /// Whether the best orbit hangs on a choice.
     pub robustness: RobustnessRecord,
-    pub warnings: Vec<String>,
+    pub warnings: Vec<&'a str>,
     #[serde(flatten)]
     pub provenance: &'a Provenance,
 }
 
-#[derive(Serialize)]
-pub(super) struct OrbitRecord {
+/// An orbit in `periodogram.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct OrbitRecord {
     pub k_kms: f64,
     pub sigma_k_kms: f64,
     pub period_d: f64,
@@ -49,20 +54,28 @@ pub(super) struct OrbitRecord {
     pub on_edge: bool,
 }
 
-#[derive(Serialize)]
-pub(super) struct PeakRecord {
+/// A peak of the periodogram.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeakRecord {
+    /// The orbit.
     #[serde(flatten)]
     pub orbit: OrbitRecord,
-    /// Null for what may be left of the highest.
-    pub false_alarm_probability: Option<f64>,
+    /// How often a star without a planet shows one as high.
+    pub false_alarm_probability: f64,
+    /// How it is an alias of the highest peak.
     pub alias: Option<AliasRecord>,
+    /// The period of the star, or alias of one, that it is not told from: spots imitate orbits there.
+    #[serde(default)]
+    pub rotation: Option<String>,
 }
 
-#[derive(Serialize)]
-pub(super) struct AliasRecord {
+/// A peak as an alias of the highest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct AliasRecord {
     pub window_frequency_per_d: f64,
     pub window: f64,
-    pub relation: &'static str,
+    pub relation: String,
 }
 
 #[derive(Serialize)]
@@ -134,10 +147,11 @@ impl PeriodogramResult<'_> {
             gain: second.both.map(|both| both.gain),
         });
         Record {
+            verdict: self.verdict,
             best: self.orbit(&found.best),
             truth: self.truth,
             false_alarm: false_alarm(&found.blind),
-            peaks: self.first_peaks(),
+            peaks: self.peaks(&found.blind),
             keplerian: self.settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
             second,
             search: SearchRecord {
@@ -161,10 +175,10 @@ impl PeriodogramResult<'_> {
             offset: found.offset,
             co_rotation: CoRotationRecord {
                 sigma_k_over_median: found.co_rotation_penalty,
-                statement: self.co_rotation(),
+                statement: found.co_rotation(),
             },
             robustness: self.robustness_record(),
-            warnings: self.warnings(),
+            warnings: self.remarks.iter().map(|remark| remark.text.as_str()).collect(),
             provenance: self.provenance,
         }
     }
@@ -174,46 +188,11 @@ impl PeriodogramResult<'_> {
     }
 
     pub(super) fn orbit(&self, peak: &Peak) -> OrbitRecord {
-        let prot = self.imager.star.rotation_period_d;
-        let orbit = &peak.orbit;
-        OrbitRecord {
-            k_kms: orbit.k_kms,
-            sigma_k_kms: orbit.sigma_k_kms,
-            period_d: prot * peak.porb_over_prot,
-            sigma_period_d: peak.sigma_porb_over_prot.map(|sigma| prot * sigma),
-            porb_over_prot: peak.porb_over_prot,
-            sigma_porb_over_prot: peak.sigma_porb_over_prot,
-            phi: orbit.phi,
-            sigma_phi: orbit.sigma_phi,
-            delta_ln_l: orbit.delta_ln_l,
-            on_edge: peak.on_edge,
-        }
-    }
-
-    /// The peaks of the first search. Where a planet is found, its false-alarm probability is that of the blind search, and the
-    /// others have none: they may be what the planet leaves at other periods.
-    pub(super) fn first_peaks(&self) -> Vec<PeakRecord> {
-        let found = self.detection;
-        let mut peaks = self.peaks(found.search());
-        if found.beside.is_some() {
-            peaks.iter_mut().for_each(|peak| peak.false_alarm_probability = None);
-            peaks[0].false_alarm_probability = Some(false_alarm(&found.blind).probability);
-        }
-        peaks
+        OrbitRecord::of(peak, self.imager.star.rotation_period_d)
     }
 
     pub(super) fn peaks(&self, search: &Search) -> Vec<PeakRecord> {
-        let prot = self.imager.star.rotation_period_d;
-        let record = |peak: &Peak| PeakRecord {
-            orbit: self.orbit(peak),
-            false_alarm_probability: Some(search.false_alarm.probability(peak.orbit.delta_ln_l).value()),
-            alias: peak.alias.map(|alias| AliasRecord {
-                window_frequency_per_d: alias.window.frequency / prot,
-                window: alias.window.height,
-                relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" },
-            }),
-        };
-        search.peaks.iter().map(record).collect()
+        PeakRecord::of_search(search, self.imager.star.rotation_period_d)
     }
 
     pub(super) fn keplerian(&self, orbit: &KeplerianOrbit) -> KeplerianRecord {
@@ -233,5 +212,41 @@ impl PeriodogramResult<'_> {
             delta_ln_l: orbit.delta_ln_l,
             gain_over_circle: orbit.gain_over_circle,
         }
+    }
+}
+
+impl OrbitRecord {
+    /// Of a peak, for a star of that rotation period.
+    pub fn of(peak: &Peak, rotation_period_d: f64) -> Self {
+        let orbit = &peak.orbit;
+        OrbitRecord {
+            k_kms: orbit.k_kms,
+            sigma_k_kms: orbit.sigma_k_kms,
+            period_d: rotation_period_d * peak.porb_over_prot,
+            sigma_period_d: peak.sigma_porb_over_prot.map(|sigma| rotation_period_d * sigma),
+            porb_over_prot: peak.porb_over_prot,
+            sigma_porb_over_prot: peak.sigma_porb_over_prot,
+            phi: orbit.phi,
+            sigma_phi: orbit.sigma_phi,
+            delta_ln_l: orbit.delta_ln_l,
+            on_edge: peak.on_edge,
+        }
+    }
+}
+
+impl PeakRecord {
+    /// The peaks of a search, from high to low.
+    pub fn of_search(search: &Search, rotation_period_d: f64) -> Vec<Self> {
+        let record = |peak: &Peak| PeakRecord {
+            orbit: OrbitRecord::of(peak, rotation_period_d),
+            false_alarm_probability: search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
+            alias: peak.alias.map(|alias| AliasRecord {
+                window_frequency_per_d: alias.window.frequency / rotation_period_d,
+                window: alias.window.height,
+                relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" }.to_owned(),
+            }),
+            rotation: peak.imitation.map(|imitation| imitation.words(rotation_period_d)),
+        };
+        search.peaks.iter().map(record).collect()
     }
 }

@@ -5,6 +5,7 @@ use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::record::{OrbitRecord, PeakRecord};
 use crate::objective::Parameter;
 use crate::text::aligned;
+use crate::verdict::probability;
 
 /// Peaks shown; the file has the others.
 const SHOWN: usize = 6;
@@ -13,10 +14,10 @@ impl PeriodogramResult<'_> {
     /// The text, a line or a table after the other.
     pub fn table(&self) -> String {
         let found = self.detection;
-        let mut text = self.orbits(&[self.orbit(&found.best)]);
-        let alarm = false_alarm(&found.blind);
-        text += &format!("{}\n", probability(&alarm));
-        text += &peaks(&self.first_peaks());
+        let mut text = format!("{}\n\n", self.verdict.sentence);
+        text += &self.orbits(&[self.orbit(&found.best)]);
+        text += &format!("{}\n", chance(&false_alarm(&found.blind)));
+        text += &peaks(&self.peaks(&found.blind));
         for orbit in found.keplerian.iter().take(1).flatten() {
             let orbit = self.keplerian(orbit);
             text += &format!(
@@ -29,16 +30,16 @@ impl PeriodogramResult<'_> {
             );
         }
         if let Some(second) = &found.second {
-            text += &format!("second planet: {}\n", probability(&false_alarm(&second.search)));
+            text += &format!("second planet: {}\n", chance(&false_alarm(&second.search)));
             match second.both {
                 Some(both) => text += &self.orbits(&both.orbits.map(|peak| self.orbit(&peak))),
                 None => text += &peaks(&self.peaks(&second.search)),
             }
         }
         text += &self.robustness_table();
-        text += &format!("{}\n", self.co_rotation());
-        for warning in self.warnings() {
-            text += &format!("warning: {warning}\n");
+        text += &format!("{}\n", found.co_rotation());
+        for remark in self.remarks {
+            text += &format!("warning: {}\n", remark.text);
         }
         text
     }
@@ -85,24 +86,15 @@ fn decimals(sigma: f64) -> usize {
     if sigma > 0.0 && sigma.is_finite() { (1.0 - sigma.log10().floor()).clamp(0.0, 12.0) as usize } else { 4 }
 }
 
-fn probability(alarm: &FalseAlarmRecord) -> String {
-    let FalseAlarmRecord { delta_ln_l, probability, used, draws, independent_periods, .. } = alarm;
+fn chance(alarm: &FalseAlarmRecord) -> String {
+    let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
     format!(
         "Delta ln L {delta_ln_l:.2}, false-alarm probability {} by {used} ({draws} draws, some \
          {independent_periods:.0} independent periods)\nDelta ln L of 10, 1, 0.1 % false alarms: {}",
-        rounded(*probability),
+        probability(*p),
         levels.join(", ")
     )
-}
-
-fn rounded(p: f64) -> String {
-    match p {
-        // what is smaller is no double any more
-        0.0 => "< 1e-300".to_owned(),
-        p if p >= 1e-3 => format!("{p:.4}"),
-        p => format!("{p:.1e}"),
-    }
 }
 
 fn peaks(peaks: &[PeakRecord]) -> String {
@@ -112,10 +104,11 @@ fn peaks(peaks: &[PeakRecord]) -> String {
         let OrbitRecord { period_d, porb_over_prot, k_kms, sigma_k_kms, delta_ln_l, on_edge, .. } = peak.orbit;
         let digits = decimals(sigma_k_kms);
         let note = match &peak.alias {
-            Some(alias) => format!("alias of 1 at {:.3}/d", alias.window_frequency_per_d),
-            None if on_edge => "on the edge".to_owned(),
-            None => String::new(),
+            Some(alias) => Some(format!("alias of 1 at {:.3}/d", alias.window_frequency_per_d)),
+            None if on_edge => Some("on the edge".to_owned()),
+            None => None,
         };
+        let notes: Vec<String> = note.into_iter().chain(peak.rotation.clone()).collect();
         rows.push(vec![
             (k + 1).to_string(),
             format!("{period_d:.4}"),
@@ -123,8 +116,8 @@ fn peaks(peaks: &[PeakRecord]) -> String {
             format!("{k_kms:.digits$}"),
             format!("{sigma_k_kms:.digits$}"),
             format!("{delta_ln_l:.2}"),
-            peak.false_alarm_probability.map_or_else(|| "-".to_owned(), rounded),
-            note,
+            probability(peak.false_alarm_probability),
+            notes.join(", "),
         ]);
     }
     // notes are of different lengths, or there is none

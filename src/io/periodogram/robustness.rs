@@ -2,7 +2,7 @@
 
 use super::PeriodogramResult;
 use crate::detection::{AtTarget, WithoutNight};
-use crate::periodogram::{CircularOrbit, DETECTION_FAP};
+use crate::periodogram::CircularOrbit;
 use crate::text::aligned;
 use serde::Serialize;
 
@@ -88,22 +88,5 @@ impl PeriodogramResult<'_> {
             row(format!("without night {:.2}, {} profiles", night.span_d.0, night.profiles), night.orbit);
         }
         aligned(&rows)
-    }
-
-    pub(super) fn robustness_warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        if let Some(errors) = self.robustness.target_matters() {
-            warnings.push(format!(
-                "K moves by {errors:.1} of its errors when the target chi2 is changed by 3 %: it hangs on imaging.chi2_target"
-            ));
-        }
-        let level = self.detection.blind.false_alarm.level(DETECTION_FAP);
-        for night in self.robustness.decisive_nights(level) {
-            warnings.push(format!(
-                "the night of {:.2} ({} profiles) makes the result: see K without it",
-                night.span_d.0, night.profiles
-            ));
-        }
-        warnings
     }
 }
