@@ -74,6 +74,9 @@ fn base() -> Result<Value, Failure> {
     let list = std::path::absolute(Path::new(CONFIG).parent().unwrap_or(Path::new("")).join(list))?;
     let changes = [
         ("/observations/path", json!(list)),
+        // white errors and the entropy's spots, until a model says otherwise
+        ("/observations/sigma_scale", json!(0.3)),
+        ("/imaging/spots_left", json!("entropy")),
         ("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": 0.5, "max": 4.0 })),
         ("/planet", json!({ "k_kms": 0.1, "porb_over_prot": 1.7, "phi": 0.5 })),
         ("/sampler/walkers", json!(24)),

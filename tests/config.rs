@@ -93,7 +93,7 @@ fn lo_peg_resolves() {
     assert_eq!(settings.equivalent_width, EquivalentWidth::Auto);
     let ObservationSource::Files { path, options, .. } = &settings.source else { panic!() };
     assert!(path.ends_with("configs/../../shared/data/lopeg/observations.txt"));
-    assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 0.3));
+    assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 1.0));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
         let data = dimcmc::io::lsd::read(list, options).unwrap().observations;

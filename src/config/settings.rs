@@ -77,7 +77,6 @@ pub struct ImagingSettings {
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
     /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
-    #[serde(skip_serializing_if = "SpotsLeft::is_default")]
     pub spots_left: SpotsLeft,
     /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors around 0, from
     /// 0 (no nuisance) to 10.

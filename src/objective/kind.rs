@@ -32,17 +32,10 @@ impl ObjectiveKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpotsLeft {
-    /// As the entropy has them: small and independent. Intervals are too narrow where spots have edges, above all near
-    /// Porb = Prot.
-    #[default]
+    /// As the entropy has them (the paper's method): small and independent. Intervals are too narrow where spots have edges, above
+    /// all near Porb = Prot.
     Entropy,
     /// The chain counts them as noise, of a size that the data tell, as a jitter's, and that is integrated over.
+    #[default]
     Fitted,
-}
-
-impl SpotsLeft {
-    /// Whether it is the default, which configs need not mention.
-    pub fn is_default(&self) -> bool {
-        *self == SpotsLeft::default()
-    }
 }
