@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
 const LAYERS: &[&[&str]] = &[
-    &["units", "text", "vector", "velocities", "log_density", "figure", "cluster"],
+    &["units", "text", "vector", "velocities", "log_density", "verdict", "figure", "cluster"],
     &["observation"],
     &["star", "maxent", "chain", "landscape", "periodogram", "nuisances"],
     &["imaging", "ensemble", "optimise", "first_look"],
@@ -19,7 +19,7 @@ const LAYERS: &[&[&str]] = &[
     &["io"],
     &["config"],
     &["scene", "search"],
-    &["origin", "proposal", "limits"],
+    &["origin", "proposal", "limits", "blind_search"],
     &["pool"],
     &["manifest", "survey", "optimum", "import"],
     &["run"],
@@ -37,15 +37,16 @@ const MAY_SEE: &[(&str, &[&str])] = &[
     ("velocities", &[]),
     ("figure", &[]),
     ("log_density", &[]),
+    ("verdict", &[]),
     ("cluster", &[]),
     ("observation", &["units"]),
     ("star", &["observation", "units", "vector"]),
     ("maxent", &["units", "vector"]),
     ("nuisances", &["observation", "vector"]),
     ("imaging", &["maxent", "nuisances", "observation", "star", "units", "vector"]),
-    ("chain", &["log_density", "text"]),
+    ("chain", &["log_density", "text", "verdict"]),
     ("landscape", &["log_density", "text"]),
-    ("periodogram", &["velocities"]),
+    ("periodogram", &["velocities", "verdict"]),
     ("ensemble", &["chain", "log_density"]),
     ("optimise", &["log_density"]),
     ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
@@ -69,9 +70,10 @@ const MAY_SEE: &[(&str, &[&str])] = &[
             "run",
             "star",
             "survey",
+            "verdict",
         ],
     ),
-    ("report", &["chain", "figure", "manifest", "objective", "origin", "plot", "survey"]),
+    ("report", &["chain", "figure", "manifest", "objective", "origin", "plot", "survey", "verdict"]),
 ];
 
 struct Source {
