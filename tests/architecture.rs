@@ -71,7 +71,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
             "survey",
         ],
     ),
-    ("report", &["chain", "figure", "manifest", "objective", "origin", "plot", "survey"]),
+    ("report", &["chain", "figure", "manifest", "objective", "origin", "plot", "survey", "text"]),
 ];
 
 struct Source {
