@@ -29,9 +29,9 @@ pub const PARABOLOID: &str = "paraboloid.json";
 /// Nodes of a batch for each reconstruction under way: enough that threads or ranks seldom wait for the slowest node.
 const BATCH_EACH: usize = 8;
 
-/// Whether nothing but an empty file of nodes was begun in `folder`: such a landscape begins again.
-pub fn is_false_start(folder: &Path) -> bool {
-    lines::is_false_start(folder, NODES)
+/// Whether nothing but an empty file of nodes is in `folder`, and with `header` perhaps that: such a landscape may begin again.
+pub fn is_false_start(folder: &Path, header: bool) -> bool {
+    lines::is_false_start(folder, header.then_some(HEADER), NODES)
 }
 
 /// The content of `landscape.json`, written before the first node and never changed.

@@ -45,7 +45,7 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let began = Instant::now();
     let signals = Signals::catch("node")?;
-    let resume = args.resume && !args.output.is_false_start();
+    let resume = args.resume && !args.output.cannot_go_on();
     if !resume {
         args.output.check()?;
     }

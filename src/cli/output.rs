@@ -44,15 +44,16 @@ impl Output {
         }
     }
 
-    /// Whether what is in the folder is to be replaced: by the user's will, or because a run or a landscape that could not
-    /// begin has left it.
+    /// Whether what is in the folder is to be replaced: by the user's will, or because it is what a run or a landscape has left
+    /// that ended before its first result.
     pub fn replaces(&self) -> bool {
-        self.force || self.is_false_start()
+        let folder = &self.folder;
+        self.force || run::is_false_start(folder, true) || survey::is_false_start(folder, true)
     }
 
-    /// Whether a run or a landscape could not begin in the folder.
-    pub fn is_false_start(&self) -> bool {
-        run::is_false_start(&self.folder) || survey::is_false_start(&self.folder)
+    /// Whether a run or a landscape ended there before it was said what it was begun with, so that it cannot go on.
+    pub fn cannot_go_on(&self) -> bool {
+        run::is_false_start(&self.folder, false) || survey::is_false_start(&self.folder, false)
     }
 
     /// That nothing which the command has read is replaced by what it `writes`, whatever the user says.

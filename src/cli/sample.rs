@@ -56,7 +56,7 @@ enum Start {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let began = Instant::now();
     let signals = Signals::catch("step")?;
-    let resume = args.extend.is_some() || (args.resume && !args.output.is_false_start());
+    let resume = args.extend.is_some() || (args.resume && !args.output.cannot_go_on());
     if !resume {
         args.output.check()?;
     }

@@ -77,9 +77,9 @@ impl From<String> for Refusal {
     }
 }
 
-/// Whether all that there is in `folder` of a computation is `lines`, still empty: it was stopped, or could not write, before
-/// it could say what it was begun with. Nothing is lost when it begins again.
-pub fn is_false_start(folder: &Path, lines: &str) -> bool {
+/// Whether all that there is in `folder` of a computation is `lines`, still empty, and perhaps the `head` that says what it was
+/// begun with: it was stopped, or could not write, before its first result. Nothing is lost when it begins again.
+pub fn is_false_start(folder: &Path, head: Option<&str>, lines: &str) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else { return false };
     let mut found = false;
     for entry in entries {
@@ -88,7 +88,7 @@ pub fn is_false_start(folder: &Path, lines: &str) -> bool {
         let is_empty = entry.metadata().is_ok_and(|file| file.is_file() && file.len() == 0);
         match name == lines && is_empty {
             true => found = true,
-            false if atomic::is_temporary(&name) => {}
+            false if atomic::is_temporary(&name) || head.is_some_and(|head| name == head) => {}
             false => return false,
         }
     }

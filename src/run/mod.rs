@@ -12,7 +12,7 @@ use crate::chain::{Chain, Convergence, Goals, ParameterKind, Record};
 use crate::ensemble::{self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason};
 use crate::io::journal::{Journal, JournalError};
 use crate::io::lines;
-use crate::manifest::{Manifest, kinds_and_goals};
+use crate::manifest::{self, Manifest, kinds_and_goals};
 use crate::origin::Origin;
 use crate::pool::{Asked, Evaluations, Pool, Target, Task};
 use crate::scene::Scene;
@@ -26,9 +26,9 @@ pub const CHAIN: &str = "chain.jsonl";
 /// Name of its analysis.
 pub const SUMMARY: &str = "summary.json";
 
-/// Whether nothing but an empty chain was begun in `folder`: such a run begins again.
-pub fn is_false_start(folder: &Path) -> bool {
-    lines::is_false_start(folder, CHAIN)
+/// Whether nothing but an empty chain is in `folder`, and with `manifest` perhaps that: such a run may begin again.
+pub fn is_false_start(folder: &Path, manifest: bool) -> bool {
+    lines::is_false_start(folder, manifest.then_some(manifest::FILE), CHAIN)
 }
 
 /// Where the walkers start.
