@@ -91,7 +91,36 @@ impl Manifest {
     /// # Errors
     /// A folder without one, or one that cannot be read.
     pub fn read(folder: &Path) -> Result<Self, OriginError> {
-        origin::read(folder, FILE)
+        let manifest: Manifest = origin::read_header(folder, FILE, Manifest::parts)?;
+        let wrong = |problem| Err(OriginError::Content { path: folder.join(FILE), problem });
+        if let Some(name) = manifest.names.iter().find(|name| Parameter::from_name(name).is_none()) {
+            return wrong(format!("names: unknown parameter {name}"));
+        }
+        if let Some(name) = manifest.priors.keys().find(|name| !manifest.names.contains(name)) {
+            return wrong(format!("priors: unknown key {name}"));
+        }
+        let free = manifest.origin.config.get("parameters").and_then(serde_json::Value::as_object);
+        let is_free = |name: &String| free.is_some_and(|free| free.get(name).is_some_and(|prior| !prior.is_null()));
+        let count = free.map_or(0, |free| free.values().filter(|prior| !prior.is_null()).count());
+        if count != manifest.names.len() || !manifest.names.iter().all(is_free) {
+            return wrong("names: are not the parameters of the config".into());
+        }
+        match manifest.has_shape() {
+            true => Ok(manifest),
+            false => wrong("start: is not of as many ensembles, walkers and parameters as the rest says".into()),
+        }
+    }
+
+    /// What it was begun with, and the names of its parameters.
+    fn parts(&self) -> (&Origin, Vec<String>) {
+        (&self.origin, self.names.clone())
+    }
+
+    /// Whether the start is of the chain's shape.
+    fn has_shape(&self) -> bool {
+        let walker = |theta: &Vec<f64>| theta.len() == self.names.len();
+        let ensemble = |walkers: &Vec<Vec<f64>>| walkers.len() == self.walkers && walkers.iter().all(walker);
+        self.start.len() == self.ensembles && self.start.iter().all(ensemble)
     }
 
     /// Writes it into a run's folder.

@@ -15,7 +15,7 @@ use crate::simulate::Simulation;
 use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A config with its observations.
 #[derive(Clone, Debug)]
@@ -141,6 +141,15 @@ impl Scene {
                 Ok((self.observations.clone(), (0..profiles).map(name).collect()))
             }
         }
+    }
+
+    /// The files that it was read from: config, list, profiles.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mut files = vec![self.settings.path.clone()];
+        if let ObservationSource::Files { path, .. } = &self.settings.source {
+            files.extend(lsd::files(path));
+        }
+        files
     }
 
     /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors stay.

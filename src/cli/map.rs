@@ -26,6 +26,7 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
+    args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let spinner = progress::bar(global, None, "reconstructing");
     let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target.value());
     spinner.finish_and_clear();

@@ -22,6 +22,7 @@ pub use automatic::Automatic;
 pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, model_difference, section_difference};
+pub use resolve_grid::MOST_NODES;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Where the profiles come from: files, or a simulation of the config's own star and planet.
 
-use super::domain::check_value;
+use super::domain::{check_size, check_value, most};
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
@@ -48,6 +48,9 @@ pub(super) fn resolve_observations(
     automatic("observations.sigma_scale", sigma_scale)?;
     let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
     let sigma_scale = if errors.measured { 1.0 } else { sigma_scale.value() };
+    for end in section.velocity_range_kms.into_iter().flatten() {
+        check_size("observations.velocity_range_kms", end, most::VELOCITY_KMS)?;
+    }
     if let Some([min, max]) = section.velocity_range_kms
         && min >= max
     {
@@ -66,8 +69,10 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
     }
     let times_d: Vec<f64> = section.cycles.iter().map(|c| star.epoch_d + c * star.rotation_period_d).collect();
-    if let Some(k) = times_d.iter().position(|t| !t.is_finite()) {
-        return Err(Fault::new(at(&format!("cycles[{k}]")), "its time leaves the range of double precision"));
+    for (k, (cycle, time_d)) in section.cycles.iter().zip(&times_d).enumerate() {
+        let key = at(&format!("cycles[{k}]"));
+        check_size(&key, *cycle, most::TIME)?;
+        check_size(&format!("{key}: its time (d)"), *time_d, most::TIME)?;
     }
     if let Some(snr) = section.snr {
         positive(&at("snr"), snr)?;
@@ -134,6 +139,8 @@ fn bins(axis: &VelocitySection, key: &str) -> Result<usize, Fault> {
     const LEAST: f64 = 5.0;
     const MOST: f64 = 100_000.0;
     positive(&format!("{key}.step"), axis.step)?;
+    check_size(&format!("{key}.min"), axis.min, most::VELOCITY_KMS)?;
+    check_size(&format!("{key}.max"), axis.max, most::VELOCITY_KMS)?;
     if axis.min >= axis.max {
         return Err(Fault::new(format!("{key}.min"), format!("{} must be below max, which is {}", axis.min, axis.max)));
     }

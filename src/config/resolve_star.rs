@@ -1,6 +1,7 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
 use super::EquivalentWidth;
+use super::domain::{check_size, most};
 use super::error::Fault;
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 use super::resolve::positive;
@@ -11,6 +12,8 @@ use std::f64::consts::TAU;
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`. An equivalent width "auto" becomes NaN.
 pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<StarSettings, Fault> {
     positive("star.rotation_period_d", star.rotation_period_d)?;
+    check_size("star.rotation_period_d", star.rotation_period_d, most::TIME)?;
+    check_size("star.epoch_d", star.epoch_d, most::TIME)?;
     let omega = TAU / star.rotation_period_d;
     if !(omega.is_finite() && omega > 0.0) {
         let problem = format!("{} leaves the range of double precision", star.rotation_period_d);

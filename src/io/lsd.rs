@@ -14,7 +14,7 @@ mod times;
 mod writing;
 
 pub use error::LsdError;
-pub use writing::{write, write_as};
+pub use writing::{is_written, write, write_as};
 
 use crate::observation::{Observations, Profile};
 use axis::Axis;
@@ -162,6 +162,13 @@ pub fn labels(list: &Path) -> Result<Vec<Label>, LsdError> {
     let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
     let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
     Ok(entries.into_iter().map(|Entry { file, vrad_kms, .. }| Label { file, vrad_kms }).collect())
+}
+
+/// The list at `list` and the profiles that it names, as far as it can be read.
+pub fn files(list: &Path) -> Vec<PathBuf> {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    let profiles = labels(list).unwrap_or_default();
+    std::iter::once(list.to_owned()).chain(profiles.into_iter().map(|profile| folder.join(profile.file))).collect()
 }
 
 fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {

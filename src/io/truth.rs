@@ -8,6 +8,9 @@ use crate::star::Orbit;
 use serde::Serialize;
 use std::path::Path;
 
+/// Name of the file.
+pub const FILE: &str = "truth.json";
+
 /// The content of `truth.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Truth {
@@ -64,5 +67,5 @@ pub struct InjectedTruth {
 /// # Errors
 /// A file that cannot be written.
 pub fn write(folder: &Path, truth: &impl Serialize) -> Result<(), WriteError> {
-    write_json(&folder.join("truth.json"), truth)
+    write_json(&folder.join(FILE), truth)
 }

@@ -1,7 +1,7 @@
 //! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of observation
 //! alone do, and how well K is known.
 
-use super::{PlotError, velocities};
+use super::{POSITIVE, PlotError, velocities};
 use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, VERMILION, WHITE};
 use crate::figure::panel::Sides;
 use crate::figure::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
@@ -22,8 +22,14 @@ struct SearchFile {
     truth: Option<BTreeMap<String, f64>>,
     false_alarm: FalseAlarm,
     peaks: Vec<OrbitFile>,
+    search: SearchedFile,
     offset: Option<Offset>,
     second: Option<Second>,
+}
+
+#[derive(Deserialize)]
+struct SearchedFile {
+    periods: usize,
 }
 
 /// A search for a second planet, the first one's period kept.
@@ -82,12 +88,12 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         period_d: file.best.period_d,
         truth: injected.and_then(|truth| truth.get("porb_over_prot")).copied(),
     };
-    figures.push(figure(TABLES[0].1, &Columns::read(&folder.join(TABLES[0].0))?, &first)?);
+    figures.push(figure(TABLES[0].1, &table(folder, TABLES[0].0, &file)?, &first)?);
     if let Some(second) = &file.second {
         let peak = second.peaks.first();
         let period_d = peak.map_or(f64::NAN, |peak| peak.period_d);
         let marks = Marks { levels: &second.false_alarm.levels, peak, period_d, truth: None };
-        let mut beside = figure(TABLES[1].1, &Columns::read(&folder.join(TABLES[1].0))?, &marks)?;
+        let mut beside = figure(TABLES[1].1, &table(folder, TABLES[1].0, &file)?, &marks)?;
         beside.caption.insert_str(0, "A second planet beside the best orbit. ");
         figures.push(beside);
     }
@@ -99,10 +105,17 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(figures)
 }
 
+/// A table of the periods searched.
+fn table(folder: &Path, name: &str, file: &SearchFile) -> Result<Columns, PlotError> {
+    let table = Columns::read(&folder.join(name))?;
+    table.check_rows(file.search.periods, &format!("the periods searched, by {FILE}"))?;
+    Ok(table)
+}
+
 /// The figure of a table.
 fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotError> {
-    let period = table.column("period_d")?;
-    let ratio = table.column("porb_over_prot")?;
+    let period = table.column_within("period_d", POSITIVE)?;
+    let ratio = table.column_within("porb_over_prot", POSITIVE)?;
     let mut figure = Figure::new(name, PAGE_MM, 128.0);
     figure.caption = CAPTION.into();
     let (left, right, top, gap, bottom) = (40.0, 58.0, 24.0, 5.0, 28.0);

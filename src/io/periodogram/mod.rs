@@ -62,6 +62,9 @@ const COLUMNS: [&str; 12] = [
     "k_limit95_kms",
 ];
 
+/// Names of all files that a search may write.
+pub const FILES: [&str; 5] = ["rv.csv", "covariance.csv", "periodogram.csv", "periodogram_2.csv", "periodogram.json"];
+
 impl PeriodogramResult<'_> {
     /// Names of the files, in the order in which they are written.
     pub fn files(&self) -> Vec<&'static str> {
