@@ -51,6 +51,15 @@ impl Imager {
         self
     }
 
+    /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the depths change
+    /// with velocity by `slopes`; in place of those that there were.
+    pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64]) -> Self {
+        let sigma: Vec<f64> = self.data.inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
+        let nuisances = std::mem::take(&mut self.data.nuisances);
+        self.data.nuisances = nuisances.with_zero_points(sd_kms, slopes, &self.bins(), &sigma);
+        self
+    }
+
     /// The same without some of the profiles.
     pub fn without(&self, profiles: &[usize]) -> Self {
         let (mut rest, mut kept) = (Vec::new(), Vec::new());

@@ -90,6 +90,7 @@ pub mod text;
 pub mod units;
 pub mod vector;
 pub mod velocities;
+pub mod zero_points;
 
 pub use fit::Fit;
 pub use log_density::LogDensity;

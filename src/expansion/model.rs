@@ -174,6 +174,13 @@ impl<'a> DisplacedModel<'a> {
     }
 }
 
+/// The derivative of every bin's depth with the velocity of its profile, at the image of `reference`.
+pub fn velocity_slopes(imager: &Imager, reference: &Reference) -> Vec<f64> {
+    let map = imager.entropy.image(&reference.solution.image.coordinates);
+    let at = |h: f64| displaced(imager, shifted(imager, &reference.response, &reference.values, h), &map);
+    first(&[VELOCITY_STEP_KMS, -VELOCITY_STEP_KMS].map(at), VELOCITY_STEP_KMS)
+}
+
 /// The problem seen through `response`, linearised at the map.
 fn displaced<'a>(imager: &'a Imager, response: Response, map: &[f64]) -> ImagingProblem<'a> {
     let mut problem = imager.problem(response);
