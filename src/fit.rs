@@ -162,7 +162,8 @@ impl Fit {
         let with = |counted: bool| estimates.iter().filter(move |_| counted);
         let nuisances =
             with(imager.data.nuisances.has_line_and_continuum()).map(|found| found.line_and_continuum).collect();
-        let zero_points_kms = with(imager.data.nuisances.has_zero_points()).map(|found| found.zero_point_kms).collect();
+        let zero_points_kms =
+            with(imager.data.nuisances.zero_point_kms() > 0.0).map(|found| found.zero_point_kms).collect();
         let depths: Vec<&[f64]> = bins.map(|bins| &depth[bins]).collect();
         let velocities = velocities(imager, observations, reference, &depths);
         let deviation = Deviation::of(imager, &map);

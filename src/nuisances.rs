@@ -134,9 +134,9 @@ impl Nuisances {
         self.templates.iter().any(|(i, _)| *i != ZERO_POINT)
     }
 
-    /// Whether velocity zero points are.
-    pub fn has_zero_points(&self) -> bool {
-        self.zero_point_kms > 0.0
+    /// Standard deviation of the velocity zero points (km/s); 0 where there are none.
+    pub fn zero_point_kms(&self) -> f64 {
+        self.zero_point_kms
     }
 
     /// From `out = x / sigma^2` to `out = W x` in the `bins` of one profile.

@@ -87,9 +87,8 @@ fn report(Fit { summary: fit, nuisances, zero_points_kms, .. }: &Fit) -> Report 
     if nuisances.is_empty() {
         return report;
     }
-    let [offset, slope, width] = [0, 1, 2].map(|i| {
-        rms(nuisances.iter().map(|n| n.numbers()[i].powi(2)).sum(), nuisances.len())
-    });
+    let [offset, slope, width] =
+        [0, 1, 2].map(|i| rms(nuisances.iter().map(|n| n.numbers()[i].powi(2)).sum(), nuisances.len()));
     let rms = format!("offset {offset:.1e}, slope {slope:.1e}, equivalent width {:.2} % rms", 100.0 * width);
     report.line("continuum", rms)
 }

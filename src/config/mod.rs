@@ -22,8 +22,8 @@ pub use crate::ensemble::SamplerSettings;
 pub use automatic::Automatic;
 pub use draft::Draft;
 pub use error::ConfigError;
-pub use jitter::VelocityJitter;
 pub use identity::{Difference, first_difference, jitter_difference, model_difference, section_difference};
+pub use jitter::VelocityJitter;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;

@@ -63,12 +63,7 @@ impl MeasuredJitter {
     }
 
     /// From an image in which zero points are counted as that large.
-    fn with(
-        imager: &Imager,
-        values: ParameterValues,
-        chi2_target: f64,
-        sd_kms: f64,
-    ) -> Result<Self, JitterError> {
+    fn with(imager: &Imager, values: ParameterValues, chi2_target: f64, sd_kms: f64) -> Result<Self, JitterError> {
         let counted = ZeroPoints::new(imager, values, chi2_target, sd_kms)?.counted_in(imager.clone());
         let expansion = Expansion::of(&counted, &image(&counted, values, chi2_target)?, &[]);
         fit::fit(&expansion, sd_kms, imager.star.rotation_period_d).ok_or(JitterError::Unbounded)
