@@ -51,8 +51,8 @@ impl Imager {
         self
     }
 
-    /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the depths change
-    /// with velocity by `slopes`; in place of those that there were.
+    /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
+    /// depths change with velocity by `slopes`; in place of those that there were.
     pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64]) -> Self {
         let sigma: Vec<f64> = self.data.inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
         let nuisances = std::mem::take(&mut self.data.nuisances);

@@ -1,12 +1,13 @@
-//! What may be wrong with each observed profile by itself: the level and the slope of its continuum, the equivalent width of its
-//! line, and the zero point of its velocity; each with a Gaussian prior, and integrated out.
+//! What may be wrong with each observed profile by itself: the level and the slope of its continuum, the equivalent
+//! width of its line, and the zero point of its velocity; each with a Gaussian prior, and integrated out.
 //!
-//! The observed depth is linear in the three, `d = D - offset - slope x + equivalent_width M + noise`, with x from -1 to 1
-//! along the profile and M the mean of all observed profiles. So integrating them out is exact and only changes the covariance of
-//! a profile's bins to `Sigma = diag(sigma^2) + T P T^t`: a chi2 of `r Sigma^-1 r` has as many degrees of freedom as there are
-//! bins, as ever. A zero point z, small against the width of the line, adds one more term `+ z D'` with D' the derivative of the
-//! depths with velocity, which is the star's and comes from outside. With the whitened templates `sigma^-1 T P^(1/2) = Q s V^t` the inverse is
-//! `sigma^-1 (1 - Q s^2/(1+s^2) Q^t) sigma^-1`: one product of two vectors a template.
+//! The observed depth is linear in the three, `d = D - offset - slope x + equivalent_width M + noise`, with x from -1
+//! to 1 along the profile and M the mean of all observed profiles. So integrating them out is exact and only changes
+//! the covariance of a profile's bins to `Sigma = diag(sigma^2) + T P T^t`: a chi2 of `r Sigma^-1 r` has as many
+//! degrees of freedom as there are bins, as ever. A zero point z, small against the width of the line, adds one more
+//! term `+ z D'` with D' the derivative of the depths with velocity, which is the star's and comes from outside. With
+//! the whitened templates `sigma^-1 T P^(1/2) = Q s V^t` the inverse is `sigma^-1 (1 - Q s^2/(1+s^2) Q^t) sigma^-1`:
+//! one product of two vectors a template.
 //!
 //! Left out: that the line's own depth is the model's and not M (second order: equivalent width times what spots make of the line),
 //! and numbers that all profiles share (the equivalent width of the star's line may be a free parameter).
@@ -97,8 +98,8 @@ impl Nuisances {
         Nuisances { priors, templates, ..Nuisances::default() }.of_profiles(&bins.collect::<Vec<_>>(), &sigma)
     }
 
-    /// The same with velocity zero points of this standard deviation (km/s) in place of those that there were. The derivatives of the
-    /// depths with velocity are `slopes`; profiles have these `bins`, of errors `sigma`.
+    /// The same with velocity zero points of this standard deviation (km/s) in place of those that there were. The
+    /// derivatives of the depths with velocity are `slopes`; profiles have these `bins`, of errors `sigma`.
     pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64], bins: &[Range<usize>], sigma: &[f64]) -> Self {
         self.templates.retain(|(i, _)| *i != ZERO_POINT);
         self.zero_point_kms = sd_kms;

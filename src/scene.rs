@@ -29,7 +29,8 @@ pub struct Scene {
     pub data_sha256: String,
     /// The parameters that were simulated; `None` for observations from files.
     pub truth: Option<ParameterValues>,
-    /// What the config leaves to the observations: errors, velocity jitter, target chi2. In `settings` the last two are numbers.
+    /// What the config leaves to the observations: errors, velocity jitter, target chi2. In `settings` the last two are
+    /// numbers.
     pub measured: Measured,
     /// What the observations are imaged with.
     pub imager: Imager,
@@ -242,8 +243,8 @@ fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, Co
     })
 }
 
-/// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The target chi2 is
-/// per datum, independent or not.
+/// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
+/// target chi2 is per datum, independent or not.
 fn zero_points(
     settings: &Settings,
     imager: &Imager,
@@ -262,7 +263,8 @@ fn zero_points(
     Ok((Some(zero_points), measured))
 }
 
-/// Errors and velocity zero points are settled in turn that many times at most, until errors move by less than this part.
+/// Errors and velocity zero points are settled in turn that many times at most, until errors move by less than this
+/// part.
 const SETTLED: (usize, f64) = (3, 0.03);
 
 /// The observations, cut as they are used, with the errors that they and the `whole` profiles ask for.

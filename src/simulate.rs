@@ -48,7 +48,8 @@ pub struct Simulation {
     pub continuum: LineAndContinuum,
     /// Standard deviation of the velocity zero points of the profiles (km/s).
     pub velocity_jitter_kms: f64,
-    /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for white noise.
+    /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for
+    /// white noise.
     pub correlated_bins: f64,
 }
 

@@ -126,7 +126,8 @@ fn zero_points_are_velocities_of_their_own() {
     assert!(noise(0.0).iter().zip(noise(0.5)).all(|(a, b)| (a - b).abs() < 1e-15));
 }
 
-/// Correlations of (c - 1) / (c + 1) between neighbours, the variance of white noise, and nothing from one profile to the next.
+/// Correlations of (c - 1) / (c + 1) between neighbours, the variance of white noise, and nothing from one profile to
+/// the next.
 #[test]
 fn noise_is_correlated_over_as_many_bins_as_asked_for() {
     let noise = |correlated_bins: f64| {

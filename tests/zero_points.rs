@@ -15,8 +15,8 @@ use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// A zero point and the velocity of a profile enter alike, so that the covariance of the velocities is that without zero points plus
-/// their variance: here on the demo's star, as orbits see it, and every profile by itself.
+/// A zero point and the velocity of a profile enter alike, so that the covariance of the velocities is that without
+/// zero points plus their variance: here on the demo's star, as orbits see it, and every profile by itself.
 #[test]
 fn zero_points_add_their_variance_to_that_of_the_velocities() {
     const SD_KMS: f64 = 0.1;
@@ -52,7 +52,8 @@ fn zero_points_add_their_variance_to_that_of_the_velocities() {
     }
 }
 
-/// A spotted star with a wide continuum whose velocities jitter by 0.1 km/s, simulated into `data`, and its config with "fitted".
+/// A spotted star with a wide continuum whose velocities jitter by 0.1 km/s, simulated into `data`, and its config with
+/// "fitted".
 fn jittering(seed: u64, k_kms: f64) -> Desk {
     let mut star = star();
     star["rotation_period_d"] = json!(0.5);

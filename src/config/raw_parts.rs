@@ -153,9 +153,9 @@ pub(super) struct ObservationsSection {
     /// With `path`: how the profiles are weighted against each other.
     #[serde(default, skip_serializing_if = "Weights::is_default")]
     pub weights: Weights,
-    /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise beside that of
-    /// the bins; 0 if not given. It should be small against the width of the local line. "fitted": as large as the profiles say at the
-    /// config's values, before anything else.
+    /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
+    /// beside that of the bins; 0 if not given. It should be small against the width of the local line. "fitted": as
+    /// large as the profiles say at the config's values, before anything else.
     #[serde(default, skip_serializing_if = "VelocityJitter::is_default")]
     pub velocity_jitter_kms: VelocityJitter,
     /// Simulated profiles of the star and planet of this config.
@@ -192,8 +192,8 @@ pub(super) struct SimulateSection {
     /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub continuum: Option<ContinuumSection>,
-    /// Standard deviation (km/s), from 0 to 100, of the velocity zero points: one Gaussian number a profile, drawn with the same seed and
-    /// added to its velocity; 0 if not given.
+    /// Standard deviation (km/s), from 0 to 100, of the velocity zero points: one Gaussian number a profile, drawn with
+    /// the same seed and added to its velocity; 0 if not given.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub velocity_jitter_kms: f64,
     /// Over how many bins the noise is correlated, from 1 (white noise, if not given) to 1000: c makes correlations of

@@ -75,12 +75,13 @@ impl<'a> DisplacedModel<'a> {
         model
     }
 
-    /// `1 - s^2 D'_k W D'_k`, that is `1 / (1 + s^2 E)` with E the information that the bins have on the velocity of a profile beside all
-    /// else.
+    /// `1 - s^2 D'_k W D'_k`, that is `1 / (1 + s^2 E)` with E the information that the bins have on the velocity of a
+    /// profile beside all else.
     ///
-    /// A profile of the density `exp(g V - J V^2 / 2)` has, its zero point integrated out, `J / (1 + s^2 J)` in place of J and
-    /// `g / (1 + s^2 J)` in place of g. Weights with the slopes of one image make that of first derivatives. Of second ones, which change
-    /// J by a small `r W D''`, they make nothing, for the slopes do not follow the velocity: so it is done here.
+    /// A profile of the density `exp(g V - J V^2 / 2)` has, its zero point integrated out, `J / (1 + s^2 J)` in place
+    /// of J and `g / (1 + s^2 J)` in place of g. Weights with the slopes of one image make that of first derivatives.
+    /// Of second ones, which change J by a small `r W D''`, they make nothing, for the slopes do not follow the
+    /// velocity: so it is done here.
     fn left_by_zero_points(&self) -> Vec<f64> {
         let sd = self.imager.data.nuisances.zero_point_kms();
         if sd == 0.0 {

@@ -53,8 +53,8 @@ impl Expansion {
         &self.noise + factor * self.spots()
     }
 
-    /// Covariance of the most likely coordinates, `I^-1 (noise + factor (I - noise)) I^-1`, with spots left over `factor` times as large as
-    /// the entropy expects in variance; `None` where the information is singular.
+    /// Covariance of the most likely coordinates, `I^-1 (noise + factor (I - noise)) I^-1`, with spots left over
+    /// `factor` times as large as the entropy expects in variance; `None` where the information is singular.
     pub fn covariance_of_best(&self, factor: f64) -> Option<DMatrix<f64>> {
         let inverse = self.information.clone().cholesky()?.inverse();
         Some(symmetric(&inverse * self.covariance_with_spots_left(factor) * &inverse))

@@ -1,16 +1,18 @@
 //! The scatter s of the zero points from the velocities of the profiles, spots marginalised out.
 //!
-//! The image is of profiles with zero points of scatter s0 counted. Its most likely velocities `v = I^-1 g` do not hang on s0, as
-//! velocity and zero point enter the profiles alike, and their covariance is `C_f + (s^2 - s0^2) 1`, where
-//! `C_f = I^-1 (noise + f (I - noise)) I^-1` has unresolved spots f times as large in variance as the entropy expects. So v has a
-//! Gaussian density, from which s follows: uniform in s and in ln f, f integrated out, a velocity that all profiles share being
-//! anything. It is given as the root of the mean of s^2, which is what adds to the variance of a velocity.
+//! The image is of profiles with zero points of scatter s0 counted. Its most likely velocities `v = I^-1 g` do not hang
+//! on s0, as velocity and zero point enter the profiles alike, and their covariance is `C_f + (s^2 - s0^2) 1`, where
+//! `C_f = I^-1 (noise + f (I - noise)) I^-1` has unresolved spots f times as large in variance as the entropy expects.
+//! So v has a Gaussian density, from which s follows: uniform in s and in ln f, f integrated out, a velocity that all
+//! profiles share being anything. It is given as the root of the mean of s^2, which is what adds to the variance of a
+//! velocity.
 //!
-//! Without an orbit in the model a planet is taken for zero points, which hides it. With `A^2` the variance of the velocities, an
-//! orbit of either amplitude N(0, A^2) adds `A^2 X X^t` to their covariance, X its cosine and sine. The odds for an orbit of
-//! any period (uniform in frequency) against none, both hypotheses with s and f integrated over, are those of the densities; they
-//! exceed c by chance, without an orbit, with a probability of at most 1/c. So s is taken beside the orbit of the highest density
-//! where the odds are larger than the inverse of the false-alarm probability of a detection.
+//! Without an orbit in the model a planet is taken for zero points, which hides it. With `A^2` the variance of the
+//! velocities, an orbit of either amplitude N(0, A^2) adds `A^2 X X^t` to their covariance, X its cosine and sine. The
+//! odds for an orbit of any period (uniform in frequency) against none, both hypotheses with s and f integrated over,
+//! are those of the densities; they exceed c by chance, without an orbit, with a probability of at most 1/c. So s is
+//! taken beside the orbit of the highest density where the odds are larger than the inverse of the false-alarm
+//! probability of a detection.
 
 use super::MeasuredJitter;
 use crate::expansion::{Expansion, SPOTS_LEFT};
@@ -84,8 +86,8 @@ struct Orbits {
     best: (usize, usize, f64),
 }
 
-/// The scatter of the zero points in an `expansion` that has them counted as `counted_kms`; `None` where there are too few velocities,
-/// or they are not bounded.
+/// The scatter of the zero points in an `expansion` that has them counted as `counted_kms`; `None` where there are too
+/// few velocities, or they are not bounded.
 pub(super) fn fit(expansion: &Expansion, counted_kms: f64, rotation_period_d: f64) -> Option<MeasuredJitter> {
     let profiles = expansion.profiles();
     if profiles < 3 {
@@ -240,7 +242,8 @@ impl Orbits {
 }
 
 impl Size {
-    /// What orbits of these cosines and sines, two columns a frequency, add to the density, by frequency and row of the `weights`.
+    /// What orbits of these cosines and sines, two columns a frequency, add to the density, by frequency and row of the
+    /// `weights`.
     fn gains(&self, waves: &DMatrix<f64>, weights: &DMatrix<f64>, amplitude2: f64) -> Vec<Vec<f64>> {
         let along = self.axes.tr_mul(waves);
         let count = along.ncols() / 2;
@@ -257,8 +260,8 @@ impl Size {
     }
 }
 
-/// What two amplitudes of variance `amplitude2`, of which the velocities have this information and gradient, add to the ln of the
-/// velocities' density, and their most likely length.
+/// What two amplitudes of variance `amplitude2`, of which the velocities have this information and gradient, add to the
+/// ln of the velocities' density, and their most likely length.
 fn gain(information: Matrix2<f64>, gradient: Vector2<f64>, amplitude2: f64) -> (f64, f64) {
     let with_prior = information + Matrix2::identity() / amplitude2;
     let Some(covariance) = with_prior.try_inverse() else { return (f64::NEG_INFINITY, 0.0) };
@@ -314,8 +317,8 @@ mod tests {
     /// What zero points are counted as.
     const COUNTED_KMS: f64 = 0.3;
 
-    /// Thirty profiles of 0.03 km/s photon noise, zero points of scatter `s`, unresolved spots of thirty times the variance that the
-    /// entropy expects, a velocity that all share, and an orbit.
+    /// Thirty profiles of 0.03 km/s photon noise, zero points of scatter `s`, unresolved spots of thirty times the
+    /// variance that the entropy expects, a velocity that all share, and an orbit.
     fn drawn(rng: &mut ChaCha8Rng, s: f64, k_kms: f64) -> Expansion {
         let n = 30;
         let cycles: Vec<f64> = (0..n).map(|k| 0.31 * k as f64 + rng.random_range(0.0..0.2)).collect();
@@ -358,7 +361,8 @@ mod tests {
             let squares = fits.iter().map(|found| pull(found).powi(2)).sum::<f64>() / fits.len() as f64;
             let mean = fits.iter().map(|found| found.value_kms).sum::<f64>() / fits.len() as f64;
             println!("{s}: {mean}, pulls {}", squares.sqrt());
-            // one in 30 profiles knows it to 13 %, sixty of them to 2 %; a mean of squares is above the most likely value
+            // one in 30 profiles knows it to 13 %, sixty of them to 2 %; a mean of squares is above the most likely
+            // value
             assert!((mean / s - 1.0).abs() < 0.1 && (0.5..1.5).contains(&squares.sqrt()), "{s}: {mean} {squares}");
             assert!(counted(&fits) <= 2, "{s}: {}", counted(&fits));
         }

@@ -1,10 +1,12 @@
-//! The zero points of the profiles' velocities: how much they scatter, and how they are counted as noise of the profiles.
+//! The zero points of the profiles' velocities: how much they scatter, and how they are counted as noise of the
+//! profiles.
 //!
-//! A zero point z of Gaussian scatter s moves a profile by z: to first order its depths change by `z D'`, D' their derivative with
-//! velocity, and integrated out it adds `s^2 D' D'^t` to the covariance of the profile's bins (`nuisances`). All that follows from
-//! the profiles then counts it: images, chi2, orbits, false alarms, chains. D' must not hold the noise of the profiles, and it must
-//! hold the spots, which are as steep as the flanks of the line: it is that of the model at a first image, in which zero points
-//! of the same scatter are counted with the slopes of a star without spots.
+//! A zero point z of Gaussian scatter s moves a profile by z: to first order its depths change by `z D'`, D' their
+//! derivative with velocity, and integrated out it adds `s^2 D' D'^t` to the covariance of the profile's bins
+//! (`nuisances`). All that follows from the profiles then counts it: images, chi2, orbits, false alarms, chains. D'
+//! must not hold the noise of the profiles, and it must hold the spots, which are as steep as the flanks of the line:
+//! it is that of the model at a first image, in which zero points of the same scatter are counted with the slopes of a
+//! star without spots.
 //!
 //! How large s is the profiles say themselves (`fit`), in an image in which zero points are counted as far larger than
 //! photon noise makes velocities uncertain, so that none of them is taken for spots.
@@ -22,7 +24,8 @@ use serde::{Deserialize, Serialize};
 /// Zero points are first counted as this many times what photon noise makes of the velocity of a profile.
 const GENEROUS: f64 = 10.0;
 
-/// The scatter that is counted must be this many times the one that is found, or it is raised to that and all is done again.
+/// The scatter that is counted must be this many times the one that is found, or it is raised to that and all is done
+/// again.
 const ABOVE_FOUND: f64 = 2.0;
 
 /// Most images of a fit with a larger scatter each.
@@ -34,7 +37,8 @@ const STEP_KMS: f64 = 0.02;
 /// The scatter of the velocity zero points as the profiles say it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredJitter {
-    /// Standard deviation that counts (km/s): that beside the orbit where this is the case, otherwise that without a planet.
+    /// Standard deviation that counts (km/s): that beside the orbit where this is the case, otherwise that without a
+    /// planet.
     pub value_kms: f64,
     /// That of stars without a planet.
     pub without_planet: Scatter,
@@ -96,8 +100,8 @@ pub enum JitterError {
     Reference(#[from] ReferenceError),
     /// Velocities without bounds, or none at all.
     #[error(
-        "\"fitted\" takes three profiles or more whose velocities the data bound: give a number (0 for zero points that are \
-         exact)"
+        "\"fitted\" takes three profiles or more whose velocities the data bound: give a number (0 for zero points \
+         that are exact)"
     )]
     Unbounded,
 }
@@ -112,7 +116,8 @@ pub struct ZeroPoints {
 }
 
 impl ZeroPoints {
-    /// Of this standard deviation in the profiles of `imager`; the image for their slopes is at `values` and the target chi2, per datum.
+    /// Of this standard deviation in the profiles of `imager`; the image for their slopes is at `values` and the target
+    /// chi2, per datum.
     ///
     /// # Errors
     /// If there is no such image.
@@ -134,8 +139,8 @@ impl ZeroPoints {
     }
 }
 
-/// The image at the target chi2, or as close as it comes before noise is turned into spots. Where zero points of that size explain all
-/// but a star without spots, it is the one at which noise would be.
+/// The image at the target chi2, or as close as it comes before noise is turned into spots. Where zero points of that
+/// size explain all but a star without spots, it is the one at which noise would be.
 fn image(imager: &Imager, values: ParameterValues, chi2_target: f64) -> Result<Reference, ReferenceError> {
     match Reference::provisional(imager, values, chi2_target) {
         Err(ReferenceError::NothingToFit { .. }) => {
@@ -156,7 +161,8 @@ fn unspotted_slopes(imager: &Imager, values: &ParameterValues) -> Vec<f64> {
     above.iter().zip(below).map(|(a, b)| (a - b) / (2.0 * STEP_KMS)).collect()
 }
 
-/// What photon noise makes of the velocity of a profile with such slopes (km/s), root mean square; `None` without a line.
+/// What photon noise makes of the velocity of a profile with such slopes (km/s), root mean square; `None` without a
+/// line.
 fn photon_error_kms(imager: &Imager, slopes: &[f64]) -> Option<f64> {
     let information: f64 = slopes.iter().zip(&imager.data.inverse_variance).map(|(d, w)| d * d * w).sum();
     let error = (imager.sampling.profiles.len() as f64 / information).sqrt();
