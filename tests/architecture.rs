@@ -15,7 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &["objective"],
     &["expansion"],
     &["surrogate"],
-    &["simulate", "injection", "noise", "fit", "detection"],
+    &["simulate", "injection", "noise", "fit", "detection", "zero_points"],
     &["io"],
     &["config"],
     &["scene", "search"],

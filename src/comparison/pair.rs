@@ -116,6 +116,10 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
     if let Some(key) = config::model_difference(&run.config, &grid.config) {
         return Some(both(key));
     }
+    // data of other zero points are the same data
+    if let Some(key) = config::jitter_difference(&run.config, &grid.config) {
+        return Some(both(key));
+    }
     if let Some(name) = header.grid.names().find(|name| !manifest.names.iter().any(|sampled| sampled == name)) {
         return Some(format!("{name} is an axis of the landscape and not sampled in the run"));
     }

@@ -95,6 +95,7 @@ impl Draft {
                 velocity_range_kms: Some(self.velocity_range_kms.into()),
                 sigma_scale: Some(Automatic::Fixed(self.sigma_scale)),
                 weights: Weights::default(),
+                velocity_jitter_kms: Default::default(),
                 simulate: None,
             },
             imaging: self.imaging.clone(),

@@ -35,6 +35,13 @@ pub fn model_difference(first: &Value, second: &Value) -> Option<Difference> {
     ["star", "instrument", "imaging"].iter().find_map(|name| section_difference(name, first, second))
 }
 
+/// Whether two resolved configs count velocity zero points alike.
+pub fn jitter_difference(first: &Value, second: &Value) -> Option<Difference> {
+    const KEY: &str = "velocity_jitter_kms";
+    let [first, second] = [first, second].map(|resolved| &resolved["observations"][KEY]);
+    difference(&format!("observations.{KEY}"), first, second)
+}
+
 /// The same within one section, which need not be there.
 pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<Difference> {
     let without_parameters = |resolved: &Value| {

@@ -5,7 +5,7 @@ use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
 use super::resolve::{automatic, check_nuisances, check_pixels, positive};
-use super::{Automatic, ObservationSource};
+use super::{Automatic, ObservationSource, VelocityJitter};
 use crate::io::lsd::ReadOptions;
 use crate::noise::ErrorSettings;
 use crate::nuisances::LineAndContinuum;
@@ -22,6 +22,9 @@ pub(super) fn resolve_observations(
     config: &Path,
 ) -> Result<ObservationSource, Fault> {
     let section = &mut raw.observations;
+    if let VelocityJitter::Known(kms) = section.velocity_jitter_kms {
+        check_jitter("observations.velocity_jitter_kms", kms)?;
+    }
     let path = match (&section.path, &section.simulate) {
         (Some(path), None) => path,
         (None, Some(simulate)) => {
@@ -82,6 +85,11 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         .continuum
         .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
     check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
+    check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
+    if !(section.correlated_bins >= 1.0 && section.correlated_bins <= MOST_CORRELATED_BINS) {
+        let problem = format!("{} must be from 1 (white noise) to {MOST_CORRELATED_BINS}", section.correlated_bins);
+        return Err(Fault::new(at("correlated_bins"), problem));
+    }
     let mut truth = *values;
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
@@ -99,7 +107,22 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         seed: section.seed,
         pixels: section.pixels,
         continuum,
+        velocity_jitter_kms: section.velocity_jitter_kms,
+        correlated_bins: section.correlated_bins,
     })
+}
+
+/// Noise that is correlated over more bins is a mistake.
+const MOST_CORRELATED_BINS: f64 = 1000.0;
+
+/// Velocity zero points that scatter by more (km/s) are a mistake: profiles would be seen as the wrong part of a line.
+const LARGEST_JITTER_KMS: f64 = 100.0;
+
+fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
+    match (0.0..=LARGEST_JITTER_KMS).contains(&kms) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{kms} must be from 0 to {LARGEST_JITTER_KMS} km/s"))),
+    }
 }
 
 /// Most brightness that a facula may add, in units of the photosphere's.

@@ -1,6 +1,6 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
-use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings};
+use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
 use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
 use crate::maxent::entropy::Entropy;
@@ -28,6 +28,8 @@ pub struct Settings {
     pub values: ParameterValues,
     /// Where the profiles come from.
     pub source: ObservationSource,
+    /// Scatter of the profiles' velocity zero points.
+    pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
     pub imaging: ImagingSettings,
     /// The free parameters in the order of [`Parameter::ALL`]; may be empty, see [`Settings::require_free`].
@@ -193,7 +195,11 @@ impl Settings {
             Some(section) => {
                 section.insert("path".into(), path.into());
             }
-            None => *section = serde_json::json!({ "path": path }),
+            None => {
+                let jitter = section.get("velocity_jitter_kms").cloned();
+                *section = serde_json::json!({ "path": path });
+                jitter.into_iter().for_each(|jitter| section["velocity_jitter_kms"] = jitter);
+            }
         }
         config
     }
