@@ -3,9 +3,9 @@
 //! A star that is done is left alone, one that was stopped goes on, and one that fails stops no other. Left out: the chain itself
 //! (`run`), and who works (`pool`).
 
-use crate::chain::{ParameterSummary, Summary, summarise};
+use crate::chain::{ParameterSummary, Summary};
 use crate::io::atomic::write_json;
-use crate::manifest::{self, Manifest, kinds_and_goals};
+use crate::manifest::{self, Manifest};
 #[cfg(feature = "mpi")]
 use crate::pool::orbit_from_bytes;
 use crate::pool::{Answer, Brief, Pool, Question};
@@ -142,8 +142,8 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
     if run.go(pool, |_, _| ())? == crate::ensemble::StopReason::Interrupted {
         return Ok(End::Interrupted);
     }
-    let (kinds, goals) = kinds_and_goals(&scene.settings);
-    write_json(&folder.join(SUMMARY), &summarise(&run.chain, &kinds, &goals)?)?;
+    let (summary, _) = run.manifest.summarise(&scene.settings, &run.chain)?;
+    write_json(&folder.join(SUMMARY), &summary)?;
     Ok(End::Sampled)
 }
 

@@ -1,10 +1,10 @@
 //! `dimcmc analyse`: credible intervals and convergence of a run.
 
 use super::{Failure, Global};
-use dimcmc::chain::{Chain, summarise, table};
+use dimcmc::chain::{Chain, table};
 use dimcmc::io::atomic::write_json;
 use dimcmc::io::journal;
-use dimcmc::manifest::{Manifest, kinds_and_goals};
+use dimcmc::manifest::Manifest;
 use dimcmc::run::{CHAIN, SUMMARY};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -29,11 +29,12 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
 
 /// Writes the summary of `chain` into `folder` and prints its table.
 pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), Failure> {
-    let (kinds, goals) = kinds_and_goals(&manifest.settings(folder).map_err(Failure::input)?);
-    let summary = summarise(chain, &kinds, &goals)
+    let settings = manifest.settings(folder).map_err(Failure::input)?;
+    let (summary, _) = manifest
+        .summarise(&settings, chain)
         .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
     write_json(&folder.join(SUMMARY), &summary)?;
-    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.origin.truth.as_ref()).trim_end());
+    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.truth(&settings, &summary).as_ref()).trim_end());
     for warning in manifest.warnings().into_iter().chain(manifest.co_rotation(&summary)) {
         let _ = writeln!(std::io::stdout(), "note: {warning}");
     }

@@ -74,6 +74,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         settings: &settings,
         fit: &fit,
         truth: scene.truth,
+        mass_msun: scene.settings.mass_msun,
         provenance: &scene.provenance(),
     };
     let folder = args.output.create()?;

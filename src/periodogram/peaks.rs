@@ -29,6 +29,8 @@ pub struct Peak {
     pub sigma_porb_over_prot: Option<f64>,
     /// The orbit; where the period has an error, those of K and phase count it.
     pub orbit: CircularOrbit,
+    /// Covariance of K (km/s), period over rotation period and phase (cycles); `None` on the edge of the search.
+    pub covariance: Option<Matrix3<f64>>,
     /// Whether it is the first or last trial period, ln L still rising beyond it.
     pub on_edge: bool,
     /// How it is an alias of the highest peak.
@@ -61,7 +63,13 @@ pub(super) fn peak(cycles: &[f64], theta: Vector3<f64>, covariance: Option<Matri
         sigma_phi: sigma(Vector3::new(-ab.y * turn, ab.x * turn, mid_cycle(cycles))).min(SIGMA_OF_UNKNOWN_PHASE),
         delta_ln_l,
     };
+    let slopes = Matrix3::from_rows(&[
+        Vector3::new(ab.x / k_kms, ab.y / k_kms, 0.0).transpose(),
+        Vector3::new(0.0, 0.0, -1.0 / (frequency * frequency)).transpose(),
+        Vector3::new(-ab.y * turn, ab.x * turn, mid_cycle(cycles)).transpose(),
+    ]);
     Peak {
+        covariance: covariance.map(|c| slopes * c * slopes.transpose()),
         porb_over_prot: 1.0 / frequency,
         sigma_porb_over_prot: covariance.map(|c| c[(2, 2)].sqrt() / (frequency * frequency)),
         orbit,
@@ -112,7 +120,7 @@ pub fn peaks(
         let Trial { frequency, orbit: Some(orbit), .. } = trials[k] else { continue };
         let on_edge = k == 0 || k == last;
         let porb_over_prot = 1.0 / frequency;
-        let start = Peak { porb_over_prot, sigma_porb_over_prot: None, orbit, on_edge, alias: None };
+        let start = Peak { porb_over_prot, sigma_porb_over_prot: None, covariance: None, orbit, on_edge, alias: None };
         let peak = if on_edge { start } else { refined(quadratic, frequencies, &start) };
         let near = |other: &Peak| {
             let apart = (1.0 / other.porb_over_prot - 1.0 / peak.porb_over_prot).abs();
@@ -169,7 +177,14 @@ mod tests {
             let quadratic = sample::independent(&cycles, &rv, &DVector::from_element(40, 0.05));
             let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
             let orbit = super::super::orbits::at(&quadratic, 1.0 / 1.7).orbit.unwrap();
-            let start = Peak { porb_over_prot: 1.7, sigma_porb_over_prot: None, orbit, on_edge: false, alias: None };
+            let start = Peak {
+                porb_over_prot: 1.7,
+                sigma_porb_over_prot: None,
+                covariance: None,
+                orbit,
+                on_edge: false,
+                alias: None,
+            };
             let found = refined(&quadratic, &frequencies, &start);
             pulls[0] += ((found.orbit.k_kms - 0.1) / found.orbit.sigma_k_kms).powi(2) / n as f64;
             pulls[1] += ((found.porb_over_prot - 1.7) / found.sigma_porb_over_prot.unwrap()).powi(2) / n as f64;

@@ -17,6 +17,10 @@ pub fn symbol(name: &str) -> (&str, &'static str) {
         Some(Parameter::LineSigma) => ("*σ*_{line}", "km/s"),
         Some(Parameter::EquivalentWidth) => ("*W*_{line}", "km/s"),
         Some(Parameter::Contrast) => ("*c*", ""),
+        None if name == "period_d" => ("*P*_{orb}", "d"),
+        None if name == "t_max_rv_d" => ("*T*_{max RV}", "d"),
+        None if name == "t_conjunction_d" => ("*T*_{conj}", "d"),
+        None if name == "msini_mjup" => ("*M* sin *i*", "*M*_{Jup}"),
         // columns of the experiments' tables
         None if name == "assumed_deg" => ("assumed *i*", "°"),
         None => (name, ""),

@@ -4,13 +4,14 @@ use super::PlotError;
 use super::symbols::{label, nearest_turn, symbol};
 use crate::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
 use crate::chain::statistics::{quantile, unwrap_around};
-use crate::chain::{Chain, ParameterKind, Series, Summary, summarise};
+use crate::chain::{Chain, ParameterKind, Series, Summary};
 use crate::figure::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figure::panel::Sides;
 use crate::figure::{Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
 use crate::io::journal;
 use crate::manifest::{Manifest, kinds_and_goals};
 use crate::run::CHAIN;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A chain with its summary.
@@ -24,6 +25,8 @@ pub struct Sampled {
     pub kinds: Vec<ParameterKind>,
     /// What the chain says.
     pub summary: Summary,
+    /// Injected values of the parameters and of what follows from them.
+    pub truth: Option<BTreeMap<String, f64>>,
 }
 
 impl Sampled {
@@ -34,10 +37,12 @@ impl Sampled {
     pub fn read(folder: &Path) -> Result<Self, PlotError> {
         let manifest = Manifest::read(folder)?;
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
-        let (kinds, goals) = kinds_and_goals(&manifest.settings(folder)?);
+        let settings = manifest.settings(folder)?;
+        let (kinds, _) = kinds_and_goals(&settings);
         let wrong = |problem: String| PlotError::Content { path: folder.join(CHAIN), problem };
-        let summary = summarise(&chain, &kinds, &goals).map_err(|e| wrong(e.to_string()))?;
-        Ok(Sampled { manifest, chain, kinds, summary })
+        let (summary, _) = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
+        let truth = manifest.truth(&settings, &summary);
+        Ok(Sampled { manifest, chain, kinds, summary, truth })
     }
 
     /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.

@@ -4,6 +4,7 @@
 //! Left out: the numbers themselves (`detection`, `periodogram`).
 
 mod alarm;
+mod quantities;
 mod record;
 mod remarks;
 mod report;
@@ -36,6 +37,8 @@ pub struct PeriodogramResult<'a> {
     pub fit: &'a Fit,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
+    /// Mass of the star (solar masses), for the minimum mass of the planet.
+    pub mass_msun: Option<f64>,
     /// Config, data and program.
     pub provenance: &'a Provenance,
 }

@@ -3,6 +3,7 @@
 use super::super::provenance::Provenance;
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
+use super::quantities::QuantitiesRecord;
 use super::robustness::RobustnessRecord;
 use crate::detection::View;
 use crate::objective::ParameterValues;
@@ -10,12 +11,16 @@ use crate::periodogram::offset::Offset;
 use crate::periodogram::peaks::Peak;
 use crate::periodogram::{KeplerianOrbit, Search};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 #[derive(Serialize)]
 pub(super) struct Record<'a> {
     /// In the expansion around its own image; its errors count the period's.
     pub best: OrbitRecord,
     pub truth: Option<ParameterValues>,
+    /// The same of what is usually quoted of the orbit, times nearest to those found.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived_truth: BTreeMap<&'static str, f64>,
     /// Of the highest peak without a planet.
     pub false_alarm: FalseAlarmRecord,
     /// Around the planet-free image, from high to low.
@@ -47,6 +52,8 @@ pub(super) struct OrbitRecord {
     pub sigma_phi: f64,
     pub delta_ln_l: f64,
     pub on_edge: bool,
+    #[serde(flatten)]
+    pub quantities: QuantitiesRecord,
 }
 
 #[derive(Serialize)]
@@ -79,6 +86,8 @@ pub(super) struct KeplerianRecord {
     pub sigma_periastron_d: f64,
     pub delta_ln_l: f64,
     pub gain_over_circle: f64,
+    #[serde(flatten)]
+    pub quantities: QuantitiesRecord,
 }
 
 #[derive(Serialize)]
@@ -136,6 +145,7 @@ impl PeriodogramResult<'_> {
         Record {
             best: self.orbit(&found.best),
             truth: self.truth,
+            derived_truth: self.derived_truth(),
             false_alarm: false_alarm(&found.blind),
             peaks: self.first_peaks(),
             keplerian: self.settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
@@ -187,6 +197,7 @@ impl PeriodogramResult<'_> {
             sigma_phi: orbit.sigma_phi,
             delta_ln_l: orbit.delta_ln_l,
             on_edge: peak.on_edge,
+            quantities: self.quantities(peak),
         }
     }
 
@@ -232,6 +243,7 @@ impl PeriodogramResult<'_> {
             sigma_periastron_d: prot * orbit.sigma_periastron_cycle,
             delta_ln_l: orbit.delta_ln_l,
             gain_over_circle: orbit.gain_over_circle,
+            quantities: self.eccentric_quantities(orbit),
         }
     }
 }
