@@ -35,8 +35,8 @@ pub enum Rule {
 pub struct Derived {
     /// Its name.
     pub name: String,
-    /// What it is, in a line.
-    pub definition: String,
+    /// What it is, in a line, where the name does not say it.
+    pub definition: Option<String>,
     /// How it is computed.
     pub rule: Rule,
 }
@@ -149,4 +149,46 @@ fn event(phases: Series, periods: &Series, near: f64) -> (f64, ParameterSummary)
         ..one
     };
     (centre, summary)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One ensemble of one walker a value, so that order does not matter.
+    fn series(values: &[f64]) -> Series {
+        vec![vec![values.to_vec()]]
+    }
+
+    /// Normal scores of even quantiles are not needed: values spread evenly over +- `half`.
+    fn spread(centre: f64, half: f64, count: usize) -> Vec<f64> {
+        (0..count).map(|k| centre + half * (2.0 * (k as f64 + 0.5) / count as f64 - 1.0)).collect()
+    }
+
+    /// Times cluster where they are, whatever turn each draw was in, on the side of t0 that is nearer.
+    #[test]
+    fn an_event_is_taken_in_the_turn_next_to_the_middle() {
+        for (phase, time) in [(0.3, 103.0), (7.3, 103.0), (-2.7, 103.0), (0.48, 104.8), (0.53, 95.3), (-0.4, 96.0)] {
+            let phases: Vec<f64> =
+                spread(phase, 0.04, 801).iter().enumerate().map(|(k, x)| x + (k % 3) as f64).collect();
+            let (centre, summary) = event(series(&phases), &series(&[10.0; 801]), 100.0);
+            assert!((summary.median - time).abs() < 0.01, "{phase}: {summary:?}");
+            assert!((100.0 + 10.0 * centre - time).abs() < 0.3 && (summary.sd - 0.8 / 12f64.sqrt()).abs() < 0.01);
+            assert!(summary.ci68[0] > time - 0.4 && summary.ci68[1] < time + 0.4);
+            assert!((summary.ci95[1] - summary.ci95[0] - 0.95 * 0.8).abs() < 0.01, "{summary:?}");
+        }
+    }
+
+    /// A period of which hardly anything is known does not spread the times more than their phases do.
+    #[test]
+    fn an_uncertain_period_and_an_unknown_phase() {
+        let periods: Vec<f64> = (0..4001).map(|k| 2.0 + 16.0 * ((k * 7919) % 4001) as f64 / 4001.0).collect();
+        let times = spread(101.0, 0.1, 4001);
+        let phases: Vec<f64> = times.iter().zip(&periods).map(|(t, p)| phase([*t + 5.0 * p, *p], 100.0)).collect();
+        let (_, known) = event(series(&phases), &series(&periods), 100.0);
+        assert!((known.median - 101.0).abs() < 0.01 && known.ci95[0] > 100.8 && known.ci95[1] < 101.2, "{known:?}");
+        let anywhere = spread(0.5, 0.5, 4001);
+        let (_, unknown) = event(series(&anywhere), &series(&vec![10.0; 4001]), 100.0);
+        assert!((unknown.ci95[1] - unknown.ci95[0] - 9.5).abs() < 0.1, "{unknown:?}");
+    }
 }

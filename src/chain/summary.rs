@@ -153,7 +153,7 @@ impl Summary {
         for Settled { quantity: Derived { name, definition, .. }, summary, .. } in &settled {
             self.derived_names.push(name.clone());
             self.derived.insert(name.clone(), summary.clone());
-            self.definitions.insert(name.clone(), definition.clone());
+            self.definitions.extend(definition.clone().map(|text| (name.clone(), text)));
         }
         settled
     }

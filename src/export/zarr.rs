@@ -102,9 +102,11 @@ fn posterior(contents: &Contents, draws: &Draws) -> Group {
         let mut attributes = some_attributes([
             ("units", json!(one.unit)),
             ("long_name", json!(format!("${}$", one.latex))),
-            ("definition", json!(one.settled.quantity.definition)),
             ("derived", json!(1)),
         ]);
+        if let Some(definition) = &one.settled.quantity.definition {
+            attributes.insert("definition".to_owned(), json!(definition));
+        }
         if let Some(injected) = one.injected {
             attributes.insert("injected".to_owned(), json!(injected));
         }

@@ -68,18 +68,18 @@ impl OrbitQuantity {
         }
     }
 
-    /// What it is, in a line.
-    pub fn definition(self) -> &'static str {
-        match self {
-            OrbitQuantity::Period => "orbital period (days)",
+    /// What it is, in a line; `None` where the name says it.
+    pub fn definition(self) -> Option<&'static str> {
+        Some(match self {
+            OrbitQuantity::Period => return None,
             OrbitQuantity::Maximum => {
-                "time (days, as in the observations) of the largest radial velocity nearest to the middle of the data"
+                "time (d) of the largest (receding) radial velocity nearest to the middle of the data"
             }
             OrbitQuantity::Conjunction => {
-                "time (days, as in the observations) of the inferior conjunction, planet in front, nearest to the middle of the data"
+                "time (d) of the inferior conjunction (planet in front) nearest to the middle of the data"
             }
-            OrbitQuantity::MinimumMass => "minimum mass M sin i of the planet (Jupiter masses) for star.mass_msun",
-        }
+            OrbitQuantity::MinimumMass => "minimum mass of the planet (Jupiter masses) for star.mass_msun",
+        })
     }
 }
 
@@ -192,7 +192,11 @@ impl OrbitQuantities {
         });
         let derived = |quantity: OrbitQuantity| {
             let rule = self.rule(quantity, orbit.clone())?;
-            Some(Derived { name: quantity.name().to_owned(), definition: quantity.definition().to_owned(), rule })
+            Some(Derived {
+                name: quantity.name().to_owned(),
+                definition: quantity.definition().map(str::to_owned),
+                rule,
+            })
         };
         of.into_iter().filter_map(derived).collect()
     }
@@ -225,7 +229,7 @@ impl OrbitQuantities {
 /// What a parameter or quantity of an orbit is, in a line, where its name does not say it.
 pub fn definition(name: &str) -> Option<&'static str> {
     match OrbitQuantity::from_name(name) {
-        Some(quantity) => Some(quantity.definition()),
+        Some(quantity) => quantity.definition(),
         None => (name == Parameter::Phi.name()).then_some(PHI),
     }
 }

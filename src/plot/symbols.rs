@@ -2,12 +2,15 @@
 
 use crate::objective::Parameter;
 
+/// Unit of phi: the part of an orbit from the epoch to the largest radial velocity.
+const PHASE_UNIT: &str = "cycles to max. RV";
+
 /// Symbol and unit of a parameter by its name in files; the name itself if it is another one.
 pub fn symbol(name: &str) -> (&str, &'static str) {
     match Parameter::from_name(name) {
         Some(Parameter::K) => ("*K*", "km/s"),
         Some(Parameter::PorbOverProt) => ("*P*_{orb}/*P*_{rot}", ""),
-        Some(Parameter::Phi) => ("*φ*", "orbital cycles"),
+        Some(Parameter::Phi) => ("*φ*", PHASE_UNIT),
         Some(Parameter::OmegaEq) => ("*Ω*_{eq}", "rad/d"),
         Some(Parameter::DOmega) => ("d*Ω*", "rad/d"),
         Some(Parameter::Inclination) => ("*i*", "°"),
@@ -40,7 +43,7 @@ pub fn label(name: &str) -> String {
 
 /// Short label of an axis, for narrow panels.
 pub fn short_label(name: &str) -> String {
-    label(name).replace("orbital cycles", "cycles")
+    label(name).replace(PHASE_UNIT, "cycles")
 }
 
 /// A value with its error bars, downwards and upwards, as lines above a panel: one where there are few
@@ -51,7 +54,7 @@ pub fn value_lines(name: &str, value: f64, [down, up]: [f64; 2], digits: usize, 
     let (symbol, unit) = symbol(name);
     let unit = match unit {
         // those of a phase go without saying
-        "" | "orbital cycles" => String::new(),
+        "" | PHASE_UNIT => String::new(),
         "°" => "°".to_owned(),
         unit => format!(" {unit}"),
     };

@@ -1,7 +1,7 @@
 //! A chain: what was sampled as figures need it, its walkers over the steps, and how long it remembers.
 
 use super::PlotError;
-use super::symbols::{label, nearest_turn, symbol};
+use super::symbols::{nearest_turn, short_label, symbol};
 use crate::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
 use crate::chain::statistics::{quantile, unwrap_around};
 use crate::chain::{Chain, ParameterKind, Series, Summary};
@@ -125,7 +125,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         let series = sampled.series(i, 0);
         let shown = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
         let values: Vec<f64> = shown.flatten().copied().chain(sampled.near_truth(i)).collect();
-        let y = Axis::linear(&label(name), range_of(values.into_iter(), Scale::Linear, 0.05));
+        let y = Axis::linear(&short_label(name), range_of(values.into_iter(), Scale::Linear, 0.05));
         let panel = Panel { frame, x: Axis::linear("step", [0.0, (steps - 1).max(1) as f64]), y };
         let kept = sampled.summary.discarded_steps as f64;
         let [low, high] = panel.y.range;
