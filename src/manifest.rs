@@ -6,12 +6,13 @@
 mod conclusions;
 
 use crate::blind_search::BlindSearch;
-use crate::chain::{Goals, ParameterKind, Shape, Summary};
+use crate::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
 use crate::config::{self, Settings};
 use crate::ensemble::Positions;
 use crate::io::atomic::{WriteError, write_json};
-use crate::objective::{FreeParameter, Parameter, Prior};
+use crate::objective::{FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, definition, in_earths};
 use crate::origin::{self, OptimumRecord, Origin, OriginError};
+use crate::star::Orbit;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -84,6 +85,55 @@ impl Manifest {
              says; see what `dimcmc periodogram` or imaging.spots_left \"fitted\" makes of it",
             100.0 * NEAR_ROTATION
         ))
+    }
+
+    /// Star and data, for what is usually quoted of an orbit.
+    pub fn orbit_quantities(&self, settings: &Settings) -> OrbitQuantities {
+        OrbitQuantities::new(&settings.star, settings.mass_msun, self.origin.time_span_d)
+    }
+
+    /// The summary of the run's chain with its verdict, and with what is usually quoted of the orbit, draw by draw, also apart.
+    ///
+    /// # Errors
+    /// A chain without a step.
+    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(Summary, Vec<Settled>), ChainError> {
+        let (kinds, goals) = kinds_and_goals(settings);
+        let mut summary = summarise(chain, &kinds, &goals)?;
+        let quantities = self.orbit_quantities(settings).of_draws(&settings.free, &settings.values);
+        let settled = summary.derive(chain, quantities);
+        self.conclude(settings, chain, &mut summary);
+        let mass = summary.derived.get(OrbitQuantity::MinimumMass.name());
+        if let Some(earths) = mass.and_then(|mass| in_earths(mass.upper95.unwrap_or(mass.median))) {
+            let meaning = summary.definitions.entry(OrbitQuantity::MinimumMass.name().to_owned()).or_default();
+            meaning.push_str(&format!("; {earths}"));
+        }
+        for name in &summary.names {
+            if let Some(meaning) = definition(name) {
+                summary.definitions.insert(name.clone(), meaning.to_owned());
+            }
+        }
+        Ok((summary, settled))
+    }
+
+    /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was injected.
+    pub fn true_quantity(&self, settings: &Settings, name: &str, estimate: f64) -> Option<f64> {
+        let truth = self.origin.truth.as_ref()?;
+        let value = |p: Parameter| truth.get(p.name()).copied();
+        let orbit = Orbit {
+            k_kms: value(Parameter::K).filter(|k| *k != 0.0)?,
+            porb_over_prot: value(Parameter::PorbOverProt)?,
+            phi: value(Parameter::Phi)?,
+        };
+        self.orbit_quantities(settings).value(OrbitQuantity::from_name(name)?, &orbit, Some(estimate))
+    }
+
+    /// Injected values of the parameters and of what `summary` derives from them, for its table; `None` for observed data.
+    pub fn truth(&self, settings: &Settings, summary: &Summary) -> Option<BTreeMap<String, f64>> {
+        let mut truth = self.origin.truth.clone()?;
+        for (name, one) in &summary.derived {
+            truth.extend(self.true_quantity(settings, name, one.median).map(|value| (name.clone(), value)));
+        }
+        Some(truth)
     }
 
     /// Reads the manifest in a run's folder.

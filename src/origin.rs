@@ -28,6 +28,9 @@ pub struct Origin {
     /// What the config leaves to the observations.
     #[serde(default, skip_serializing_if = "Measured::is_empty")]
     pub measured: Measured,
+    /// First and last time of the data (d).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_span_d: Option<[f64; 2]>,
     /// Injected values of all parameters, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
     /// The image that every evaluation starts from.
@@ -144,17 +147,12 @@ impl Origin {
             data_sha256,
             config,
             measured,
+            time_span_d: scene.observations.time_span_d(),
             truth: scene.truth.map(|values| by_name(&values)),
             reference: ReferenceRecord::of(found.posterior.reference()),
             optimum: OptimumRecord::of(names, &found.optimum),
             rivals: found.rivals().into_iter().map(|rival| OptimumRecord::of(names, rival)).collect(),
         }
-    }
-
-    /// The rotation period (d) that orbits are measured by; NaN where a file has none.
-    pub fn rotation_period_d(&self) -> f64 {
-        let period = self.config.pointer("/star/rotation_period_d");
-        period.and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN)
     }
 
     /// Whether what began in `folder` can go on in `scene`.

@@ -29,11 +29,11 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
 /// Writes the summary of `chain` into `folder` and prints its table.
 pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), Failure> {
     let settings = manifest.settings(folder).map_err(Failure::of)?;
-    let summary = manifest
+    let (summary, _) = manifest
         .summarise(&settings, chain)
         .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
     write_json(&folder.join(SUMMARY), &summary)?;
-    console::line(table(&summary, manifest.origin.truth.as_ref()).trim_end());
+    console::line(table(&summary, manifest.truth(&settings, &summary).as_ref()).trim_end());
     let notes = summary.remarks.iter().cloned().chain(manifest.warnings()).chain(manifest.co_rotation(&summary));
     for warning in notes {
         console::line(format_args!("note: {warning}"));

@@ -84,6 +84,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         settings: &settings,
         fit: &fit(&detection.planet_free),
         truth: scene.truth,
+        mass_msun: scene.settings.mass_msun,
         provenance: &scene.provenance(),
     };
     let folder = args.output.create()?;

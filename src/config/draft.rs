@@ -119,6 +119,7 @@ impl Draft {
             vsys_kms: self.vsys_kms,
             omega_eq_rad_d: None,
             domega_rad_d: self.domega_rad_d,
+            mass_msun: None,
             limb_darkening: LimbDarkeningSection { law: LimbLaw::Linear, coefficients: vec![self.limb_darkening] },
             photosphere_k: Some(self.photosphere_k),
             spot_k: Some(self.spot_k),

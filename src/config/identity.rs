@@ -4,8 +4,8 @@ use crate::objective::Parameter;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, and the sampler's `steps`,
-/// `rhat` and `ess`. Independent of the order of keys.
+/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, the star's
+/// mass, and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
@@ -49,7 +49,7 @@ pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<D
         if let Some(map) = section.as_object_mut() {
             // a landscape has spots left over as the entropy has them, whatever the chain does
             let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_surface());
-            map.retain(|key, _| !free(key) && key != "spots_left");
+            map.retain(|key, _| !free(key) && key != "spots_left" && key != "mass_msun");
         }
         section
     };
@@ -85,6 +85,9 @@ fn decisive(resolved: &Value) -> Value {
     if let Some(top) = value.as_object_mut() {
         top.remove("$schema");
         top.remove("grid");
+        if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut) {
+            star.remove("mass_msun");
+        }
         if let Some(sampler) = top.get_mut("sampler").and_then(Value::as_object_mut) {
             sampler.retain(|key, _| !["steps", "rhat", "ess"].contains(&key.as_str()));
         }

@@ -19,7 +19,7 @@ pub(super) struct PerParameter<T> {
     /// Orbital period over the rotation period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub porb_over_prot: Option<T>,
-    /// Orbital phase (cycles).
+    /// Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's radial velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phi: Option<T>,
     /// Angular velocity of the equator (rad/d).

@@ -41,6 +41,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     Ok(Settings {
         path: path.into(),
         star,
+        mass_msun: raw.star.mass_msun,
         equivalent_width: raw.star.line.equivalent_width_kms,
         values,
         source,

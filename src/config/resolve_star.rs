@@ -9,6 +9,9 @@ use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use crate::units::{instrumental_sigma_kms, planck_contrast};
 use std::f64::consts::TAU;
 
+/// Lightest and heaviest star (solar masses).
+const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
+
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`. An equivalent width "auto" becomes NaN.
 pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<StarSettings, Fault> {
     positive("star.rotation_period_d", star.rotation_period_d)?;
@@ -20,6 +23,11 @@ pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<S
         return Err(Fault::new("star.rotation_period_d", problem));
     }
     star.omega_eq_rad_d.get_or_insert(omega);
+    if let Some(mass) = star.mass_msun.filter(|mass| !MASSES_MSUN.contains(mass)) {
+        let (least, most) = (MASSES_MSUN.start(), MASSES_MSUN.end());
+        let problem = format!("{mass} must be from {least} to {most} solar masses");
+        return Err(Fault::new("star.mass_msun", problem));
+    }
     Ok(StarSettings {
         rotation_period_d: star.rotation_period_d,
         epoch_d: star.epoch_d,

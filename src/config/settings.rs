@@ -22,6 +22,8 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through [`Settings::star_for`].
     pub star: StarSettings,
+    /// Mass of the star (solar masses), for the minimum mass of the planet.
+    pub mass_msun: Option<f64>,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
     /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
@@ -40,8 +42,8 @@ pub struct Settings {
     pub grid: Option<GridSettings>,
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
-    /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`, and
-    /// `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
+    /// `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
     pub sha256: String,
 }
 

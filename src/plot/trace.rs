@@ -1,7 +1,7 @@
 //! A chain: what was sampled as figures need it, its walkers over the steps, and how long it remembers.
 
 use super::PlotError;
-use super::symbols::{label, nearest_turn, symbol};
+use super::symbols::{nearest_turn, short_label, symbol};
 use crate::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
 use crate::chain::statistics::{quantile, unwrap_around};
 use crate::chain::{Chain, ParameterKind, Series, Summary};
@@ -11,6 +11,7 @@ use crate::figure::{Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scal
 use crate::io::journal;
 use crate::manifest::{Manifest, kinds_and_goals};
 use crate::run::CHAIN;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A chain with its summary.
@@ -24,6 +25,8 @@ pub struct Sampled {
     pub kinds: Vec<ParameterKind>,
     /// What the chain says.
     pub summary: Summary,
+    /// Injected values of the parameters and of what follows from them.
+    pub truth: Option<BTreeMap<String, f64>>,
 }
 
 impl Sampled {
@@ -37,8 +40,9 @@ impl Sampled {
         let settings = manifest.settings(folder)?;
         let (kinds, _) = kinds_and_goals(&settings);
         let wrong = |problem: String| PlotError::Content { path: folder.join(CHAIN), problem };
-        let summary = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
-        Ok(Sampled { manifest, chain, kinds, summary })
+        let (summary, _) = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
+        let truth = manifest.truth(&settings, &summary);
+        Ok(Sampled { manifest, chain, kinds, summary, truth })
     }
 
     /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
@@ -121,7 +125,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         let series = sampled.series(i, 0);
         let shown = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
         let values: Vec<f64> = shown.flatten().copied().chain(sampled.near_truth(i)).collect();
-        let y = Axis::linear(&label(name), range_of(values.into_iter(), Scale::Linear, 0.05));
+        let y = Axis::linear(&short_label(name), range_of(values.into_iter(), Scale::Linear, 0.05));
         let panel = Panel { frame, x: Axis::linear("step", [0.0, (steps - 1).max(1) as f64]), y };
         let kept = sampled.summary.discarded_steps as f64;
         let [low, high] = panel.y.range;

@@ -167,8 +167,11 @@ impl Curves<'_> {
 
     fn fold(&self, figure: &mut Figure, frame: Rect) {
         let (label, series) = &self.panels[self.orbital];
-        let panel =
-            Panel { frame, x: Axis::linear("orbital phase", [0.0, 1.0]), y: Axis::linear(label, range(series)) };
+        let panel = Panel {
+            frame,
+            x: Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]),
+            y: Axis::linear(label, range(series)),
+        };
         let phase = |cycle: &f64| (cycle / self.orbit.porb_over_prot - self.orbit.phi).rem_euclid(1.0);
         let curve: Vec<[f64; 2]> = (0..=200)
             .map(|i| f64::from(i) / 200.0)

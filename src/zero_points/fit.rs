@@ -16,7 +16,8 @@
 
 use super::MeasuredJitter;
 use crate::expansion::{Expansion, SPOTS_LEFT};
-use crate::periodogram::{DETECTION_FAP, Frequencies, FrequencySettings};
+use crate::periodogram::{Frequencies, FrequencySettings};
+use crate::verdict::CANDIDATE_FAP;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -177,7 +178,7 @@ fn beside_orbit(
         porb_over_prot: 1.0 / frequencies[frequency],
         k_kms: rounded(sizes[size].orbit(s, &along[size], variance).1),
         ln_odds,
-        counts: ln_odds > -DETECTION_FAP.ln(),
+        counts: ln_odds > -CANDIDATE_FAP.ln(),
     }
 }
 
