@@ -187,8 +187,8 @@ impl Origin {
     }
 }
 
-/// Reads the `file` that says what a computation in `folder` was begun with: what `T` does not know is refused, and so are
-/// parameters with other names than `names` finds in it.
+/// Reads the `file` that says what a computation in `folder` was begun with: what `T` does not know is refused, and so
+/// are parameters with other names than `names` finds in it.
 ///
 /// # Errors
 /// As [`read`]; unknown keys, and records of other parameters.

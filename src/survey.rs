@@ -29,7 +29,8 @@ pub const PARABOLOID: &str = "paraboloid.json";
 /// Nodes of a batch for each reconstruction under way: enough that threads or ranks seldom wait for the slowest node.
 const BATCH_EACH: usize = 8;
 
-/// Whether nothing but an empty file of nodes is in `folder`, and with `header` perhaps that: such a landscape may begin again.
+/// Whether nothing but an empty file of nodes is in `folder`, and with `header` perhaps that: such a landscape may
+/// begin again.
 pub fn is_false_start(folder: &Path, header: bool) -> bool {
     lines::is_false_start(folder, header.then_some(HEADER), NODES)
 }

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Text of others, such as a file's name, with control characters as escapes (`\n`, `\u{1b}`): it can neither break a line nor
-/// command a terminal.
+/// Text of others, such as a file's name, with control characters as escapes (`\n`, `\u{1b}`): it can neither break a
+/// line nor command a terminal.
 pub fn escaped(text: &str) -> Cow<'_, str> {
     if !text.contains(char::is_control) {
         return Cow::Borrowed(text);

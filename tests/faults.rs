@@ -1,5 +1,5 @@
-//! What users and systems do to a program: streams that are gone, signals at any time, full disks, missing permissions, numbers
-//! beyond sense, `--force` into the wrong place, edited results, control characters in names.
+//! What users and systems do to a program: streams that are gone, signals at any time, full disks, missing permissions,
+//! numbers beyond sense, `--force` into the wrong place, edited results, control characters in names.
 
 #[path = "common/desk.rs"]
 mod desk;

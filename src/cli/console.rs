@@ -1,6 +1,6 @@
-//! The only way to the terminal: results on stdout, errors on stderr. Nothing that happens to either stream stops a command or
-//! the thread that waits for signals: a stream that is gone is written to in vain, and results that a full disk has swallowed are
-//! a failure once the command has ended.
+//! The only way to the terminal: results on stdout, errors on stderr. Nothing that happens to either stream stops a
+//! command or the thread that waits for signals: a stream that is gone is written to in vain, and results that a full
+//! disk has swallowed are a failure once the command has ended.
 
 use super::Failure;
 use dimcmc::text::escaped;

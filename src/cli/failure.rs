@@ -191,8 +191,8 @@ impl From<PlotError> for Failure {
     }
 }
 
-/// Whether an error, or what is behind it, is the system's: anything but a file that is missing, there already, or no file of
-/// that kind.
+/// Whether an error, or what is behind it, is the system's: anything but a file that is missing, there already, or no
+/// file of that kind.
 fn is_of_system(error: &(dyn Error + 'static)) -> bool {
     let mut behind = Some(error);
     while let Some(error) = behind {

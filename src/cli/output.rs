@@ -44,8 +44,8 @@ impl Output {
         }
     }
 
-    /// Whether what is in the folder is to be replaced: by the user's will, or because it is what a run or a landscape has left
-    /// that ended before its first result.
+    /// Whether what is in the folder is to be replaced: by the user's will, or because it is what a run or a landscape
+    /// has left that ended before its first result.
     pub fn replaces(&self) -> bool {
         let folder = &self.folder;
         self.force || run::is_false_start(folder, true) || survey::is_false_start(folder, true)
@@ -117,8 +117,8 @@ impl ConfigFile {
         }
     }
 
-    /// That neither the config nor another file that comes with it replaces one that the command has `read`, whatever the
-    /// user says.
+    /// That neither the config nor another file that comes with it replaces one that the command has `read`, whatever
+    /// the user says.
     pub fn spare(&self, read: &[PathBuf], other: Option<&Path>) -> Result<(), Failure> {
         let targets = [Some(self.path.as_path()), other];
         match read.iter().find(|file| targets.into_iter().flatten().any(|target| is_same(file, target))) {

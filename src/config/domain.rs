@@ -15,8 +15,8 @@ pub(super) fn key(parameter: Parameter) -> String {
     }
 }
 
-/// Bounds of numbers that no star needs to exceed: beyond them they are slips of the pen, digits of a phase are lost, or the
-/// computation has no end.
+/// Bounds of numbers that no star needs to exceed: beyond them they are slips of the pen, digits of a phase are lost,
+/// or the computation has no end.
 pub(super) mod most {
     /// Rotation velocity (km/s); velocity axes grow absurdly long beyond it.
     pub const VSINI_KMS: f64 = 2000.0;

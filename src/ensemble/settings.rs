@@ -88,7 +88,8 @@ impl SamplerSettings {
 /// Bound on ensembles: far beyond use.
 const MOST_ENSEMBLES: usize = 1000;
 
-/// Bound on the walkers of all ensembles: several for each core of the largest cluster, and a step of them fits the memory.
+/// Bound on the walkers of all ensembles: several for each core of the largest cluster, and a step of them fits the
+/// memory.
 const MOST_WALKERS: usize = 100_000;
 
 /// Bound on steps: far beyond use, and small enough that counts never overflow.

@@ -63,7 +63,8 @@ impl Columns {
     /// Reads a table with the names of its columns in the first line.
     ///
     /// # Errors
-    /// [`CsvError`]: a file that cannot be read, a line of another length, something that is no number or beyond sense, no row.
+    /// [`CsvError`]: a file that cannot be read, a line of another length, something that is no number or beyond sense,
+    /// no row.
     pub fn read(path: &Path) -> Result<Self, CsvError> {
         let text = std::fs::read_to_string(path).map_err(|source| CsvError::Read { path: path.into(), source })?;
         let mut lines = text.lines();

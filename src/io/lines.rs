@@ -77,8 +77,9 @@ impl From<String> for Refusal {
     }
 }
 
-/// Whether all that there is in `folder` of a computation is `lines`, still empty, and perhaps the `head` that says what it was
-/// begun with: it was stopped, or could not write, before its first result. Nothing is lost when it begins again.
+/// Whether all that there is in `folder` of a computation is `lines`, still empty, and perhaps the `head` that says
+/// what it was begun with: it was stopped, or could not write, before its first result. Nothing is lost when it begins
+/// again.
 pub fn is_false_start(folder: &Path, head: Option<&str>, lines: &str) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else { return false };
     let mut found = false;
