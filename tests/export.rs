@@ -194,7 +194,17 @@ fn the_hdf5_file_holds_the_chain_step_by_step() {
         bytes.windows(wanted.len()).any(|window| window == wanted)
     };
     assert!(holds(later.iter().map(|record| number(&record["log_prob"])).collect()));
-    assert!(holds(later.iter().flat_map(|r| [number(&r["spottedness"]), number(&r["chi2"])]).collect()));
+    // blobs: what follows from the parameters comes after spottedness and chi2, as in the last columns of csv
+    desk.succeed(&["export", "run", "--format", "csv"]);
+    let csv = desk.read("run/chain.csv");
+    let derived = csv.lines().skip(1 + ENSEMBLES * WALKERS).map(|line| {
+        let cells: Vec<f64> = line.rsplit(',').take(2).map(|cell| cell.parse().unwrap()).collect();
+        [cells[1], cells[0]]
+    });
+    let blobs = later.iter().zip(derived);
+    let blobs = blobs
+        .flat_map(|(r, [maximum, conjunction])| [number(&r["spottedness"]), number(&r["chi2"]), maximum, conjunction]);
+    assert!(holds(blobs.collect()));
     let accepted =
         |w: usize| later.iter().skip(w).step_by(ENSEMBLES * WALKERS).filter(|r| r["accepted"] == true).count();
     assert!(holds((0..ENSEMBLES * WALKERS).map(|walker| accepted(walker) as f64).collect()));
