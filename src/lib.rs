@@ -51,6 +51,7 @@ pub mod cluster;
 pub mod comparison;
 pub mod config;
 pub mod detection;
+pub mod diagnosis;
 pub mod ensemble;
 pub mod expansion;
 pub mod experiments;

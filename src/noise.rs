@@ -104,13 +104,16 @@ impl NoiseError {
 const FEWEST: (usize, usize) = (30, 10);
 
 /// chi2 per datum of a map of profiles whose errors are right, at the lambda beyond which noise is turned into spots.
-const FITTED: f64 = 0.97;
+pub const FITTED: f64 = 0.97;
 
 /// The residuals stay when they move by less than this part.
 const STAYS: f64 = 0.005;
 
 /// Most maps; it takes three or four.
 const MOST_MAPS: usize = 12;
+
+/// Errors with which no map is found are tried again larger by this.
+const FAR_TOO_SMALL: f64 = 3.0;
 
 /// Beyond this many local line widths from the limb there is continuum.
 const BEYOND: f64 = 3.0;
@@ -172,27 +175,21 @@ impl MeasuredErrors {
         imager: impl Fn(f64) -> Result<Imager, E>,
     ) -> Result<Result<(), NoiseError>, E> {
         let before = self.sigma_scale.unwrap_or(1.0);
-        let mut factor = 1.0;
-        for _ in 0..MOST_MAPS {
-            let scaled = imager(factor)?;
-            let map = match Reference::at_lambda(&scaled, values, PROVISIONAL_LAMBDA * self.correlated_bins) {
-                Ok(map) => map,
-                Err(error) if error.ran_out_of_steps() => return Ok(Err(NoiseError::NoMap(before * factor))),
-                Err(error) => return Ok(Err(error.into())),
-            };
-            let independent = scaled.data.depth.len() as f64 / self.correlated_bins;
-            let next = factor * (map.solution.chi2 / (FITTED * independent)).sqrt();
-            let stays = (next / factor - 1.0).abs() < STAYS;
-            factor = next;
-            if stays {
-                let root = self.correlated_bins.sqrt();
-                let residual = rounded(before * factor / root);
-                self.residual = Some(residual);
-                self.sigma_scale = Some(rounded(root * self.continuum.unwrap_or(residual).max(residual)));
-                return Ok(Ok(()));
-            }
-        }
-        Ok(Err(NoiseError::NoMap(before * factor)))
+        let factor = match factor_to_fit(values, self.correlated_bins, imager)? {
+            Ok(factor) => factor,
+            Err(NoiseError::NoMap(factor)) => return Ok(Err(NoiseError::NoMap(before * factor))),
+            Err(error) => return Ok(Err(error)),
+        };
+        let root = self.correlated_bins.sqrt();
+        let residual = rounded(before * factor / root);
+        self.residual = Some(residual);
+        self.sigma_scale = Some(rounded(root * self.continuum.unwrap_or(residual).max(residual)));
+        Ok(Ok(()))
+    }
+
+    /// By how much the residuals of a map are larger than the scatter of the continuum, where both were measured.
+    pub fn misfit(&self) -> Option<f64> {
+        Some(self.residual? / self.continuum?)
     }
 
     /// Multiplies the errors of `observations` by all that was measured.
@@ -223,6 +220,46 @@ impl MeasuredErrors {
         }
         line
     }
+}
+
+/// The smallest factor on the errors with which a map comes down to 0.97 per independent datum before noise is turned into spots.
+/// `imager` is of the profiles with errors times a factor.
+///
+/// # Errors
+/// The outer ones are those of `imager`, the inner ones say that there is no map.
+pub fn factor_to_fit<E>(
+    values: ParameterValues,
+    correlated_bins: f64,
+    imager: impl Fn(f64) -> Result<Imager, E>,
+) -> Result<Result<f64, NoiseError>, E> {
+    let mut factor = 1.0;
+    for _ in 0..MOST_MAPS {
+        let chi2 = match chi2_at(&imager(factor)?, values, correlated_bins) {
+            Ok(chi2) => chi2,
+            // errors that are far too small for the model take more steps than a map may
+            Err(error) if error.ran_out_of_steps() => {
+                factor *= FAR_TOO_SMALL;
+                continue;
+            }
+            Err(error) => return Ok(Err(error.into())),
+        };
+        let next = factor * (chi2 / FITTED).sqrt();
+        let stays = (next / factor - 1.0).abs() < STAYS;
+        factor = next;
+        if stays {
+            return Ok(Ok(factor));
+        }
+    }
+    Ok(Err(NoiseError::NoMap(factor)))
+}
+
+/// chi2 per independent datum of the map beyond which noise is turned into spots.
+///
+/// # Errors
+/// If the solver fails.
+pub fn chi2_at(imager: &Imager, values: ParameterValues, correlated_bins: f64) -> Result<f64, ReferenceError> {
+    let map = Reference::at_lambda(imager, values, PROVISIONAL_LAMBDA * correlated_bins)?;
+    Ok(map.solution.chi2 * correlated_bins / imager.data.depth.len() as f64)
 }
 
 /// To three digits: the last bits of a fit mean nothing, and everything after it hangs on them.

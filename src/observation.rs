@@ -73,6 +73,14 @@ impl Observations {
         self.profiles.iter().map(|p| p.first_moment(self.step_kms)).collect()
     }
 
+    /// The same in units of a continuum that is at `level` here.
+    pub fn over_continuum(mut self, level: f64) -> Self {
+        for profile in &mut self.profiles {
+            profile.intensity.iter_mut().chain(&mut profile.sigma).for_each(|x| *x /= level);
+        }
+        self
+    }
+
     /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that the velocity
     /// range holds whole, whatever the spots, because every pixel's line has the same one (method section 1).
     pub fn mean_equivalent_width_kms(&self) -> f64 {

@@ -73,14 +73,20 @@ impl Scene {
     pub fn new(settings: Settings) -> Result<Self, SceneError> {
         let mut errors = None;
         let (observations, data_sha256, truth) = match &settings.source {
-            ObservationSource::Files { path, options, errors: wanted } => {
+            ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
                 let data = lsd::read(path, options)?;
-                if *wanted == ErrorSettings::default() {
+                let as_quoted = *wanted == ErrorSettings::default();
+                if as_quoted && *continuum_level == 1.0 {
                     (data.observations, data.sha256, None)
                 } else {
-                    let whole = lsd::read(path, &ReadOptions::default())?.observations;
-                    let (observations, measured) = with_errors(&settings, *wanted, &whole, data.observations)?;
-                    errors = Some(measured);
+                    let mut observations = data.observations.over_continuum(*continuum_level);
+                    if !as_quoted {
+                        let whole = lsd::read(path, &ReadOptions::default())?.observations;
+                        let whole = whole.over_continuum(*continuum_level);
+                        let measured = measured_errors(&settings, *wanted, &whole, &observations)?;
+                        measured.apply(&mut observations);
+                        errors = Some(measured);
+                    }
                     let sha256 = fingerprint(&observations);
                     (observations, sha256, None)
                 }
@@ -102,6 +108,26 @@ impl Scene {
     /// Settings that make no sense with these observations.
     pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
         Scene::with_noise(settings, observations, None)
+    }
+
+    /// The same of profiles in their `whole` width and `cut` to the config's velocity range, both in units of their continuum and with
+    /// errors as quoted. Errors that `settings` leave to them are measured.
+    ///
+    /// # Errors
+    /// Settings that make no sense with these observations, and errors that cannot be measured.
+    pub fn of_whole(settings: Settings, whole: &Observations, cut: &Observations) -> Result<Self, ConfigError> {
+        let ObservationSource::Files { options, errors: wanted, .. } = &settings.source else {
+            return Scene::of(settings, cut.clone());
+        };
+        let (scale, wanted) = (options.sigma_scale, *wanted);
+        let mut observations = cut.clone();
+        observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= scale);
+        if wanted == ErrorSettings::default() {
+            return Scene::of(settings, observations);
+        }
+        let measured = measured_errors(&settings, wanted, whole, &observations)?;
+        measured.apply(&mut observations);
+        Scene::with_noise(settings, observations, Some(measured))
     }
 
     /// The same where the errors were measured: a target chi2 is then that of independent data.
@@ -134,7 +160,7 @@ impl Scene {
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
     }
 
-    /// The profiles in their whole width, errors as quoted, with what the list says of each: what is injected into.
+    /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected into.
     ///
     /// # Errors
     /// Files that are no longer what they were.
@@ -160,13 +186,18 @@ impl Scene {
         files
     }
 
+    /// The profiles in their whole width and in units of their continuum, errors as quoted; `None` if they are no longer there.
+    pub fn whole_over_continuum(&self) -> Option<Observations> {
+        self.whole().ok().map(|(whole, _)| whole.over_continuum(self.continuum_level()))
+    }
+
     /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors stay.
     ///
     /// # Errors
     /// Profiles that no longer make sense.
     pub fn injected(&self, whole: &Observations, orbits: &[Orbit]) -> Result<Self, ConfigError> {
         let mut observations = self.observations.clone();
-        let injected = inject(whole, &self.imager.star, orbits);
+        let injected = inject(whole, &self.imager.star, orbits).over_continuum(self.continuum_level());
         for (cut, whole) in observations.profiles.iter_mut().zip(&injected.profiles) {
             let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / injected.step_kms).round() as usize;
             for (intensity, shifted) in cut.intensity.iter_mut().zip(whole.intensity.iter().skip(first)) {
@@ -193,6 +224,13 @@ impl Scene {
             BrightnessModel::BrightAndDark => self
                 .simulation()
                 .map(|simulation| simulation.brightness(&self.imager.grid, simulation.contrast(&self.imager.star))),
+        }
+    }
+
+    fn continuum_level(&self) -> f64 {
+        match self.settings.source {
+            ObservationSource::Files { continuum_level, .. } => continuum_level,
+            ObservationSource::Simulate(_) => 1.0,
         }
     }
 
@@ -242,7 +280,10 @@ impl Scene {
 }
 
 /// What `observations` are imaged with.
-fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
+///
+/// # Errors
+/// Settings that make no sense with these observations.
+pub fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
     settings.check_velocity_grid(&settings.values, observations.step_kms)?;
     let star = settings.star_for(observations)?;
     let imager = Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy());
@@ -276,13 +317,13 @@ fn zero_points(
 /// part.
 const SETTLED: (usize, f64) = (3, 0.03);
 
-/// The observations, cut as they are used, with the errors that they and the `whole` profiles ask for.
-fn with_errors(
+/// The errors that the observations, `cut` as they are used, and the `whole` profiles ask for.
+fn measured_errors(
     settings: &Settings,
     wanted: ErrorSettings,
     whole: &Observations,
-    cut: Observations,
-) -> Result<(Observations, MeasuredErrors), ConfigError> {
+    cut: &Observations,
+) -> Result<MeasuredErrors, ConfigError> {
     let fault = |e: NoiseError| settings.fault(e.key(), &e.to_string());
     let scaled = |measured: &MeasuredErrors| {
         let mut observations = cut.clone();
@@ -291,7 +332,7 @@ fn with_errors(
     };
     let continuum = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
     if !wanted.measured {
-        return Ok((scaled(&continuum), continuum));
+        return Ok(continuum);
     }
     let before = scaled(&continuum);
     let chi2_target = settings.imaging.chi2_target.value() / continuum.correlated_bins;
@@ -312,7 +353,7 @@ fn with_errors(
             break;
         }
     }
-    Ok((scaled(&measured), measured))
+    Ok(measured)
 }
 
 fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {

@@ -92,6 +92,26 @@ fn nuisances_take_part() {
     assert!((number(&errors["residual"]) / 0.25 - 1.0).abs() < 0.12, "{errors}");
 }
 
+/// The strength of the line is measured below the continuum beside it, wherever that is, where its level is a nuisance.
+#[test]
+fn a_continuum_offset_is_not_counted_as_line() {
+    let desk = desk(|observations| {
+        for profile in &mut observations.profiles {
+            profile.intensity.iter_mut().for_each(|intensity| *intensity -= 0.03);
+        }
+    });
+    let mut config: Value = serde_json::from_str(&desk.read("config.json")).unwrap();
+    config["observations"] =
+        json!({ "path": "data/observations.txt", "velocity_range_kms": [-38, 38], "sigma_scale": 1.0 });
+    config["star"]["line"]["equivalent_width_kms"] = json!("auto");
+    config["imaging"]["nuisances"] = json!({ "continuum_offset": 0.03 });
+    desk.write("config.json", &config.to_string());
+    desk.succeed(&["map", "config.json", "--out", "map"]);
+    let width = number(&desk.json("map/fit.json")["equivalent_width_kms"]);
+    // 76 km/s of 0.03 would add 2.3 km/s; 20 profiles of some 14 bins of continuum of S/N 500 leave 0.02 km/s
+    assert!((width - 5.8).abs() < 0.1, "{width}");
+}
+
 #[test]
 fn a_line_that_no_map_fits_counts_for_more_than_the_continuum() {
     let desk = desk(|observations| {

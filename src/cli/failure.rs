@@ -70,7 +70,11 @@ impl Failure {
     /// No reference image at the values of the config at `path`.
     pub fn reference(path: &Path, error: ReferenceError) -> Self {
         match error {
-            ReferenceError::TargetBelowFloor { .. } | ReferenceError::NothingToFit { .. } => {
+            ReferenceError::TargetBelowFloor { .. } => {
+                let config = path.display();
+                Failure::input(format!("{config}: imaging.chi2_target: {error}; `dimcmc map {config}` tries out why"))
+            }
+            ReferenceError::NothingToFit { .. } => {
                 Failure::input(format!("{}: imaging.chi2_target: {error}", path.display()))
             }
             ReferenceError::Solver(_) => Failure::failed(format!("{}: {error}", path.display())),

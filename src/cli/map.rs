@@ -3,11 +3,12 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
+use dimcmc::diagnosis::Diagnosis;
 use dimcmc::fit::{Deviation, Fit, FitSummary};
 use dimcmc::io::map::{FILES, MapResult};
-use dimcmc::objective::Reference;
+use dimcmc::objective::{Reference, ReferenceError};
 use dimcmc::scene::Scene;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Reconstruct the spots at the config's parameter values
 ///
@@ -29,6 +30,14 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let spinner = progress::bar(global, None, "reconstructing");
     let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target.value());
+    if let Err(error @ ReferenceError::TargetBelowFloor { .. }) = reference {
+        spinner.set_message("looking for the reason");
+        let failure = unreached(&args.config, &scene, error);
+        spinner.finish_and_clear();
+        return Err(failure);
+    }
+    let misfits = scene.measured.errors.as_ref().is_some_and(Diagnosis::is_called_for);
+    let diagnosis = if misfits { diagnosis(&scene) } else { None };
     spinner.finish_and_clear();
     let reference = reference.map_err(|e| Failure::reference(&args.config, e))?;
     let fit = Fit::new(&scene.imager, &scene.observations, &reference);
@@ -39,6 +48,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         fit: &fit,
         true_map: true_map.as_deref(),
         truth: scene.truth,
+        diagnosis: diagnosis.as_ref().and_then(|diagnosis| serde_json::to_value(diagnosis).ok()),
         provenance: &scene.provenance(),
     };
     let folder = args.output.create()?;
@@ -50,8 +60,23 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     for warning in &fit.checks.warnings {
         report = report.line("warning", warning);
     }
+    if let Some(diagnosis) = &diagnosis {
+        let text = &diagnosis.text;
+        report = report.line("warning", format!("the model does not fit as well as the continuum promises: {text}"));
+    }
     report.written(folder, FILES.join(", ")).print();
     Ok(())
+}
+
+/// Why no map of `scene` fits, by trying.
+fn diagnosis(scene: &Scene) -> Option<Diagnosis> {
+    Diagnosis::of(scene, scene.whole_over_continuum().as_ref())
+}
+
+/// The target chi2 of the config at `config` is not reached: with the likely reason.
+fn unreached(config: &Path, scene: &Scene, error: ReferenceError) -> Failure {
+    let reason = diagnosis(scene).map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text));
+    Failure::input(format!("{}: imaging.chi2_target: {error}{reason}", config.display()))
 }
 
 fn report(Fit { summary: fit, nuisances, zero_points_kms, .. }: &Fit) -> Report {

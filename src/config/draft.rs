@@ -49,7 +49,9 @@ pub struct Draft {
     /// First and last velocity (km/s) used.
     pub velocity_range_kms: (f64, f64),
     /// Factor on the standard errors.
-    pub sigma_scale: f64,
+    pub sigma_scale: Automatic,
+    /// Level of the continuum in the files, where it is not 1.
+    pub continuum_level: Option<f64>,
     /// The image.
     pub imaging: ImagingSettings,
     /// Starts of the orbit: semi-amplitude (km/s), 0 for no planet; period over the rotation period; phase.
@@ -93,7 +95,8 @@ impl Draft {
             observations: ObservationsSection {
                 path: Some(self.observations.clone()),
                 velocity_range_kms: Some(self.velocity_range_kms.into()),
-                sigma_scale: Some(Automatic::Fixed(self.sigma_scale)),
+                sigma_scale: Some(self.sigma_scale),
+                continuum_level: self.continuum_level,
                 weights: Weights::default(),
                 velocity_jitter_kms: Default::default(),
                 simulate: None,

@@ -150,6 +150,10 @@ pub(super) struct ObservationsSection {
     /// scatter of the continuum says and what a map at the config's values leaves over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_scale: Option<Automatic>,
+    /// With `path`: level of the continuum in the files, from 0.5 to 2; 1 if not given. Intensities and standard errors are divided
+    /// by it as they are read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuum_level: Option<f64>,
     /// With `path`: how the profiles are weighted against each other.
     #[serde(default, skip_serializing_if = "Weights::is_default")]
     pub weights: Weights,

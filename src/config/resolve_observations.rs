@@ -14,6 +14,9 @@ use crate::simulate::Simulation;
 use crate::star::{Disc, Facula, Spot, StarSettings};
 use std::path::Path;
 
+/// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
+const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+
 /// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start from.
 pub(super) fn resolve_observations(
     raw: &mut Config,
@@ -31,6 +34,7 @@ pub(super) fn resolve_observations(
             let file_only = [
                 ("velocity_range_kms", section.velocity_range_kms.is_some()),
                 ("sigma_scale", section.sigma_scale.is_some()),
+                ("continuum_level", section.continuum_level.is_some()),
                 ("weights", !section.weights.is_default()),
             ];
             if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
@@ -54,6 +58,12 @@ pub(super) fn resolve_observations(
     for end in section.velocity_range_kms.into_iter().flatten() {
         check_size("observations.velocity_range_kms", end, most::VELOCITY_KMS)?;
     }
+    let continuum_level = section.continuum_level.unwrap_or(1.0);
+    if !CONTINUUM_LEVELS.contains(&continuum_level) {
+        let (min, max) = (CONTINUUM_LEVELS.start(), CONTINUUM_LEVELS.end());
+        let problem = format!("{continuum_level} must be from {min} to {max}");
+        return Err(Fault::new("observations.continuum_level", problem));
+    }
     if let Some([min, max]) = section.velocity_range_kms
         && min >= max
     {
@@ -61,7 +71,8 @@ pub(super) fn resolve_observations(
         return Err(Fault::new("observations.velocity_range_kms", problem));
     }
     let options = ReadOptions { velocity_range_kms: section.velocity_range_kms.map(Into::into), sigma_scale };
-    Ok(ObservationSource::Files { path: config.parent().unwrap_or(Path::new("")).join(path), options, errors })
+    let path = config.parent().unwrap_or(Path::new("")).join(path);
+    Ok(ObservationSource::Files { path, options, continuum_level, errors })
 }
 
 fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {

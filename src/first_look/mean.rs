@@ -12,6 +12,9 @@ const FEWEST_BINS: usize = 3;
 /// A line that is no deeper than that many standard errors of a bin of the mean is no line.
 const LEAST_SIGNIFICANCE: f64 = 5.0;
 
+/// Either end of a profile is one such part of it.
+const ENDS: usize = 20;
+
 /// The mean of all profiles, on the bins that all of them have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeanProfile {
@@ -98,6 +101,13 @@ impl MeanProfile {
         }
     }
 
+    /// Mean depth of its ends: that of the continuum, wherever its level is, or of the last of the line.
+    fn at_its_ends(&self) -> f64 {
+        let bins = (self.depth.len() / ENDS).max(1);
+        let (first, last) = (&self.depth[..bins], &self.depth[self.depth.len() - bins..]);
+        0.5 * (super::median(first.to_vec()) + super::median(last.to_vec()))
+    }
+
     /// Error (km/s) of the middle of two crossings by the noise of the mean profile alone.
     pub fn centre_error_kms(&self, half_depth: HalfDepth) -> f64 {
         let deepest = self.depth.iter().copied().fold(0.0, f64::max);
@@ -110,10 +120,12 @@ impl MeanProfile {
     /// If there is no line, or it runs out of the data.
     pub fn half_depth(&self) -> Result<HalfDepth, LookError> {
         let deepest = (0..self.depth.len()).max_by(|a, b| self.depth[*a].total_cmp(&self.depth[*b])).unwrap_or(0);
-        let half = 0.5 * self.depth[deepest];
-        if half.is_nan() || 2.0 * half < LEAST_SIGNIFICANCE * self.sigma {
-            return Err(LookError::NoLine { depth: 2.0 * half, sigma: self.sigma });
+        let continuum = self.at_its_ends();
+        let depth = self.depth[deepest] - continuum;
+        if depth.is_nan() || depth < LEAST_SIGNIFICANCE * self.sigma {
+            return Err(LookError::NoLine { depth, sigma: self.sigma });
         }
+        let half = continuum + 0.5 * depth;
         let (from_kms, to_kms) = self.range_kms();
         let cut = || LookError::LineCut { from_kms, to_kms };
         let above = |j: &usize| self.depth[*j] > half;

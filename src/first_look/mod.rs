@@ -4,10 +4,12 @@
 //! Every number is a start for what the program does afterwards, and says how far it can be trusted. Left out: spots, orbits,
 //! and what to make of the numbers (`proposal`).
 
+mod continuum;
 mod mean;
 mod noise;
 mod unspotted;
 
+pub use continuum::Continuum;
 pub use mean::{HalfDepth, MeanProfile};
 pub use noise::{Noise, Scatter};
 pub use unspotted::Unspotted;
@@ -22,7 +24,7 @@ const SPOTS: (f64, f64) = (0.01, 0.3);
 /// What the centre owes to spots, as a share of vsini.
 const CENTRE: f64 = 0.004;
 
-/// How far limb darkening (its linear coefficient) and the width of the local line (a share of it) may be wrong.
+/// How far limb darkening (its linear coefficient) and the width of a local line that is given (a share of it) may be wrong.
 const DOUBT: (f64, f64) = (0.15, 0.2);
 
 /// The local line as far as it is assumed.
@@ -30,8 +32,12 @@ const DOUBT: (f64, f64) = (0.15, 0.2);
 pub struct LineModel {
     /// Limb darkening: coefficient of the linear law.
     pub limb_darkening: f64,
-    /// Standard deviation (km/s), instrumental broadening included.
+    /// Standard deviation (km/s), before the spectrograph.
     pub sigma_kms: f64,
+    /// What the spectrograph adds to it in quadrature (km/s).
+    pub instrumental_sigma_kms: f64,
+    /// Whether the width is a guess and the profiles are asked for it.
+    pub is_guess: bool,
 }
 
 /// What the profiles say by themselves.
@@ -43,10 +49,16 @@ pub struct FirstLook {
     pub unspotted: Unspotted,
     /// How far its vsini may be wrong (km/s): by spots, limb darkening and the width of the local line.
     pub vsini_error_kms: f64,
+    /// How far the width of the local line may be wrong (km/s); `None` where it is given.
+    pub line_sigma_error_kms: Option<f64>,
     /// How far its centre may be wrong (km/s), by spots.
     pub centre_error_kms: f64,
     /// Distance (km/s) from the centre at which the line has ended.
     pub reach_kms: f64,
+    /// First and last velocity (km/s) that all profiles have.
+    pub range_kms: (f64, f64),
+    /// The continuum beside the line.
+    pub continuum: Option<Continuum>,
     /// Errors of a bin.
     pub noise: Noise,
 }
@@ -114,9 +126,13 @@ impl FirstLook {
         // towards the middle of what is possible
         let other_limb = if line.limb_darkening > 0.5 { -DOUBT.0 } else { DOUBT.0 };
         let by_limb = change(LineModel { limb_darkening: line.limb_darkening + other_limb, ..line })?;
-        let by_width = change(LineModel { sigma_kms: line.sigma_kms * (1.0 - DOUBT.1), ..line })?;
+        let (width_error, by_guess) = unspotted.line_errors_kms;
+        let by_width = match line.is_guess {
+            true => by_guess,
+            false => change(LineModel { sigma_kms: line.sigma_kms * (1.0 - DOUBT.1), ..line })?,
+        };
         let by_spots = SPOTS.0 * unspotted.vsini_kms + SPOTS.1;
-        let reach_kms = unspotted.reach_kms(line.sigma_kms);
+        let reach_kms = unspotted.reach_kms(line.instrumental_sigma_kms);
         let times = observations.times_d();
         let extreme = |f: fn(f64, f64) -> f64| times.iter().copied().reduce(f).unwrap_or(f64::NAN);
         Ok(FirstLook {
@@ -124,7 +140,10 @@ impl FirstLook {
             unspotted,
             vsini_error_kms: by_spots.hypot(by_limb).hypot(by_width),
             centre_error_kms: (CENTRE * unspotted.vsini_kms).hypot(mean.centre_error_kms(half_depth)),
+            line_sigma_error_kms: line.is_guess.then_some(width_error),
             reach_kms,
+            range_kms: mean.range_kms(),
+            continuum: Continuum::of(observations, unspotted.centre_kms, reach_kms),
             noise: Noise::of(observations, unspotted.centre_kms, reach_kms),
         })
     }
@@ -134,11 +153,16 @@ impl LineModel {
     /// Whether the line can be seen in the bins of a profile, and fits into it.
     fn check(self, mean: &MeanProfile) -> Result<(), LookError> {
         const NARROWEST: f64 = 0.02;
-        let (sigma_kms, step_kms, (from_kms, to_kms)) = (self.sigma_kms, mean.step_kms, mean.range_kms());
+        let (sigma_kms, step_kms, (from_kms, to_kms)) = (self.total_sigma_kms(), mean.step_kms, mean.range_kms());
         match (NARROWEST * step_kms..=to_kms - from_kms).contains(&sigma_kms) {
             true => Ok(()),
             false => Err(LookError::LineModel { sigma_kms, step_kms, from_kms, to_kms }),
         }
+    }
+
+    /// Standard deviation (km/s) as the spectrograph shows it.
+    pub fn total_sigma_kms(self) -> f64 {
+        self.sigma_kms.hypot(self.instrumental_sigma_kms)
     }
 
     fn law(self) -> LimbDarkening {

@@ -16,7 +16,7 @@ use serde::Serialize;
 use std::path::Path;
 
 /// A reconstruction with all that its files say of it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct MapResult<'a> {
     /// What the data were imaged with.
     pub imager: &'a Imager,
@@ -28,6 +28,8 @@ pub struct MapResult<'a> {
     pub true_map: Option<&'a [f64]>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
+    /// Why the model does not fit as well as the errors promise, if it does not.
+    pub diagnosis: Option<serde_json::Value>,
     /// Config, data and program.
     pub provenance: &'a Provenance,
 }
@@ -89,6 +91,8 @@ struct FitFile<'a> {
     zero_points_kms: &'a [f64],
     truth: Option<ParameterValues>,
     checks: &'a Checks,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    diagnosis: Option<&'a serde_json::Value>,
     trade_off: Vec<TradeOffNode>,
     #[serde(flatten)]
     provenance: &'a Provenance,
@@ -187,6 +191,7 @@ impl MapResult<'_> {
             zero_points_kms: &self.fit.zero_points_kms,
             truth: self.truth,
             checks: &self.fit.checks,
+            diagnosis: self.diagnosis.as_ref(),
             trade_off: self.fit.tradeoff.iter().map(node).collect(),
             provenance: self.provenance,
         }

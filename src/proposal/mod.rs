@@ -1,12 +1,13 @@
 //! A first config for observed profiles: what they say themselves, what is given, and what has to be assumed; each value with
 //! where it came from.
 //!
-//! It is a config that `map`, `periodogram` and `sample` take as it is, and that is tried out: errors that promise more than the
-//! model can keep are scaled up until a map reaches the target chi2. Left out: who gives values (`import`, the command line),
-//! and writing it down.
+//! It is a config that `map`, `periodogram` and `sample` take as it is, and that is tried out. Where the model does not fit as well as
+//! the errors of the continuum promise, what is likely to be wrong is found by trying (`diagnosis`), and put right where it was
+//! measured. Left out: who gives values (`import`, the command line), and writing it down.
 
 mod digits;
 mod ledger;
+mod line;
 mod trial;
 mod values;
 
@@ -18,6 +19,7 @@ use crate::io::lsd::{self, LsdError, ReadOptions};
 use crate::star::BrightnessModel;
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
+use trial::Profiles;
 use values::Values;
 
 /// A value with who gave it: an option, or a line of a file.
@@ -103,22 +105,14 @@ pub enum ProposalError {
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// The model is nowhere near the profiles.
-    #[error(
-        "{}: no map fits unless the errors are {factor:.1} times as large: with vsini = {vsini_kms} km/s (measured {measured_kms:.1} \
-         +- {error_kms:.1}), the local line or the velocity range is wrong",
-        .list.display()
-    )]
+    #[error("{}: no map fits unless the errors are {factor:.1} times as large: {reason}", .list.display())]
     OutOfReach {
         /// The list of profiles.
         list: PathBuf,
-        /// Factor on the errors at which a map would fit.
+        /// Factor on the errors of the continuum at which a map would fit.
         factor: f64,
-        /// Projected rotation velocity that was tried.
-        vsini_kms: f64,
-        /// That of the mean profile.
-        measured_kms: f64,
-        /// Its error.
-        error_kms: f64,
+        /// The likely reason, by trying.
+        reason: String,
     },
     /// A path that JSON cannot hold.
     #[error("{}: the path of the observations cannot be written in JSON: {problem}", .config.display())]
@@ -137,22 +131,26 @@ pub enum ProposalError {
 /// Profiles that cannot be read or show no line, given values that make no sense or are far from what the profiles say.
 pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Proposal, ProposalError> {
     let read = |options: &ReadOptions| lsd::read_listed(place.list, place.list_bytes, options);
-    let whole = read(&ReadOptions::default())?.observations;
+    let mut whole = read(&ReadOptions::default())?.observations;
     let mut ledger = Ledger::default();
     let look = |error| ProposalError::Look { list: place.list.into(), error };
-    let values = Values::measure(&whole, known, &mut ledger).map_err(look)?;
-    let cut =
-        read(&ReadOptions { velocity_range_kms: Some(values.velocity_range_kms), sigma_scale: 1.0 })?.observations;
+    let values = Values::measure(&mut whole, known, &mut ledger).map_err(look)?;
+    let range = ReadOptions { velocity_range_kms: Some(values.velocity_range_kms), ..ReadOptions::default() };
+    let cut = read(&range)?.observations.over_continuum(values.continuum_level.unwrap_or(1.0));
     let mut draft = values.draft(&cut, known, &mut ledger);
     draft.observations.clone_from(&place.list_in_config);
     draft.schema.clone_from(&place.schema);
     let mut notes = values.notes(known);
     notes.iter().for_each(|note| say(note));
-    let trial = trial::run(&mut draft, place, &cut, &values, known)?;
-    notes.extend(trial.notes(values.look.noise.quoted, &draft));
-    if trial.floor_scale.is_some() {
-        let remark = "so that a map reaches the target chi2, see the note";
-        ledger.replace("observations.sigma_scale", draft.sigma_scale, remark);
+    let trial = trial::run(&mut draft, place, Profiles { whole: &whole, cut: &cut }, &values, known)?;
+    notes.extend(trial.notes(&draft));
+    values.note_errors(known, trial.errors.as_ref(), &mut ledger);
+    if trial.measured_vsini {
+        ledger.replace(
+            "star.vsini_kms",
+            draft.vsini_kms,
+            "flanks of the mean profile, in place of the given one: see the note",
+        );
     }
     values::note_orbit(&draft, trial.orbit && trial.is_complete(), &mut ledger);
     Ok(Proposal {

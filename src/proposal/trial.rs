@@ -1,10 +1,12 @@
-//! Tries a draft out: whether a map reaches its target chi2, without a planet or with the best orbit that a search finds, and by
-//! how much the errors promise too much if none does.
+//! Tries a draft out: whether a map reaches its target chi2 with errors as the continuum has them, without a planet or with the best
+//! orbit that a search finds, and what is likely to be wrong if none does.
 
-use super::digits::{rounded, significant};
+use super::digits::rounded;
 use super::values::Values;
 use super::{Known, Place, ProposalError, to_json};
-use crate::config::{self, Draft};
+use crate::config::{self, Automatic, ConfigError, Draft};
+use crate::diagnosis::{Diagnosis, Reason};
+use crate::noise::MeasuredErrors;
 use crate::objective::{Parameter, Reference, ReferenceError};
 use crate::observation::Observations;
 use crate::scene::Scene;
@@ -15,27 +17,37 @@ use std::path::Path;
 /// Stands in for a rotation period that is still to be given, so that everything else is checked (d).
 const STAND_IN_D: f64 = 1.0;
 
-/// Errors are scaled to stay that far above those at which the target is just reached: at other parameters the floor is higher.
-const CLEARANCE: f64 = 1.2;
+/// Errors that a map needs may be larger by this than those that it is hoped to do with.
+const AS_GOOD: f64 = 0.8;
 
-/// Most rounds of scaling and trying again; it takes one or two.
-const ROUNDS: usize = 4;
-
-/// Errors that have to be scaled by more than this, beyond what the continuum says, are not at fault: the config is.
-const MOST_SCALE: f64 = 5.0;
+/// Where errors have to be larger than those of the continuum by more than this, and nothing that is tried helps, they are not at
+/// fault: the model is.
+const MOST_MISFIT: f64 = 5.0;
 
 /// More of a star is hardly ever spotted in a maximum-entropy map.
 const MANY_SPOTS: f64 = 0.25;
+
+/// Profiles in units of their continuum, errors as quoted.
+#[derive(Clone, Copy)]
+pub(super) struct Profiles<'a> {
+    pub whole: &'a Observations,
+    /// Within the draft's velocity range.
+    pub cut: &'a Observations,
+}
 
 /// What became of it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Trial {
     /// How it ended.
     pub end: End,
-    /// Factor on the errors as quoted at which the best fit just reaches the target, if they had to be scaled for it.
-    pub floor_scale: Option<f64>,
+    /// What the profiles say of their errors, where that is left to them.
+    pub errors: Option<MeasuredErrors>,
+    /// Why no map fits as well as the errors promise, if none does.
+    pub diagnosis: Option<Diagnosis>,
     /// Whether the start is an orbit, since there is no fit without one.
     pub orbit: bool,
+    /// Whether the measured vsini stands in place of the given one, with which nothing fits.
+    pub measured_vsini: bool,
 }
 
 /// How it ended.
@@ -52,97 +64,122 @@ pub(super) enum End {
     Failed(String),
 }
 
-/// Tries `draft` on `cut`, the profiles within its velocity range with errors as quoted. Changes the draft's start where only an
-/// orbit makes a map fit, and scales its errors where nothing does, unless they are the user's own. No orbit is searched for where
-/// the star is another one than that of the profiles.
+/// One draft, tried.
+struct Attempt {
+    /// The draft with its profiles; `None` where their errors cannot be measured.
+    scene: Option<Scene>,
+    reached: Result<f64, String>,
+    /// Whether errors are larger than those of the continuum, or than those given would have to be, because no map fits.
+    misfits: bool,
+    /// By how much; 1 where they do not.
+    misfit: f64,
+}
+
+/// Tries `draft` on its profiles. Changes the draft's start where only an orbit makes a map fit, and vsini where the given one is far
+/// from that of the profiles and no map fits with it. No orbit is searched for with such a vsini.
 ///
 /// # Errors
-/// Given values that make no sense; a model so far from the profiles that their errors would have to be scaled beyond reason.
+/// Given values that make no sense; a model so far from the profiles that nothing helps.
 pub(super) fn run(
     draft: &mut Draft,
     Place { config, list, .. }: &Place,
-    cut: &Observations,
+    profiles: Profiles,
     values: &Values,
     known: &Known,
 ) -> Result<Trial, ProposalError> {
-    let (scale_is_given, other_star) = (known.sigma_scale.is_some(), values.is_another_star(known));
-    let mut trial = Trial { end: End::Untried, floor_scale: None, orbit: false };
+    let mut trial = Trial { end: End::Untried, errors: None, diagnosis: None, orbit: false, measured_vsini: false };
     if draft.rotation_period_d.is_none() {
-        scene(&Draft { rotation_period_d: Some(STAND_IN_D), ..draft.clone() }, config, cut)?;
+        let stand_in =
+            Draft { rotation_period_d: Some(STAND_IN_D), sigma_scale: Automatic::Fixed(1.0), ..draft.clone() };
+        scene(&stand_in, config, profiles)?;
         return Ok(trial);
     }
-    let without_planet = draft.clone();
-    for _ in 0..ROUNDS {
-        *draft = Draft { sigma_scale: draft.sigma_scale, ..without_planet.clone() };
-        let mut reached = reach(draft, config, cut)?;
-        trial.orbit = matches!(reached, Err(ReferenceError::TargetBelowFloor { .. }));
-        trial.orbit &= !other_star;
-        if trial.orbit {
-            reached = match search(draft, config, cut)? {
-                Ok(()) => reach(draft, config, cut)?,
-                Err(SearchError::Reference(error)) => Err(error),
-                // what matters is that there is no map
-                Err(SearchError::Optimise(_)) => reached,
-            };
+    let mut attempt = attempt_of(draft, config, profiles)?;
+    if attempt.misfits && values.is_another_star(known) {
+        let measured = Draft { vsini_kms: rounded(values.look.unspotted.vsini_kms, 1), ..draft.clone() };
+        let other = attempt_of(&measured, config, profiles)?;
+        if other.misfit < AS_GOOD * attempt.misfit {
+            (*draft, attempt, trial.measured_vsini) = (measured, other, true);
         }
-        match reached {
-            Ok(spottedness) => {
-                trial.end = End::Reached { spottedness };
-                return Ok(trial);
-            }
-            Err(ReferenceError::TargetBelowFloor { target, floor }) if !scale_is_given => {
-                let least = draft.sigma_scale * (floor / target).sqrt();
-                if least > MOST_SCALE * without_planet.sigma_scale {
-                    return Err(ProposalError::OutOfReach {
-                        list: list.into(),
-                        factor: least / without_planet.sigma_scale,
-                        vsini_kms: draft.vsini_kms,
-                        measured_kms: values.look.unspotted.vsini_kms,
-                        error_kms: values.look.vsini_error_kms,
-                    });
-                }
-                trial.floor_scale = Some(least);
-                draft.sigma_scale = significant(CLEARANCE * least, f64::ceil);
-            }
-            Err(error) => {
-                trial.end = End::Failed(error.to_string());
-                break;
+    }
+    if attempt.misfits && (trial.measured_vsini || !values.is_another_star(known)) {
+        let mut with_orbit = draft.clone();
+        if search(&mut with_orbit, config, profiles, attempt.scene.as_ref())? {
+            let other = attempt_of(&with_orbit, config, profiles)?;
+            if other.reached.is_ok() && (!other.misfits || other.misfit < AS_GOOD * attempt.misfit) {
+                (*draft, attempt, trial.orbit) = (with_orbit, other, true);
             }
         }
     }
-    *draft = Draft { sigma_scale: draft.sigma_scale, ..without_planet };
+    if attempt.misfits {
+        trial.diagnosis = attempt.scene.as_ref().and_then(|scene| Diagnosis::of(scene, Some(profiles.whole)));
+    }
+    let hopeless = |diagnosis: &&Diagnosis| diagnosis.reason == Reason::Errors && attempt.misfit > MOST_MISFIT;
+    if let Some(diagnosis) = trial.diagnosis.as_ref().filter(hopeless) {
+        let (factor, reason) = (attempt.misfit, diagnosis.text.clone());
+        return Err(ProposalError::OutOfReach { list: list.into(), factor, reason });
+    }
+    trial.errors = attempt.scene.and_then(|scene| scene.measured.errors);
+    trial.end = match attempt.reached {
+        Ok(spottedness) => End::Reached { spottedness },
+        Err(error) => End::Failed(error),
+    };
     Ok(trial)
 }
 
-/// The draft as commands see it, with the profiles `cut`, their errors scaled.
-fn scene(draft: &Draft, config: &Path, cut: &Observations) -> Result<Scene, ProposalError> {
+/// The draft as commands see it.
+fn scene(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Scene, ProposalError> {
     let settings = config::from_json(to_json(draft, config)?.as_bytes(), config)?;
-    let mut observations = cut.clone();
-    for profile in &mut observations.profiles {
-        profile.sigma.iter_mut().for_each(|sigma| *sigma *= draft.sigma_scale);
-    }
-    Ok(Scene::of(settings, observations)?)
+    Ok(Scene::of_whole(settings, profiles.whole, profiles.cut)?)
 }
 
-/// Spottedness of the map at the draft's values.
-fn reach(draft: &Draft, config: &Path, cut: &Observations) -> Result<Result<f64, ReferenceError>, ProposalError> {
-    let Scene { settings, imager, .. } = scene(draft, config, cut)?;
-    let reference = Reference::build(&imager, settings.values, settings.imaging.chi2_target.value());
-    Ok(reference.map(|reference| reference.solution.spottedness))
+/// The map at the draft's values.
+fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attempt, ProposalError> {
+    let scene = match scene(draft, config, profiles) {
+        Ok(scene) => scene,
+        // what is measured, not what is given
+        Err(ProposalError::Config(ConfigError::Key { key, problem, .. })) if key == "observations.sigma_scale" => {
+            let reached = Err(format!("{key}: {problem}"));
+            return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
+        }
+        Err(error) => return Err(error),
+    };
+    let target = scene.settings.imaging.chi2_target.value();
+    let reference = Reference::build(&scene.imager, scene.settings.values, target);
+    let floor = match &reference {
+        Err(ReferenceError::TargetBelowFloor { target, floor }) => Some((floor / target).sqrt()),
+        _ => None,
+    };
+    let errors = scene.measured.errors.as_ref();
+    let larger = errors.and_then(|errors| errors.misfit()).map_or(1.0, |misfit| misfit.max(1.0));
+    Ok(Attempt {
+        misfits: floor.is_some() || errors.is_some_and(Diagnosis::is_called_for),
+        misfit: larger * floor.unwrap_or(1.0),
+        reached: reference.map(|reference| reference.solution.spottedness).map_err(|error| error.to_string()),
+        scene: Some(scene),
+    })
 }
 
-/// Puts the best orbit and systemic velocity into the draft, if there are any.
-fn search(draft: &mut Draft, config: &Path, cut: &Observations) -> Result<Result<(), SearchError>, ProposalError> {
-    let Scene { settings, imager, space, .. } = scene(draft, config, cut)?;
-    Ok(search::find(&imager, &space, SearchSettings::new(&settings), &|_| ()).map(|found| {
-        let best = space.values_at(&found.optimum.theta);
-        // rounding does not lead out of the priors
-        let within = |parameter, (min, max): (f64, f64)| rounded(best[parameter], 4).clamp(min, max);
-        let k = within(Parameter::K, (0.0, draft.k_max_kms));
-        let period = within(Parameter::PorbOverProt, draft.porb_over_prot_range);
-        draft.orbit = (k, period, rounded(best[Parameter::Phi], 4).rem_euclid(1.0));
-        draft.vsys_kms = within(Parameter::Vsys, draft.vsys_range_kms);
-    }))
+/// Puts the best orbit and systemic velocity into the draft, searched for with errors as the continuum has them; whether there
+/// are any.
+fn search(draft: &mut Draft, config: &Path, profiles: Profiles, tried: Option<&Scene>) -> Result<bool, ProposalError> {
+    let measured = tried.and_then(|scene| scene.measured.errors.as_ref());
+    let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
+    let sigma_scale = by_continuum.map_or(draft.sigma_scale, Automatic::Fixed);
+    let Scene { settings, imager, space, .. } = scene(&Draft { sigma_scale, ..draft.clone() }, config, profiles)?;
+    let found = match search::find(&imager, &space, SearchSettings::new(&settings), &|_| ()) {
+        Ok(found) => found,
+        // what matters is that there is no map
+        Err(SearchError::Reference(_) | SearchError::Optimise(_)) => return Ok(false),
+    };
+    let best = space.values_at(&found.optimum.theta);
+    // rounding does not lead out of the priors
+    let within = |parameter, (min, max): (f64, f64)| rounded(best[parameter], 4).clamp(min, max);
+    let k = within(Parameter::K, (0.0, draft.k_max_kms));
+    let period = within(Parameter::PorbOverProt, draft.porb_over_prot_range);
+    draft.orbit = (k, period, rounded(best[Parameter::Phi], 4).rem_euclid(1.0));
+    draft.vsys_kms = within(Parameter::Vsys, draft.vsys_range_kms);
+    Ok(true)
 }
 
 impl Trial {
@@ -151,17 +188,25 @@ impl Trial {
         matches!(self.end, End::Reached { .. })
     }
 
-    /// It in words; `quoted` is the error of a bin as its file has it.
-    pub fn notes(&self, quoted: f64, draft: &Draft) -> Vec<String> {
-        let scaled = self.floor_scale.map(|floor_scale| {
+    /// It in words.
+    pub fn notes(&self, draft: &Draft) -> Vec<String> {
+        let vsini = self.measured_vsini.then(|| {
             format!(
-                "no map fits better than errors of {:.1e} a bin allow, so they are scaled to {:.1e}; better values for vsini, line \
-                 or velocity range may allow less (see the README)",
-                quoted * floor_scale,
-                quoted * draft.sigma_scale
+                "no map fits with the given vsini, and one does much better with that of the mean profile, which is written: {} km/s",
+                draft.vsini_kms
             )
         });
-        let end = match &self.end {
+        let misfit = self.diagnosis.as_ref().map(|diagnosis| {
+            let larger = self.errors.as_ref().and_then(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
+                format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
+            });
+            format!("the model does not fit as well as the errors promise: {}{larger}", diagnosis.text)
+        });
+        vsini.into_iter().chain(misfit).chain([self.ending(draft)]).collect()
+    }
+
+    fn ending(&self, draft: &Draft) -> String {
+        match &self.end {
             End::Untried => "without a rotation period no command takes the config".into(),
             End::Reached { spottedness } => {
                 let orbit =
@@ -178,7 +223,6 @@ impl Trial {
                 format!("tried out: {what} the profiles{orbit}{many}")
             }
             End::Failed(error) => format!("no command takes the config as it is: {error}"),
-        };
-        scaled.into_iter().chain([end]).collect()
+        }
     }
 }

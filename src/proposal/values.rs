@@ -2,9 +2,11 @@
 
 use super::digits::{rounded, significant};
 use super::ledger::{Ledger, Source};
-use super::{Given, Known};
+use super::{Given, Known, line};
 use crate::config::{Automatic, Draft, EquivalentWidth, ImagingSettings};
-use crate::first_look::{FirstLook, LineModel, LookError};
+use crate::first_look::{Continuum, FirstLook, LineModel, LookError};
+use crate::noise::MeasuredErrors;
+use crate::nuisances::LineAndContinuum;
 use crate::observation::Observations;
 use crate::periodogram::{Frequencies, FrequencySettings};
 use crate::units::instrumental_sigma_kms;
@@ -28,9 +30,6 @@ mod assumed {
     pub const PORB_OVER_PROT: (f64, f64) = (0.5, 5.0);
 }
 
-/// Quoted errors are left alone if the continuum scatters by no more than this factor differently.
-const FAIR_ERRORS: f64 = 1.4;
-
 /// The prior of the systemic velocity reaches that many errors, and this far (km/s) at least.
 const VSYS_REACH: (f64, f64) = (6.0, 0.5);
 
@@ -48,20 +47,18 @@ const SHEAR_RAD: f64 = 0.2;
 pub(super) struct Values {
     pub look: FirstLook,
     pub velocity_range_kms: (f64, f64),
+    /// Level of the continuum that the profiles were divided by, if they were.
+    pub continuum_level: Option<f64>,
     line_sigma_kms: f64,
     resolving_power: f64,
     limb_darkening: f64,
 }
 
 impl Values {
-    /// A look at all that was observed, and where the line is in it.
-    pub fn measure(whole: &Observations, known: &Known, ledger: &mut Ledger) -> Result<Self, LookError> {
+    /// A look at all that was observed, and where the line is in it. Profiles whose continuum is elsewhere than at 1 are divided by
+    /// its level.
+    pub fn measure(whole: &mut Observations, known: &Known, ledger: &mut Ledger) -> Result<Self, LookError> {
         let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
-        let line_sigma_kms = ledger.settle(
-            ("star.line.sigma_kms", "km/s"),
-            &known.line_sigma_kms,
-            assume(assumed::LINE_SIGMA_KMS, "standard deviation of the local line; --line-sigma"),
-        );
         let resolving_power = ledger.settle(
             ("instrument.resolving_power", ""),
             &known.resolving_power,
@@ -72,15 +69,24 @@ impl Values {
             &known.limb_darkening,
             assume(assumed::LIMB_DARKENING, "coefficient of the linear law; --limb-darkening"),
         );
-        let sigma_kms = line_sigma_kms.hypot(instrumental_sigma_kms(resolving_power));
-        let look = FirstLook::at(whole, LineModel { limb_darkening, sigma_kms })?;
-        let (centre, reach) = (look.unspotted.centre_kms, look.reach_kms);
-        let measured = (rounded(centre - reach, 1), rounded(centre + reach, 1));
-        let velocity_range_kms = known.velocity_range_kms.as_ref().map_or(measured, |given| given.value);
-        let (source, remark) = origin(&known.velocity_range_kms, "the line, to 3 standard deviations beyond vsini");
-        let shown = format!("[{}, {}]", velocity_range_kms.0, velocity_range_kms.1);
-        ledger.note("observations.velocity_range_kms", shown, "km/s", source, remark);
-        Ok(Values { look, velocity_range_kms, line_sigma_kms, resolving_power, limb_darkening })
+        let model = LineModel {
+            limb_darkening,
+            sigma_kms: known.line_sigma_kms.as_ref().map_or(assumed::LINE_SIGMA_KMS, |given| given.value),
+            instrumental_sigma_kms: instrumental_sigma_kms(resolving_power),
+            is_guess: known.line_sigma_kms.is_none(),
+        };
+        let mut look = FirstLook::at(whole, model)?;
+        let mut continuum_level = None;
+        if let Some(continuum) = look.continuum.filter(Continuum::is_off) {
+            let level = rounded(continuum.level, 4);
+            *whole = whole.clone().over_continuum(level);
+            look = FirstLook::at(whole, model)?;
+            continuum_level = Some(level);
+        }
+        line::note_continuum(&look, continuum_level, ledger);
+        let line_sigma_kms = line::sigma_kms(&look, model, known, ledger);
+        let velocity_range_kms = line::velocity_range(&look, model, whole.step_kms, known, ledger);
+        Ok(Values { look, velocity_range_kms, continuum_level, line_sigma_kms, resolving_power, limb_darkening })
     }
 
     /// The config's values, from the profiles within the velocity range.
@@ -126,8 +132,9 @@ impl Values {
             equivalent_width: equivalent_width(cut, known, ledger),
             resolving_power: self.resolving_power,
             velocity_range_kms: self.velocity_range_kms,
-            sigma_scale: self.sigma_scale(known, ledger),
-            imaging: imaging(known, ledger),
+            sigma_scale: known.sigma_scale.as_ref().map_or(Automatic::Auto, |given| Automatic::Fixed(given.value)),
+            continuum_level: self.continuum_level,
+            imaging: ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) },
             orbit: (0.0, porb_over_prot, 0.0),
             porb_over_prot_range,
             k_max_kms: k_max(cut, ledger),
@@ -167,19 +174,33 @@ impl Values {
         (start.clamp(min, max), (min, max))
     }
 
-    fn sigma_scale(&self, known: &Known, ledger: &mut Ledger) -> f64 {
+    /// Levels of single continua, where these wander by more than their noise.
+    fn nuisances(&self, ledger: &mut Ledger) -> Option<LineAndContinuum> {
+        let wandering = self.look.continuum.and_then(|continuum| continuum.wandering)?;
+        let continuum_offset = significant(wandering, f64::ceil);
+        let remark = format!("continua of single profiles scatter by {wandering:.1e}, more than their noise explains");
+        ledger.note("imaging.nuisances.continuum_offset", continuum_offset, "", Source::Data, remark);
+        Some(LineAndContinuum { continuum_offset, ..LineAndContinuum::default() })
+    }
+
+    /// The factor on the errors with its reason; `measured` is what "auto" came to.
+    pub fn note_errors(&self, known: &Known, measured: Option<&MeasuredErrors>, ledger: &mut Ledger) {
         let noise = &self.look.noise;
-        let unfair = noise.ratio().filter(|ratio| !(1.0 / FAIR_ERRORS..=FAIR_ERRORS).contains(ratio));
-        let (scale, source) = match (unfair, noise.ratio()) {
-            (Some(ratio), _) => (significant(ratio, f64::round), Source::Data),
-            (None, Some(_)) => (1.0, Source::Data),
-            (None, None) => (1.0, Source::Assumed),
+        let auto = match (measured, noise.scatter) {
+            (Some(measured), _) => format!("measured by every command: {}", measured.line()),
+            (None, Some(scatter)) => {
+                format!(
+                    "measured by every command: quoted errors are {:.1e}, the continuum scatters by {scatter:.1e}",
+                    noise.quoted
+                )
+            }
+            (None, None) => {
+                format!("measured by every command: quoted errors are {:.1e}, by a map alone", noise.quoted)
+            }
         };
-        let remark = match noise.scatter {
-            Some(scatter) => format!("errors are {:.1e}, the continuum scatters by {scatter:.1e}", noise.quoted),
-            None => format!("errors are {:.1e}; no continuum to hold them against", noise.quoted),
-        };
-        ledger.settle(("observations.sigma_scale", ""), &known.sigma_scale, (scale, source, &remark))
+        let given =
+            known.sigma_scale.as_ref().map(|given| Given { value: given.value.to_string(), by: given.by.clone() });
+        ledger.settle(("observations.sigma_scale", ""), &given, ("auto".to_owned(), Source::Data, &auto));
     }
 
     fn vsys_range(&self, vsys_kms: f64, ledger: &mut Ledger) -> (f64, f64) {
@@ -242,7 +263,7 @@ impl Values {
     }
 }
 
-fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, String) {
+pub(super) fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, String) {
     match given {
         Some(given) => (Source::Given, given.by.clone()),
         None => (Source::Data, otherwise.to_owned()),
