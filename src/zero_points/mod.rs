@@ -24,11 +24,11 @@ use serde::{Deserialize, Serialize};
 /// Zero points are first counted as this many times what photon noise makes of the velocity of a profile.
 const GENEROUS: f64 = 10.0;
 
-/// The scatter that is counted must be this many times the one that is found, or it is raised to that and all is done
-/// again.
+/// Where more is found than is counted, all is done again with this many times as much as was found. Much more is of no
+/// use: where lines are shifted far, their change is no longer linear in the shift.
 const ABOVE_FOUND: f64 = 2.0;
 
-/// Most images of a fit with a larger scatter each.
+/// Most images of a fit, zero points counted as larger or smaller in each.
 const MOST_IMAGES: usize = 4;
 
 /// Step of the derivative of an unspotted star's depths with velocity (km/s).
@@ -54,16 +54,22 @@ impl MeasuredJitter {
     /// [`JitterError`].
     pub fn of(imager: &Imager, values: ParameterValues, chi2_target: f64) -> Result<Self, JitterError> {
         let photons = photon_error_kms(imager, &unspotted_slopes(imager, &values)).ok_or(JitterError::Unbounded)?;
+        let with = |sd_kms: f64| MeasuredJitter::with(imager, values, chi2_target, sd_kms);
         let mut sd_kms = GENEROUS * photons;
+        let mut found = with(sd_kms);
         for _ in 1..MOST_IMAGES {
-            let found = MeasuredJitter::with(imager, values, chi2_target, sd_kms)?;
-            let found_kms = found.without_planet.kms;
-            if ABOVE_FOUND * found_kms <= sd_kms {
-                return Ok(found);
+            match &found {
+                // too far for an expansion to second order
+                Err(JitterError::Unbounded) => sd_kms *= 0.5,
+                Ok(jitter) if jitter.without_planet.kms > sd_kms => sd_kms = ABOVE_FOUND * jitter.without_planet.kms,
+                _ => break,
             }
-            sd_kms = 2.0 * ABOVE_FOUND * found_kms;
+            found = match (with(sd_kms), found) {
+                (Err(JitterError::Unbounded), Ok(found)) => return Ok(found),
+                (next, _) => next,
+            };
         }
-        MeasuredJitter::with(imager, values, chi2_target, sd_kms)
+        found
     }
 
     /// From an image in which zero points are counted as that large.
