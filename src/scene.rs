@@ -69,10 +69,11 @@ impl Scene {
     /// # Errors
     /// Observations that cannot be read or make no sense.
     pub fn new(settings: Settings) -> Result<Self, SceneError> {
-        let mut errors = None;
+        let (mut errors, mut remarks) = (None, Vec::new());
         let (observations, data_sha256, truth) = match &settings.source {
             ObservationSource::Files { path, options, errors: wanted } => {
-                let data = lsd::read(path, options)?;
+                let mut data = lsd::read(path, options)?;
+                remarks = std::mem::take(&mut data.remarks);
                 if *wanted == ErrorSettings::default() {
                     (data.observations, data.sha256, None)
                 } else {
@@ -90,7 +91,9 @@ impl Scene {
                 (observations, sha256, Some(simulation.truth))
             }
         };
-        Ok(Scene { data_sha256, truth, ..Scene::with_noise(settings, observations, errors)? })
+        let mut scene = Scene::with_noise(settings, observations, errors)?;
+        scene.measured.profiles = remarks;
+        Ok(Scene { data_sha256, truth, ..scene })
     }
 
     /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left to them
@@ -111,7 +114,7 @@ impl Scene {
         let mut imager = imager(&settings, &observations)?;
         let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
         imager.data.correlated_bins = correlated_bins;
-        let mut measured = Measured { errors, chi2_target: None };
+        let mut measured = Measured { errors, ..Measured::default() };
         settings.imaging.chi2_target = match settings.imaging.chi2_target {
             Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
             Automatic::Auto => {

@@ -1,6 +1,6 @@
 //! `dimcmc grid`: the landscape and its paraboloid.
 
-use super::output::Output;
+use super::output::{Output, remarks};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, progress};
@@ -48,6 +48,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         args.output.check()?;
     }
     let scene = Scene::load(&args.config)?;
+    remarks(&scene);
     let plan = scene.settings.require_grid()?;
     let folder = args.output.folder();
     let failed = |e| Failure::survey(&args.config, e);

@@ -1,6 +1,6 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
-use super::output::Output;
+use super::output::{Output, remarks};
 use super::signals::Signals;
 use super::{Failure, Global, cluster, progress};
 use dimcmc::detection::{DetectionError, DetectionSettings};
@@ -71,6 +71,7 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
+    remarks(&scene);
     let settings = settings(args, &scene)?;
     let spinner = progress::bar(global, None, "reconstructing without a planet");
     let shortcut = Shortcut::new(&scene.imager, scene.settings.values, &settings);

@@ -4,6 +4,7 @@
 //! behind.
 
 use super::Failure;
+use dimcmc::scene::Scene;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,13 @@ pub fn print(bytes: &[u8]) -> Result<(), Failure> {
             Err(Failure::failed(format!("standard output: cannot write: {e}")))
         }
         _ => Ok(()),
+    }
+}
+
+/// Says on standard error what was made of the profiles of `scene` on reading, for commands whose report does not.
+pub fn remarks(scene: &Scene) {
+    for remark in &scene.measured.profiles {
+        let _ = writeln!(std::io::stderr(), "note: profiles: {remark}");
     }
 }
 

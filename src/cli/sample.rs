@@ -1,6 +1,6 @@
 //! `dimcmc sample`: the ensemble chain.
 
-use super::output::Output;
+use super::output::{Output, remarks};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
@@ -59,6 +59,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         args.output.check()?;
     }
     let scene = Scene::new(config::load_with_seed(&args.config, args.seed)?)?;
+    remarks(&scene);
     scene.settings.require_free()?;
     let folder = args.output.folder();
     let signals = Signals::catch("step")?;

@@ -147,7 +147,9 @@ impl Found {
             };
             match finding {
                 Finding::Given(given) => format!("{which}: {}", given.remark()),
-                Finding::FirstOf(profiles) => format!("{which}: the first of {profiles} mean profiles in the file is used"),
+                Finding::FirstOf(profiles) => {
+                    format!("{which}: the first of {profiles} mean profiles in the file is used")
+                }
             }
         };
         self.0.iter().map(remark).collect()

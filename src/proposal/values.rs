@@ -72,7 +72,10 @@ impl Values {
             &known.limb_darkening,
             assume(assumed::LIMB_DARKENING, "coefficient of the linear law; --limb-darkening"),
         );
-        let sigma_kms = line_sigma_kms.hypot(instrumental_sigma_kms(resolving_power));
+        if let Some(given) = &known.line_gamma_kms {
+            ledger.note("star.line.gamma_kms", given.value, "km/s", Source::Given, given.by.as_str());
+        }
+        let sigma_kms = known.line_width_kms(line_sigma_kms).hypot(instrumental_sigma_kms(resolving_power));
         let look = FirstLook::at(whole, LineModel { limb_darkening, sigma_kms })?;
         let (centre, reach) = (look.unspotted.centre_kms, look.reach_kms);
         let measured = (rounded(centre - reach, 1), rounded(centre + reach, 1));
@@ -123,6 +126,7 @@ impl Values {
                 assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --wavelength"),
             ),
             line_sigma_kms: self.line_sigma_kms,
+            line_gamma_kms: known.line_gamma_kms.as_ref().map(|given| given.value),
             equivalent_width: equivalent_width(cut, known, ledger),
             resolving_power: self.resolving_power,
             velocity_range_kms: self.velocity_range_kms,

@@ -36,7 +36,8 @@ pub(super) type Fault = (usize, String);
 pub(super) fn check(entries: &[Entry]) -> Result<(), Fault> {
     entries.iter().try_for_each(of_sense)?;
     if let [only] = entries {
-        let problem = "the only profile of the list: spots and velocities are told apart by how they change, list two or more";
+        let problem =
+            "the only profile of the list: spots and velocities are told apart by how they change, list two or more";
         return Err((only.line, problem.into()));
     }
     let mut sorted: Vec<&Entry> = entries.iter().collect();
@@ -94,7 +95,8 @@ fn in_days(sorted: &[&Entry]) -> Result<(), Fault> {
     let (sum, least) = (gaps.clone().sum::<f64>(), gaps.filter(|gap| *gap > 0.0).fold(f64::INFINITY, f64::min));
     let line = sorted.iter().map(|entry| entry.line).min().unwrap_or(0);
     let in_seconds = sum / SECONDS_PER_DAY;
-    let cure = format!("days are due; if these are seconds ({in_seconds:.3} d in all), divide them by {SECONDS_PER_DAY}");
+    let cure =
+        format!("days are due; if these are seconds ({in_seconds:.3} d in all), divide them by {SECONDS_PER_DAY}");
     if sum > LONGEST_D {
         return Err((line, format!("the times span {:.0} years from here on: {cure}", sum / DAYS_PER_YEAR)));
     }
@@ -110,7 +112,10 @@ fn no_file_twice(entries: &[Entry]) -> Result<(), Fault> {
         // one that cannot be found is told of by who reads it
         let path = std::fs::canonicalize(&entry.path).unwrap_or_else(|_| entry.path.clone());
         if let Some(line) = seen.insert(path, entry.line) {
-            return Err((entry.line, format!("{} is listed in line {line} already: leave one of them out", entry.file)));
+            return Err((
+                entry.line,
+                format!("{} is listed in line {line} already: leave one of them out", entry.file),
+            ));
         }
     }
     Ok(())
