@@ -90,6 +90,9 @@ impl Layout {
             }
             named = Some((line, text));
             at += 1;
+            if !counts_follow && names::columns(&Separator::of(text).fields(text)).is_ok() {
+                break;
+            }
         }
         let first = lines.get(at).map_or("", |(_, text)| text);
         let separator = Separator::of(first);
