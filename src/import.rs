@@ -1,9 +1,9 @@
 //! From another program's input files to a proposal: ZDIpy's star, line and list of profiles in this program's terms, and a list
 //! of what has no counterpart here.
 //!
-//! Angles, signs, epoch, units and the Voigt profile of the local line are the same in both (`io::zdipy`). A target chi2 far from 1
-//! says that the errors are wrong, and becomes a factor on them (the image is the same, and so the posterior is as wide as it should
-//! be).
+//! Angles, signs, epoch, units and the Voigt profile of the local line are the same in both (`io::zdipy`). A target
+//! chi2 far from 1 says that the errors are wrong, and becomes a factor on them (the image is the same, and so the
+//! posterior is as wide as it should be).
 
 use crate::config::EquivalentWidth;
 use crate::io::zdipy::{BrightnessEntropy, Field, Input, LocalLineFile, Target};

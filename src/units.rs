@@ -14,8 +14,8 @@ pub fn instrumental_sigma_kms(resolving_power: f64) -> f64 {
     SPEED_OF_LIGHT_KMS / resolving_power / FWHM_PER_SIGMA
 }
 
-/// Standard deviation of the Gaussian as wide at half depth as a Voigt profile of a Gaussian of standard deviation `sigma` and a
-/// Lorentzian of half width `gamma` (Olivero & Longbothum 1977, JQSRT 17, 233: good to 0.02 %).
+/// Standard deviation of the Gaussian as wide at half depth as a Voigt profile of a Gaussian of standard deviation
+/// `sigma` and a Lorentzian of half width `gamma` (Olivero & Longbothum 1977, JQSRT 17, 233: good to 0.02 %).
 pub fn gaussian_as_wide_as_voigt(sigma: f64, gamma: f64) -> f64 {
     let (gauss, lorentz) = (sigma * FWHM_PER_SIGMA, 2.0 * gamma);
     (0.5346 * lorentz + (0.2166 * lorentz * lorentz + gauss * gauss).sqrt()) / FWHM_PER_SIGMA

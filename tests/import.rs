@@ -244,8 +244,8 @@ fn a_gaussian_line_stays_one() {
     assert_eq!(desk.json("star.json")["star"]["line"], line);
 }
 
-/// ZDIpy's own example, LO Peg with its line and the targets that its input file names for the brightness, is fitted to them. The
-/// data may not be distributed with the program, so that this runs where they are.
+/// ZDIpy's own example, LO Peg with its line and the targets that its input file names for the brightness, is fitted to
+/// them. The data may not be distributed with the program, so that this runs where they are.
 #[test]
 fn zdipys_own_example_reaches_its_target() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg");

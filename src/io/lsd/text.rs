@@ -1,5 +1,5 @@
-//! The text of one profile: what stands before its rows (`layout`), then rows of velocity (km/s), I and its sigma, and others that are
-//! not used. What is given as `1 - I` or `I - 1` becomes I (`level`).
+//! The text of one profile: what stands before its rows (`layout`), then rows of velocity (km/s), I and its sigma, and
+//! others that are not used. What is given as `1 - I` or `I - 1` becomes I (`level`).
 
 use super::axis::Axis;
 use super::layout::{Announced, Layout, Separator, is_comment, wrong_count};
