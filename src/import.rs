@@ -1,9 +1,9 @@
 //! From another program's input files to a proposal: ZDIpy's star, line and list of profiles in this program's terms, and a list
 //! of what has no counterpart here.
 //!
-//! Angles, signs, epoch and units are the same in both (`io::zdipy`). Two things are turned: a target chi2 far from 1 says that
-//! the errors are wrong, and becomes a factor on them (the image is the same, and so the posterior is as wide as it should be);
-//! the Voigt profile of the local line becomes the Gaussian of the same width at half depth and the same area.
+//! Angles, signs, epoch, units and the Voigt profile of the local line are the same in both (`io::zdipy`). A target
+//! chi2 far from 1 says that the errors are wrong, and becomes a factor on them (the image is the same, and so the
+//! posterior is as wide as it should be).
 
 use crate::config::EquivalentWidth;
 use crate::io::zdipy::{BrightnessEntropy, Field, Input, LocalLineFile, Target};
@@ -102,6 +102,7 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
         known.wavelength_nm = given(line.wavelength_nm);
         known.limb_darkening = given(line.limb_darkening);
         known.line_sigma_kms = given(digits(line.sigma_kms(), 1e-4));
+        known.line_gamma_kms = line.gamma_kms().and_then(|gamma| given(digits(gamma, 1e-4).max(1e-4)));
         let width = match input.measured_strength.value {
             true => EquivalentWidth::Auto,
             false => EquivalentWidth::Fixed(digits(line.equivalent_width_kms(), 1e-4)),
@@ -202,12 +203,6 @@ fn leave_out_of_line(line: &LocalLineFile, measured_strength: bool, rows: &mut V
     let mut row = |what: String, why: &str| rows.push([place(&line.path, line.line), what, why.to_owned()]);
     if measured_strength {
         row(format!("line depth {}", line.depth), "the strength is measured on the profiles, as there");
-    }
-    if line.lorentz > 0.0 {
-        row(
-            format!("Lorentzian width {}", line.lorentz),
-            "the line is the Gaussian of the same width at half depth here",
-        );
     }
     row(format!("Lande factor {}", line.lande), "Stokes V is not modelled here");
     if line.gravity_darkening != 0.0 {

@@ -71,10 +71,11 @@ impl Scene {
     /// # Errors
     /// Observations that cannot be read or make no sense.
     pub fn new(settings: Settings) -> Result<Self, SceneError> {
-        let mut errors = None;
+        let (mut errors, mut remarks) = (None, Vec::new());
         let (observations, data_sha256, truth) = match &settings.source {
             ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
-                let data = lsd::read(path, options)?;
+                let mut data = lsd::read(path, options)?;
+                remarks = std::mem::take(&mut data.remarks);
                 let as_quoted = *wanted == ErrorSettings::default();
                 if as_quoted && *continuum_level == 1.0 {
                     (data.observations, data.sha256, None)
@@ -98,7 +99,9 @@ impl Scene {
                 (observations, sha256, Some(simulation.truth))
             }
         };
-        Ok(Scene { data_sha256, truth, ..Scene::with_noise(settings, observations, errors)? })
+        let mut scene = Scene::with_noise(settings, observations, errors)?;
+        scene.measured.profiles = remarks;
+        Ok(Scene { data_sha256, truth, ..scene })
     }
 
     /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left to them

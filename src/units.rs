@@ -32,6 +32,13 @@ pub fn instrumental_sigma_kms(resolving_power: f64) -> f64 {
     SPEED_OF_LIGHT_KMS / resolving_power / FWHM_PER_SIGMA
 }
 
+/// Standard deviation of the Gaussian as wide at half depth as a Voigt profile of a Gaussian of standard deviation
+/// `sigma` and a Lorentzian of half width `gamma` (Olivero & Longbothum 1977, JQSRT 17, 233: good to 0.02 %).
+pub fn gaussian_as_wide_as_voigt(sigma: f64, gamma: f64) -> f64 {
+    let (gauss, lorentz) = (sigma * FWHM_PER_SIGMA, 2.0 * gamma);
+    (0.5346 * lorentz + (0.2166 * lorentz * lorentz + gauss * gauss).sqrt()) / FWHM_PER_SIGMA
+}
+
 /// Ratio of Planck functions `B(spot) / B(photosphere)` at one wavelength: the brightness of a pixel wholly spotted.
 pub fn planck_contrast(spot_k: f64, photosphere_k: f64, wavelength_nm: f64) -> f64 {
     let x = SECOND_RADIATION_M_K / (wavelength_nm * 1e-9);

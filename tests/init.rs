@@ -367,7 +367,8 @@ fn what_cannot_be_is_refused_in_a_line() {
     says(&desk.refusal(&["init", "empty.txt", "--out", "a.json"]), &["empty.txt: lists no profile"]);
     let flat: String = (0..40).map(|j| format!("{} 1.0 0.001\n", -39 + 2 * j)).collect();
     desk.write("flat.prof", &flat);
-    desk.write("flat.txt", "flat.prof 0\n");
+    desk.write("flat2.prof", &flat);
+    desk.write("flat.txt", "flat.prof 0\nflat2.prof 1\n");
     says(
         &desk.refusal(&["init", "flat.txt", "--out", "a.json"]),
         &["flat.txt: no absorption line in the mean profile"],
@@ -377,13 +378,17 @@ fn what_cannot_be_is_refused_in_a_line() {
     assert_ne!(desk.read("star.json"), "precious");
 }
 
-/// A single profile, or two at the same time, say nothing of periods; the rest is there.
+/// A single profile, or two at the same time, say nothing of spots and periods; two within minutes are enough for the rest.
 #[test]
-fn one_profile_is_enough_for_a_start() {
+fn two_profiles_are_enough_for_a_start() {
     let desk = desk();
-    desk.write("data/one.txt", "p003.prof 101.1\n");
-    let table = desk.succeed(&["init", "data/one.txt", "--rotation-period", "3"]);
-    says(&table, &["1 profiles of", "0.5 to 5", "log-uniform; give what the times can show"]);
+    desk.write("data/few.txt", "p003.prof 101.1\n");
+    says(&desk.refusal(&["init", "data/few.txt", "--rotation-period", "3"]), &["data/few.txt:1: the only profile of"]);
+    desk.write("data/few.txt", "p003.prof 101.1\np004.prof 101.1\n");
+    says(&desk.refusal(&["init", "data/few.txt"]), &["data/few.txt:2: p004.prof has the time 101.1 of p003.prof"]);
+    desk.write("data/few.txt", "p003.prof 101.1\np004.prof 101.11\n");
+    let table = desk.succeed(&["init", "data/few.txt", "--rotation-period", "3"]);
+    says(&table, &["2 profiles of", "parameters.porb_over_prot"]);
     desk.succeed(&["map", "star.json", "--out", "map"]);
 }
 

@@ -37,9 +37,18 @@ pub fn print_bytes(bytes: &[u8]) {
 
 /// Says on stderr, in one line, what went wrong; in vain where stderr is gone.
 pub fn error(message: impl Display) {
+    aside("error", message);
+}
+
+/// Says on stderr, in one line, what has to be known beside the results.
+pub fn note(message: impl Display) {
+    aside("note", message);
+}
+
+fn aside(kind: &str, message: impl Display) {
     let message = message.to_string();
     // one write: a line of another process does not come between
-    let _ = std::io::stderr().write_all(format!("error: {}\n", escaped(&message)).as_bytes());
+    let _ = std::io::stderr().write_all(format!("{kind}: {}\n", escaped(&message)).as_bytes());
 }
 
 /// The same where a terminal may be in the middle of the progress line.

@@ -1,6 +1,6 @@
 //! `dimcmc grid`: the landscape and its paraboloid.
 
-use super::output::Output;
+use super::output::{Output, remarks};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
@@ -51,6 +51,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| [HEADER, NODES, PARABOLOID, EFFORT].contains(&name))?;
+    remarks(&scene);
     let plan = scene.settings.require_grid()?;
     let folder = args.output.folder();
     let failed = |e| Failure::survey(&args.config, e);

@@ -1,6 +1,6 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
-use super::output::Output;
+use super::output::{Output, remarks};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
 use dimcmc::detection::{DetectionError, DetectionSettings};
@@ -76,6 +76,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| [CSV, JSON].contains(&name))?;
+    remarks(&scene);
     let settings = settings(args, &scene)?;
     let spinner = progress::bar(global, None, "reconstructing without a planet");
     let shortcut = Shortcut::new(&scene.imager, scene.settings.values, &settings);

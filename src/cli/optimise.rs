@@ -1,6 +1,6 @@
 //! `dimcmc optimise`: the best parameters and their curvature.
 
-use super::output::Output;
+use super::output::{Output, remarks};
 use super::search::search;
 use super::{Failure, Global, console};
 use dimcmc::io::atomic::write_json;
@@ -29,6 +29,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| name == OPTIMUM)?;
+    remarks(&scene);
     scene.settings.require_free()?;
     let found = search(global, &args.config, &scene, &scene.space)?;
     let file = OptimumFile::new(&scene, &found);

@@ -3,10 +3,18 @@
 //! It is checked before anything is computed and created once there is something to write, so that bad input leaves nothing
 //! behind.
 
-use super::Failure;
+use super::{Failure, console};
+use dimcmc::scene::Scene;
 use dimcmc::{run, survey};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+/// Says on standard error what was made of the profiles of `scene` on reading, for commands whose report does not.
+pub fn remarks(scene: &Scene) {
+    for remark in &scene.measured.profiles {
+        console::note(format_args!("profiles: {remark}"));
+    }
+}
 
 /// Options of every command that writes.
 #[derive(Debug, clap::Args)]

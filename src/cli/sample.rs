@@ -1,6 +1,6 @@
 //! `dimcmc sample`: the ensemble chain.
 
-use super::output::Output;
+use super::output::{Output, remarks};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
@@ -65,6 +65,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
     let scene = Scene::new(config::load_with_seed(&args.config, args.seed)?)?;
     args.output.spare(&scene.files(), |name| [manifest::FILE, CHAIN, SUMMARY, EFFORT].contains(&name))?;
+    remarks(&scene);
     scene.settings.require_free()?;
     let folder = args.output.folder();
     let pool = cluster::pool(global, &signals);

@@ -38,8 +38,10 @@ pub struct Draft {
     pub spot_k: f64,
     /// Wavelength (nm).
     pub wavelength_nm: f64,
-    /// Standard deviation (km/s) of the local line.
+    /// Standard deviation (km/s) of the local line, of its Gaussian.
     pub line_sigma_kms: f64,
+    /// Half width at half depth (km/s) of its Lorentzian, which makes it a Voigt profile.
+    pub line_gamma_kms: Option<f64>,
     /// Its equivalent width.
     pub equivalent_width: EquivalentWidth,
     /// Resolving power of the spectrograph.
@@ -129,9 +131,9 @@ impl Draft {
             wavelength_nm: self.wavelength_nm,
             contrast: None,
             line: Line {
-                shape: LineShape::Gaussian,
+                shape: self.line_gamma_kms.map_or(LineShape::Gaussian, |_| LineShape::Voigt),
                 sigma_kms: self.line_sigma_kms,
-                gamma_kms: None,
+                gamma_kms: self.line_gamma_kms,
                 equivalent_width_kms: self.equivalent_width,
             },
         }

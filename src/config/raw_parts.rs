@@ -140,7 +140,10 @@ pub(super) enum PriorKind {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObservationsSection {
-    /// The list of profiles, `FILE TIME_DAYS [VRAD_KMS]` a line, relative to the folder of this config.
+    /// The list of profiles, `FILE TIME_DAYS [VRAD_KMS]` a line, relative to the folder of this config. Times are days,
+    /// of the middle of each exposure, all counted from one zero point: BJD_TDB, whole or less a constant. Velocities
+    /// are barycentric: those of the profiles, or what VRAD, which is subtracted from them, makes of them. Without the
+    /// correction the Earth's motion, up to 30 km/s, looks like an orbit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
     /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.

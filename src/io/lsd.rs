@@ -1,8 +1,8 @@
 //! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment), and the LSD
 //! profiles it names, relative to its folder (`layout` has their formats).
 //!
-//! Times are days of one count (`times`). VRAD is subtracted from the velocity axis first; the velocity range is cut in that
-//! frame. Stokes V and nulls are not used.
+//! Times are days of one count (`times`). VRAD is subtracted from the velocity axis first; the velocity range is cut in
+//! that frame. Stokes V and nulls are not used.
 
 mod axis;
 mod error;
@@ -71,8 +71,8 @@ struct Entry {
 /// Reads the list at `list` and all profiles it names.
 ///
 /// # Errors
-/// A file that cannot be read, a line that makes no sense, a list of one profile, profiles on different velocity axes, or a
-/// velocity range that leaves fewer than five bins of a profile.
+/// A file that cannot be read, a line that makes no sense, a list of one profile, profiles on different velocity axes,
+/// or a velocity range that leaves fewer than five bins of a profile.
 pub fn read(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
     let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
     read_listed(list, &bytes, options)
@@ -83,14 +83,29 @@ pub fn read(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
 /// # Errors
 /// As [`read`].
 pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<DataSet, LsdError> {
-    let mut hash = Sha256::new();
-    hash.update(bytes);
     let entries = parse_list(list, &String::from_utf8_lossy(bytes))?;
     times::check(&entries).map_err(|(line, problem)| LsdError::Line { path: list.into(), line, problem })?;
+    read_entries(list, bytes, &entries, options)
+}
+
+/// Reads the list at `list`, which [`write()`] wrote, and all profiles it names: of a simulation, whatever its times
+/// are.
+///
+/// # Errors
+/// As [`read`], but for the times.
+pub fn read_written(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
+    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
+    let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
+    read_entries(list, &bytes, &entries, options)
+}
+
+fn read_entries(list: &Path, bytes: &[u8], entries: &[Entry], options: &ReadOptions) -> Result<DataSet, LsdError> {
+    let mut hash = Sha256::new();
+    hash.update(bytes);
     let mut first: Option<(&Path, Axis)> = None;
     let mut profiles = Vec::with_capacity(entries.len());
     let mut found = Found::default();
-    for entry in &entries {
+    for entry in entries {
         let bytes = read_profile(list, entry)?;
         hash.update(&bytes);
         let raw = text::parse(&String::from_utf8_lossy(&bytes)).map_err(|fault| match fault.line {

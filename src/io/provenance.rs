@@ -21,9 +21,12 @@ pub struct Provenance {
     pub measured: Measured,
 }
 
-/// Settings that were taken from the observations before anything else.
+/// Settings that were taken from the observations before anything else, and what was made of these.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
+    /// What was made of the profiles on reading.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub profiles: Vec<String>,
     /// `observations.sigma_scale` and `.weights`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<MeasuredErrors>,
@@ -43,9 +46,10 @@ impl Measured {
 
     /// It in words, label and text a line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
+        let profiles = self.profiles.iter().map(|remark| ("profiles", remark.clone()));
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("velocity jitter", jitter.line()));
-        errors.into_iter().chain(jitter).chain(target).collect()
+        profiles.chain(errors).chain(jitter).chain(target).collect()
     }
 }

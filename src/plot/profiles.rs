@@ -70,7 +70,7 @@ pub(super) fn simulated(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let number = |key: &str| truth.pointer(&format!("/config/star/{key}")).and_then(Value::as_f64);
     let (period, epoch) = (number("rotation_period_d").unwrap_or(1.0), number("epoch_d").unwrap_or(0.0));
     let list = folder.join("observations.txt");
-    let observations = lsd::read(&list, &ReadOptions::default())?.observations;
+    let observations = lsd::read_written(&list, &ReadOptions::default())?.observations;
     let line = |profile: &crate::observation::Profile| Line {
         cycle: (profile.time_d - epoch) / period,
         velocity_kms: (0..profile.intensity.len()).map(|j| profile.velocity_kms(j, observations.step_kms)).collect(),

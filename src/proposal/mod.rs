@@ -15,8 +15,9 @@ pub use ledger::{Entry, Source};
 
 use crate::config::{ConfigError, Draft, EquivalentWidth};
 use crate::first_look::LookError;
-use crate::io::lsd::{self, LsdError, ReadOptions};
+use crate::io::lsd::{self, DataSet, LsdError, ReadOptions};
 use crate::star::BrightnessModel;
+use crate::units::gaussian_as_wide_as_voigt;
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
 use trial::Profiles;
@@ -46,8 +47,10 @@ pub struct Known {
     pub photosphere_k: Option<Given<f64>>,
     pub spot_k: Option<Given<f64>>,
     pub wavelength_nm: Option<Given<f64>>,
-    /// Standard deviation of the local line.
+    /// Standard deviation of the local line, of its Gaussian.
     pub line_sigma_kms: Option<Given<f64>>,
+    /// Half width at half depth of its Lorentzian, which makes it a Voigt profile.
+    pub line_gamma_kms: Option<Given<f64>>,
     pub equivalent_width: Option<Given<EquivalentWidth>>,
     pub resolving_power: Option<Given<f64>>,
     pub velocity_range_kms: Option<Given<(f64, f64)>>,
@@ -55,6 +58,13 @@ pub struct Known {
     pub brightness: Option<Given<BrightnessModel>>,
     pub pixels: Option<Given<usize>>,
     pub chi2_target: Option<Given<f64>>,
+}
+
+impl Known {
+    /// Standard deviation (km/s) of the Gaussian as wide as the local line, whose Gaussian has that of `sigma_kms`.
+    fn line_width_kms(&self, sigma_kms: f64) -> f64 {
+        self.line_gamma_kms.as_ref().map_or(sigma_kms, |gamma| gaussian_as_wide_as_voigt(sigma_kms, gamma.value))
+    }
 }
 
 /// Where things are or will be.
@@ -131,7 +141,7 @@ pub enum ProposalError {
 /// Profiles that cannot be read or show no line, given values that make no sense or are far from what the profiles say.
 pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Proposal, ProposalError> {
     let read = |options: &ReadOptions| lsd::read_listed(place.list, place.list_bytes, options);
-    let mut whole = read(&ReadOptions::default())?.observations;
+    let DataSet { observations: mut whole, remarks, .. } = read(&ReadOptions::default())?;
     let mut ledger = Ledger::default();
     let look = |error| ProposalError::Look { list: place.list.into(), error };
     let values = Values::measure(&mut whole, known, &mut ledger).map_err(look)?;
@@ -140,7 +150,8 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     let mut draft = values.draft(&cut, known, &mut ledger);
     draft.observations.clone_from(&place.list_in_config);
     draft.schema.clone_from(&place.schema);
-    let mut notes = values.notes(known);
+    let mut notes: Vec<String> = remarks.into_iter().map(|remark| format!("profiles: {remark}")).collect();
+    notes.extend(values.notes(known));
     notes.iter().for_each(|note| say(note));
     let trial = trial::run(&mut draft, place, Profiles { whole: &whole, cut: &cut }, &values, known)?;
     notes.extend(trial.notes(&draft));

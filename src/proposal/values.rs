@@ -69,9 +69,13 @@ impl Values {
             &known.limb_darkening,
             assume(assumed::LIMB_DARKENING, "coefficient of the linear law; --limb-darkening"),
         );
+        if let Some(given) = &known.line_gamma_kms {
+            ledger.note("star.line.gamma_kms", given.value, "km/s", Source::Given, given.by.as_str());
+        }
+        let sigma_kms = known.line_sigma_kms.as_ref().map_or(assumed::LINE_SIGMA_KMS, |given| given.value);
         let model = LineModel {
             limb_darkening,
-            sigma_kms: known.line_sigma_kms.as_ref().map_or(assumed::LINE_SIGMA_KMS, |given| given.value),
+            sigma_kms: known.line_width_kms(sigma_kms),
             instrumental_sigma_kms: instrumental_sigma_kms(resolving_power),
             is_guess: known.line_sigma_kms.is_none(),
         };
@@ -129,6 +133,7 @@ impl Values {
                 assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --wavelength"),
             ),
             line_sigma_kms: self.line_sigma_kms,
+            line_gamma_kms: known.line_gamma_kms.as_ref().map(|given| given.value),
             equivalent_width: equivalent_width(cut, known, ledger),
             resolving_power: self.resolving_power,
             velocity_range_kms: self.velocity_range_kms,

@@ -1,10 +1,11 @@
 //! What stands before the rows of a profile, and how its rows are laid out.
 //!
-//! - Donati's text format (Donati et al. 1997, MNRAS 291, 658), as LSDpy and SpecpolFlow write it (`prof.save` in `lsdpFunc.py` of
-//!   <https://github.com/folsomcp/LSDpy>, `LSD.save` in `profileLSD.py` of <https://github.com/folsomcp/specpolFlow>): a title; a line
-//!   `npoints ncolumns` with the columns after the velocity (2: I, sigma; 6: V, sigma, null, sigma as well; 8: another null, sigma).
-//! - iLSD (Kochukhov et al. 2010, A&A 524, A5; README of <https://github.com/okochukhov/iLSD>): a line `bins profiles S/N chi2`; rows of
-//!   velocity, profile, sigma; before each further profile a line of its own `S/N chi2`.
+//! - Donati's text format (Donati et al. 1997, MNRAS 291, 658), as LSDpy and SpecpolFlow write it (`prof.save` in
+//!   `lsdpFunc.py` of <https://github.com/folsomcp/LSDpy>, `LSD.save` in `profileLSD.py` of
+//!   <https://github.com/folsomcp/specpolFlow>): a title; a line `npoints ncolumns` with the columns after the velocity
+//!   (2: I, sigma; 6: V, sigma, null, sigma as well; 8: another null, sigma).
+//! - iLSD (Kochukhov et al. 2010, A&A 524, A5; README of <https://github.com/okochukhov/iLSD>): a line `bins profiles
+//!   S/N chi2`; rows of velocity, profile, sigma; before each further profile a line of its own `S/N chi2`.
 //! - CSV: a line that names the columns, in any order; rows with commas or semicolons.
 //!
 //! Comments and titles before the rows are passed over, and so may be any of these lines.
@@ -90,6 +91,9 @@ impl Layout {
             }
             named = Some((line, text));
             at += 1;
+            if !counts_follow && names::columns(&Separator::of(text).fields(text)).is_ok() {
+                break;
+            }
         }
         let first = lines.get(at).map_or("", |(_, text)| text);
         let separator = Separator::of(first);
@@ -130,8 +134,8 @@ fn uncommented(line: &str) -> &str {
     line.trim_start().trim_start_matches(COMMENT).trim_start()
 }
 
-/// A line before the rows is a title unless it reads as numbers; one with the columns of a row and a single bad number is a bad
-/// row.
+/// A line before the rows is a title unless it reads as numbers; one with the columns of a row and a single bad number
+/// is a bad row.
 fn is_title(line: &str) -> bool {
     let separator = Separator::of(line);
     let fields = separator.fields(line);

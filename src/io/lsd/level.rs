@@ -1,5 +1,6 @@
-//! What a profile is given as: the intensity I in units of the continuum, or what the line takes from it, `1 - I` (as LSD solves for
-//! it) or `I - 1`. It is told by the continuum at both ends, which is near 1 or near 0, and by the sign of the line.
+//! What a profile is given as: the intensity I in units of the continuum, or what the line takes from it, `1 - I` (as
+//! LSD solves for it) or `I - 1`. It is told by the continuum at both ends, which is near 1 or near 0, and by the sign
+//! of the line.
 
 use super::text::RawProfile;
 
@@ -21,7 +22,8 @@ const NEAR_ZERO: f64 = 0.2;
 const ENDS: f64 = 0.1;
 const SMOOTHED: f64 = 0.05;
 
-/// What is on the other side of the continuum, over the line, is noise or blends below this, and a Stokes V or a null above.
+/// What is on the other side of the continuum, over the line, is noise or blends below this, and a Stokes V or a null
+/// above.
 const ONE_SIDED: f64 = 0.5;
 
 /// What `profile` is given as.
@@ -46,8 +48,8 @@ pub(super) fn given_as(profile: &RawProfile) -> Result<Given, String> {
     match (below < ONE_SIDED * above, above < ONE_SIDED * below) {
         (true, _) => Ok(Given::Depth),
         (_, true) => Ok(Given::Excess),
-        _ => Err("the continuum is at 0, with as much above as below it: is it Stokes V or a null? I in units of the continuum \
-                  is due"
+        _ => Err("the continuum is at 0, with as much above as below it: is it Stokes V or a null? I in units of the \
+                  continuum is due"
             .into()),
     }
 }

@@ -1,5 +1,5 @@
-//! The text of one profile: what stands before its rows (`layout`), then rows of velocity (km/s), I and its sigma, and others that are
-//! not used. What is given as `1 - I` or `I - 1` becomes I (`level`).
+//! The text of one profile: what stands before its rows (`layout`), then rows of velocity (km/s), I and its sigma, and
+//! others that are not used. What is given as `1 - I` or `I - 1` becomes I (`level`).
 
 use super::axis::Axis;
 use super::layout::{Announced, Layout, Separator, is_comment, wrong_count};
@@ -47,6 +47,9 @@ pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
     let comments: Vec<&str> = filled.clone().map(|(_, l)| l).take_while(|l| is_comment(l)).collect();
     let lines: Vec<(usize, &str)> = filled.filter(|(_, l)| !is_comment(l)).collect();
     let layout = Layout::of(&lines, &comments)?;
+    if let Some((line, text)) = lines.first().filter(|_| layout.first_row == lines.len()) {
+        return fault(*line, format!("no row of numbers (with decimal points) here or below: {}", shown(text)));
+    }
     let rows = rows(&lines[layout.first_row..], &layout)?;
     let mut profile = RawProfile {
         axis: Axis::through(&rows)?,

@@ -51,10 +51,13 @@ pub(super) fn check(entries: &[Entry]) -> Result<(), Fault> {
 fn of_sense(entry: &Entry) -> Result<(), Fault> {
     let (time, vrad) = (entry.time_d, entry.vrad_kms);
     if time.abs() >= BEYOND_SENSE_D {
-        return Err((entry.line, format!("time {time} is beyond sense in days; divide seconds by {SECONDS_PER_DAY}")));
+        return Err((
+            entry.line,
+            format!("time {time:e} is beyond sense in days; divide seconds by {SECONDS_PER_DAY}"),
+        ));
     }
     if vrad.abs() >= BEYOND_SENSE_KMS {
-        return Err((entry.line, format!("radial velocity {vrad} is beyond sense in km/s; divide m/s by 1000")));
+        return Err((entry.line, format!("radial velocity {vrad:e} is beyond sense in km/s; divide m/s by 1000")));
     }
     Ok(())
 }
@@ -127,8 +130,8 @@ fn no_time_twice(entries: &[Entry]) -> Result<(), Fault> {
         // 0 and -0 are one time
         if let Some(Entry { line, file, time_d, .. }) = seen.insert((entry.time_d + 0.0).to_bits(), entry) {
             let problem = format!(
-                "{} has the time {time_d} of {file} in line {line}: is it the same profile? leave one out, or give each its own \
-                 time",
+                "{} has the time {time_d} of {file} in line {line}: is it the same profile? leave one out, or give each \
+                 its own time",
                 entry.file
             );
             return Err((entry.line, problem));
