@@ -36,12 +36,13 @@ posterior = tree["posterior"].to_dataset()
 print(az.summary(posterior).to_string())
 
 # %% [markdown]
-# The marginals, with the injected values where there are any.
+# The marginals of the sampled parameters (what follows from them, as the period in days, is there too), with the injected values where there are any.
 
 # %%
-quantities = posterior.data_vars.values()
+sampled = [name for name, one in posterior.data_vars.items() if "derived" not in one.attrs]
+quantities = [posterior[name] for name in sampled]
 figure = corner.corner(
-    posterior.to_dataframe()[list(posterior.data_vars)].to_numpy(),
+    posterior.to_dataframe()[sampled].to_numpy(),
     labels=[f"{one.attrs['long_name']} [{one.attrs['units']}]".replace(" [1]", "") for one in quantities],
     truths=[one.attrs.get("injected") for one in quantities],
     show_titles=True,

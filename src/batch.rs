@@ -142,7 +142,8 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
     if run.go(pool, |_, _| ())? == crate::ensemble::StopReason::Interrupted {
         return Ok(End::Interrupted);
     }
-    write_json(&folder.join(SUMMARY), &run.manifest.summarise(&scene.settings, &run.chain)?)?;
+    let (summary, _) = run.manifest.summarise(&scene.settings, &run.chain)?;
+    write_json(&folder.join(SUMMARY), &summary)?;
     Ok(End::Sampled)
 }
 

@@ -7,7 +7,6 @@
 use crate::detection::{Detection, DetectionError, DetectionSettings, Evidence};
 use crate::expansion::nuisances;
 use crate::fit::Fit;
-use crate::io::periodogram::{OrbitRecord, PeakRecord};
 use crate::objective::{Parameter, Prior};
 use crate::periodogram::{CircularOrbit, Frequencies, FrequencyError, FrequencySettings, RotationPeriods, Row};
 use crate::scene::Scene;
@@ -21,10 +20,6 @@ pub struct BlindSearch {
     pub verdict: Verdict,
     /// What has to be known beside the verdict.
     pub remarks: Vec<Remark>,
-    /// The best orbit, in the image that it implies; null where there was no search.
-    pub best: Option<OrbitRecord>,
-    /// The peaks, from high to low.
-    pub peaks: Vec<PeakRecord>,
     /// The star's own periods under this sampling; null where there was no search.
     pub rotation: Option<RotationPeriods>,
 }
@@ -65,18 +60,12 @@ impl BlindSearch {
                 rotation_period_d * found.best.porb_over_prot
             )));
         }
-        Ok(BlindSearch {
-            verdict,
-            best: Some(OrbitRecord::of(&found.best, rotation_period_d)),
-            peaks: PeakRecord::of_search(&found.blind, rotation_period_d),
-            rotation: Some(found.blind.rotation.clone()),
-            remarks,
-        })
+        Ok(BlindSearch { verdict, rotation: Some(found.blind.rotation.clone()), remarks })
     }
 
     fn failed(error: &SearchError) -> Self {
         let verdict = Verdict::not_judged(format!("the blind search failed ({error})"));
-        BlindSearch { verdict, remarks: Vec::new(), best: None, peaks: Vec::new(), rotation: None }
+        BlindSearch { verdict, remarks: Vec::new(), rotation: None }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::imaging::Imager;
 use crate::log_density::Status;
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Problem, Termination, parallelism};
-use crate::nuisances::LineAndContinuum;
+use crate::nuisances::{Estimate, LineAndContinuum};
 use crate::objective::tradeoff::Node;
 use crate::objective::{ParameterValues, Reference};
 use crate::observation::{Observations, RadialVelocity};
@@ -26,6 +26,8 @@ pub struct Fit {
     pub model: Vec<Vec<f64>>,
     /// Posterior mean of the nuisances of each profile, given the map; empty where none are integrated out.
     pub nuisances: Vec<LineAndContinuum>,
+    /// Posterior mean of each profile's velocity zero point (km/s), given the map; empty where none is integrated out.
+    pub zero_points_kms: Vec<f64>,
     /// Radial velocities, one a profile.
     pub velocities: Vec<FilteredVelocity>,
     /// Nodes of the trade-off curve, in order of falling chi2.
@@ -156,10 +158,12 @@ impl Fit {
         let mut depth = problem.model().to_vec();
         let bins = (0..observations.profiles.len()).map(|k| reference.response.bins(k));
         let estimate = |bins| imager.data.nuisances.estimate(bins, problem.weighted_residual(), &mut depth);
-        let nuisances = match imager.data.nuisances.is_empty() {
-            true => Vec::new(),
-            false => bins.clone().map(estimate).collect(),
-        };
+        let estimates: Vec<Estimate> = bins.clone().map(estimate).collect();
+        let with = |counted: bool| estimates.iter().filter(move |_| counted);
+        let nuisances =
+            with(imager.data.nuisances.has_line_and_continuum()).map(|found| found.line_and_continuum).collect();
+        let zero_points_kms =
+            with(imager.data.nuisances.zero_point_kms() > 0.0).map(|found| found.zero_point_kms).collect();
         let depths: Vec<&[f64]> = bins.map(|bins| &depth[bins]).collect();
         let velocities = velocities(imager, observations, reference, &depths);
         let deviation = Deviation::of(imager, &map);
@@ -169,7 +173,7 @@ impl Fit {
         let checks = Checks::of(&residuals, imager.data.correlated_bins);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
         let tradeoff = reference.tradeoff.nodes().to_vec();
-        Fit { map, model, nuisances, velocities, tradeoff, summary, checks }
+        Fit { map, model, nuisances, zero_points_kms, velocities, tradeoff, summary, checks }
     }
 }
 

@@ -51,6 +51,15 @@ impl Imager {
         self
     }
 
+    /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
+    /// depths change with velocity by `slopes`; in place of those that there were.
+    pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64]) -> Self {
+        let sigma: Vec<f64> = self.data.inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
+        let nuisances = std::mem::take(&mut self.data.nuisances);
+        self.data.nuisances = nuisances.with_zero_points(sd_kms, slopes, &self.bins(), &sigma);
+        self
+    }
+
     /// The same without some of the profiles.
     pub fn without(&self, profiles: &[usize]) -> Self {
         let (mut rest, mut kept) = (Vec::new(), Vec::new());
@@ -189,17 +198,22 @@ impl<'a> ImagingProblem<'a> {
 
     /// Gradient of the part of chi2 / 2 that the given profiles make, with respect to the map, at the current map.
     pub fn gradient_of(&self, profiles: std::ops::Range<usize>, out: &mut [f64]) {
+        self.pulled(profiles, &self.weighted_residual, out);
+    }
+
+    /// `J^T x` of what stands in the bins of the given profiles, J the derivative of the model with respect to the map.
+    pub fn pulled(&self, profiles: std::ops::Range<usize>, x: &[f64], out: &mut [f64]) {
         let (mut bins, mut constants) = (vec![0.0; self.bins.len()], vec![0.0; self.constants.len()]);
         for k in profiles {
-            constants[k] = self.pull(k, &mut bins);
+            constants[k] = self.pull(k, x, &mut bins);
         }
         self.response.apply_transpose(&bins, &constants, out);
     }
 
-    /// What profile `k` hands to the transpose for the gradient: its bins, and the constant that comes with them.
-    fn pull(&self, k: usize, back: &mut [f64]) -> f64 {
+    /// What profile `k` hands to the transpose for such a residual: its bins, and the constant that comes with them.
+    fn pull(&self, k: usize, weighted_residual: &[f64], back: &mut [f64]) -> f64 {
         let (bins, scale) = (self.response.bins(k), self.brightness_of.slope / self.continuum[k]);
-        let (model, weighted_residual) = (&self.model[bins.clone()], &self.weighted_residual[bins.clone()]);
+        let (model, weighted_residual) = (&self.model[bins.clone()], &weighted_residual[bins.clone()]);
         vector::run(Pull { scale, model, weighted_residual, back: &mut back[bins] })
     }
 
@@ -247,7 +261,7 @@ impl Problem for ImagingProblem<'_> {
         self.passes += 1;
         let mut bins = std::mem::take(&mut self.bins);
         for k in 0..self.response.profiles() {
-            self.constants[k] = self.pull(k, &mut bins);
+            self.constants[k] = self.pull(k, &self.weighted_residual, &mut bins);
         }
         self.bins = bins;
         self.response.apply_transpose(&self.bins, &self.constants, out);

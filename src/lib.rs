@@ -92,6 +92,7 @@ pub mod units;
 pub mod vector;
 pub mod velocities;
 pub mod verdict;
+pub mod zero_points;
 
 pub use fit::Fit;
 pub use log_density::LogDensity;

@@ -6,12 +6,13 @@
 mod conclusions;
 
 use crate::blind_search::BlindSearch;
-use crate::chain::{Goals, ParameterKind, Shape, Summary};
+use crate::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
 use crate::config::{self, Settings};
 use crate::ensemble::Positions;
 use crate::io::atomic::{WriteError, write_json};
-use crate::objective::{FreeParameter, Parameter, Prior};
+use crate::objective::{FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, definition, in_earths};
 use crate::origin::{self, OptimumRecord, Origin, OriginError};
+use crate::star::Orbit;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -86,12 +87,90 @@ impl Manifest {
         ))
     }
 
+    /// Star and data, for what is usually quoted of an orbit.
+    pub fn orbit_quantities(&self, settings: &Settings) -> OrbitQuantities {
+        OrbitQuantities::new(&settings.star, settings.mass_msun, self.origin.time_span_d)
+    }
+
+    /// The summary of the run's chain with its verdict, and with what is usually quoted of the orbit, draw by draw, also apart.
+    ///
+    /// # Errors
+    /// A chain without a step.
+    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(Summary, Vec<Settled>), ChainError> {
+        let (kinds, goals) = kinds_and_goals(settings);
+        let mut summary = summarise(chain, &kinds, &goals)?;
+        let quantities = self.orbit_quantities(settings).of_draws(&settings.free, &settings.values);
+        let settled = summary.derive(chain, quantities);
+        self.conclude(settings, chain, &mut summary);
+        let mass = summary.derived.get(OrbitQuantity::MinimumMass.name());
+        if let Some(earths) = mass.and_then(|mass| in_earths(mass.upper95.unwrap_or(mass.median))) {
+            let meaning = summary.definitions.entry(OrbitQuantity::MinimumMass.name().to_owned()).or_default();
+            meaning.push_str(&format!("; {earths}"));
+        }
+        for name in &summary.names {
+            if let Some(meaning) = definition(name) {
+                summary.definitions.insert(name.clone(), meaning.to_owned());
+            }
+        }
+        Ok((summary, settled))
+    }
+
+    /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was injected.
+    pub fn true_quantity(&self, settings: &Settings, name: &str, estimate: f64) -> Option<f64> {
+        let truth = self.origin.truth.as_ref()?;
+        let value = |p: Parameter| truth.get(p.name()).copied();
+        let orbit = Orbit {
+            k_kms: value(Parameter::K).filter(|k| *k != 0.0)?,
+            porb_over_prot: value(Parameter::PorbOverProt)?,
+            phi: value(Parameter::Phi)?,
+        };
+        self.orbit_quantities(settings).value(OrbitQuantity::from_name(name)?, &orbit, Some(estimate))
+    }
+
+    /// Injected values of the parameters and of what `summary` derives from them, for its table; `None` for observed data.
+    pub fn truth(&self, settings: &Settings, summary: &Summary) -> Option<BTreeMap<String, f64>> {
+        let mut truth = self.origin.truth.clone()?;
+        for (name, one) in &summary.derived {
+            truth.extend(self.true_quantity(settings, name, one.median).map(|value| (name.clone(), value)));
+        }
+        Some(truth)
+    }
+
     /// Reads the manifest in a run's folder.
     ///
     /// # Errors
     /// A folder without one, or one that cannot be read.
     pub fn read(folder: &Path) -> Result<Self, OriginError> {
-        origin::read(folder, FILE)
+        let manifest: Manifest = origin::read_header(folder, FILE, Manifest::parts)?;
+        let wrong = |problem| Err(OriginError::Content { path: folder.join(FILE), problem });
+        if let Some(name) = manifest.names.iter().find(|name| Parameter::from_name(name).is_none()) {
+            return wrong(format!("names: unknown parameter {name}"));
+        }
+        if let Some(name) = manifest.priors.keys().find(|name| !manifest.names.contains(name)) {
+            return wrong(format!("priors: unknown key {name}"));
+        }
+        let free = manifest.origin.config.get("parameters").and_then(serde_json::Value::as_object);
+        let is_free = |name: &String| free.is_some_and(|free| free.get(name).is_some_and(|prior| !prior.is_null()));
+        let count = free.map_or(0, |free| free.values().filter(|prior| !prior.is_null()).count());
+        if count != manifest.names.len() || !manifest.names.iter().all(is_free) {
+            return wrong("names: are not the parameters of the config".into());
+        }
+        match manifest.has_shape() {
+            true => Ok(manifest),
+            false => wrong("start: is not of as many ensembles, walkers and parameters as the rest says".into()),
+        }
+    }
+
+    /// What it was begun with, and the names of its parameters.
+    fn parts(&self) -> (&Origin, Vec<String>) {
+        (&self.origin, self.names.clone())
+    }
+
+    /// Whether the start is of the chain's shape.
+    fn has_shape(&self) -> bool {
+        let walker = |theta: &Vec<f64>| theta.len() == self.names.len();
+        let ensemble = |walkers: &Vec<Vec<f64>>| walkers.len() == self.walkers && walkers.iter().all(walker);
+        self.start.len() == self.ensembles && self.start.iter().all(ensemble)
     }
 
     /// Writes it into a run's folder.

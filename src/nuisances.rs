@@ -1,11 +1,13 @@
-//! What may be wrong with each observed profile by itself: the level and the slope of its continuum, and the equivalent width of
-//! its line; each with a Gaussian prior, and integrated out.
+//! What may be wrong with each observed profile by itself: the level and the slope of its continuum, the equivalent
+//! width of its line, and the zero point of its velocity; each with a Gaussian prior, and integrated out.
 //!
-//! The observed depth is linear in the three, `d = D - offset - slope x + equivalent_width M + noise`, with x from -1 to 1
-//! along the profile and M the mean of all observed profiles. So integrating them out is exact and only changes the covariance of
-//! a profile's bins to `Sigma = diag(sigma^2) + T P T^t`: a chi2 of `r Sigma^-1 r` has as many degrees of freedom as there are
-//! bins, as ever. With the whitened templates `sigma^-1 T P^(1/2) = Q s V^t` the inverse is
-//! `sigma^-1 (1 - Q s^2/(1+s^2) Q^t) sigma^-1`: one product of two vectors a template.
+//! The observed depth is linear in the three, `d = D - offset - slope x + equivalent_width M + noise`, with x from -1
+//! to 1 along the profile and M the mean of all observed profiles. So integrating them out is exact and only changes
+//! the covariance of a profile's bins to `Sigma = diag(sigma^2) + T P T^t`: a chi2 of `r Sigma^-1 r` has as many
+//! degrees of freedom as there are bins, as ever. A zero point z, small against the width of the line, adds one more
+//! term `+ z D'` with D' the derivative of the depths with velocity, which is the star's and comes from outside. With
+//! the whitened templates `sigma^-1 T P^(1/2) = Q s V^t` the inverse is `sigma^-1 (1 - Q s^2/(1+s^2) Q^t) sigma^-1`:
+//! one product of two vectors a template.
 //!
 //! Left out: that the line's own depth is the model's and not M (second order: equivalent width times what spots make of the line),
 //! and numbers that all profiles share (the equivalent width of the star's line may be a free parameter).
@@ -48,11 +50,25 @@ pub fn templates(j: usize, bins: usize, depth: f64) -> [f64; 3] {
     [-1.0, -(j as f64 - half) / half.max(0.5), depth]
 }
 
+/// What was found in one profile.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Line and continuum.
+    pub line_and_continuum: LineAndContinuum,
+    /// Zero point of the velocity (km/s).
+    pub zero_point_kms: f64,
+}
+
+/// Place of the zero point among the templates, behind those of line and continuum.
+const ZERO_POINT: usize = 3;
+
 /// The nuisances of a set of profiles; none by default. Vectors are as long as the data, all profiles one after the other.
 #[derive(Clone, Debug, Default)]
 pub struct Nuisances {
     priors: LineAndContinuum,
-    /// Change of the depths per standard deviation of the prior, for each of the three that is not fixed.
+    /// Standard deviation of the velocity zero points (km/s).
+    zero_point_kms: f64,
+    /// Change of the depths per standard deviation of the prior, for each that is not fixed.
     templates: Vec<(usize, Vec<f64>)>,
     corrections: Vec<Correction>,
 }
@@ -79,7 +95,18 @@ impl Nuisances {
             end - profile.sigma.len()..end
         });
         let sigma: Vec<f64> = observations.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect();
-        Nuisances { priors, templates, corrections: Vec::new() }.of_profiles(&bins.collect::<Vec<_>>(), &sigma)
+        Nuisances { priors, templates, ..Nuisances::default() }.of_profiles(&bins.collect::<Vec<_>>(), &sigma)
+    }
+
+    /// The same with velocity zero points of this standard deviation (km/s) in place of those that there were. The
+    /// derivatives of the depths with velocity are `slopes`; profiles have these `bins`, of errors `sigma`.
+    pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64], bins: &[Range<usize>], sigma: &[f64]) -> Self {
+        self.templates.retain(|(i, _)| *i != ZERO_POINT);
+        self.zero_point_kms = sd_kms;
+        if sd_kms > 0.0 {
+            self.templates.push((ZERO_POINT, slopes.iter().map(|slope| sd_kms * slope).collect()));
+        }
+        self.of_profiles(bins, sigma)
     }
 
     /// Those of the profiles with these `bins` alone, whose bins have the errors `sigma`, one after the other.
@@ -95,12 +122,22 @@ impl Nuisances {
             correct(&columns, &sigma[first..first + bins.len()], &mut corrections);
             first += bins.len();
         }
-        Nuisances { priors: self.priors, templates, corrections }
+        Nuisances { templates, corrections, ..*self }
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.templates.is_empty()
+    }
+
+    /// Whether line or continuum are among them.
+    pub fn has_line_and_continuum(&self) -> bool {
+        self.templates.iter().any(|(i, _)| *i != ZERO_POINT)
+    }
+
+    /// Standard deviation of the velocity zero points (km/s); 0 where there are none.
+    pub fn zero_point_kms(&self) -> f64 {
+        self.zero_point_kms
     }
 
     /// From `out = x / sigma^2` to `out = W x` in the `bins` of one profile.
@@ -123,15 +160,18 @@ impl Nuisances {
 
     /// The posterior mean of the nuisances of the profile with these `bins`, given the weighted residual `W (model - data)`; the
     /// change of its depths that they make is added to `depth`.
-    pub fn estimate(&self, bins: Range<usize>, weighted_residual: &[f64], depth: &mut [f64]) -> LineAndContinuum {
-        let mut numbers = [0.0; 3];
+    pub fn estimate(&self, bins: Range<usize>, weighted_residual: &[f64], depth: &mut [f64]) -> Estimate {
+        let mut numbers = [0.0; ZERO_POINT + 1];
+        let [offset, slope, width] = self.priors.numbers();
+        let sd = [offset, slope, width, self.zero_point_kms];
         for (i, template) in &self.templates {
             let template = &template[bins.clone()];
             let in_sd = -dot(template, &weighted_residual[bins.clone()]);
-            numbers[*i] = in_sd * self.priors.numbers()[*i];
+            numbers[*i] = in_sd * sd[*i];
             depth[bins.clone()].iter_mut().zip(template).for_each(|(depth, change)| *depth += in_sd * change);
         }
-        LineAndContinuum::of_numbers(numbers)
+        let [offset, slope, width, zero_point_kms] = numbers;
+        Estimate { line_and_continuum: LineAndContinuum::of_numbers([offset, slope, width]), zero_point_kms }
     }
 }
 

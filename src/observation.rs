@@ -50,6 +50,15 @@ impl Observations {
         self.profiles.iter().map(|p| p.time_d).collect()
     }
 
+    /// First and last time (d); `None` where there is no profile.
+    pub fn time_span_d(&self) -> Option<[f64; 2]> {
+        let span = |span: Option<[f64; 2]>, profile: &Profile| {
+            let [first, last] = span.unwrap_or([profile.time_d; 2]);
+            Some([first.min(profile.time_d), last.max(profile.time_d)])
+        };
+        self.profiles.iter().fold(None, span)
+    }
+
     /// The middle of the time base (d), half way between the first and the last profile.
     pub fn mid_time_d(&self) -> f64 {
         let (lo, hi) = self

@@ -2,6 +2,8 @@
 
 use crate::blind_search::BlindSearch;
 use crate::io::provenance::Provenance;
+use crate::objective::{Estimate, OrbitQuantities, OrbitQuantity, Parameter, definition, in_earths};
+use crate::optimise::Optimum;
 use crate::origin::{OptimumRecord, ReferenceRecord, by_name};
 use crate::scene::Scene;
 use crate::search::{Attempt, Found};
@@ -33,8 +35,14 @@ pub struct OptimumFile {
     /// The blind search that the verdict rests on; absent where no orbit was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_search: Option<BlindSearch>,
+    /// What is usually quoted of the orbit, with standard deviations by the same covariance.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived: BTreeMap<&'static str, Estimate>,
     /// Injected values, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
+    /// The same of what is usually quoted of the orbit, times nearest to those found.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived_truth: BTreeMap<&'static str, f64>,
     /// The reference image.
     pub reference: ReferenceRecord,
     /// Where the climbs started and ended, by regularised likelihood.
@@ -63,6 +71,7 @@ impl OptimumFile {
     /// The file for what a search in `scene` found.
     pub fn new(scene: &Scene, found: &Found) -> Self {
         let optimum = &found.optimum;
+        let (derived, derived_truth) = derived(scene, optimum);
         let rows = |m: &nalgebra::DMatrix<f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect();
         OptimumFile {
             names: scene.space.names().to_vec(),
@@ -74,7 +83,9 @@ impl OptimumFile {
             covariance: rows(&optimum.written_covariance),
             internal_curvature: rows(&optimum.curvature),
             blind_search: BlindSearch::of(scene),
+            derived,
             truth: scene.truth.map(|values| by_name(&values)),
+            derived_truth,
             reference: ReferenceRecord::of(found.posterior.reference()),
             starts: found.attempts.iter().map(StartRecord::of).collect(),
             provenance: scene.provenance(),
@@ -99,6 +110,7 @@ impl OptimumFile {
             }
             table.push('\n');
         }
+        table += &self.derived_table();
         let maximum = match (self.well_defined, self.converged) {
             (true, true) => "a well-defined maximum",
             (true, false) => "the search ran out of steps; the values may be improved from there",
@@ -111,6 +123,54 @@ impl OptimumFile {
         }
         table
     }
+
+    /// What is usually quoted of the orbit, and what names mean.
+    fn derived_table(&self) -> String {
+        let of = OrbitQuantity::ALL.map(OrbitQuantity::name);
+        let rows: Vec<(&str, &Estimate)> =
+            of.into_iter().filter_map(|name| Some((name, self.derived.get(name)?))).collect();
+        let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        let mut text = String::new();
+        for (name, Estimate { value, sd }) in &rows {
+            let _ = write!(text, "{name:width$}  {value:>14.6}  {sd:>10.6}");
+            if let Some(truth) = self.derived_truth.get(name) {
+                let _ = write!(text, "  {truth:>14.6}");
+            }
+            text.push('\n');
+        }
+        let names = self.names.iter().map(String::as_str).chain(rows.iter().map(|(name, _)| *name));
+        for (name, meaning) in names.filter_map(|name| Some((name, definition(name)?))) {
+            let _ = writeln!(text, "{name}: {meaning}");
+        }
+        let mass = self.derived.get(OrbitQuantity::MinimumMass.name());
+        if let Some(earths) = mass.and_then(|mass| in_earths(mass.value)) {
+            let _ = writeln!(text, "{earths}");
+        }
+        text
+    }
+}
+
+/// What is usually quoted of the orbit at the optimum, and the injected values of the same.
+fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<&'static str, Estimate>, BTreeMap<&'static str, f64>) {
+    let settings = &scene.settings;
+    let quantities = OrbitQuantities::new(&settings.star, settings.mass_msun, scene.observations.time_span_d());
+    let free: Vec<Parameter> = scene.space.free().iter().map(|one| one.parameter).collect();
+    let mut values = settings.values;
+    free.iter().zip(&optimum.theta).for_each(|(parameter, value)| values[*parameter] = *value);
+    let place = |p: Parameter| free.iter().position(|one| *one == p);
+    let covariance =
+        |p: Parameter, q: Parameter| place(p).zip(place(q)).map_or(0.0, |(i, j)| optimum.written_covariance[(i, j)]);
+    let orbital = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
+    let covariance = orbital.map(|p| orbital.map(|q| covariance(p, q)));
+    let (mut derived, mut truth) = (BTreeMap::new(), BTreeMap::new());
+    for quantity in quantities.of_free(&free) {
+        let Some(found) = quantities.estimate(quantity, &values.state().orbit, &covariance) else { continue };
+        derived.insert(quantity.name(), found);
+        let injected = scene.truth.map(|truth| truth.state().orbit).filter(|orbit| orbit.k_kms != 0.0);
+        let injected = injected.and_then(|orbit| quantities.value(quantity, &orbit, Some(found.value)));
+        truth.extend(injected.map(|value| (quantity.name(), value)));
+    }
+    (derived, truth)
 }
 
 impl StartRecord {

@@ -28,6 +28,9 @@ pub struct Origin {
     /// What the config leaves to the observations.
     #[serde(default, skip_serializing_if = "Measured::is_empty")]
     pub measured: Measured,
+    /// First and last time of the data (d).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_span_d: Option<[f64; 2]>,
     /// Injected values of all parameters, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
     /// The image that every evaluation starts from.
@@ -40,6 +43,7 @@ pub struct Origin {
 
 /// The reference solution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ReferenceRecord {
     /// All eight parameters.
     pub parameters: BTreeMap<String, f64>,
@@ -61,6 +65,7 @@ pub struct ReferenceRecord {
 
 /// The optimum and its error bars.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct OptimumRecord {
     /// Value of each sampled parameter.
     pub parameters: BTreeMap<String, f64>,
@@ -96,6 +101,14 @@ pub enum OriginError {
         path: PathBuf,
         /// Why.
         source: serde_json::Error,
+    },
+    /// What it says does not belong together.
+    #[error("{}: {problem}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
     },
     /// The config in it does not resolve.
     #[error(transparent)]
@@ -134,17 +147,12 @@ impl Origin {
             data_sha256,
             config,
             measured,
+            time_span_d: scene.observations.time_span_d(),
             truth: scene.truth.map(|values| by_name(&values)),
             reference: ReferenceRecord::of(found.posterior.reference()),
             optimum: OptimumRecord::of(names, &found.optimum),
             rivals: found.rivals().into_iter().map(|rival| OptimumRecord::of(names, rival)).collect(),
         }
-    }
-
-    /// The rotation period (d) that orbits are measured by; NaN where a file has none.
-    pub fn rotation_period_d(&self) -> f64 {
-        let period = self.config.pointer("/star/rotation_period_d");
-        period.and_then(serde_json::Value::as_f64).unwrap_or(f64::NAN)
     }
 
     /// Whether what began in `folder` can go on in `scene`.
@@ -178,6 +186,47 @@ impl Origin {
         Ok(Posterior::new(scene.imager.clone(), space, scene.settings.imaging.objective, reference))
     }
 }
+
+/// Reads the `file` that says what a computation in `folder` was begun with: what `T` does not know is refused, and so are
+/// parameters with other names than `names` finds in it.
+///
+/// # Errors
+/// As [`read`]; unknown keys, and records of other parameters.
+pub fn read_header<T: DeserializeOwned + Serialize>(
+    folder: &Path,
+    file: &'static str,
+    parts: impl Fn(&T) -> (&Origin, Vec<String>),
+) -> Result<T, OriginError> {
+    let whole: serde_json::Map<String, serde_json::Value> = read(folder, file)?;
+    let header: T = read(folder, file)?;
+    let wrong = |problem| OriginError::Content { path: folder.join(file), problem };
+    let known =
+        serde_json::to_value(&header).map_err(|source| OriginError::Json { path: folder.join(file), source })?;
+    let is_known = |key: &str| OPTIONAL.contains(&key) || known.get(key).is_some();
+    if let Some(key) = whole.keys().find(|key| !is_known(key)) {
+        return Err(wrong(format!("unknown key {key}")));
+    }
+    let (origin, names) = parts(&header);
+    let optima =
+        std::iter::once(("optimum", &origin.optimum)).chain(origin.rivals.iter().map(|rival| ("rivals", rival)));
+    for (key, optimum) in optima {
+        for (part, values) in [("parameters", &optimum.parameters), ("sd", &optimum.sd)] {
+            if let Some(name) = values.keys().find(|name| !names.contains(name)) {
+                return Err(wrong(format!(
+                    "{key}.{part}: unknown key {name}, the parameters are {}",
+                    names.join(", ")
+                )));
+            }
+            if let Some(name) = names.iter().find(|name| !values.contains_key(*name)) {
+                return Err(wrong(format!("{key}.{part}: missing {name}")));
+            }
+        }
+    }
+    Ok(header)
+}
+
+/// Keys of such files that are left out where there is nothing to say.
+const OPTIONAL: [&str; 2] = ["measured", "merged_seeds"];
 
 /// Reads `file`, which a computation that began in `folder` has written there.
 ///

@@ -2,7 +2,7 @@
 //!
 //! Left out: anything that takes a reconstruction.
 
-use crate::config::{self, Automatic, ConfigError, ObservationSource, Settings};
+use crate::config::{self, Automatic, ConfigError, ObservationSource, Settings, VelocityJitter};
 use crate::imaging::Imager;
 use crate::injection::inject;
 use crate::io::lsd::{self, Label, LsdError, ReadOptions};
@@ -13,9 +13,10 @@ use crate::objective::{FreeParameter, ParameterSpace, ParameterValues, Reference
 use crate::observation::Observations;
 use crate::simulate::Simulation;
 use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
+use crate::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A config with its observations.
 #[derive(Clone, Debug)]
@@ -28,7 +29,8 @@ pub struct Scene {
     pub data_sha256: String,
     /// The parameters that were simulated; `None` for observations from files.
     pub truth: Option<ParameterValues>,
-    /// What the config leaves to the observations: errors, target chi2. In `settings` the target is a number.
+    /// What the config leaves to the observations: errors, velocity jitter, target chi2. In `settings` the last two are
+    /// numbers.
     pub measured: Measured,
     /// What the observations are imaged with.
     pub imager: Imager,
@@ -111,7 +113,7 @@ impl Scene {
         let mut imager = imager(&settings, &observations)?;
         let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
         imager.data.correlated_bins = correlated_bins;
-        let mut measured = Measured { errors, chi2_target: None };
+        let mut measured = Measured { errors, ..Measured::default() };
         settings.imaging.chi2_target = match settings.imaging.chi2_target {
             Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
             Automatic::Auto => {
@@ -121,6 +123,12 @@ impl Scene {
                 Automatic::Fixed(chosen.value)
             }
         };
+        let (zero_points, jitter) = zero_points(&settings, &imager, settings.imaging.chi2_target.value())?;
+        if let Some(zero_points) = zero_points {
+            settings.velocity_jitter = VelocityJitter::Known(zero_points.sd_kms);
+            imager = zero_points.counted_in(imager);
+        }
+        measured.velocity_jitter = jitter;
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
@@ -141,6 +149,15 @@ impl Scene {
                 Ok((self.observations.clone(), (0..profiles).map(name).collect()))
             }
         }
+    }
+
+    /// The files that it was read from: config, list, profiles.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mut files = vec![self.settings.path.clone()];
+        if let ObservationSource::Files { path, .. } = &self.settings.source {
+            files.extend(lsd::files(path));
+        }
+        files
     }
 
     /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors stay.
@@ -199,6 +216,8 @@ impl Scene {
             faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
             contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
             continuum: simulation.nuisances(),
+            zero_points_kms: simulation.zero_points_kms(),
+            correlated_bins: Some(simulation.correlated_bins).filter(|bins| *bins != 1.0),
             spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
             snr: simulation.snr,
             sigma: simulation.sigma(),
@@ -233,6 +252,30 @@ fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, Co
     })
 }
 
+/// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
+/// target chi2 is per datum, independent or not.
+fn zero_points(
+    settings: &Settings,
+    imager: &Imager,
+    chi2_target: f64,
+) -> Result<(Option<ZeroPoints>, Option<MeasuredJitter>), ConfigError> {
+    let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
+    let (sd_kms, measured) = match settings.velocity_jitter {
+        VelocityJitter::Known(0.0) => return Ok((None, None)),
+        VelocityJitter::Known(sd_kms) => (sd_kms, None),
+        VelocityJitter::Fitted => {
+            let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;
+            (measured.value_kms, Some(measured))
+        }
+    };
+    let zero_points = ZeroPoints::new(imager, settings.values, chi2_target, sd_kms).map_err(|e| fault(e.into()))?;
+    Ok((Some(zero_points), measured))
+}
+
+/// Errors and velocity zero points are settled in turn that many times at most, until errors move by less than this
+/// part.
+const SETTLED: (usize, f64) = (3, 0.03);
+
 /// The observations, cut as they are used, with the errors that they and the `whole` profiles ask for.
 fn with_errors(
     settings: &Settings,
@@ -246,15 +289,28 @@ fn with_errors(
         measured.apply(&mut observations);
         observations
     };
-    let mut measured = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
-    if wanted.measured {
-        let before = scaled(&measured);
+    let continuum = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
+    if !wanted.measured {
+        return Ok((scaled(&continuum), continuum));
+    }
+    let before = scaled(&continuum);
+    let chi2_target = settings.imaging.chi2_target.value() / continuum.correlated_bins;
+    let mut measured = continuum.clone();
+    for _ in 0..SETTLED.0 {
+        // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
+        let (zero_points, _) = zero_points(settings, &imager(settings, &scaled(&measured))?, chi2_target)?;
         let with_factor = |factor: f64| {
             let mut observations = before.clone();
             observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
-            imager(settings, &observations)
+            let imager = imager(settings, &observations)?;
+            Ok(zero_points.iter().fold(imager, |imager, zero_points| zero_points.counted_in(imager)))
         };
+        let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);
         measured.count_residuals(settings.values, with_factor)?.map_err(fault)?;
+        let moved = (measured.sigma_scale.unwrap_or(1.0) / then).ln().abs();
+        if settings.velocity_jitter != VelocityJitter::Fitted || moved < SETTLED.1 {
+            break;
+        }
     }
     Ok((scaled(&measured), measured))
 }

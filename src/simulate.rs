@@ -46,10 +46,18 @@ pub struct Simulation {
     pub pixels: usize,
     /// Standard deviations of what is wrong with each profile by itself, in line and continuum.
     pub continuum: LineAndContinuum,
+    /// Standard deviation of the velocity zero points of the profiles (km/s).
+    pub velocity_jitter_kms: f64,
+    /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for
+    /// white noise.
+    pub correlated_bins: f64,
 }
 
 /// Stream of the random numbers of line and continuum; noise is drawn from stream 0.
 const CONTINUUM_STREAM: u64 = 1;
+
+/// Stream of the random numbers of the velocity zero points.
+const ZERO_POINT_STREAM: u64 = 2;
 
 impl Simulation {
     /// Standard error of each bin, in units of the continuum.
@@ -62,7 +70,10 @@ impl Simulation {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
         let state = self.truth.state();
         let brightness = self.brightness(&grid, self.contrast(star));
-        let profiles = self.times_d.iter().map(|time| (*time, self.first_velocity_kms, self.bins)).collect();
+        let zero_points = self.zero_points_kms();
+        // a line that is farther to the red by its zero point is the line seen from bins that are farther to the blue
+        let first = |k: usize| zero_points.get(k).map_or(self.first_velocity_kms, |v| self.first_velocity_kms - v);
+        let profiles = self.times_d.iter().enumerate().map(|(k, time)| (*time, first(k), self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
         let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
         for (depths, nuisances) in depths.chunks_exact_mut(self.bins).zip(self.nuisances()) {
@@ -104,6 +115,17 @@ impl Simulation {
         self.times_d.iter().map(|_| draw()).collect()
     }
 
+    /// The velocity zero point of each profile (km/s), which is added to its own velocity; empty if there is none.
+    pub fn zero_points_kms(&self) -> Vec<f64> {
+        if self.velocity_jitter_kms == 0.0 {
+            return Vec::new();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(ZERO_POINT_STREAM);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        self.times_d.iter().map(|_| self.velocity_jitter_kms * draw()).collect()
+    }
+
     /// Brightness of spots on `star` over that of the photosphere.
     pub fn contrast(&self, star: &StarSettings) -> f64 {
         star.with(&self.truth.state().surface).contrast
@@ -120,13 +142,23 @@ impl Simulation {
         brightness
     }
 
-    /// Gaussian noise of `n` bins, all profiles one after the other.
+    /// Gaussian noise of `n` bins, all profiles one after the other. Neighbours in a profile have the correlation
+    /// `rho = (c - 1) / (c + 1)`, bins m apart rho^m, so that the correlations add up to the c `correlated_bins`.
     fn noise(&self, n: usize) -> Vec<f64> {
         if self.snr.is_none() {
             return vec![0.0; n];
         }
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
-        (0..n).map(|_| self.sigma() * draw()).collect()
+        let mut noise: Vec<f64> = (0..n).map(|_| self.sigma() * draw()).collect();
+        let rho = (self.correlated_bins - 1.0) / (self.correlated_bins + 1.0);
+        if rho > 0.0 {
+            for profile in noise.chunks_mut(self.bins) {
+                for j in 1..profile.len() {
+                    profile[j] = rho * profile[j - 1] + (1.0 - rho * rho).sqrt() * profile[j];
+                }
+            }
+        }
+        noise
     }
 }

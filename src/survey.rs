@@ -4,10 +4,10 @@
 //! order of the grid, so that the file does not depend on the number of threads, and a kill loses the batch under way. Left out:
 //! how progress is shown, and what is read off a landscape (`landscape`).
 
-use crate::config::GridSettings;
+use crate::config::{GridSettings, MOST_NODES};
 use crate::io::atomic::{WriteError, write_json};
 use crate::io::landscape;
-use crate::io::lines::{JournalError, LineFile};
+use crate::io::lines::{self, JournalError, LineFile};
 use crate::landscape::{Grid, Landscape, LandscapeError, Node};
 use crate::objective::Posterior;
 use crate::origin::{self, Origin, OriginError};
@@ -29,6 +29,11 @@ pub const PARABOLOID: &str = "paraboloid.json";
 /// Nodes of a batch for each reconstruction under way: enough that threads or ranks seldom wait for the slowest node.
 const BATCH_EACH: usize = 8;
 
+/// Whether nothing but an empty file of nodes is in `folder`, and with `header` perhaps that: such a landscape may begin again.
+pub fn is_false_start(folder: &Path, header: bool) -> bool {
+    lines::is_false_start(folder, header.then_some(HEADER), NODES)
+}
+
 /// The content of `landscape.json`, written before the first node and never changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
@@ -37,6 +42,32 @@ pub struct Header {
     pub origin: Origin,
     /// Where the nodes are.
     pub grid: Grid,
+}
+
+impl Header {
+    /// What it was begun with, and the names of its parameters.
+    fn parts(&self) -> (&Origin, Vec<String>) {
+        (&self.origin, self.grid.names().map(str::to_owned).collect())
+    }
+
+    /// Reads that of the landscape in `folder`.
+    ///
+    /// # Errors
+    /// A folder without one, one that cannot be read, or says what does not belong together.
+    pub fn read(folder: &Path) -> Result<Self, OriginError> {
+        let header: Header = origin::read_header(folder, HEADER, Header::parts)?;
+        let nodes = header.grid.axes.iter().try_fold(1usize, |all, axis| all.checked_mul(axis.nodes));
+        let is_sound = (1..=3).contains(&header.grid.axes.len())
+            && header.grid.axes.iter().all(|axis| axis.nodes >= 2 && axis.min < axis.max)
+            && nodes.is_some_and(|nodes| nodes <= MOST_NODES);
+        match is_sound {
+            true => Ok(header),
+            false => {
+                let problem = format!("grid: must have 1 to 3 axes, each rising, and at most {MOST_NODES} nodes");
+                Err(OriginError::Content { path: folder.join(HEADER), problem })
+            }
+        }
+    }
 }
 
 /// A landscape with its nodes so far.
@@ -99,7 +130,7 @@ impl Survey {
     /// # Errors
     /// [`SurveyError`]: no landscape there, changed config, grid or data, broken lines.
     pub fn resume(scene: &Scene, plan: &GridSettings, folder: &Path) -> Result<Self, SurveyError> {
-        let header: Header = origin::read(folder, HEADER)?;
+        let header = Header::read(folder)?;
         header.origin.check(scene, folder)?;
         if let Some(what) = change(&header.grid, &plan.grid) {
             return Err(OriginError::Changed { folder: folder.into(), what }.into());

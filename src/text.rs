@@ -1,4 +1,22 @@
-//! Tables as text. Left out: what stands in them.
+//! Tables as text, and text of others in a line of one's own. Left out: what stands in them.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Text of others, such as a file's name, with control characters as escapes (`\n`, `\u{1b}`): it can neither break a line nor
+/// command a terminal.
+pub fn escaped(text: &str) -> Cow<'_, str> {
+    if !text.contains(char::is_control) {
+        return Cow::Borrowed(text);
+    }
+    let escape = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(escape).collect())
+}
+
+/// A path as it is shown.
+pub fn shown(path: &Path) -> String {
+    escaped(&path.to_string_lossy()).into_owned()
+}
 
 /// How a column is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,4 +48,10 @@ pub fn columns(rows: &[Vec<String>], aligns: &[Align]) -> String {
         cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
     };
     rows.iter().map(line).collect()
+}
+
+#[test]
+fn names_stay_in_their_line() {
+    assert_eq!(escaped("a\nb\u{1b}[31m\u{9b}c\td\u{7f}"), "a\\nb\\u{1b}[31m\\u{9b}c\\td\\u{7f}");
+    assert!(matches!(escaped("K \u{2212} \u{b1} \\ \"quoted\" 'one'"), Cow::Borrowed(_)));
 }

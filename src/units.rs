@@ -6,6 +6,24 @@ pub const SPEED_OF_LIGHT_KMS: f64 = 299_792.458;
 /// FWHM of a Gaussian over its standard deviation, `2 sqrt(2 ln 2)`.
 pub const FWHM_PER_SIGMA: f64 = 2.354_820_045_030_949_3;
 
+/// Seconds in a day.
+pub const SECONDS_PER_DAY: f64 = 86_400.0;
+
+/// Gravity of the Sun, G M (km^3/s^2): the nominal solar mass parameter of IAU 2015 resolution B3.
+pub const SOLAR_GM_KM3_S2: f64 = 1.327_124_4e11;
+
+/// Gravity of Jupiter, G M (km^3/s^2), nominal (the same resolution).
+const JOVIAN_GM_KM3_S2: f64 = 1.266_865_3e8;
+
+/// Gravity of the Earth, G M (km^3/s^2), nominal (the same resolution).
+const TERRESTRIAL_GM_KM3_S2: f64 = 3.986_004e5;
+
+/// Masses of Jupiter in one of the Sun.
+pub const JUPITERS_PER_SUN: f64 = SOLAR_GM_KM3_S2 / JOVIAN_GM_KM3_S2;
+
+/// Masses of the Earth in one of Jupiter.
+pub const EARTHS_PER_JUPITER: f64 = JOVIAN_GM_KM3_S2 / TERRESTRIAL_GM_KM3_S2;
+
 /// Second radiation constant `h c / k` (m K), CODATA 2018.
 const SECOND_RADIATION_M_K: f64 = 1.438_776_877e-2;
 

@@ -20,6 +20,7 @@ import xarray as xr
 run = Path(sys.argv[1])
 summary = json.loads((run / "summary.json").read_text())
 records = [json.loads(line) for line in (run / "chain.jsonl").read_text().splitlines()]
+derived = summary["derived_names"]
 names, parameters, discarded = summary["names"], summary["parameters"], summary["discarded_steps"]
 PERIODIC = {"phi"}
 
@@ -44,7 +45,7 @@ def off_by_turns(x, y):
 # pandas: the same numbers to the last bit
 numbers = [*names, "log_prob", "spottedness", "chi2"]
 # pandas' own conversion may be off by the last bit, depending on its version
-table = pd.read_csv(run / "chain.csv", converters={key: float for key in numbers})
+table = pd.read_csv(run / "chain.csv", converters={key: float for key in [*numbers, *derived]})
 close("pandas by itself", pd.read_csv(run / "chain.csv")[numbers] / table[numbers], 1, 1e-15)
 assert len(table) == len(records)
 for key in [*numbers, "ensemble", "step", "walker", "passes", "accepted", "status", "proposed"]:
@@ -65,7 +66,7 @@ def cube(name, first=0):
 # xarray: every draw of the chain is there once, under its step and walker
 tree = xr.open_datatree(run / "chain.zarr", engine="zarr")
 posterior, stats = tree["posterior"].to_dataset(), tree["sample_stats"].to_dataset()
-assert list(posterior.data_vars) == names and posterior.sizes == {"chain": ensembles, "draw": kept * walkers}
+assert list(posterior.data_vars) == names + derived and posterior.sizes == {"chain": ensembles, "draw": kept * walkers}
 for group, first, last in [("posterior", discarded, steps), ("warmup_posterior", 0, discarded)]:
     grid = tree[group].to_dataset().set_index(draw=["step", "walker"]).unstack("draw").transpose("step", "chain", "walker")
     assert grid["step"].values.tolist() == list(range(first, last))
@@ -84,6 +85,12 @@ for name, start in [("move", "start"), ("status", ""), ("proposed", "")]:
     words = np.array(stats[name].attrs["flag_meanings"].split())
     assert stats[name].attrs["flag_values"] == list(range(len(words)))
     assert (words[grid[name].values.astype(int)] == np.where(pd.isna(cube(name, discarded)), start, cube(name, discarded))).all()
+for name in derived:
+    one, wanted = posterior[name], summary["derived"][name]
+    grid = posterior.set_index(draw=["step", "walker"]).unstack("draw").transpose("step", "chain", "walker")
+    assert (grid[name].values == cube(name, discarded)).all() and one.attrs["derived"] == 1 and one.attrs["units"] in ["d", "Mjup"]
+    close(f"median of {name}", (float(np.median(one)) - wanted["median"]) / wanted["sd"], 0, 1e-6)
+    close(f"sd of {name}", float(one.std(ddof=1)) / wanted["sd"], 1, 1e-6)
 assert posterior["k_kms"].attrs["units"] == "km/s" and posterior["k_kms"].attrs["injected"] == 0.2
 assert json.loads(posterior["k_kms"].attrs["prior"])["max"] == 1.0
 assert tree.attrs["discarded_steps"] == discarded and json.loads(tree.attrs["config"])["star"]["vsini_kms"] == 20.0
@@ -120,6 +127,7 @@ for name in names:
 backend = emcee.backends.HDFBackend(str(run / "chain.h5"), read_only=True)
 with backend.open() as file:
     attributes = dict(file["mcmc"].attrs)
+assert list(attributes["blob_names"]) == ["spottedness", "chi2", *derived]
 assert list(attributes["parameter_names"]) == names and json.loads(attributes["injected"])["k_kms"] == 0.2
 positions = np.stack([cube(name, 1).reshape(steps - 1, -1) for name in names], axis=-1)
 chain = backend.get_chain()
@@ -145,7 +153,7 @@ for time, name in zip(times, names):
     # sine counts
     tau = parameters[name]["tau"]
     within(f"emcee tau of {name} over summary.json's", time / tau, 0.85 - 10 * tau / kept, 1.1)
-from_emcee = az.from_emcee(backend, var_names=names, blob_names=list(attributes["blob_names"]), blob_groups=["sample_stats"] * 2)
+from_emcee = az.from_emcee(backend, var_names=names, blob_names=list(attributes["blob_names"]), blob_groups=["sample_stats"] * (2 + len(derived)))
 assert dict(from_emcee["posterior"].sizes) == {"chain": ensembles * walkers, "draw": steps - 1}
 assert (from_emcee["sample_stats"]["chi2"].transpose("draw", "chain").values == backend.get_blobs()[..., 1]).all()
 
@@ -166,7 +174,7 @@ between = np.cov(np.array([draws.mean(axis=0) for draws in kept_draws]).T)
 close("GetDist R-1", samples.getGelmanRubin(), np.max(np.linalg.eigvals(np.linalg.solve(covariance, between)).real), 1e-9)
 assert samples.ranges.periodic == {"phi"} and (samples.ranges.getLower("k_kms"), samples.ranges.getUpper("k_kms")) == (0, 1)
 labels = {one.name: one.label for one in samples.paramNames.names}
-assert labels["k_kms"] == r"K\;[\mathrm{km/s}]" and samples.paramNames.numDerived() == 2
+assert labels["k_kms"] == r"K\;[\mathrm{km/s}]" and samples.paramNames.numDerived() == 2 + len(derived)
 density = samples.get1DDensity("phi")
 # both smooth the draws, each by its own width
 mode = off_by_turns(density.x[np.argmax(density.P)], parameters["phi"]["mode"])

@@ -136,7 +136,8 @@ fn text_formats_have_the_digits_of_the_chain() {
     let table = desk.read("run/chain.csv");
     let mut lines = table.lines();
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let names = "ensemble step walker warmup k_kms phi log_prob spottedness chi2 accepted status move proposed passes";
+    let names = "ensemble step walker warmup k_kms phi log_prob spottedness chi2 accepted status move proposed passes \
+                 t_max_rv_d t_conjunction_d";
     assert_eq!(columns.join(" "), names);
     assert_eq!(lines.clone().count(), records.len());
     for (line, record) in lines.zip(&records) {
@@ -145,6 +146,7 @@ fn text_formats_have_the_digits_of_the_chain() {
                 Value::Number(wanted) => assert_eq!(cell.parse::<f64>().unwrap(), wanted.as_f64().unwrap(), "{line}"),
                 Value::String(wanted) => assert_eq!(cell, wanted),
                 Value::Bool(wanted) => assert_eq!(cell, wanted.to_string()),
+                Value::Null if column.starts_with("t_") => assert!(cell.parse::<f64>().unwrap().abs() < 6.0, "{line}"),
                 _ if *column == "warmup" => assert_eq!(cell == "true", record["step"].as_u64().unwrap() < discarded),
                 _ => assert_eq!((*column, cell, &record["step"]), ("move", "", &json!(0))),
             }
@@ -159,9 +161,14 @@ fn text_formats_have_the_digits_of_the_chain() {
         let found: Vec<f64> = row.split(' ').map(|cell| cell.parse().unwrap()).collect();
         let [k, log_prob, spottedness, chi2] =
             ["k_kms", "log_prob", "spottedness", "chi2"].map(|key| number(&record[key]));
-        assert_eq!(found, [1.0, -log_prob, k, phi, spottedness, chi2]);
+        // P = 5.1 d, counted from day 0
+        let quarters = (found[5] - found[4] - 0.25 * 5.1) / 5.1;
+        let turns = found[4] / 5.1 - phi;
+        assert!((quarters - quarters.round()).abs() < 1e-12 && (turns - turns.round()).abs() < 1e-12, "{row}");
+        assert_eq!([&found[..4], &found[6..]].concat(), [1.0, -log_prob, k, phi, spottedness, chi2]);
     }
     let names = "k_kms\tK\\;[\\mathrm{km/s}]\nphi\t\\phi\\;[\\mathrm{cycles}]\n\
+                 t_max_rv_d*\tT_\\mathrm{max\\,RV}\\;[\\mathrm{d}]\nt_conjunction_d*\tT_\\mathrm{conj}\\;[\\mathrm{d}]\n\
                  spottedness*\t\\mathrm{spottedness}\nchi2*\t\\chi^2\n";
     assert_eq!(desk.read("run/chain.paramnames"), names);
     let ranges = desk.read("run/chain.ranges");

@@ -51,6 +51,8 @@ fn observe(vsini_kms: f64, cap_deg: f64, beyond_kms: f64, rng: &mut ChaCha8Rng) 
         seed: 1,
         pixels: 3000,
         continuum: Default::default(),
+        velocity_jitter_kms: 0.0,
+        correlated_bins: 1.0,
     };
     simulation.observe(&star)
 }

@@ -66,9 +66,12 @@ fn every_folder_has_its_figures() {
         }
     }
     for (file, labels) in [
-        ("sample/figures/corner.svg", &["K (km/s)", "φ (orbital cycles)", "injected"][..]),
+        ("sample/figures/corner.svg", &["K (km/s)", "φ (cycles to max. RV)", "injected"][..]),
         ("sample/figures/traces.svg", &["step", "ensemble 4", "burn-in"]),
-        ("map/figures/rv.svg", &["RV (km/s)", "rotation cycle", "orbital phase", "model", "assumed orbit"]),
+        (
+            "map/figures/rv.svg",
+            &["RV (km/s)", "rotation cycle", "orbital phase (0: maximal RV)", "model", "assumed orbit"],
+        ),
         ("map/figures/residuals.svg", &["velocity (km/s)", "rotation phase", "standard errors"]),
         (
             "map/figures/map.svg",

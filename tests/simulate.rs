@@ -93,6 +93,70 @@ fn a_simulation_is_a_function_of_its_settings() {
     assert_ne!(fingerprint(&small(3)), fingerprint(&small(4)));
 }
 
+fn depths(observations: &Observations) -> Vec<f64> {
+    observations.profiles.iter().flat_map(|p| p.intensity.clone()).collect()
+}
+
+/// Zero points move profiles by what `truth.json` says of them, and leave the noise as it is.
+#[test]
+fn zero_points_are_velocities_of_their_own() {
+    let with = |snr: Option<f64>, jitter: f64| {
+        demo(|s| {
+            s.pixels = 2000;
+            s.snr = snr;
+            s.velocity_jitter_kms = jitter;
+        })
+    };
+    let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
+    let config::ObservationSource::Simulate(simulation) = settings.source else { panic!() };
+    assert!(simulation.zero_points_kms().is_empty());
+    let zero_points = Simulation { velocity_jitter_kms: 0.5, ..simulation }.zero_points_kms();
+    // fifty numbers know their scatter to 10 %
+    assert!((rms(&zero_points) / 0.5 - 1.0).abs() < 0.25, "{}", rms(&zero_points));
+    let (still, moved) = (with(None, 0.0), with(None, 0.5));
+    for ((still, moved), zero_point) in still.first_moments().iter().zip(moved.first_moments()).zip(&zero_points) {
+        // the last bins cut a little of the line off
+        let shift = moved.value_kms - still.value_kms;
+        assert!((shift - zero_point).abs() < 2e-3 + 0.01 * zero_point.abs(), "{shift} {zero_point}");
+    }
+    let noise = |jitter: f64| -> Vec<f64> {
+        let (loud, quiet) = (with(Some(1000.0), jitter), with(None, jitter));
+        depths(&loud).iter().zip(depths(&quiet)).map(|(a, b)| a - b).collect()
+    };
+    assert!(noise(0.0).iter().zip(noise(0.5)).all(|(a, b)| (a - b).abs() < 1e-15));
+}
+
+/// Correlations of (c - 1) / (c + 1) between neighbours, the variance of white noise, and nothing from one profile to
+/// the next.
+#[test]
+fn noise_is_correlated_over_as_many_bins_as_asked_for() {
+    let noise = |correlated_bins: f64| {
+        let with = |snr: Option<f64>| {
+            demo(|s| {
+                s.pixels = 500;
+                (s.snr, s.correlated_bins, s.bins) = (snr, correlated_bins, 200);
+            })
+        };
+        let (loud, quiet) = (depths(&with(Some(1000.0))), depths(&with(None)));
+        loud.iter().zip(quiet).map(|(a, b)| 1000.0 * (a - b)).collect::<Vec<f64>>()
+    };
+    let (white, together) = (noise(1.0), noise(3.0));
+    for (white, together) in white.chunks(200).zip(together.chunks(200)) {
+        assert!((white[0] - together[0]).abs() < 1e-9, "the first bin of a profile");
+        assert!((together[1] - 0.5 * together[0] - 0.75f64.sqrt() * white[1]).abs() < 1e-9);
+    }
+    // 10,000 bins, of which a third are independent
+    assert!((rms(&together) - 1.0).abs() < 0.04, "{}", rms(&together));
+    let product = |lag: usize| {
+        let pairs =
+            together.chunks(200).flat_map(|p| p.iter().zip(&p[lag..]).map(|(a, b)| a * b).collect::<Vec<f64>>());
+        pairs.sum::<f64>() / (50 * (200 - lag)) as f64
+    };
+    for (lag, wanted) in [(1, 0.5), (2, 0.25), (5, 0.03125)] {
+        assert!((product(lag) - wanted).abs() < 0.06, "{lag}: {}", product(lag));
+    }
+}
+
 #[test]
 fn a_shifted_line_has_a_shifted_first_moment() {
     let line = |shift: f64| Profile {

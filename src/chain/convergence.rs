@@ -50,6 +50,11 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
+    /// Of one quantity.
+    pub fn of(series: Series, kind: ParameterKind) -> Self {
+        diagnose(&facets(series, kind))
+    }
+
     /// Whether the goals are reached.
     pub fn reached(&self, goals: &Goals) -> bool {
         self.rhat.is_some_and(|rhat| rhat <= goals.rhat) && self.ess.is_some_and(|ess| ess >= goals.ess)

@@ -1,12 +1,14 @@
 //! Chains: what was sampled, how far it can be trusted, and what it says.
 //!
 //! [`Record`] is one line, [`Chain`] holds whole steps; `autocorrelation` and `convergence` say how many independent draws
-//! that amounts to, `summary` and `table` say what came out. All of it is a function of the chain's content alone.
+//! that amounts to, `summary` and `table` say what came out, `derived` of what
+//! follows from the parameters too. All of it is a function of the chain's content alone.
 //! Left out: who sampled (`ensemble`), and files (`io::journal`).
 
 pub mod advice;
 pub mod autocorrelation;
 pub mod convergence;
+pub mod derived;
 pub mod modes;
 pub mod moves;
 pub mod record;
@@ -16,6 +18,7 @@ pub mod summary;
 pub mod table;
 
 pub use convergence::{Convergence, Diagnostic, Goals, ParameterKind};
+pub use derived::{Derived, Settled};
 pub use modes::PeriodMode;
 pub use moves::MoveSummary;
 pub use record::{MoveKind, Record, Shape};

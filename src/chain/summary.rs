@@ -14,8 +14,9 @@
 use crate::chain::autocorrelation::mean;
 use crate::chain::statistics::{mode, periodic_mode, quantile, shortest_interval, unwrap_around, wrap};
 use crate::chain::{
-    Chain, ChainError, Convergence, Diagnostic, Goals, MoveSummary, ParameterKind, PeriodMode, advice, moves,
+    Chain, ChainError, Convergence, Derived, Diagnostic, Goals, MoveSummary, ParameterKind, PeriodMode,
 };
+use crate::chain::{Settled, advice, derived, moves};
 use crate::log_density::Status;
 use crate::verdict::Verdict;
 use rayon::prelude::*;
@@ -79,6 +80,15 @@ pub struct Summary {
     pub names: Vec<String>,
     /// Summary of each parameter, by name.
     pub parameters: BTreeMap<String, ParameterSummary>,
+    /// Names of the quantities that follow from the parameters, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub derived_names: Vec<String>,
+    /// Summary of each of them, by name, from its values at the draws.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived: BTreeMap<String, ParameterSummary>,
+    /// What names of parameters and derived quantities mean, where they do not say it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub definitions: BTreeMap<String, String>,
     /// Accepted share of the proposals, of the steps kept.
     pub acceptance_fraction: f64,
     /// What each kind of move is worth; empty for a chain that does not name its moves.
@@ -137,6 +147,9 @@ pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Resul
     let sd: Vec<f64> = parameters.iter().map(|one| one.sd).collect();
     Ok(Summary {
         moves: moves::summarise_moves(chain, discarded, kinds, &sd),
+        derived_names: Vec::new(),
+        derived: BTreeMap::new(),
+        definitions: BTreeMap::new(),
         ess_per_evaluation: least.map(|ess| ess / evaluated.max(1) as f64),
         parameters: names.iter().cloned().zip(parameters).collect(),
         acceptance_fraction: mean(accepted.iter().flatten().flatten()),
@@ -155,8 +168,26 @@ pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Resul
     })
 }
 
+impl Summary {
+    /// Adds what `chain`, of which it is the summary, says of quantities that follow from the parameters.
+    pub fn derive(&mut self, chain: &Chain, quantities: Vec<Derived>) -> Vec<Settled> {
+        let has_limit = |name: &str| self.parameters.get(name).is_some_and(|one| one.upper95.is_some());
+        let settled = derived::settle(chain, self.discarded_steps, quantities, &has_limit);
+        for Settled { quantity: Derived { name, definition, .. }, summary, .. } in &settled {
+            self.derived_names.push(name.clone());
+            self.derived.insert(name.clone(), summary.clone());
+            self.definitions.extend(definition.clone().map(|text| (name.clone(), text)));
+        }
+        settled
+    }
+}
+
 /// Statistics of the pooled draws of one parameter.
-fn parameter_summary(mut values: Vec<f64>, kind: ParameterKind, diagnostic: &Diagnostic) -> ParameterSummary {
+pub(super) fn parameter_summary(
+    mut values: Vec<f64>,
+    kind: ParameterKind,
+    diagnostic: &Diagnostic,
+) -> ParameterSummary {
     let effective = diagnostic.ess.unwrap_or(1.0);
     let periodic = kind == ParameterKind::Periodic;
     let around = periodic.then(|| periodic_mode(&values, effective));

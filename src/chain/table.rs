@@ -31,6 +31,7 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
             text += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
         }
     }
+    text += &derived(summary, truth);
     text += &format!(
         "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} passes each, best log_prob {:.3}\n",
         summary.steps,
@@ -42,6 +43,32 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
         summary.best.log_prob
     );
     text + &moves(summary) + &convergence(summary) + "\n"
+}
+
+/// What follows from the parameters, and what names mean; `truth` has it too.
+fn derived(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
+    let mut head = vec!["derived", "median", "- 68%", "+ 68%", "95% interval", "95% HDI"];
+    if truth.is_some() {
+        head.insert(1, "truth");
+    }
+    let mut rows: Vec<Vec<String>> = vec![head.iter().map(|&text| text.to_owned()).collect()];
+    let mut limits = String::new();
+    for (name, one) in summary.derived_names.iter().filter_map(|name| summary.derived.get_key_value(name)) {
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let text = truth.get(name).map_or_else(|| "-".to_owned(), |value| number(*value, decimals(one)));
+            row.insert(1, text);
+        }
+        row.truncate(head.len());
+        rows.push(row);
+        if let Some(upper) = one.upper95 {
+            limits += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
+        }
+    }
+    let table = if rows.len() > 1 { aligned(&rows) } else { String::new() };
+    let names = summary.names.iter().chain(&summary.derived_names);
+    let meanings = names.filter_map(|name| summary.definitions.get_key_value(name));
+    table + &limits + &meanings.map(|(name, meaning)| format!("{name}: {meaning}\n")).collect::<String>()
 }
 
 /// A line on the moves, where the chain names them.

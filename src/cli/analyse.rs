@@ -1,12 +1,11 @@
 //! `dimcmc analyse`: credible intervals and convergence of a run.
 
-use super::{Failure, Global};
+use super::{Failure, Global, console};
 use dimcmc::chain::{Chain, table};
 use dimcmc::io::atomic::write_json;
 use dimcmc::io::journal;
 use dimcmc::manifest::Manifest;
 use dimcmc::run::{CHAIN, SUMMARY};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Credible intervals and convergence of a run
@@ -22,22 +21,22 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
-    let manifest = Manifest::read(&args.run).map_err(Failure::input)?;
+    let manifest = Manifest::read(&args.run).map_err(Failure::of)?;
     let chain = journal::read(&args.run.join(CHAIN), &manifest.shape())?;
     report(&args.run, &manifest, &chain)
 }
 
 /// Writes the summary of `chain` into `folder` and prints its table.
 pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), Failure> {
-    let settings = manifest.settings(folder).map_err(Failure::input)?;
-    let summary = manifest
+    let settings = manifest.settings(folder).map_err(Failure::of)?;
+    let (summary, _) = manifest
         .summarise(&settings, chain)
         .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
     write_json(&folder.join(SUMMARY), &summary)?;
-    let _ = writeln!(std::io::stdout(), "{}", table(&summary, manifest.origin.truth.as_ref()).trim_end());
+    console::line(table(&summary, manifest.truth(&settings, &summary).as_ref()).trim_end());
     let notes = summary.remarks.iter().cloned().chain(manifest.warnings()).chain(manifest.co_rotation(&summary));
     for warning in notes {
-        let _ = writeln!(std::io::stdout(), "note: {warning}");
+        console::line(format_args!("note: {warning}"));
     }
     Ok(())
 }

@@ -2,12 +2,11 @@
 
 use super::output::Output;
 use super::signals::Signals;
-use super::{Failure, Global, cluster, progress};
-use dimcmc::batch::{End, FILE, ListError, Row, read_list, rows, sample_all};
+use super::{Failure, Global, cluster, console, progress};
+use dimcmc::batch::{End, FILE, Row, read_list, rows, sample_all};
 use dimcmc::chain::ParameterSummary;
 use dimcmc::io::atomic::write_json;
-use dimcmc::text::{Align, columns};
-use std::io::Write as _;
+use dimcmc::text::{Align, columns, escaped, shown};
 use std::path::PathBuf;
 
 /// Sample the posteriors of many stars
@@ -27,12 +26,10 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
-    let stars = read_list(&args.list, &args.folder).map_err(|error| match error {
-        ListError::Read { .. } | ListError::Line { .. } | ListError::Empty(_) => Failure::input(error),
-    })?;
+    let signals = Signals::catch("star")?;
+    let stars = read_list(&args.list, &args.folder).map_err(Failure::of)?;
     let output = Output::to(args.folder.clone(), true);
     let folder = output.create()?;
-    let signals = Signals::catch("star")?;
     let pool = cluster::pool(global, &signals);
     signals.defer();
     let bar = progress::bar(global, Some(stars.len() as u64), "stars");
@@ -40,7 +37,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     bar.finish_and_clear();
     let rows = rows(&stars, &ends);
     write_json(&folder.join(FILE), &rows)?;
-    let _ = writeln!(std::io::stdout(), "{}written: {}: {FILE}", table(&rows), folder.display());
+    console::line(format_args!("{}written: {}: {FILE}", table(&rows), shown(folder)));
     let count = |is: &dyn Fn(&End) -> bool| ends.iter().filter(|end| is(end)).count();
     let (interrupted, failed) = (count(&|end| *end == End::Interrupted), count(&|end| matches!(end, End::Failed(_))));
     if interrupted > 0 {
@@ -61,11 +58,11 @@ fn table(rows: &[Row]) -> String {
     for row in rows {
         match &row.end {
             End::Sampled => {}
-            End::Interrupted => failures += &format!("{}: interrupted\n", row.name),
-            End::Failed(why) => failures += &format!("{}: {why}\n", row.name),
+            End::Interrupted => failures += &format!("{}: interrupted\n", escaped(&row.name)),
+            End::Failed(why) => failures += &format!("{}: {}\n", escaped(&row.name), escaped(why)),
         }
         for (name, one) in &row.parameters {
-            cells.push([vec![row.name.clone(), name.clone()], numbers(one, row.converged)].concat());
+            cells.push([vec![escaped(&row.name).into_owned(), name.clone()], numbers(one, row.converged)].concat());
         }
     }
     let aligns: Vec<Align> = (0..head.len()).map(|k| if k < 2 { Align::Left } else { Align::Right }).collect();

@@ -60,7 +60,7 @@ pub fn join(global: &Global) -> Result<Done, Failure> {
             // the first rank decides when to stop; what comes to all is not to kill the others
             let _signals = Signals::ignore()?;
             if let Err(error) = worker.serve(dimcmc::batch::learn) {
-                eprintln!("error: rank {}: {error}", worker.rank());
+                super::console::error(format_args!("rank {}: {error}", worker.rank()));
                 cluster::abort(2);
             }
             return Ok(Done::Everything);

@@ -1,13 +1,13 @@
 //! `dimcmc compare`: a chain against a landscape.
 
 use super::output::Output;
-use super::{Failure, Global};
+use super::{Failure, Global, console};
 use dimcmc::comparison::{Comparison, FILE, Pair};
 use dimcmc::io::atomic::write_json;
 use dimcmc::io::paraboloid;
 use dimcmc::run::CHAIN;
 use dimcmc::survey::PARABOLOID;
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::PathBuf;
 
 /// Compare a chain with a landscape of the same data
@@ -35,6 +35,6 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
         Comparison::of(&pair, rule).map_err(|e| Failure::input(format!("{}: {e}", args.run.join(CHAIN).display())))?;
     let folder = args.output.create()?;
     write_json(&folder.join(FILE), &comparison)?;
-    let _ = writeln!(std::io::stdout(), "{}written: {}: {FILE}", comparison.table(), folder.display());
+    console::line(format_args!("{}written: {}: {FILE}", comparison.table(), shown(folder)));
     Ok(())
 }

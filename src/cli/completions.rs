@@ -1,7 +1,6 @@
 //! `dimcmc completions`: what a shell needs to complete commands and options.
 
-use super::Failure;
-use super::output::print;
+use super::{Failure, console};
 use clap_complete::Shell;
 
 /// Print a shell's completions of commands and options
@@ -19,5 +18,6 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut super::command(), "dimcmc", &mut script);
-    print(&script)
+    console::print_bytes(&script);
+    Ok(())
 }

@@ -1,8 +1,8 @@
 //! `dimcmc export`: a run's chain for other programs.
 
-use super::{Failure, Global};
+use super::{Failure, Global, console};
 use dimcmc::export::{self, Contents};
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::PathBuf;
 
 /// Write a run's chain for other programs
@@ -49,10 +49,10 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     let out = args.out.clone().unwrap_or_else(|| format.place(&args.run));
     let contents = Contents::read(&args.run)?;
     let written = export::write(&contents, format, &out, args.force)?;
-    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
-    let _ = writeln!(std::io::stdout(), "written: {}", names.join(", "));
+    let names: Vec<String> = written.iter().map(|path| shown(path)).collect();
+    console::line(format_args!("written: {}", names.join(", ")));
     if !contents.summary.converged {
-        let _ = writeln!(std::io::stdout(), "note: the chain has not converged, `dimcmc analyse` says what to do");
+        console::line("note: the chain has not converged, `dimcmc analyse` says what to do");
     }
     Ok(())
 }

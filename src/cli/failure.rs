@@ -1,5 +1,5 @@
 //! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 75 where a scheduler stopped what can go on, 1
-//! for anything else.
+//! for anything else. Which error of the system is the input's fault is said in one place, [`Failure::of`].
 
 use dimcmc::comparison::PairError;
 use dimcmc::config::ConfigError;
@@ -16,11 +16,19 @@ use dimcmc::run::RunError;
 use dimcmc::scene::SceneError;
 use dimcmc::search::SearchError;
 use dimcmc::survey::SurveyError;
+use std::error::Error;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::process::ExitCode;
 
+/// Exit code of bad usage or input.
+const INPUT: u8 = 2;
+
+/// Exit code of a command that failed all the same.
+const FAILED: u8 = 1;
+
 /// Exit code of a command that Ctrl-C stopped.
-pub const INTERRUPTED: u8 = 1;
+pub const INTERRUPTED: u8 = FAILED;
 
 /// Exit code of a command that a scheduler stopped and that can go on: sysexits' EX_TEMPFAIL.
 pub const RESUME: u8 = 75;
@@ -35,13 +43,23 @@ pub struct Failure {
 
 impl Failure {
     /// Bad usage or input: the user can put it right.
-    pub fn input(message: impl std::fmt::Display) -> Self {
-        Failure { code: 2, message: message.to_string() }
+    pub fn input(message: impl Into<String>) -> Self {
+        Failure { code: INPUT, message: message.into() }
+    }
+
+    /// Bad usage or input, unless the system is behind it: a full disk or a missing permission is nobody's input.
+    pub fn of(error: impl Error + 'static) -> Self {
+        Failure { code: if is_of_system(&error) { FAILED } else { INPUT }, message: error.to_string() }
+    }
+
+    /// The system has refused something; `message` says what.
+    pub fn system(error: &std::io::Error, message: impl Into<String>) -> Self {
+        Failure { code: if is_of_system(error) { FAILED } else { INPUT }, message: message.into() }
     }
 
     /// The input was right, and yet it did not work.
     pub fn failed(message: impl std::fmt::Display) -> Self {
-        Failure { code: 1, message: message.to_string() }
+        Failure { code: FAILED, message: message.to_string() }
     }
 
     /// A signal stopped it.
@@ -73,7 +91,7 @@ impl Failure {
             RunError::Origin(error) => Failure::origin(path, error),
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
-            RunError::Merged(_) => Failure::input(error),
+            RunError::Merged(_) => Failure::of(error),
             RunError::PriorStart | RunError::SpotsLeft(_) => Failure::input(format!("{}: {error}", path.display())),
             RunError::Journal(error) => error.into(),
             RunError::Interrupted => Failure::failed(error),
@@ -94,7 +112,7 @@ impl Failure {
         match error {
             OriginError::Reference(error) => Failure::reference(path, error),
             OriginError::Irreproducible { .. } => Failure::failed(error),
-            error => Failure::input(error),
+            error => Failure::of(error),
         }
     }
 
@@ -106,7 +124,7 @@ impl Failure {
 
 impl From<ConfigError> for Failure {
     fn from(error: ConfigError) -> Self {
-        Failure::input(error)
+        Failure::of(error)
     }
 }
 
@@ -114,7 +132,7 @@ impl From<LsdError> for Failure {
     fn from(error: LsdError) -> Self {
         match error {
             LsdError::Write(error) => Failure::failed(error),
-            error => Failure::input(error),
+            error => Failure::of(error),
         }
     }
 }
@@ -136,7 +154,7 @@ impl From<WriteError> for Failure {
 
 impl From<JournalError> for Failure {
     fn from(error: JournalError) -> Self {
-        Failure::input(error)
+        Failure::of(error)
     }
 }
 
@@ -144,31 +162,54 @@ impl From<ExportError> for Failure {
     fn from(error: ExportError) -> Self {
         match error {
             ExportError::Write(error) => error.into(),
-            error => Failure::input(error),
+            error => Failure::of(error),
         }
     }
 }
 
 impl From<PairError> for Failure {
     fn from(error: PairError) -> Self {
-        Failure::input(error)
+        Failure::of(error)
     }
 }
 
 impl From<ProposalError> for Failure {
     fn from(error: ProposalError) -> Self {
-        Failure::input(error)
+        Failure::of(error)
     }
 }
 
 impl From<ZdipyError> for Failure {
     fn from(error: ZdipyError) -> Self {
-        Failure::input(error)
+        Failure::of(error)
     }
 }
 
 impl From<PlotError> for Failure {
     fn from(error: PlotError) -> Self {
-        Failure::input(error)
+        Failure::of(error)
     }
+}
+
+/// Whether an error, or what is behind it, is the system's: anything but a file that is missing, there already, or no file of
+/// that kind.
+fn is_of_system(error: &(dyn Error + 'static)) -> bool {
+    let mut behind = Some(error);
+    while let Some(error) = behind {
+        if let Some(error) = error.downcast_ref::<std::io::Error>() {
+            return !matches!(
+                error.kind(),
+                ErrorKind::NotFound
+                    | ErrorKind::AlreadyExists
+                    | ErrorKind::NotADirectory
+                    | ErrorKind::IsADirectory
+                    | ErrorKind::InvalidFilename
+                    | ErrorKind::InvalidInput
+                    | ErrorKind::InvalidData
+                    | ErrorKind::UnexpectedEof
+            );
+        }
+        behind = error.source();
+    }
+    false
 }

@@ -3,13 +3,13 @@
 use super::output::Output;
 use super::search::search;
 use super::signals::Signals;
-use super::{Failure, Global, cluster, progress};
-use dimcmc::io::effort::Effort;
+use super::{Failure, Global, cluster, console, progress};
+use dimcmc::io::effort::{EFFORT, Effort};
 use dimcmc::io::paraboloid::ParaboloidFile;
 use dimcmc::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
 use dimcmc::scene::Scene;
 use dimcmc::survey::{HEADER, NODES, PARABOLOID, Survey};
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -44,16 +44,18 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let began = Instant::now();
-    if !args.resume {
+    let signals = Signals::catch("node")?;
+    let resume = args.resume && !args.output.cannot_go_on();
+    if !resume {
         args.output.check()?;
     }
     let scene = Scene::load(&args.config)?;
+    args.output.spare(&scene.files(), |name| [HEADER, NODES, PARABOLOID, EFFORT].contains(&name))?;
     let plan = scene.settings.require_grid()?;
     let folder = args.output.folder();
     let failed = |e| Failure::survey(&args.config, e);
-    let signals = Signals::catch("node")?;
     let pool = cluster::pool(global, &signals);
-    let mut survey = if args.resume {
+    let mut survey = if resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the landscape, reference image");
         let survey = Survey::resume(&scene, plan, folder);
@@ -71,31 +73,31 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut meter = Meter::new(global, &survey.landscape);
     let whole = survey.go(&pool, |landscape| meter.show(landscape));
     meter.bar.finish_and_clear();
-    Effort::add(folder, !args.resume, began.elapsed().as_secs_f64(), pool.size())?;
+    let noted = Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size());
     if !whole.map_err(failed)? {
         let (config, folder, nodes) = (args.config.display(), folder.display(), survey.landscape.nodes().len());
         return Err(signals.interrupted(format!(
             "interrupted after {nodes} nodes; go on with: dimcmc grid {config} --out {folder} --resume"
         )));
     }
+    noted?;
     let Survey { header, landscape, .. } = &survey;
     let truth = header.origin.truth.as_ref();
     let rule = Rule { nodes: args.fit_nodes.map(NonZeroUsize::get), radius: args.fit_radius.map(NonZeroUsize::get) };
     let found = paraboloid(landscape, rule);
     ParaboloidFile::new(landscape.grid(), rule, truth, &found).write(&folder.join(PARABOLOID))?;
-    let mut stdout = std::io::stdout().lock();
     // whoever reads may stop reading
-    let _ = write!(stdout, "{}", table(landscape, truth));
-    let _ = write!(stdout, "{}", paraboloid_table(&found, landscape.grid(), truth));
+    console::print(table(landscape, truth));
+    console::print(paraboloid_table(&found, landscape.grid(), truth));
     let images = match survey.footholds() {
         0 => String::new(),
         others => format!(" from {} images", others + 1),
     };
-    let _ = writeln!(stdout, "{}{images}", meter.cost(landscape));
+    console::line(format_args!("{}{images}", meter.cost(landscape)));
     if let Some(warning) = header.origin.reference.warning() {
-        let _ = writeln!(stdout, "note: {warning}");
+        console::line(format_args!("note: {warning}"));
     }
-    let _ = writeln!(stdout, "written: {}: {HEADER}, {NODES}, {PARABOLOID}", folder.display());
+    console::line(format_args!("written: {}: {HEADER}, {NODES}, {PARABOLOID}", shown(folder)));
     Ok(())
 }
 

@@ -2,12 +2,12 @@
 
 use super::init::{KnownArgs, next_commands};
 use super::output::{ConfigFile, folder_of};
-use super::{Failure, Global, progress};
+use super::{Failure, Global, console, progress};
 use dimcmc::import::Import;
 use dimcmc::io::atomic;
 use dimcmc::io::zdipy::{Input, LINE_FILE, LocalLineFile};
 use dimcmc::proposal::{Place, propose};
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::{Path, PathBuf};
 
 /// Write a config from ZDIpy's input files
@@ -36,8 +36,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check(Some(&list))?;
     let input = Input::read(&args.input)?;
     let line = line_file(args).map(|path| LocalLineFile::read(&path)).transpose()?;
+    args.output.spare(&files(args, &input), Some(&list))?;
     let folder = args.output.relative(folder_of(&args.input))?;
-    let import = Import::zdipy(&input, line.as_ref(), &folder).map_err(Failure::input)?;
+    let import = Import::zdipy(&input, line.as_ref(), &folder).map_err(Failure::of)?;
     let place = Place {
         config,
         list: &list,
@@ -55,10 +56,16 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     atomic::write(&list, import.list.as_bytes())?;
     atomic::write(config, proposal.json.as_bytes())?;
     let (table, left_out) = (proposal.table(), import.table());
-    let written = format!("written: {}, {}", config.display(), list.display());
-    let _ = write!(std::io::stdout(), "{table}\n{left_out}{}{written}\n", if left_out.is_empty() { "" } else { "\n" });
+    let written = format!("written: {}, {}", shown(config), shown(&list));
+    console::print(format_args!("{table}\n{left_out}{}{written}\n", if left_out.is_empty() { "" } else { "\n" }));
     next_commands(&proposal, config);
     Ok(())
+}
+
+/// The files that are read.
+fn files(args: &Args, input: &Input) -> Vec<PathBuf> {
+    let profiles = input.profiles.iter().map(|profile| folder_of(&args.input).join(&profile.file));
+    std::iter::once(args.input.clone()).chain(line_file(args)).chain(profiles).collect()
 }
 
 fn line_file(args: &Args) -> Option<PathBuf> {

@@ -1,12 +1,12 @@
 //! `dimcmc init`: a first config for observed profiles.
 
 use super::output::ConfigFile;
-use super::{Failure, Global, progress};
+use super::{Failure, Global, console, progress};
 use dimcmc::config::ConfigError;
-use dimcmc::io::atomic;
 use dimcmc::io::lsd::LsdError;
+use dimcmc::io::{atomic, lsd};
 use dimcmc::proposal::{Given, Known, Place, Proposal, ProposalError, propose};
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::{Path, PathBuf};
 
 /// Write a first config for observed profiles
@@ -120,6 +120,7 @@ impl KnownArgs {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check(None)?;
     let list = &args.observations;
+    args.output.spare(&lsd::files(list), None)?;
     let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.clone(), source })?;
     let place = Place {
         config: args.output.path(),
@@ -135,14 +136,14 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let proposal = proposal.map_err(|error| args.known.failure(error))?;
     args.output.check(None)?;
     atomic::write(args.output.path(), proposal.json.as_bytes())?;
-    let _ = write!(std::io::stdout(), "{}\nwritten: {}\n", proposal.table(), args.output.path().display());
+    console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));
     next_commands(&proposal, args.output.path());
     Ok(())
 }
 
 /// What to do with the config at `path`.
 pub fn next_commands(proposal: &Proposal, path: &Path) {
-    let config = path.display();
+    let config = shown(path);
     let next = match proposal.complete {
         true => format!(
             "next:\n  dimcmc map {config} --out map               does the model fit? is the map plausible?\n  dimcmc periodogram \
@@ -150,5 +151,5 @@ pub fn next_commands(proposal: &Proposal, path: &Path) {
         ),
         false => format!("next: put right what the notes say in {config}, then\n  dimcmc map {config} --out map\n"),
     };
-    let _ = write!(std::io::stdout(), "{next}");
+    console::print(next);
 }

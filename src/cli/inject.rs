@@ -47,6 +47,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
+    args.output.spare(&scene.files(), |name| name == CONFIG || lsd::is_written(name) || name == truth::FILE)?;
     let (whole, labels) = scene.whole()?;
     let orbit = orbit(args, &whole)?;
     let star = &scene.imager.star;

@@ -1,8 +1,8 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
 use super::output::Output;
-use super::signals::Signals;
-use super::{Failure, Global, cluster, progress};
+use super::signals::{Signals, before_the_first};
+use super::{Failure, Global, cluster, console, progress};
 use dimcmc::detection::{DetectionError, DetectionSettings};
 use dimcmc::expansion::nuisances;
 use dimcmc::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
@@ -10,10 +10,13 @@ use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, Search
 use dimcmc::pool::Brief;
 use dimcmc::scene::Scene;
 use dimcmc::star::Orbit;
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
+
+/// What a survey that is interrupted has not come to.
+const LIMIT: &str = "limit";
 
 /// Find out which planets would be found: injection and recovery over period, K and phase
 ///
@@ -69,8 +72,10 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    let signals = Signals::catch(LIMIT)?;
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
+    args.output.spare(&scene.files(), |name| [CSV, JSON].contains(&name))?;
     let settings = settings(args, &scene)?;
     let spinner = progress::bar(global, None, "reconstructing without a planet");
     let shortcut = Shortcut::new(&scene.imager, scene.settings.values, &settings);
@@ -82,29 +87,29 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     meter.bar.finish_and_clear();
     let found = limits::limits(&cells);
     let drawn = limits::drawn(&shortcut, &found, usize::from(args.full));
-    let comparisons = whole_way(global, &scene, &shortcut, &drawn)?;
+    let comparisons = whole_way(global, &signals, &scene, &shortcut, &drawn)?;
     let rotation_period_d = scene.imager.star.rotation_period_d;
     let file = LimitsFile::new(&shortcut, &orbits, &found, &comparisons, rotation_period_d, scene.provenance());
     let folder = args.output.create()?;
     file.write(&cells, rotation_period_d, folder)?;
-    let _ = writeln!(std::io::stdout(), "{}written: {}: {CSV}, {JSON}", file.table(), folder.display());
+    console::line(format_args!("{}written: {}: {CSV}, {JSON}", file.table(), shown(folder)));
     Ok(())
 }
 
 /// The orbits both ways.
 fn whole_way(
     global: &Global,
+    signals: &Signals,
     scene: &Scene,
     shortcut: &Shortcut,
     orbits: &[Orbit],
 ) -> Result<Vec<Comparison>, Failure> {
-    let signals = Signals::catch("orbit")?;
-    let pool = cluster::pool(global, &signals);
+    let pool = cluster::pool(global, signals);
     if orbits.is_empty() {
         return Ok(Vec::new());
     }
     let way = WholeWay::new(scene, shortcut);
-    let search = way.searcher().map_err(Failure::input)?;
+    let search = way.searcher().map_err(Failure::of)?;
     let brief = Brief::Injections(Box::new(way)).to_bytes();
     let meter = Meter::new(global, orbits.len());
     signals.defer();
@@ -113,7 +118,7 @@ fn whole_way(
         let found = pool.answers(&brief, some, &search);
         if found.len() < some.len() {
             meter.bar.finish_and_clear();
-            return Err(Failure::failed("interrupted, nothing is written"));
+            return Err(signals.interrupted(before_the_first(LIMIT)));
         }
         meter.show(some.len());
         let both = |(orbit, full): (&Orbit, _)| Comparison { orbit: *orbit, shortcut: shortcut.search(orbit), full };
@@ -130,7 +135,7 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
     let frequencies = Frequencies::new(&scene.imager.cycles(), scene.imager.star.rotation_period_d, wanted);
     let frequencies = frequencies.map_err(|error| match error {
         FrequencyError::TooFewTimes(_) => Failure::input(format!("{}: observations: {error}", args.config.display())),
-        error => Failure::input(error),
+        error => Failure::of(error),
     })?;
     Ok(LimitSettings {
         detection: DetectionSettings {

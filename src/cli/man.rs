@@ -1,9 +1,10 @@
 //! `dimcmc man`: the manual, one page a command.
 
-use super::Failure;
-use super::output::{Output, print};
+use super::output::Output;
+use super::{Failure, console};
 use clap_mangen::Man;
 use dimcmc::io::atomic;
+use dimcmc::text::shown;
 
 /// Write the manual pages
 ///
@@ -24,7 +25,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     for (name, page) in &pages {
         atomic::write(&folder.join(name), page)?;
     }
-    print(format!("written: {}: {} pages, dimcmc.1 first\n", folder.display(), pages.len()).as_bytes())
+    console::line(format_args!("written: {}: {} pages, dimcmc.1 first", shown(folder), pages.len()));
+    Ok(())
 }
 
 /// Every page with its file name.

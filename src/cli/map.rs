@@ -26,6 +26,7 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
+    args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let spinner = progress::bar(global, None, "reconstructing");
     let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target.value());
     spinner.finish_and_clear();
@@ -53,7 +54,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-fn report(Fit { summary: fit, nuisances, .. }: &Fit) -> Report {
+fn report(Fit { summary: fit, nuisances, zero_points_kms, .. }: &Fit) -> Report {
     let FitSummary { chi2, chi2_per_datum, data, profiles, .. } = fit;
     let report = Report::default()
         .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"));
@@ -64,9 +65,10 @@ fn report(Fit { summary: fit, nuisances, .. }: &Fit) -> Report {
             format!("{:.5} rms: {darkness:.5} dark, {brightness_excess:.5} bright", fit.spottedness),
         ),
     };
-    let filtered = match nuisances.is_empty() {
-        true => format!("{:.4} km/s rms", fit.filtered_rv_rms_kms),
-        false => "not told: first moments follow the continuum that was fitted".to_owned(),
+    let filtered = match (nuisances.is_empty(), zero_points_kms.is_empty()) {
+        (true, true) => format!("{:.4} km/s rms", fit.filtered_rv_rms_kms),
+        (true, false) => "not told: first moments follow the zero points that were fitted".to_owned(),
+        (false, _) => "not told: first moments follow the continuum that was fitted".to_owned(),
     };
     let report = report
         .line("entropy", format!("{:.5} at lambda = {:.4e}", fit.entropy, fit.lambda))
@@ -75,13 +77,19 @@ fn report(Fit { summary: fit, nuisances, .. }: &Fit) -> Report {
         .line("RV observed", format!("{:.4} km/s rms", fit.observed_rv_rms_kms))
         .line("RV filtered", filtered)
         .line("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms));
+    let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
+    let report = match zero_points_kms.len() {
+        0 => report,
+        count => {
+            let squares = zero_points_kms.iter().map(|v| v * v).sum();
+            report.line("zero points", format!("{:.4} km/s rms", rms(squares, count)))
+        }
+    };
     if nuisances.is_empty() {
         return report;
     }
-    let [offset, slope, width] = [0, 1, 2].map(|i| {
-        let squares: f64 = nuisances.iter().map(|n| n.numbers()[i].powi(2)).sum();
-        (squares / nuisances.len() as f64).sqrt()
-    });
+    let [offset, slope, width] =
+        [0, 1, 2].map(|i| rms(nuisances.iter().map(|n| n.numbers()[i].powi(2)).sum(), nuisances.len()));
     let rms = format!("offset {offset:.1e}, slope {slope:.1e}, equivalent width {:.2} % rms", 100.0 * width);
     report.line("continuum", rms)
 }

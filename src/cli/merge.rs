@@ -1,9 +1,9 @@
 //! `dimcmc merge`: runs of independent ensembles joined into one.
 
 use super::output::Output;
-use super::{Failure, Global, analyse};
+use super::{Failure, Global, analyse, console};
 use dimcmc::merge::{MergeError, merge};
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::PathBuf;
 
 /// Join runs of the same config but for the seed into one
@@ -36,11 +36,10 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     analyse::report(folder, &merged.manifest, &merged.chain)?;
     for (run, beyond) in args.runs.iter().zip(&merged.beyond).filter(|(_, beyond)| **beyond > 0) {
         let shortest = merged.chain.steps() - 1;
-        let _ = writeln!(
-            std::io::stdout(),
+        console::line(format_args!(
             "note: {}: its last {beyond} steps are left out, the shortest run ends at step {shortest}",
-            run.display()
-        );
+            shown(run)
+        ));
     }
     Ok(())
 }
@@ -48,6 +47,6 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
 fn failure(error: MergeError) -> Failure {
     match error {
         MergeError::Write(_) | MergeError::Chain(_) => Failure::failed(error),
-        error => Failure::input(error),
+        error => Failure::of(error),
     }
 }

@@ -8,6 +8,7 @@ mod batch;
 mod cluster;
 mod compare;
 mod completions;
+mod console;
 mod export;
 mod failure;
 mod grid;
@@ -33,6 +34,7 @@ mod search;
 mod signals;
 mod simulate;
 
+pub use console::end;
 pub use failure::Failure;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
@@ -55,7 +57,7 @@ pub struct Cli {
 #[derive(Debug, clap::Args)]
 pub struct Global {
     /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do not depend on it
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// No progress bar
     #[arg(long, short, global = true)]
@@ -63,6 +65,14 @@ pub struct Global {
     #[cfg(feature = "mpi")]
     #[arg(skip)]
     ranks: cluster::Ranks,
+}
+
+/// More threads than any machine has processors for: the system would take minutes to make them, or fail.
+const MOST_THREADS: usize = 4096;
+
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let number = text.parse::<NonZeroUsize>().ok().filter(|number| number.get() <= MOST_THREADS);
+    number.ok_or_else(|| format!("a whole number from 1 to {MOST_THREADS}"))
 }
 
 #[derive(Debug, Subcommand)]

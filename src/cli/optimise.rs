@@ -2,12 +2,14 @@
 
 use super::output::Output;
 use super::search::search;
-use super::{Failure, Global};
+use super::{Failure, Global, console};
 use dimcmc::io::atomic::write_json;
 use dimcmc::optimum::OptimumFile;
 use dimcmc::scene::Scene;
-use std::io::Write as _;
 use std::path::PathBuf;
+
+/// Name of the file.
+const OPTIMUM: &str = "optimum.json";
 
 /// Find the best parameters and their error bars
 ///
@@ -26,11 +28,12 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
+    args.output.spare(&scene.files(), |name| name == OPTIMUM)?;
     scene.settings.require_free()?;
     let found = search(global, &args.config, &scene, &scene.space)?;
     let file = OptimumFile::new(&scene, &found);
     let folder = args.output.create()?;
-    write_json(&folder.join("optimum.json"), &file)?;
-    let _ = write!(std::io::stdout(), "{}", file.table());
+    write_json(&folder.join(OPTIMUM), &file)?;
+    console::print(file.table());
     Ok(())
 }

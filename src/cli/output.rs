@@ -4,19 +4,9 @@
 //! behind.
 
 use super::Failure;
-use std::io::{ErrorKind, Write as _};
+use dimcmc::{run, survey};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-
-/// Prints what a command is for. That nobody reads on (a closed pipe) is no failure.
-pub fn print(bytes: &[u8]) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure::failed(format!("standard output: cannot write: {e}")))
-        }
-        _ => Ok(()),
-    }
-}
 
 /// Options of every command that writes.
 #[derive(Debug, clap::Args)]
@@ -40,23 +30,41 @@ impl Output {
         let folder = self.folder.display();
         let wrong = |problem: String| Err(Failure::input(format!("--out {folder}: {problem}")));
         match std::fs::read_dir(&self.folder) {
-            Ok(entries) => match entries.count() {
-                0 => Ok(()),
-                _ if self.force => Ok(()),
+            Ok(mut entries) => match entries.next() {
+                None => Ok(()),
+                _ if self.replaces() => Ok(()),
                 _ => wrong("the folder is not empty; give another one, or --force to replace the files in it".into()),
             },
             Err(e) => match obstacle(&self.folder) {
                 Some(file) if file == self.folder => wrong("is not a folder".into()),
                 Some(file) => wrong(format!("{} is not a folder", file.display())),
-                None if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
-                None => wrong(format!("cannot be used: {e}")),
+                None if e.kind() == ErrorKind::NotFound => Ok(()),
+                None => Err(Failure::system(&e, format!("--out {folder}: cannot be used: {e}"))),
             },
         }
     }
 
-    /// Whether what is in the folder is to be replaced.
+    /// Whether what is in the folder is to be replaced: by the user's will, or because it is what a run or a landscape has left
+    /// that ended before its first result.
     pub fn replaces(&self) -> bool {
-        self.force
+        let folder = &self.folder;
+        self.force || run::is_false_start(folder, true) || survey::is_false_start(folder, true)
+    }
+
+    /// Whether a run or a landscape ended there before it was said what it was begun with, so that it cannot go on.
+    pub fn cannot_go_on(&self) -> bool {
+        run::is_false_start(&self.folder, false) || survey::is_false_start(&self.folder, false)
+    }
+
+    /// That nothing which the command has read is replaced by what it `writes`, whatever the user says.
+    pub fn spare(&self, read: &[PathBuf], writes: impl Fn(&str) -> bool) -> Result<(), Failure> {
+        let is_written = |file: &Path| file.file_name().is_some_and(|name| writes(&name.to_string_lossy()));
+        let mut targets =
+            read.iter().filter(|file| is_written(file)).map(|file| (file, self.folder.join(name_of(file))));
+        match targets.find(|(file, target)| is_same(file, target)) {
+            Some((file, _)) => Err(read_too(&self.folder, file)),
+            None => Ok(()),
+        }
     }
 
     /// The folder as given.
@@ -109,10 +117,20 @@ impl ConfigFile {
         }
     }
 
+    /// That neither the config nor another file that comes with it replaces one that the command has `read`, whatever the
+    /// user says.
+    pub fn spare(&self, read: &[PathBuf], other: Option<&Path>) -> Result<(), Failure> {
+        let targets = [Some(self.path.as_path()), other];
+        match read.iter().find(|file| targets.into_iter().flatten().any(|target| is_same(file, target))) {
+            Some(file) => Err(read_too(&self.path, file)),
+            None => Ok(()),
+        }
+    }
+
     /// `file` as a config at this place names it: relative to its folder, or from the root where the two share none.
     pub fn relative(&self, file: &Path) -> Result<PathBuf, Failure> {
         let whole = |path: &Path| {
-            path.canonicalize().map_err(|e| Failure::input(format!("{}: cannot read: {e}", path.display())))
+            path.canonicalize().map_err(|e| Failure::system(&e, format!("{}: cannot read: {e}", path.display())))
         };
         let (folder, file) = (whole(folder_of(&self.path))?, whole(file)?);
         let shared = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
@@ -134,6 +152,23 @@ impl ConfigFile {
 /// The folder that a file is in.
 pub fn folder_of(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether two paths lead to the same file that is there, or its name stands in the same folder.
+fn is_same(file: &Path, other: &Path) -> bool {
+    let whole = |path: &Path| path.canonicalize().ok();
+    let named = |path: &Path| Some(folder_of(path).canonicalize().ok()?.join(name_of(path)));
+    let same = |a: Option<PathBuf>, b: Option<PathBuf>| a.is_some() && a == b;
+    same(whole(file), whole(other)) || same(named(file), named(other))
+}
+
+fn name_of(file: &Path) -> &Path {
+    Path::new(file.file_name().unwrap_or_default())
+}
+
+fn read_too(out: &Path, file: &Path) -> Failure {
+    let (out, file) = (out.display(), file.display());
+    Failure::input(format!("--out {out}: {file} would be replaced, which the command reads; give another name"))
 }
 
 /// What exists of the path, if that is no folder.

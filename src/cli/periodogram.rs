@@ -1,14 +1,14 @@
 //! `dimcmc periodogram`: the blind search for a planet.
 
 use super::output::Output;
-use super::{Failure, Global, progress};
+use super::{Failure, Global, console, progress};
 use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
 use dimcmc::expansion::nuisances;
 use dimcmc::fit::Fit;
-use dimcmc::io::periodogram::PeriodogramResult;
+use dimcmc::io::periodogram::{FILES, PeriodogramResult};
 use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
 use dimcmc::scene::Scene;
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::{Path, PathBuf};
 
 /// Search for a planet at every period, the star's spots marginalised out
@@ -58,6 +58,7 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
+    args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let frequencies = frequencies(args, &scene)?;
     let settings = settings(args, &scene);
     let spinner = progress::bar(global, None, "reconstructing");
@@ -83,13 +84,14 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         settings: &settings,
         fit: &fit(&detection.planet_free),
         truth: scene.truth,
+        mass_msun: scene.settings.mass_msun,
         provenance: &scene.provenance(),
     };
     let folder = args.output.create()?;
     result.write(folder)?;
     let (table, files) = (result.table(), result.files().join(", "));
     let measured: String = scene.measured.lines().iter().map(|(label, text)| format!("{label}: {text}\n")).collect();
-    let _ = writeln!(std::io::stdout(), "{table}{measured}written: {}: {files}", folder.display());
+    console::line(format_args!("{table}{measured}written: {}: {files}", shown(folder)));
     Ok(())
 }
 
@@ -99,7 +101,7 @@ fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
     let rotation_period_d = scene.imager.star.rotation_period_d;
     Frequencies::new(&scene.imager.cycles(), rotation_period_d, settings).map_err(|error| match error {
         FrequencyError::TooFewTimes(_) => Failure::input(format!("{}: observations: {error}", args.config.display())),
-        error => Failure::input(error),
+        error => Failure::of(error),
     })
 }
 

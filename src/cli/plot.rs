@@ -60,6 +60,10 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     for figure in &figures {
         files.extend(plot::write(figure, folder, args.dpi)?);
     }
-    Report::default().written(folder, files.join(", ")).print();
+    let mut report = Report::default();
+    for note in figures.iter().flat_map(|figure| &figure.notes) {
+        report = report.line("note", note);
+    }
+    report.written(folder, files.join(", ")).print();
     Ok(())
 }

@@ -35,6 +35,13 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
             file.display()
         )));
     }
+    // nothing that a page is made of
+    if file.exists() && !report::is_page(&file) {
+        return Err(Failure::input(format!(
+            "--out {}: is there already, and no report: it is not replaced",
+            file.display()
+        )));
+    }
     let page = report::report(&args.folder)?;
     atomic::write(&file, page.as_bytes())?;
     Report::default().line("written", file.display()).print();

@@ -1,7 +1,8 @@
 //! Short results on stdout, a label and a value a line.
 
+use super::console;
+use dimcmc::text::escaped;
 use std::fmt::Display;
-use std::io::Write as _;
 use std::path::Path;
 
 /// Lines of label and value.
@@ -22,12 +23,11 @@ impl Report {
         self.line("written", format!("{}: {files}", folder.display()))
     }
 
-    /// Prints the lines, values aligned. Whoever reads may stop reading.
+    /// Prints the lines, values aligned.
     pub fn print(self) {
         let width = self.lines.iter().map(|(label, _)| label.len()).max().unwrap_or(0);
-        let mut stdout = std::io::stdout().lock();
         for (label, value) in &self.lines {
-            let _ = writeln!(stdout, "{label:width$}  {value}");
+            console::line(format_args!("{label:width$}  {}", escaped(value)));
         }
     }
 }

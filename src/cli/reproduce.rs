@@ -1,12 +1,12 @@
 //! `dimcmc reproduce`: the paper's experiments.
 
 use super::signals::Signals;
-use super::{Failure, Global, cluster, progress};
+use super::{Failure, Global, cluster, console, progress};
 use dimcmc::experiments::files::{Made, SUMMARY, TABLE};
 use dimcmc::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
 use dimcmc::plot::{self, DPI};
 use dimcmc::run::RunError;
-use std::io::Write as _;
+use dimcmc::text::shown;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -41,12 +41,11 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let rows = rows(&args.rows)?;
-    let mut stdout = std::io::stdout();
     if args.list {
         for row in rows {
-            let _ = writeln!(stdout, "{:<11}  {}", row.name, row.title);
+            console::line(format_args!("{:<11}  {}", row.name, row.title));
             if !row.paper.is_empty() {
-                let _ = writeln!(stdout, "{:<11}  paper: {}", "", row.paper);
+                console::line(format_args!("{:<11}  paper: {}", "", row.paper));
             }
         }
         return Ok(());
@@ -66,7 +65,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
                 let problem = format!("{}: the row was done {other}; give another --out, or --force", folder.display());
                 return Err(Failure::input(problem));
             }
-            let _ = writeln!(stdout, "{}: done before: {}; --force does it again", row.name, folder.display());
+            console::line(format_args!("{}: done before: {}; --force does it again", row.name, shown(&folder)));
             continue;
         }
         // what is wrong with the folder is to be known before, not after
@@ -99,8 +98,12 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             let _ = std::fs::remove_file(folder.join(SUMMARY));
         })?;
         let paper = if row.paper.is_empty() { String::new() } else { format!("\n  paper: {}", row.paper) };
-        let _ = write!(stdout, "{}: {}{paper}\n{}", row.name, row.title, result.text());
-        let _ = writeln!(stdout, "  in {} s; written: {}: {TABLE}, {SUMMARY}{figures}", made.seconds, folder.display());
+        console::print(format_args!("{}: {}{paper}\n{}", row.name, row.title, result.text()));
+        console::line(format_args!(
+            "  in {} s; written: {}: {TABLE}, {SUMMARY}{figures}",
+            made.seconds,
+            shown(&folder)
+        ));
     }
     Ok(())
 }

@@ -7,10 +7,11 @@ use super::{Failure, Global, analyse, cluster, progress};
 use dimcmc::chain::advice::growth_needed;
 use dimcmc::chain::{Convergence, Goals, Record};
 use dimcmc::config;
-use dimcmc::ensemble::StopReason;
-use dimcmc::io::effort::Effort;
+use dimcmc::ensemble::{MOST_STEPS, StopReason};
+use dimcmc::io::effort::{EFFORT, Effort};
 use dimcmc::log_density::Status;
-use dimcmc::run::{Run, RunError, StartFrom};
+use dimcmc::manifest;
+use dimcmc::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
 use dimcmc::scene::Scene;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -54,14 +55,18 @@ enum Start {
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let began = Instant::now();
-    let resume = args.resume || args.extend.is_some();
+    let signals = Signals::catch("step")?;
+    let resume = args.extend.is_some() || (args.resume && !args.output.cannot_go_on());
     if !resume {
         args.output.check()?;
     }
+    if let Some(steps) = args.extend.filter(|steps| *steps > MOST_STEPS) {
+        return Err(Failure::input(format!("--extend: must be at most {MOST_STEPS}, not {steps}")));
+    }
     let scene = Scene::new(config::load_with_seed(&args.config, args.seed)?)?;
+    args.output.spare(&scene.files(), |name| [manifest::FILE, CHAIN, SUMMARY, EFFORT].contains(&name))?;
     scene.settings.require_free()?;
     let folder = args.output.folder();
-    let signals = Signals::catch("step")?;
     let pool = cluster::pool(global, &signals);
     let failed = |error| match error {
         RunError::Interrupted => signals.interrupted(error),
@@ -90,7 +95,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut meter = Meter::new(global, &run);
     let reason = run.go(&pool, |records, convergence| meter.step(records, convergence));
     meter.bar.finish_and_clear();
-    Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size())?;
+    let noted = Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size());
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);
@@ -100,7 +105,10 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
                 "interrupted after step {step}; go on with: dimcmc sample {config} --out {folder}{seed} --resume"
             )))
         }
-        StopReason::Converged | StopReason::StepLimit => analyse::report(folder, &run.manifest, &run.chain),
+        StopReason::Converged | StopReason::StepLimit => {
+            noted?;
+            analyse::report(folder, &run.manifest, &run.chain)
+        }
     }
 }
 

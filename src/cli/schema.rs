@@ -1,7 +1,6 @@
 //! `dimcmc schema`: the JSON Schema of the config.
 
-use super::Failure;
-use super::output::print;
+use super::{Failure, console};
 use dimcmc::config;
 
 /// Print the JSON Schema of the config
@@ -14,5 +13,6 @@ pub struct Args {}
 
 /// Runs the command.
 pub fn run(_args: &Args) -> Result<(), Failure> {
-    print(config::schema().as_bytes())
+    console::print_bytes(config::schema().as_bytes());
+    Ok(())
 }

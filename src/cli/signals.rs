@@ -2,11 +2,10 @@
 //!
 //! SIGTERM and SIGUSR1 come from a scheduler whose time is up, and the exit code says that the same command goes on.
 
-use super::Failure;
 use super::failure::{INTERRUPTED, RESUME};
+use super::{Failure, console};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals as Incoming;
-use std::io::IsTerminal as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
@@ -19,7 +18,8 @@ pub struct Signals {
 
 impl Signals {
     /// Catches the signals: until [`Signals::defer`], the first one ends the program with a message; after it, the first one
-    /// sets the flag, and a second Ctrl-C ends the program. The message names what has not begun: the first `unit`.
+    /// sets the flag, and a second Ctrl-C ends the program. The message names what has not begun: the first `unit`. What comes
+    /// before this is the system's: call it first.
     pub fn catch(unit: &'static str) -> Result<Self, Failure> {
         let signals = Signals { stop: Arc::default(), deferred: Arc::default(), code: Arc::new(INTERRUPTED.into()) };
         let Signals { stop, deferred, code } = &signals;
@@ -33,9 +33,7 @@ impl Signals {
                     code.store(RESUME, Ordering::SeqCst);
                 }
                 if !deferred.load(Ordering::SeqCst) {
-                    // a terminal is in the middle of the progress line
-                    let line_break = if std::io::stderr().is_terminal() { "\n" } else { "" };
-                    eprintln!("{line_break}error: interrupted before the first {unit}; nothing was written");
+                    console::error_below_progress(before_the_first(unit));
                     std::process::exit(code.load(Ordering::SeqCst).into());
                 }
                 if stop.swap(true, Ordering::SeqCst) && by_hand {
@@ -68,4 +66,9 @@ impl Signals {
     pub fn interrupted(&self, message: impl std::fmt::Display) -> Failure {
         Failure::interrupted(self.code.load(Ordering::SeqCst), message)
     }
+}
+
+/// That nothing has begun yet.
+pub fn before_the_first(unit: &str) -> String {
+    format!("interrupted before the first {unit}; nothing was written")
 }

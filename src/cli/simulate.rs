@@ -30,6 +30,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::input(format!("{}: observations.simulate: {problem}", args.config.display())));
     };
     let scene = Scene::new(settings)?;
+    args.output.spare(&scene.files(), |name| lsd::is_written(name) || name == truth::FILE)?;
     let truth = scene.truth_of(&simulation);
     let folder = args.output.create()?;
     lsd::write(folder, &scene.observations)?;

@@ -121,7 +121,7 @@ impl Comparison {
     /// # Errors
     /// A chain without steps.
     pub fn of(pair: &Pair, rule: Rule) -> Result<Self, ChainError> {
-        let summary = pair.manifest.summarise(&pair.settings, &pair.chain)?;
+        let (summary, _) = pair.manifest.summarise(&pair.settings, &pair.chain)?;
         let found = paraboloid(&pair.landscape, rule);
         let draws = Draws::of(pair, &summary);
         let compared = |(i, name): (usize, &String)| (name.clone(), parameter(pair, &summary, &found, &draws, i));

@@ -11,7 +11,7 @@ use crate::io::lines::JournalError;
 use crate::landscape::Landscape;
 use crate::manifest::Manifest;
 use crate::objective::Parameter;
-use crate::origin::{self, Origin, OriginError};
+use crate::origin::{Origin, OriginError};
 use crate::run::CHAIN;
 use crate::survey::{HEADER, Header, NODES};
 use std::path::{Path, PathBuf};
@@ -71,7 +71,7 @@ impl Pair {
     /// [`PairError`]: files that are not there or wrong, a landscape that is not whole, or of something else.
     pub fn read(run: &Path, grid: &Path) -> Result<Self, PairError> {
         let manifest = Manifest::read(run)?;
-        let header: Header = origin::read(grid, HEADER)?;
+        let header = Header::read(grid)?;
         let settings = manifest.settings(run)?;
         let source = grid.join(HEADER);
         let grid_settings = config::from_json(header.origin.config.to_string().as_bytes(), &source);
@@ -114,6 +114,10 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
     let (run, grid) = (&manifest.origin, &header.origin);
     let both = |d: Difference| format!("{} ({} in the run, {} in the landscape)", d.key, d.first, d.second);
     if let Some(key) = config::model_difference(&run.config, &grid.config) {
+        return Some(both(key));
+    }
+    // data of other zero points are the same data
+    if let Some(key) = config::jitter_difference(&run.config, &grid.config) {
         return Some(both(key));
     }
     if let Some(name) = header.grid.names().find(|name| !manifest.names.iter().any(|sampled| sampled == name)) {

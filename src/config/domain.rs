@@ -15,8 +15,26 @@ pub(super) fn key(parameter: Parameter) -> String {
     }
 }
 
-/// Beyond this a rotation velocity is a mistake, and velocity axes grow absurdly long.
-const LARGEST_VELOCITY_KMS: f64 = 2000.0;
+/// Bounds of numbers that no star needs to exceed: beyond them they are slips of the pen, digits of a phase are lost, or the
+/// computation has no end.
+pub(super) mod most {
+    /// Rotation velocity (km/s); velocity axes grow absurdly long beyond it.
+    pub const VSINI_KMS: f64 = 2000.0;
+    /// Any other velocity (km/s), up or down: that of light.
+    pub const VELOCITY_KMS: f64 = 3e5;
+    /// Times and periods (d), rotation cycles, and periods over each other: some millions of years.
+    pub const TIME: f64 = 1e9;
+    /// Angular velocity (rad/d), up or down: a rotation in less than a second.
+    pub const OMEGA_RAD_D: f64 = 1e6;
+}
+
+/// Whether a number keeps within `most`, up or down.
+pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> {
+    match value.abs() <= most {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{value} is beyond sense: at most {most:e}, up or down"))),
+    }
+}
 
 /// Whether a value makes sense at all, whatever the prior.
 pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result<(), Fault> {
@@ -26,11 +44,20 @@ pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result
         Parameter::LineSigma | Parameter::EquivalentWidth => (value > 0.0, "above 0"),
         Parameter::LimbDarkening => ((0.0..=1.0).contains(&value), "from 0 to 1"),
         Parameter::Contrast => ((0.0..1.0).contains(&value), "0 or more and below 1"),
-        Parameter::Vsini => (value > 0.0 && value <= LARGEST_VELOCITY_KMS, "above 0 and up to 2000"),
+        Parameter::Vsini => (value > 0.0 && value <= most::VSINI_KMS, "above 0 and up to 2000"),
         Parameter::Inclination => (value > 0.0 && value <= 90.0, "above 0 and up to 90"),
         Parameter::Phi | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
     };
-    if fine && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be {allowed}"))) }
+    if !(fine && value.is_finite()) {
+        return Err(Fault::new(key, format!("{value} must be {allowed}")));
+    }
+    match parameter {
+        Parameter::K | Parameter::Vsys => check_size(key, value, most::VELOCITY_KMS),
+        Parameter::LineSigma | Parameter::EquivalentWidth => check_size(key, value, most::VELOCITY_KMS),
+        Parameter::PorbOverProt => check_size(key, value, most::TIME),
+        Parameter::OmegaEq | Parameter::DOmega => check_size(key, value, most::OMEGA_RAD_D),
+        _ => Ok(()),
+    }
 }
 
 /// Widest bounds of a prior.

@@ -1,6 +1,7 @@
 //! What can be wrong with a config: one line each, naming the file and the key. Serde's words are turned into the user's here.
 
 use super::suggest::nearest;
+use crate::text::escaped;
 use std::path::{Path, PathBuf};
 
 /// Why a config was refused.
@@ -145,11 +146,10 @@ fn below(parent: &str, field: &str) -> String {
     if parent == "." { field.to_string() } else { format!("{parent}.{field}") }
 }
 
-/// Text of the user's, without line breaks and of bounded length.
+/// Text of the user's in one line of bounded length, control characters escaped.
 fn one_line(text: &str) -> String {
     const LONGEST: usize = 300;
-    let clean = text.chars().map(|c| if c.is_control() { ' ' } else { c });
-    let mut short: String = clean.take(LONGEST + 1).collect();
+    let mut short: String = escaped(text).chars().take(LONGEST + 1).collect();
     if let Some((cut, _)) = short.char_indices().nth(LONGEST) {
         short.truncate(cut);
         short.push_str("...");

@@ -4,8 +4,8 @@ use crate::objective::Parameter;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, and the sampler's `steps`,
-/// `rhat` and `ess`. Independent of the order of keys.
+/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, the star's
+/// mass, and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
@@ -35,6 +35,13 @@ pub fn model_difference(first: &Value, second: &Value) -> Option<Difference> {
     ["star", "instrument", "imaging"].iter().find_map(|name| section_difference(name, first, second))
 }
 
+/// Whether two resolved configs count velocity zero points alike.
+pub fn jitter_difference(first: &Value, second: &Value) -> Option<Difference> {
+    const KEY: &str = "velocity_jitter_kms";
+    let [first, second] = [first, second].map(|resolved| &resolved["observations"][KEY]);
+    difference(&format!("observations.{KEY}"), first, second)
+}
+
 /// The same within one section, which need not be there.
 pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<Difference> {
     let without_parameters = |resolved: &Value| {
@@ -42,7 +49,7 @@ pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<D
         if let Some(map) = section.as_object_mut() {
             // a landscape has spots left over as the entropy has them, whatever the chain does
             let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_surface());
-            map.retain(|key, _| !free(key) && key != "spots_left");
+            map.retain(|key, _| !free(key) && key != "spots_left" && key != "mass_msun");
         }
         section
     };
@@ -78,6 +85,9 @@ fn decisive(resolved: &Value) -> Value {
     if let Some(top) = value.as_object_mut() {
         top.remove("$schema");
         top.remove("grid");
+        if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut) {
+            star.remove("mass_msun");
+        }
         if let Some(sampler) = top.get_mut("sampler").and_then(Value::as_object_mut) {
             sampler.retain(|key, _| !["steps", "rhat", "ess"].contains(&key.as_str()));
         }

@@ -8,6 +8,7 @@ mod domain;
 mod draft;
 mod error;
 mod identity;
+mod jitter;
 mod raw;
 mod raw_parts;
 mod resolve;
@@ -21,7 +22,9 @@ pub use crate::ensemble::SamplerSettings;
 pub use automatic::Automatic;
 pub use draft::Draft;
 pub use error::ConfigError;
-pub use identity::{Difference, first_difference, model_difference, section_difference};
+pub use identity::{Difference, first_difference, jitter_difference, model_difference, section_difference};
+pub use jitter::VelocityJitter;
+pub use resolve_grid::MOST_NODES;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 
 use std::path::Path;

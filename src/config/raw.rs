@@ -62,6 +62,10 @@ pub(super) struct Star {
     /// Differential rotation: angular velocity of the equator minus that of the pole (rad/d).
     #[serde(default)]
     pub domega_rad_d: f64,
+    /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It decides nothing
+    /// else, and may be added to a run that is there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass_msun: Option<f64>,
     /// Limb darkening; linear with coefficient 0.65 if not given.
     #[serde(default)]
     pub limb_darkening: LimbDarkeningSection,
@@ -156,7 +160,8 @@ pub(super) struct Planet {
     pub k_kms: f64,
     /// Orbital period over the rotation period, above 0.
     pub porb_over_prot: f64,
-    /// Phase (orbital cycles) at which the radial velocity is largest, counted from rotation cycle 0.
+    /// Orbital phase (cycles, 0 to 1): the part of an orbit from `star.epoch_d` (rotation cycle 0) to the next maximum of the star's
+    /// radial velocity. `phi` = 0 is a maximum at `star.epoch_d`.
     pub phi: f64,
 }
 

@@ -1,6 +1,7 @@
 //! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
 
 use super::automatic::Automatic;
+use super::jitter::VelocityJitter;
 use crate::noise::Weights;
 use crate::objective::Parameter;
 use schemars::JsonSchema;
@@ -18,7 +19,7 @@ pub(super) struct PerParameter<T> {
     /// Orbital period over the rotation period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub porb_over_prot: Option<T>,
-    /// Orbital phase (cycles).
+    /// Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's radial velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phi: Option<T>,
     /// Angular velocity of the equator (rad/d).
@@ -152,6 +153,11 @@ pub(super) struct ObservationsSection {
     /// With `path`: how the profiles are weighted against each other.
     #[serde(default, skip_serializing_if = "Weights::is_default")]
     pub weights: Weights,
+    /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
+    /// beside that of the bins; 0 if not given. It should be small against the width of the local line. "fitted": as
+    /// large as the profiles say at the config's values, before anything else.
+    #[serde(default, skip_serializing_if = "VelocityJitter::is_default")]
+    pub velocity_jitter_kms: VelocityJitter,
     /// Simulated profiles of the star and planet of this config.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateSection>,
@@ -186,10 +192,30 @@ pub(super) struct SimulateSection {
     /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub continuum: Option<ContinuumSection>,
+    /// Standard deviation (km/s), from 0 to 100, of the velocity zero points: one Gaussian number a profile, drawn with
+    /// the same seed and added to its velocity; 0 if not given.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub velocity_jitter_kms: f64,
+    /// Over how many bins the noise is correlated, from 1 (white noise, if not given) to 1000: c makes correlations of
+    /// ((c - 1) / (c + 1))^m at a distance of m bins, which add up to c. The variance of a bin stays.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub correlated_bins: f64,
     /// Values of parameters that are simulated in place of those under `star` and `planet`, so that the start of an
     /// inference may be wrong.
     #[serde(default)]
     pub truth: PerParameter<f64>,
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
 }
 
 fn default_snr() -> Option<f64> {

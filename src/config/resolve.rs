@@ -10,7 +10,7 @@ use super::raw::Config;
 use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
-use super::{Automatic, ImagingSettings, SamplerSettings, Settings};
+use super::{Automatic, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
 use crate::nuisances::LineAndContinuum;
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
@@ -23,7 +23,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
     let source = resolve_observations(&mut raw, &star, &values, path)?;
-    check_imaging(&raw.imaging)?;
+    check_imaging(&raw.imaging, raw.observations.velocity_jitter_kms)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
     if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
@@ -41,9 +41,11 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     Ok(Settings {
         path: path.into(),
         star,
+        mass_msun: raw.star.mass_msun,
         equivalent_width: raw.star.line.equivalent_width_kms,
         values,
         source,
+        velocity_jitter: raw.observations.velocity_jitter_kms,
         imaging: raw.imaging,
         free,
         sampler: raw.sampler,
@@ -127,7 +129,7 @@ pub(super) fn without_planet(free: &[FreeParameter], values: &ParameterValues) -
     parameters.find(|parameter| no_planet && parameter.is_orbital())
 }
 
-fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
+fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<(), Fault> {
     check_pixels("imaging.pixels", imaging.pixels)?;
     if !(imaging.default_spot > 0.0 && imaging.default_spot < 0.5) {
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
@@ -136,6 +138,11 @@ fn check_imaging(imaging: &ImagingSettings) -> Result<(), Fault> {
     if imaging.nuisances.is_some() && imaging.chi2_target == Automatic::Auto {
         let problem =
             "auto goes by velocities that nuisances of line and continuum take up: give a number, such as 0.97";
+        return Err(Fault::new("imaging.chi2_target", problem));
+    }
+    if !jitter.is_default() && imaging.chi2_target == Automatic::Auto {
+        let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
+                       give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if let Some(priors) = &imaging.nuisances {

@@ -9,7 +9,7 @@ use crate::landscape::{Axis, Grid};
 use crate::objective::{FreeParameter, Parameter, ParameterValues, Prior};
 
 /// Most nodes of a landscape: a day or so of reconstructions.
-const MOST_NODES: usize = 1_000_000;
+pub const MOST_NODES: usize = 1_000_000;
 
 /// Values closer than this, relative to their size, would drown in rounding.
 const SMALLEST_SPACING: f64 = 1e-12;

@@ -1,11 +1,11 @@
 //! Where the profiles come from: files, or a simulation of the config's own star and planet.
 
-use super::domain::check_value;
+use super::domain::{check_size, check_value, most};
 use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
 use super::resolve::{automatic, check_nuisances, check_pixels, positive};
-use super::{Automatic, ObservationSource};
+use super::{Automatic, ObservationSource, VelocityJitter};
 use crate::io::lsd::ReadOptions;
 use crate::noise::ErrorSettings;
 use crate::nuisances::LineAndContinuum;
@@ -22,6 +22,9 @@ pub(super) fn resolve_observations(
     config: &Path,
 ) -> Result<ObservationSource, Fault> {
     let section = &mut raw.observations;
+    if let VelocityJitter::Known(kms) = section.velocity_jitter_kms {
+        check_jitter("observations.velocity_jitter_kms", kms)?;
+    }
     let path = match (&section.path, &section.simulate) {
         (Some(path), None) => path,
         (None, Some(simulate)) => {
@@ -48,6 +51,9 @@ pub(super) fn resolve_observations(
     automatic("observations.sigma_scale", sigma_scale)?;
     let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
     let sigma_scale = if errors.measured { 1.0 } else { sigma_scale.value() };
+    for end in section.velocity_range_kms.into_iter().flatten() {
+        check_size("observations.velocity_range_kms", end, most::VELOCITY_KMS)?;
+    }
     if let Some([min, max]) = section.velocity_range_kms
         && min >= max
     {
@@ -66,8 +72,10 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
     }
     let times_d: Vec<f64> = section.cycles.iter().map(|c| star.epoch_d + c * star.rotation_period_d).collect();
-    if let Some(k) = times_d.iter().position(|t| !t.is_finite()) {
-        return Err(Fault::new(at(&format!("cycles[{k}]")), "its time leaves the range of double precision"));
+    for (k, (cycle, time_d)) in section.cycles.iter().zip(&times_d).enumerate() {
+        let key = at(&format!("cycles[{k}]"));
+        check_size(&key, *cycle, most::TIME)?;
+        check_size(&format!("{key}: its time (d)"), *time_d, most::TIME)?;
     }
     if let Some(snr) = section.snr {
         positive(&at("snr"), snr)?;
@@ -77,6 +85,11 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         .continuum
         .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
     check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
+    check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
+    if !(section.correlated_bins >= 1.0 && section.correlated_bins <= MOST_CORRELATED_BINS) {
+        let problem = format!("{} must be from 1 (white noise) to {MOST_CORRELATED_BINS}", section.correlated_bins);
+        return Err(Fault::new(at("correlated_bins"), problem));
+    }
     let mut truth = *values;
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
@@ -94,7 +107,22 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         seed: section.seed,
         pixels: section.pixels,
         continuum,
+        velocity_jitter_kms: section.velocity_jitter_kms,
+        correlated_bins: section.correlated_bins,
     })
+}
+
+/// Noise that is correlated over more bins is a mistake.
+const MOST_CORRELATED_BINS: f64 = 1000.0;
+
+/// Velocity zero points that scatter by more (km/s) are a mistake: profiles would be seen as the wrong part of a line.
+const LARGEST_JITTER_KMS: f64 = 100.0;
+
+fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
+    match (0.0..=LARGEST_JITTER_KMS).contains(&kms) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{kms} must be from 0 to {LARGEST_JITTER_KMS} km/s"))),
+    }
 }
 
 /// Most brightness that a facula may add, in units of the photosphere's.
@@ -134,6 +162,8 @@ fn bins(axis: &VelocitySection, key: &str) -> Result<usize, Fault> {
     const LEAST: f64 = 5.0;
     const MOST: f64 = 100_000.0;
     positive(&format!("{key}.step"), axis.step)?;
+    check_size(&format!("{key}.min"), axis.min, most::VELOCITY_KMS)?;
+    check_size(&format!("{key}.max"), axis.max, most::VELOCITY_KMS)?;
     if axis.min >= axis.max {
         return Err(Fault::new(format!("{key}.min"), format!("{} must be below max, which is {}", axis.min, axis.max)));
     }

@@ -1,6 +1,7 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
 use super::EquivalentWidth;
+use super::domain::{check_size, most};
 use super::error::Fault;
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 use super::resolve::positive;
@@ -8,15 +9,25 @@ use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use crate::units::{instrumental_sigma_kms, planck_contrast};
 use std::f64::consts::TAU;
 
+/// Lightest and heaviest star (solar masses).
+const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
+
 /// Checks and resolves the star; fills the default of its `omega_eq_rad_d`. An equivalent width "auto" becomes NaN.
 pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<StarSettings, Fault> {
     positive("star.rotation_period_d", star.rotation_period_d)?;
+    check_size("star.rotation_period_d", star.rotation_period_d, most::TIME)?;
+    check_size("star.epoch_d", star.epoch_d, most::TIME)?;
     let omega = TAU / star.rotation_period_d;
     if !(omega.is_finite() && omega > 0.0) {
         let problem = format!("{} leaves the range of double precision", star.rotation_period_d);
         return Err(Fault::new("star.rotation_period_d", problem));
     }
     star.omega_eq_rad_d.get_or_insert(omega);
+    if let Some(mass) = star.mass_msun.filter(|mass| !MASSES_MSUN.contains(mass)) {
+        let (least, most) = (MASSES_MSUN.start(), MASSES_MSUN.end());
+        let problem = format!("{mass} must be from {least} to {most} solar masses");
+        return Err(Fault::new("star.mass_msun", problem));
+    }
     Ok(StarSettings {
         rotation_period_d: star.rotation_period_d,
         epoch_d: star.epoch_d,

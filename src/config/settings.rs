@@ -1,6 +1,6 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
-use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings};
+use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
 use crate::io::lsd::ReadOptions;
 use crate::landscape::Grid;
 use crate::maxent::entropy::Entropy;
@@ -22,12 +22,16 @@ pub struct Settings {
     pub path: PathBuf,
     /// The star. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through [`Settings::star_for`].
     pub star: StarSettings,
+    /// Mass of the star (solar masses), for the minimum mass of the planet.
+    pub mass_msun: Option<f64>,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
     /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
     pub values: ParameterValues,
     /// Where the profiles come from.
     pub source: ObservationSource,
+    /// Scatter of the profiles' velocity zero points.
+    pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
     pub imaging: ImagingSettings,
     /// The free parameters in the order of [`Parameter::ALL`]; may be empty, see [`Settings::require_free`].
@@ -38,8 +42,8 @@ pub struct Settings {
     pub grid: Option<GridSettings>,
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
-    /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`, and
-    /// `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
+    /// `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
     pub sha256: String,
 }
 
@@ -193,7 +197,11 @@ impl Settings {
             Some(section) => {
                 section.insert("path".into(), path.into());
             }
-            None => *section = serde_json::json!({ "path": path }),
+            None => {
+                let jitter = section.get("velocity_jitter_kms").cloned();
+                *section = serde_json::json!({ "path": path });
+                jitter.into_iter().for_each(|jitter| section["velocity_jitter_kms"] = jitter);
+            }
         }
         config
     }

@@ -12,7 +12,7 @@ pub mod stop;
 
 pub use moves::{Mix, Move, MoveWeights, Proposal};
 pub use sampler::{Sampler, State, Walker};
-pub use settings::SamplerSettings;
+pub use settings::{MOST_STEPS, SamplerSettings};
 pub use start::{Positions, StartDraw, draw_start, start_numbers};
 pub use stop::{OnStep, RunError, StopPolicy, StopReason, run};
 

@@ -54,8 +54,8 @@ impl SamplerSettings {
         if self.ensembles == 0 {
             return refuse("sampler.ensembles", "must be at least 1, not 0".to_owned());
         }
-        if self.ensembles > MAX_COUNT {
-            return refuse("sampler.ensembles", format!("must be at most {MAX_COUNT}, not {}", self.ensembles));
+        if self.ensembles > MOST_ENSEMBLES {
+            return refuse("sampler.ensembles", format!("must be at most {MOST_ENSEMBLES}, not {}", self.ensembles));
         }
         if !self.walkers.is_multiple_of(2) {
             return refuse("sampler.walkers", format!("must be even, not {}", self.walkers));
@@ -64,11 +64,16 @@ impl SamplerSettings {
             let why = format!("must be at least {least} for {dimension} sampled parameters, not {}", self.walkers);
             return refuse("sampler.walkers", why);
         }
-        if self.walkers > MAX_COUNT {
-            return refuse("sampler.walkers", format!("must be at most {MAX_COUNT}, not {}", self.walkers));
+        let all = self.ensembles.saturating_mul(self.walkers);
+        if all > MOST_WALKERS {
+            let whole = format!("in all ensembles must be at most {MOST_WALKERS}, not {all}");
+            return refuse("sampler.walkers", whole);
         }
         if self.steps == 0 {
             return refuse("sampler.steps", "must be at least 1, not 0".to_owned());
+        }
+        if self.steps > MOST_STEPS {
+            return refuse("sampler.steps", format!("must be at most {MOST_STEPS}, not {}", self.steps));
         }
         if !(self.rhat.is_finite() && self.rhat > 1.0) {
             return refuse("sampler.rhat", format!("must be a finite number above 1, not {}", self.rhat));
@@ -80,8 +85,14 @@ impl SamplerSettings {
     }
 }
 
-/// Bound on ensembles and on walkers: far beyond use, and small enough that counts never overflow.
-const MAX_COUNT: usize = 1 << 20;
+/// Bound on ensembles: far beyond use.
+const MOST_ENSEMBLES: usize = 1000;
+
+/// Bound on the walkers of all ensembles: several for each core of the largest cluster, and a step of them fits the memory.
+const MOST_WALKERS: usize = 100_000;
+
+/// Bound on steps: far beyond use, and small enough that counts never overflow.
+pub const MOST_STEPS: usize = 1_000_000_000;
 
 #[cfg(test)]
 mod tests {
@@ -100,6 +111,10 @@ mod tests {
         assert!(refused(|s| s.walkers = 14).starts_with("sampler.walkers: must be at least 16"));
         assert!(refused(|s| s.ensembles = 0).starts_with("sampler.ensembles"));
         assert!(refused(|s| s.steps = 0).starts_with("sampler.steps"));
+        assert!(refused(|s| s.steps = usize::MAX).starts_with("sampler.steps: must be at most"));
+        assert!(refused(|s| s.ensembles = 100_000).starts_with("sampler.ensembles: must be at most 1000"));
+        assert!(refused(|s| s.walkers = 1_000_000).starts_with("sampler.walkers: in all ensembles must be at most"));
+        assert!(refused(|s| (s.ensembles, s.walkers) = (500, 1000)).contains("not 500000"));
         for rhat in [1.0, f64::NAN, f64::INFINITY] {
             assert!(refused(|s| s.rhat = rhat).starts_with("sampler.rhat"));
         }

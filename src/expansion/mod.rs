@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 pub use counted::SpotsCounted;
 pub use marginal::{Nuisance, nuisances};
+pub use model::velocity_slopes;
 pub use spots::SPOTS_LEFT;
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.

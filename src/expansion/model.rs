@@ -7,6 +7,7 @@ use crate::imaging::{Imager, ImagingProblem};
 use crate::maxent::Problem;
 use crate::objective::{Parameter, ParameterValues, Reference};
 use crate::star::Response;
+use crate::vector::Portable;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -42,6 +43,8 @@ pub(super) struct DisplacedModel<'a> {
     shifted: [ImagingProblem<'a>; 2],
     /// Each stellar parameter a step up and down.
     turned: Vec<[ImagingProblem<'a>; 2]>,
+    /// What velocity zero points leave of the information on the velocity of each profile; empty where there are none.
+    left: Vec<f64>,
 }
 
 impl<'a> DisplacedModel<'a> {
@@ -56,7 +59,7 @@ impl<'a> DisplacedModel<'a> {
             [h, -h].map(|h| at(imager.response(&moved(&reference.values, &[(p, h)]).state())))
         };
         let turned = stellar.par_iter().zip(&steps).map(turn).collect();
-        DisplacedModel {
+        let mut model = DisplacedModel {
             shifted: [VELOCITY_STEP_KMS, -VELOCITY_STEP_KMS].map(shift),
             cycles: imager.cycles(),
             stellar: stellar.to_vec(),
@@ -66,7 +69,35 @@ impl<'a> DisplacedModel<'a> {
             here,
             turned,
             map,
+            left: Vec::new(),
+        };
+        model.left = model.left_by_zero_points();
+        model
+    }
+
+    /// `1 - s^2 D'_k W D'_k`, that is `1 / (1 + s^2 E)` with E the information that the bins have on the velocity of a
+    /// profile beside all else.
+    ///
+    /// A profile of the density `exp(g V - J V^2 / 2)` has, its zero point integrated out, `J / (1 + s^2 J)` in place
+    /// of J and `g / (1 + s^2 J)` in place of g. Weights with the slopes of one image make that of first derivatives.
+    /// Of second ones, which change J by a small `r W D''`, they make nothing, for the slopes do not follow the
+    /// velocity: so it is done here.
+    fn left_by_zero_points(&self) -> Vec<f64> {
+        let sd = self.imager.data.nuisances.zero_point_kms();
+        if sd == 0.0 {
+            return Vec::new();
         }
+        let slopes = first(&self.shifted, VELOCITY_STEP_KMS);
+        let mut weighted = vec![0.0; slopes.len()];
+        let left = |k: usize| {
+            self.imager.data.weigh_root(self.bins(k), &slopes, &mut weighted);
+            (1.0 - sd * sd * self.bins(k).map(|j| weighted[j] * weighted[j]).sum::<f64>()).max(0.0)
+        };
+        (0..self.profiles()).map(left).collect()
+    }
+
+    fn left(&self, profile: usize) -> f64 {
+        self.left.get(profile).copied().unwrap_or(1.0)
     }
 
     pub fn profiles(&self) -> usize {
@@ -93,7 +124,15 @@ impl<'a> DisplacedModel<'a> {
             at.gradient_of(profiles.clone(), &mut gradient);
             gradient
         });
-        plus.iter().zip(minus).map(|(p, m)| (p - m) / (2.0 * h)).collect()
+        let mut pull: Vec<f64> = plus.iter().zip(minus).map(|(p, m)| (p - m) / (2.0 * h)).collect();
+        if let Some(left) = self.left.get(x) {
+            let (slopes, bins) = (first(&self.shifted, VELOCITY_STEP_KMS), self.bins(x));
+            let (mut weighted, mut linear) = (vec![0.0; slopes.len()], vec![0.0; pull.len()]);
+            self.imager.data.weigh(Portable, bins, &slopes, &mut weighted);
+            self.here.pulled(x..x + 1, &weighted, &mut linear);
+            pull.iter_mut().zip(linear).for_each(|(pull, linear)| *pull = linear + left * (*pull - linear));
+        }
+        pull
     }
 
     /// `D_x` of every bin, a column a coordinate.
@@ -126,14 +165,14 @@ impl<'a> DisplacedModel<'a> {
         let bent = |second: &[f64], bins: Range<usize>| bins.map(|j| residual[j] * second[j]).sum::<f64>();
         let velocity = second(&self.shifted, &self.here, VELOCITY_STEP_KMS);
         for k in 0..profiles {
-            curvature[(k, k)] += bent(&velocity, self.bins(k));
+            curvature[(k, k)] += self.left(k).powi(2) * bent(&velocity, self.bins(k));
         }
         for i in 0..stellar {
             let own = second(&self.turned[i], &self.here, self.steps[i]);
             curvature[(profiles + i, profiles + i)] += bent(&own, 0..own.len());
             let with_velocity = self.mixed((self.stellar[i], self.steps[i]), (Parameter::Vsys, VELOCITY_STEP_KMS));
             for k in 0..profiles {
-                let share = bent(&with_velocity, self.bins(k));
+                let share = self.left(k) * bent(&with_velocity, self.bins(k));
                 curvature[(k, profiles + i)] += share;
                 curvature[(profiles + i, k)] += share;
             }
@@ -172,6 +211,13 @@ impl<'a> DisplacedModel<'a> {
     fn bins(&self, profile: usize) -> Range<usize> {
         self.reference.response.bins(profile)
     }
+}
+
+/// The derivative of every bin's depth with the velocity of its profile, at the image of `reference`.
+pub fn velocity_slopes(imager: &Imager, reference: &Reference) -> Vec<f64> {
+    let map = imager.entropy.image(&reference.solution.image.coordinates);
+    let at = |h: f64| displaced(imager, shifted(imager, &reference.response, &reference.values, h), &map);
+    first(&[VELOCITY_STEP_KMS, -VELOCITY_STEP_KMS].map(at), VELOCITY_STEP_KMS)
 }
 
 /// The problem seen through `response`, linearised at the map.

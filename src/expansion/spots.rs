@@ -53,6 +53,13 @@ impl Expansion {
         &self.noise + factor * self.spots()
     }
 
+    /// Covariance of the most likely coordinates, `I^-1 (noise + factor (I - noise)) I^-1`, with spots left over
+    /// `factor` times as large as the entropy expects in variance; `None` where the information is singular.
+    pub fn covariance_of_best(&self, factor: f64) -> Option<DMatrix<f64>> {
+        let inverse = self.information.clone().cholesky()?.inverse();
+        Some(symmetric(&inverse * self.covariance_with_spots_left(factor) * &inverse))
+    }
+
     /// What spots add to the covariance of the gradient, as the entropy has it: positive, whatever rounding and the curvature of
     /// the model make of the difference.
     fn spots(&self) -> DMatrix<f64> {

@@ -237,7 +237,7 @@ pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<
     if run.go(pool, |_, _| ())? == StopReason::Interrupted {
         return Err(ExperimentError::Interrupted);
     }
-    let summary = run.manifest.summarise(&scene.settings, &run.chain)?;
+    let (summary, _) = run.manifest.summarise(&scene.settings, &run.chain)?;
     let estimate =
         |one: &crate::chain::summary::ParameterSummary| Estimate { value: one.median, ci68: one.ci68, ci95: one.ci95 };
     let route = Route {

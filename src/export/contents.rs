@@ -3,10 +3,10 @@
 //! Steps to be left out are those that `summary.json` leaves out.
 
 use super::ExportError;
-use crate::chain::{Chain, Summary, statistics::unwrap_around};
+use crate::chain::{Chain, Settled, Summary, statistics::unwrap_around};
 use crate::io::journal;
 use crate::manifest::{Manifest, kinds_and_goals};
-use crate::objective::{FreeParameter, Prior};
+use crate::objective::{FreeParameter, OrbitQuantity, Prior};
 use crate::run::CHAIN;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub struct Contents {
     /// The sampled parameters, in the order of the chain.
     pub parameters: Vec<Quantity>,
+    /// What follows from them, draw by draw.
+    pub derived: Vec<DerivedQuantity>,
     /// All whole steps.
     pub chain: Chain,
     /// Its file.
@@ -53,6 +55,26 @@ pub struct Quantity {
     pub injected: Option<f64>,
 }
 
+/// A quantity that follows from the parameters of a draw.
+#[derive(Clone, Debug)]
+pub struct DerivedQuantity {
+    /// The quantity, with its values at draws.
+    pub settled: Settled,
+    /// Symbol, in LaTeX without dollars.
+    pub latex: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Injected value, for simulated data.
+    pub injected: Option<f64>,
+}
+
+impl DerivedQuantity {
+    /// Name.
+    pub fn name(&self) -> &str {
+        &self.settled.quantity.name
+    }
+}
+
 impl Contents {
     /// Reads the run in a folder; it may be being written meanwhile.
     ///
@@ -64,7 +86,7 @@ impl Contents {
         let path = run.join(CHAIN);
         let chain = journal::read(&path, &manifest.shape())?;
         let (kinds, _) = kinds_and_goals(&settings);
-        let summary = manifest
+        let (summary, settled) = manifest
             .summarise(&settings, &chain)
             .map_err(|source| ExportError::Chain { path: path.clone(), source })?;
         let quantity = |(free, kind): (&FreeParameter, &crate::chain::ParameterKind)| {
@@ -81,9 +103,16 @@ impl Contents {
             }
         };
         let parameters = settings.free.iter().zip(&kinds).map(quantity).collect();
+        let derived = |settled: Settled| {
+            let quantity = OrbitQuantity::from_name(&settled.quantity.name)?;
+            let injected = manifest.true_quantity(&settings, quantity.name(), settled.summary.median);
+            Some(DerivedQuantity { settled, latex: quantity.latex(), unit: quantity.unit(), injected })
+        };
+        let derived = settled.into_iter().filter_map(derived).collect();
         let origin = manifest.origin;
         Ok(Contents {
             parameters,
+            derived,
             chain,
             path,
             summary,

@@ -1,10 +1,10 @@
 //! Comma-separated text for pandas and everything else: a row for each line of the chain, in the same order.
 //!
 //! `warmup` is true for the steps that `analyse` discards. Values are those of the chain, digit by digit; a periodic parameter is
-//! not unwrapped. `move` is empty at step 0.
+//! not unwrapped. `move` is empty at step 0. What follows from the parameters is in the last columns.
 
-use super::Contents;
 use super::place::begins_with;
+use super::{Contents, DerivedQuantity};
 use crate::io::atomic::{self, WriteError};
 use crate::io::csv::Table;
 use serde::Serialize;
@@ -24,7 +24,8 @@ pub fn is_own(file: &Path) -> bool {
 /// A file that cannot be written.
 pub fn write(contents: &Contents, file: &Path) -> Result<(), WriteError> {
     let after = ["log_prob", "spottedness", "chi2", "accepted", "status", "move", "proposed", "passes"];
-    let columns: Vec<&str> = FIRST.into_iter().chain(contents.names()).chain(after).collect();
+    let derived = contents.derived.iter().map(DerivedQuantity::name);
+    let columns: Vec<&str> = FIRST.into_iter().chain(contents.names()).chain(after).chain(derived).collect();
     let mut table = Table::new(&columns);
     for record in contents.chain.records() {
         let warmup = record.step < contents.summary.discarded_steps;
@@ -39,7 +40,8 @@ pub fn write(contents: &Contents, file: &Path) -> Result<(), WriteError> {
             word(&record.proposed),
             record.passes.to_string(),
         ];
-        table.cells(place.into_iter().chain(values).chain(outcome));
+        let derived = contents.derived.iter().map(|one| one.settled.value(&record.theta).to_string());
+        table.cells(place.into_iter().chain(values).chain(outcome).chain(derived));
     }
     atomic::write(file, &table.into_bytes())
 }

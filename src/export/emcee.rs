@@ -11,7 +11,8 @@
 //! program's random numbers have no state that emcee could go on with (its backend then gives None).
 
 use super::place::begins_with;
-use super::{Contents, ExportError};
+use super::{Contents, DerivedQuantity, ExportError};
+use crate::chain::Record;
 use crate::io::atomic::{self, WriteError};
 use hdf5_writer::{AttributeBuilder, DatasetBuilder, Hdf5Builder, WriteOptions};
 use std::path::Path;
@@ -22,7 +23,7 @@ const GROUP: &str = "mcmc";
 /// Version of emcee whose layout this is.
 const EMCEE: &str = "3.1.6";
 
-/// What the blobs are.
+/// The first blobs; what follows from the parameters comes after them.
 const BLOBS: [&str; 2] = ["spottedness", "chi2"];
 
 /// Whether there is anything to write.
@@ -62,7 +63,9 @@ fn encode(contents: &Contents) -> hdf5_writer::Result<Vec<u8>> {
         accepted[index % walkers] += f64::from(u8::from(record.accepted));
     }
     let log_prob: Vec<f64> = records.iter().map(|record| record.log_prob).collect();
-    let blobs: Vec<f64> = records.iter().flat_map(|record| [record.spottedness, record.chi2]).collect();
+    let derived = |record: &Record| contents.derived.iter().map(|one| one.settled.value(&record.theta)).collect();
+    let blobs_of = |record: &Record| [vec![record.spottedness, record.chi2], derived(record)].concat();
+    let blobs: Vec<f64> = records.iter().flat_map(blobs_of).collect();
     let dataset = |name: &str, shape: &[usize], values: &[f64]| {
         let shape: Vec<u64> = shape.iter().map(|&length| length as u64).collect();
         DatasetBuilder::typed_data(format!("{GROUP}/{name}"), shape, values)
@@ -71,12 +74,16 @@ fn encode(contents: &Contents) -> hdf5_writer::Result<Vec<u8>> {
     let mut file = Hdf5Builder::new()
         .dataset(dataset("chain", &[iteration, walkers, names.len()], &positions)?)
         .dataset(dataset("log_prob", &[iteration, walkers], &log_prob)?)
-        .dataset(dataset("blobs", &[iteration, walkers, BLOBS.len()], &blobs)?)
+        .dataset(dataset("blobs", &[iteration, walkers, blob_names(contents).len()], &blobs)?)
         .dataset(dataset("accepted", &[walkers], &accepted)?);
     for attribute in attributes(contents)? {
         file = file.group_attribute(GROUP, attribute);
     }
     file.into_plan()?.encode(WriteOptions::default())
+}
+
+fn blob_names(contents: &Contents) -> Vec<&str> {
+    BLOBS.into_iter().chain(contents.derived.iter().map(DerivedQuantity::name)).collect()
 }
 
 fn attributes(contents: &Contents) -> hdf5_writer::Result<Vec<AttributeBuilder>> {
@@ -97,7 +104,9 @@ fn attributes(contents: &Contents) -> hdf5_writer::Result<Vec<AttributeBuilder>>
     let mut attributes = counts.collect::<hdf5_writer::Result<Vec<_>>>()?;
     attributes.push(AttributeBuilder::vlen_strings("parameter_names", &names)?);
     attributes.push(AttributeBuilder::vlen_strings("parameter_units", &units)?);
-    attributes.push(AttributeBuilder::vlen_strings("blob_names", &BLOBS)?);
+    attributes.push(AttributeBuilder::vlen_strings("blob_names", &blob_names(contents))?);
+    let blob_units: Vec<&str> = BLOBS.iter().map(|_| "1").chain(contents.derived.iter().map(|one| one.unit)).collect();
+    attributes.push(AttributeBuilder::vlen_strings("blob_units", &blob_units)?);
     let texts = [
         ("version", EMCEE.to_owned()),
         ("dimcmc_version", contents.version.clone()),

@@ -2,8 +2,8 @@
 //! `ROOT.ranges`.
 //!
 //! An ensemble is a file, so that GetDist's R-1 (variance of the files' means over mean of their variances) compares what is
-//! independent. Rows are weight (always 1), -ln P, the parameters, and spottedness and chi2 as derived ones, in the order of
-//! `draws`; the warm-up is left out, `ignore_rows` is to stay 0. `.ranges` has the bounds of the priors, `N` where there is none;
+//! independent. Rows are weight (always 1), -ln P, the parameters, and as derived ones what follows from them, spottedness
+//! and chi2, in the order of `draws`; the warm-up is left out, `ignore_rows` is to stay 0. `.ranges` has the bounds of the priors, `N` where there is none;
 //! a periodic parameter is unwrapped around its mode and its range is one period around that.
 
 use super::draws::Draws;
@@ -12,7 +12,7 @@ use crate::io::atomic::{self, WriteError};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Derived quantities in `.paramnames`; no other program ends the file so.
+/// The last derived quantities in `.paramnames`; no other program ends the file so.
 const DERIVED: &str = "spottedness*\t\\mathrm{spottedness}\nchi2*\t\\chi^2\n";
 
 /// Writes the files.
@@ -27,6 +27,7 @@ pub fn write(contents: &Contents, root: &Path) -> Result<(), WriteError> {
         for record in draws.ensemble(&contents.chain, ensemble) {
             let parameters = contents.parameters.iter().zip(&record.theta).map(|(one, x)| one.unwrapped(*x));
             let numbers = [1.0, -record.log_prob].into_iter().chain(parameters);
+            let numbers = numbers.chain(contents.derived.iter().map(|one| one.settled.value(&record.theta)));
             let line: Vec<String> =
                 numbers.chain([record.spottedness, record.chi2]).map(|number| number.to_string()).collect();
             text += &line.join(" ");
@@ -34,7 +35,7 @@ pub fn write(contents: &Contents, root: &Path) -> Result<(), WriteError> {
         }
         atomic::write(&chain(root, ensemble), text.as_bytes())?;
     }
-    atomic::write(&ending(root, ".paramnames"), paramnames(&contents.parameters).as_bytes())?;
+    atomic::write(&ending(root, ".paramnames"), paramnames(contents).as_bytes())?;
     atomic::write(&ending(root, ".ranges"), ranges(&contents.parameters).as_bytes())
 }
 
@@ -45,7 +46,7 @@ pub fn files(root: &Path, ensembles: usize) -> Vec<PathBuf> {
 }
 
 /// Whether the file, one of [`files`], may be of an earlier export: `ROOT.paramnames` is one of ours, or the file has nothing but
-/// rows of a chain of so many parameters (an export that was interrupted).
+/// rows of a chain of so many parameters and quantities that follow from them (an export that was interrupted).
 pub fn is_own(root: &Path, file: &Path, parameters: usize) -> bool {
     let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
     if read(&ending(root, ".paramnames")).ends_with(DERIVED) {
@@ -103,12 +104,15 @@ fn ending(root: &Path, end: &str) -> PathBuf {
 }
 
 /// Names and LaTeX labels; derived quantities have a star.
-fn paramnames(parameters: &[Quantity]) -> String {
+fn paramnames(contents: &Contents) -> String {
     let mut text = String::new();
-    for one in parameters {
-        let unit = if one.unit == "1" { String::new() } else { format!(r"\;[\mathrm{{{}}}]", one.unit) };
+    let unit = |unit: &str| if unit == "1" { String::new() } else { format!(r"\;[\mathrm{{{unit}}}]") };
+    for one in &contents.parameters {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "{}\t{}{unit}", one.name, one.latex);
+        let _ = writeln!(text, "{}\t{}{}", one.name, one.latex, unit(one.unit));
+    }
+    for one in &contents.derived {
+        let _ = writeln!(text, "{}*\t{}{}", one.name(), one.latex, unit(one.unit));
     }
     text + DERIVED
 }

@@ -9,7 +9,8 @@
 //!
 //! Ensembles are independent of each other, walkers of one ensemble are not: R-hat compares ensembles. A periodic parameter is
 //! unwrapped around its mode, as in `summary.json`, for means and R-hat take no heed of periods; only csv has it as it stands in
-//! the chain. Left out: what the parameters mean, beyond names, units and priors, and everything that `summary.json` has.
+//! the chain. What follows from the parameters (`chain::derived`: period, times, minimum mass) goes along, draw by draw, with the values
+//! that `summary.json` is of. Left out: what the parameters mean, beyond names, units and priors, and everything that `summary.json` has.
 
 pub mod contents;
 pub mod csv;
@@ -19,7 +20,7 @@ pub mod getdist;
 mod place;
 pub mod zarr;
 
-pub use contents::{Contents, Quantity};
+pub use contents::{Contents, DerivedQuantity, Quantity};
 
 use crate::chain::ChainError;
 use crate::io::atomic::WriteError;
@@ -116,7 +117,7 @@ fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Resu
     match format {
         Format::Zarr => place::check_folder(out, replace, &zarr::is_own),
         Format::Getdist => {
-            let is_own = |file: &Path| getdist::is_own(out, file, contents.parameters.len());
+            let is_own = |file: &Path| getdist::is_own(out, file, contents.parameters.len() + contents.derived.len());
             place::check_files(&targets(format, ensembles, out), replace, &is_own)?;
             getdist::check_strangers(out, ensembles)
         }

@@ -4,12 +4,13 @@
 //! `walker` are coordinates along `draw`, so that the ensemble can be had back. `sample_stats` has what belongs to a draw and is
 //! no parameter: `lp` (ln of the posterior density), spottedness, chi2, and how the draw came about, words as codes with CF's
 //! `flag_values` and `flag_meanings`. Attributes are numbers and text, JSON where there is more to say, so that xarray can also
-//! write them to netCDF. A periodic parameter is unwrapped around its mode.
+//! write them to netCDF. A periodic parameter is unwrapped around its mode. What follows from the
+//! parameters is in `posterior` too, with the attribute `derived`.
 //!
 //! Layout: <https://python.arviz.org/projects/base/en/latest/explanation/schema.html>. Left out: observed data and predictions.
 
 use super::draws::Draws;
-use super::{Contents, Quantity};
+use super::{Contents, DerivedQuantity, Quantity};
 use crate::chain::{MoveKind, Record};
 use crate::io::atomic::WriteError;
 use crate::io::zarr::{self, Array, Attributes, Group, Values};
@@ -96,7 +97,23 @@ fn posterior(contents: &Contents, draws: &Draws) -> Group {
         }
         variable(&one.name, draws, Values::Floats(values.collect()), attributes)
     };
-    let arrays = contents.parameters.iter().enumerate().map(parameter).collect();
+    let derived = |one: &DerivedQuantity| {
+        let values = draws.records(&contents.chain).map(|record| one.settled.value(&record.theta));
+        let mut attributes = some_attributes([
+            ("units", json!(one.unit)),
+            ("long_name", json!(format!("${}$", one.latex))),
+            ("derived", json!(1)),
+        ]);
+        if let Some(definition) = &one.settled.quantity.definition {
+            attributes.insert("definition".to_owned(), json!(definition));
+        }
+        if let Some(injected) = one.injected {
+            attributes.insert("injected".to_owned(), json!(injected));
+        }
+        variable(one.name(), draws, Values::Floats(values.collect()), attributes)
+    };
+    let parameters = contents.parameters.iter().enumerate().map(parameter);
+    let arrays = parameters.chain(contents.derived.iter().map(derived)).collect();
     group(contents, draws, arrays)
 }
 

@@ -183,6 +183,8 @@ pub struct Figure {
     pub name: String,
     /// What it shows, in a sentence or two.
     pub caption: String,
+    /// What is missing in it, a line each.
+    pub notes: Vec<String>,
     /// Width of the page (pt).
     pub width: f64,
     /// Height of the page (pt).
@@ -198,6 +200,7 @@ impl Figure {
         Figure {
             name: name.into(),
             caption: String::new(),
+            notes: Vec::new(),
             width: width_mm * PT_PER_MM,
             height: height_mm * PT_PER_MM,
             items: Vec::new(),

@@ -67,6 +67,10 @@ fn linear(low: f64, high: f64, most: usize) -> Ticks {
 }
 
 fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
+    // no decades without end
+    if !(low > 0.0 && high.is_finite()) {
+        return Ticks { major: Vec::new(), minor: Vec::new() };
+    }
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let inside = |value: &f64| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(value);
     let multiples = |factors: &'static [f64]| {
@@ -132,6 +136,9 @@ mod tests {
         assert_eq!(texts([1.0, 1000.0], Scale::Log, 4), ["1", "10", "100", "1000"]);
         assert_eq!(texts([0.4, 12.0], Scale::Log, 6), ["0.5", "1", "2", "5", "10"]);
         assert_eq!(texts([1.6, 1.9], Scale::Log, 4), ["1.6", "1.7", "1.8", "1.9"]);
+        for range in [[0.0, 1.0], [1.0, f64::INFINITY], [-1.0, 1.0], [f64::NAN, 1.0]] {
+            assert!(texts(range, Scale::Log, 4).is_empty(), "{range:?}");
+        }
         assert_eq!(texts([1e-8, 1e-6], Scale::Log, 3), ["10^{-8}", "10^{-7}", "10^{-6}"]);
     }
 

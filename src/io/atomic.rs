@@ -60,6 +60,12 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
     path.with_file_name(name)
 }
 
+/// Whether this is the name of a half-written file that a crash has left.
+pub fn is_temporary(name: &std::ffi::OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name.starts_with('.') && name.ends_with(".tmp")
+}
+
 /// Writes `value` as indented JSON; what is not a finite number becomes null.
 ///
 /// # Errors

@@ -24,6 +24,18 @@ pub enum CsvError {
         /// What is wrong.
         problem: String,
     },
+    /// The table is not as long as it should be.
+    #[error("{}: {found} rows instead of {expected}: {because}", path.display())]
+    Rows {
+        /// The file.
+        path: PathBuf,
+        /// Rows that are there.
+        found: usize,
+        /// Rows that should be.
+        expected: usize,
+        /// What says so.
+        because: String,
+    },
     /// There is no such column.
     #[error("{}: no column {name}", path.display())]
     Column {
@@ -34,37 +46,79 @@ pub enum CsvError {
     },
 }
 
+/// Beyond this a finite number is no result of this program, and nothing can be drawn with it.
+const LARGEST: f64 = 1e100;
+
 /// A table that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {
     path: PathBuf,
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
+    /// The line that each row stands in.
+    lines: Vec<usize>,
 }
 
 impl Columns {
     /// Reads a table with the names of its columns in the first line.
     ///
     /// # Errors
-    /// [`CsvError`]: a file that cannot be read, a line of another length, something that is no number.
+    /// [`CsvError`]: a file that cannot be read, a line of another length, something that is no number or beyond sense, no row.
     pub fn read(path: &Path) -> Result<Self, CsvError> {
         let text = std::fs::read_to_string(path).map_err(|source| CsvError::Read { path: path.into(), source })?;
         let mut lines = text.lines();
         let names: Vec<String> =
             lines.next().unwrap_or_default().split(',').map(|name| name.trim().to_owned()).collect();
         let mut columns = vec![Vec::new(); names.len()];
+        let mut rows = Vec::new();
         for (k, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
             let wrong = |problem: String| CsvError::Line { path: path.into(), line: k + 2, problem };
             let cells: Vec<&str> = line.split(',').collect();
             if cells.len() != names.len() {
                 return Err(wrong(format!("{} columns instead of {}", cells.len(), names.len())));
             }
-            for (column, cell) in columns.iter_mut().zip(cells) {
+            for ((column, cell), name) in columns.iter_mut().zip(cells).zip(&names) {
                 let cell = cell.trim();
-                column.push(cell.parse().map_err(|_| wrong(format!("{cell:?} is not a number")))?);
+                let number: f64 = cell.parse().map_err(|_| wrong(format!("{cell:?} is not a number")))?;
+                if number.is_finite() && number.abs() > LARGEST {
+                    return Err(wrong(format!("{name}: {cell} is beyond sense")));
+                }
+                column.push(number);
             }
+            rows.push(k + 2);
         }
-        Ok(Columns { path: path.into(), names, columns })
+        if rows.is_empty() {
+            return Err(CsvError::Line { path: path.into(), line: 2, problem: "the table has no row".into() });
+        }
+        Ok(Columns { path: path.into(), names, columns, lines: rows })
+    }
+
+    /// That there are `expected` rows; `because` names who says so.
+    ///
+    /// # Errors
+    /// [`CsvError::Rows`].
+    pub fn check_rows(&self, expected: usize, because: &str) -> Result<(), CsvError> {
+        let found = self.lines.len();
+        match found == expected {
+            true => Ok(()),
+            false => Err(CsvError::Rows { path: self.path.clone(), found, expected, because: because.into() }),
+        }
+    }
+
+    /// The numbers of a column, all of them in a range.
+    ///
+    /// # Errors
+    /// [`CsvError::Column`]; [`CsvError::Line`] of the first that is not in it.
+    pub fn column_within(&self, name: &str, [low, high]: [f64; 2]) -> Result<&[f64], CsvError> {
+        let column = self.column(name)?;
+        match column.iter().position(|x| !(low..=high).contains(x)) {
+            None => Ok(column),
+            Some(k) => Err(CsvError::Line {
+                path: self.path.clone(),
+                line: self.lines[k],
+                problem: format!("{name}: {} must be from {low:e} to {high:e}", column[k]),
+            }),
+        }
     }
 
     /// The numbers of a column.

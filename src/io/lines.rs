@@ -5,6 +5,7 @@
 //! wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn tail.
 //! While a process writes such a file it holds a lock on it. Left out: what is in a line (`journal`, `landscape`).
 
+use super::atomic;
 use serde::Serialize;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
@@ -74,6 +75,24 @@ impl From<String> for Refusal {
     fn from(problem: String) -> Self {
         Refusal { problem, torn: false }
     }
+}
+
+/// Whether all that there is in `folder` of a computation is `lines`, still empty, and perhaps the `head` that says what it was
+/// begun with: it was stopped, or could not write, before its first result. Nothing is lost when it begins again.
+pub fn is_false_start(folder: &Path, head: Option<&str>, lines: &str) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else { return false };
+    let mut found = false;
+    for entry in entries {
+        let Ok(entry) = entry else { return false };
+        let name = entry.file_name();
+        let is_empty = entry.metadata().is_ok_and(|file| file.is_file() && file.len() == 0);
+        match name == lines && is_empty {
+            true => found = true,
+            false if atomic::is_temporary(&name) || head.is_some_and(|head| name == head) => {}
+            false => return false,
+        }
+    }
+    found
 }
 
 /// Takes the lines one by one, without their ends; says whether a block is whole with this one.

@@ -1,19 +1,28 @@
 //! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment), and the LSD
-//! profiles it names (Donati text format, Donati et al. 1997), relative to its folder.
+//! profiles it names, relative to its folder (`layout` has their formats).
 //!
-//! VRAD is subtracted from the velocity axis first; the velocity range is cut in that frame. Left out: Stokes V and N.
+//! Times are days of one count (`times`). VRAD is subtracted from the velocity axis first; the velocity range is cut in that
+//! frame. Stokes V and nulls are not used.
 
+mod axis;
 mod error;
+mod layout;
+mod level;
+mod names;
 mod text;
+mod times;
 mod writing;
 
 pub use error::LsdError;
-pub use writing::{write, write_as};
+pub use writing::{is_written, write, write_as};
 
 use crate::observation::{Observations, Profile};
+use axis::Axis;
+use level::Given;
 use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use text::{Axis, MIN_BINS, RawProfile, shown};
+use text::{MIN_BINS, RawProfile, shown};
 
 /// What to do with the profiles on reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +46,8 @@ pub struct DataSet {
     pub observations: Observations,
     /// SHA-256 (hex) of the bytes of the list and of every profile, in the order of the list.
     pub sha256: String,
+    /// What was made of the files that a reader of results must know, one line each.
+    pub remarks: Vec<String>,
 }
 
 /// What a list says of a profile beside its time.
@@ -60,8 +71,8 @@ struct Entry {
 /// Reads the list at `list` and all profiles it names.
 ///
 /// # Errors
-/// A file that cannot be read, a line that makes no sense, profiles on different velocity axes, or a velocity range that
-/// leaves fewer than five bins of a profile.
+/// A file that cannot be read, a line that makes no sense, a list of one profile, profiles on different velocity axes, or a
+/// velocity range that leaves fewer than five bins of a profile.
 pub fn read(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
     let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
     read_listed(list, &bytes, options)
@@ -75,8 +86,10 @@ pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<D
     let mut hash = Sha256::new();
     hash.update(bytes);
     let entries = parse_list(list, &String::from_utf8_lossy(bytes))?;
+    times::check(&entries).map_err(|(line, problem)| LsdError::Line { path: list.into(), line, problem })?;
     let mut first: Option<(&Path, Axis)> = None;
     let mut profiles = Vec::with_capacity(entries.len());
+    let mut found = Found::default();
     for entry in &entries {
         let bytes = read_profile(list, entry)?;
         hash.update(&bytes);
@@ -93,14 +106,53 @@ pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<D
                 expected: axis.to_string(),
             });
         }
+        found.note(entry, &raw);
         profiles.push(in_star_frame(entry, RawProfile { axis, ..raw }, options)?);
     }
     match first {
         Some((_, axis)) => Ok(DataSet {
             observations: Observations { step_kms: axis.step, profiles },
             sha256: format!("{:x}", hash.finalize()),
+            remarks: found.remarks(entries.len()),
         }),
         None => Err(LsdError::File { path: list.into(), problem: "lists no profile".into() }),
+    }
+}
+
+/// Profiles by what is to be said of them.
+#[derive(Default)]
+struct Found(BTreeMap<Finding, Vec<String>>);
+
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Finding {
+    Given(Given),
+    FirstOf(usize),
+}
+
+impl Found {
+    fn note(&mut self, Entry { file, .. }: &Entry, raw: &RawProfile) {
+        let given = Some(Finding::Given(raw.given)).filter(|_| raw.given != Given::Intensity);
+        let several = Some(Finding::FirstOf(raw.profiles)).filter(|_| raw.profiles > 1);
+        for finding in given.into_iter().chain(several) {
+            self.0.entry(finding).or_default().push(file.clone());
+        }
+    }
+
+    fn remarks(&self, all: usize) -> Vec<String> {
+        let remark = |(finding, files): (&Finding, &Vec<String>)| {
+            let which = match files.len() {
+                count if count == all => "all of them".to_owned(),
+                1 => shown(&files[0]),
+                count => format!("{count} of {all}, {} the first", shown(&files[0])),
+            };
+            match finding {
+                Finding::Given(given) => format!("{which}: {}", given.remark()),
+                Finding::FirstOf(profiles) => {
+                    format!("{which}: the first of {profiles} mean profiles in the file is used")
+                }
+            }
+        };
+        self.0.iter().map(remark).collect()
     }
 }
 
@@ -112,6 +164,13 @@ pub fn labels(list: &Path) -> Result<Vec<Label>, LsdError> {
     let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
     let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
     Ok(entries.into_iter().map(|Entry { file, vrad_kms, .. }| Label { file, vrad_kms }).collect())
+}
+
+/// The list at `list` and the profiles that it names, as far as it can be read.
+pub fn files(list: &Path) -> Vec<PathBuf> {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    let profiles = labels(list).unwrap_or_default();
+    std::iter::once(list.to_owned()).chain(profiles.into_iter().map(|profile| folder.join(profile.file))).collect()
 }
 
 fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {

@@ -84,6 +84,9 @@ struct FitFile<'a> {
     /// One entry a profile, in the order of the list.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     nuisances: &'a [LineAndContinuum],
+    /// The same for the zero point of its velocity.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    zero_points_kms: &'a [f64],
     truth: Option<ParameterValues>,
     checks: &'a Checks,
     trade_off: Vec<TradeOffNode>,
@@ -181,6 +184,7 @@ impl MapResult<'_> {
         FitFile {
             summary: &self.fit.summary,
             nuisances: &self.fit.nuisances,
+            zero_points_kms: &self.fit.zero_points_kms,
             truth: self.truth,
             checks: &self.fit.checks,
             trade_off: self.fit.tradeoff.iter().map(node).collect(),

@@ -2,6 +2,7 @@
 
 use crate::noise::MeasuredErrors;
 use crate::objective::target::ChosenTarget;
+use crate::zero_points::MeasuredJitter;
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.
@@ -26,6 +27,9 @@ pub struct Measured {
     /// `observations.sigma_scale` and `.weights`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<MeasuredErrors>,
+    /// `observations.velocity_jitter_kms`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_jitter: Option<MeasuredJitter>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
@@ -41,6 +45,7 @@ impl Measured {
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
-        errors.into_iter().chain(target).collect()
+        let jitter = self.velocity_jitter.as_ref().map(|jitter| ("velocity jitter", jitter.line()));
+        errors.into_iter().chain(jitter).chain(target).collect()
     }
 }

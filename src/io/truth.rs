@@ -8,6 +8,9 @@ use crate::star::Orbit;
 use serde::Serialize;
 use std::path::Path;
 
+/// Name of the file.
+pub const FILE: &str = "truth.json";
+
 /// The content of `truth.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Truth {
@@ -24,6 +27,12 @@ pub struct Truth {
     /// What is wrong with each profile by itself, in line and continuum.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub continuum: Vec<LineAndContinuum>,
+    /// The velocity zero point of each profile (km/s), which is not part of `orbit_kms`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub zero_points_kms: Vec<f64>,
+    /// Over how many bins the noise is correlated, where it is not white.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlated_bins: Option<f64>,
     /// Fractional spot coverage.
     pub spottedness: f64,
     /// Signal-to-noise ratio of each bin; null for no noise.
@@ -64,5 +73,5 @@ pub struct InjectedTruth {
 /// # Errors
 /// A file that cannot be written.
 pub fn write(folder: &Path, truth: &impl Serialize) -> Result<(), WriteError> {
-    write_json(&folder.join("truth.json"), truth)
+    write_json(&folder.join(FILE), truth)
 }

@@ -4,10 +4,10 @@
 //! The verdict is that of the blind search. A chain takes a planet for granted, so that it can only take something away: where its K
 //! is compatible with zero, or its period is not one, a detection becomes a candidate.
 
-use super::{Manifest, kinds_and_goals};
+use super::Manifest;
 use crate::chain::modes::period_modes;
 use crate::chain::statistics::quantile;
-use crate::chain::{Chain, ChainError, ParameterSummary, Summary, summarise};
+use crate::chain::{Chain, ParameterSummary, PeriodMode, Summary};
 use crate::config::Settings;
 use crate::objective::{FreeParameter, Parameter, Prior};
 use crate::verdict::{Finding, Remark, Verdict};
@@ -27,28 +27,22 @@ const ALONE: f64 = 0.95;
 const PRIOR_DRAWS: usize = 4001;
 
 impl Manifest {
-    /// The summary of `chain`, this run's, with the settings it was begun with.
-    ///
-    /// # Errors
-    /// A chain without steps.
-    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<Summary, ChainError> {
-        let (kinds, goals) = kinds_and_goals(settings);
-        let mut summary = summarise(chain, &kinds, &goals)?;
-        summary.period_modes = self.period_modes(chain, summary.discarded_steps);
+    /// Adds to the summary of `chain` what priors and blind search have to say to it.
+    pub(super) fn conclude(&self, settings: &Settings, chain: &Chain, summary: &mut Summary) {
+        summary.period_modes = self.period_modes(settings, chain, summary.discarded_steps);
         for f in &settings.free {
-            let few = f.parameter == Parameter::PorbOverProt && is_in_few_modes(&summary);
+            let few = f.parameter == Parameter::PorbOverProt && is_in_few_modes(summary);
             if let Some(one) = summary.parameters.get_mut(f.parameter.name()) {
                 one.unconstrained = !few && is_as_wide(one, f);
             }
         }
-        if let Some((verdict, remarks)) = self.verdict(&summary, settings) {
+        if let Some((verdict, remarks)) = self.verdict(summary, settings) {
             summary.remarks = remarks.into_iter().map(|remark| remark.text).filter(|text| !text.is_empty()).collect();
             summary.verdict = Some(verdict);
         }
-        Ok(summary)
     }
 
-    fn period_modes(&self, chain: &Chain, discarded: usize) -> Vec<crate::chain::PeriodMode> {
+    fn period_modes(&self, settings: &Settings, chain: &Chain, discarded: usize) -> Vec<PeriodMode> {
         let place = |p: Parameter| self.names.iter().position(|name| name == p.name());
         let rotation = self.blind_search.as_ref().and_then(|search| search.rotation.as_ref());
         let (Some(period), Some(k), Some(rotation)) = (place(Parameter::PorbOverProt), place(Parameter::K), rotation)
@@ -61,7 +55,7 @@ impl Manifest {
         for mode in &mut modes {
             let sigma = 0.5 * (mode.ci68[1] - mode.ci68[0]);
             let imitation = rotation.imitated(mode.porb_over_prot, Some(sigma));
-            mode.rotation = imitation.map(|imitation| imitation.words(self.origin.rotation_period_d()));
+            mode.rotation = imitation.map(|imitation| imitation.words(settings.star.rotation_period_d));
         }
         modes
     }

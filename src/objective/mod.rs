@@ -4,6 +4,7 @@ pub mod coordinates;
 mod foothold;
 pub mod kind;
 mod likelihood;
+pub mod orbital;
 pub mod parameters;
 pub mod posterior;
 mod prediction;
@@ -14,6 +15,7 @@ pub mod tradeoff;
 
 pub use coordinates::{FreeParameter, ParameterSpace};
 pub use kind::{ObjectiveKind, SpotsLeft};
+pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 pub use parameters::{Parameter, ParameterValues};
 pub use posterior::Posterior;
 pub use prior::Prior;

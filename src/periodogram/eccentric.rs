@@ -5,7 +5,7 @@
 //! frequency), which give the mean longitude, and `(e cos omega, e sin omega)`: at e = 0 nothing is singular.
 
 use super::frequencies::Frequencies;
-use super::kepler::true_anomaly;
+use super::kepler::{mean_anomaly, true_anomaly};
 use super::orbits::{SIGMA_OF_UNKNOWN_PHASE, mid_cycle};
 use super::peaks::{Peak, parameters, steps};
 use super::refine::{Maximum, Model};
@@ -21,6 +21,9 @@ const ECCENTRICITIES: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
 /// Times of periastron of the grid.
 const PERIASTRA: usize = 48;
+
+/// Step in `e cos omega` and `e sin omega` by which times are differentiated.
+const STEP: f64 = 1e-5;
 
 /// A Keplerian orbit with its standard errors, NaN where ln L does not bound them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +48,18 @@ pub struct KeplerianOrbit {
     pub periastron_cycle: f64,
     /// Its error, at most that of a phase of which nothing is known.
     pub sigma_periastron_cycle: f64,
+    /// `K sqrt(1 - e^2)`, which the mass of the planet goes by (km/s).
+    pub mass_amplitude_kms: f64,
+    /// Its error.
+    pub sigma_mass_amplitude_kms: f64,
+    /// Rotation cycle of the largest radial velocity nearest to mid-time.
+    pub maximum_cycle: f64,
+    /// Its error, at most that of a phase of which nothing is known.
+    pub sigma_maximum_cycle: f64,
+    /// Rotation cycle of the inferior conjunction nearest to mid-time.
+    pub conjunction_cycle: f64,
+    /// Its error, at most that of a phase of which nothing is known.
+    pub sigma_conjunction_cycle: f64,
     /// ln L above no planet.
     pub delta_ln_l: f64,
     /// ln L above the circular orbit of the peak, with two parameters fewer.
@@ -125,7 +140,37 @@ fn named(cycles: &[f64], maximum: &Maximum, circle: f64) -> KeplerianOrbit {
     // radians from mid-time to periastron
     let angle = (b.atan2(a) + omega + PI).rem_euclid(TAU) - PI;
     let turn = 1.0 / (TAU * f);
+    let unknown = SIGMA_OF_UNKNOWN_PHASE / f;
+    // mean longitude at which the angle from the node is `from_node`, the true anomaly plus omega
+    let longitude = |h: f64, k: f64, from_node: f64| {
+        let omega = k.atan2(h);
+        mean_anomaly(from_node - omega, h.hypot(k)) + omega
+    };
+    let passage = |from_node: f64| {
+        let angle = (b.atan2(a) + longitude(h, k, from_node) + PI).rem_euclid(TAU) - PI;
+        let by = |dh: f64, dk: f64| longitude(h + dh, k + dk, from_node) - longitude(h - dh, k - dk, from_node);
+        // a branch of the angle may lie between the two
+        let slope = |dh: f64, dk: f64| ((by(dh, dk) + PI).rem_euclid(TAU) - PI) / (2.0 * STEP);
+        let (by_h, by_k) = (turn * slope(STEP, 0.0), turn * slope(0.0, STEP));
+        let error = sigma([-turn * b / k2, turn * a / k2, -turn * angle / f, by_h, by_k]);
+        (mid_cycle(cycles) + turn * angle, capped(error, unknown))
+    };
+    let (maximum_cycle, sigma_maximum_cycle) = passage(0.0);
+    let (conjunction_cycle, sigma_conjunction_cycle) = passage(0.5 * PI);
+    let round = (1.0 - e2).sqrt();
     KeplerianOrbit {
+        mass_amplitude_kms: amplitude * round,
+        sigma_mass_amplitude_kms: sigma([
+            round * a / amplitude,
+            round * b / amplitude,
+            0.0,
+            -amplitude * h / round,
+            -amplitude * k / round,
+        ]),
+        maximum_cycle,
+        sigma_maximum_cycle,
+        conjunction_cycle,
+        sigma_conjunction_cycle,
         k_kms: amplitude,
         sigma_k_kms: sigma([a / amplitude, b / amplitude, 0.0, 0.0, 0.0]),
         porb_over_prot: 1.0 / f,
@@ -141,7 +186,7 @@ fn named(cycles: &[f64], maximum: &Maximum, circle: f64) -> KeplerianOrbit {
         periastron_cycle: mid_cycle(cycles) + turn * angle,
         sigma_periastron_cycle: capped(
             sigma([-turn * b / k2, turn * a / k2, -turn * angle / f, -turn * k / e2, turn * h / e2]),
-            SIGMA_OF_UNKNOWN_PHASE / f,
+            unknown,
         ),
         delta_ln_l: *delta_ln_l,
         gain_over_circle: delta_ln_l - circle,
@@ -162,6 +207,7 @@ mod tests {
         let start = Peak {
             porb_over_prot: period,
             sigma_porb_over_prot: None,
+            covariance: None,
             orbit,
             on_edge: false,
             alias: None,
@@ -197,6 +243,16 @@ mod tests {
             // at periastron the velocity has its own form: K (1 + e) cos omega
             let at = velocities(&[cycles[0], found.periastron_cycle, 2.0 * mid_cycle(&cycles) - cycles[0]], &theta)[1];
             assert!((at - theta[0].hypot(theta[1]) * (1.0 + e) * omega.cos()).abs() < 1e-3, "{at}");
+            let ends = [cycles[0], 2.0 * mid_cycle(&cycles) - cycles[0]];
+            let velocity = |cycle: f64| velocities(&[ends[0], cycle, ends[1]], &theta)[1];
+            // the largest velocity is K (1 + e cos omega)
+            let largest = theta[0].hypot(theta[1]) * (1.0 + e * omega.cos());
+            assert!((velocity(found.maximum_cycle) - largest).abs() < 1e-4 * largest, "{found:?}");
+            // at conjunction the velocity is K e cos omega, that of the centre of mass, and falls
+            let at = velocity(found.conjunction_cycle) - theta[0].hypot(theta[1]) * e * omega.cos();
+            assert!(at.abs() < 1e-3 * largest, "{at}");
+            assert!(velocity(found.conjunction_cycle + 1e-3) < velocity(found.conjunction_cycle - 1e-3));
+            assert!((found.mass_amplitude_kms - found.k_kms * (1.0 - e * e).sqrt()).abs() < 1e-4);
         }
     }
 }

@@ -30,6 +30,13 @@ pub fn true_anomaly(mean_anomaly: f64, e: f64) -> (f64, f64) {
     ((cos - e) / distance, (1.0 - e * e).sqrt() * sin / distance)
 }
 
+/// The mean anomaly (radians) at a true anomaly, in (-pi, pi].
+pub fn mean_anomaly(true_anomaly: f64, e: f64) -> f64 {
+    let (sin, cos) = true_anomaly.sin_cos();
+    let (sin, cos) = ((1.0 - e * e).sqrt() * sin / (1.0 + e * cos), (cos + e) / (1.0 + e * cos));
+    sin.atan2(cos) - e * sin
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -41,6 +48,16 @@ mod tests {
                 let m = k as f64 * 2.5e-3 + 1e-7;
                 let anomaly = eccentric_anomaly(m, e);
                 assert!((anomaly - e * anomaly.sin() - m).abs() < 1e-13, "{m} {e}: {anomaly}");
+            }
+        }
+    }
+
+    #[test]
+    fn true_anomalies_lead_back() {
+        for e in [0.0, 0.1, 0.6, 0.95] {
+            for m in [-3.0, -0.7, 0.0, 0.2, 1.5, 3.1] {
+                let (cos, sin) = true_anomaly(m, e);
+                assert!((mean_anomaly(sin.atan2(cos), e) - m).abs() < 1e-12, "{m} {e}");
             }
         }
     }

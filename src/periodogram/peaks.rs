@@ -30,6 +30,8 @@ pub struct Peak {
     pub sigma_porb_over_prot: Option<f64>,
     /// The orbit; where the period has an error, those of K and phase count it.
     pub orbit: CircularOrbit,
+    /// Covariance of K (km/s), period over rotation period and phase (cycles); `None` on the edge of the search.
+    pub covariance: Option<Matrix3<f64>>,
     /// Whether it is the first or last trial period, ln L still rising beyond it.
     pub on_edge: bool,
     /// How it is an alias of the highest peak.
@@ -64,7 +66,13 @@ pub(super) fn peak(cycles: &[f64], theta: Vector3<f64>, covariance: Option<Matri
         sigma_phi: sigma(Vector3::new(-ab.y * turn, ab.x * turn, mid_cycle(cycles))).min(SIGMA_OF_UNKNOWN_PHASE),
         delta_ln_l,
     };
+    let slopes = Matrix3::from_rows(&[
+        Vector3::new(ab.x / k_kms, ab.y / k_kms, 0.0).transpose(),
+        Vector3::new(0.0, 0.0, -1.0 / (frequency * frequency)).transpose(),
+        Vector3::new(-ab.y * turn, ab.x * turn, mid_cycle(cycles)).transpose(),
+    ]);
     Peak {
+        covariance: covariance.map(|c| slopes * c * slopes.transpose()),
         porb_over_prot: 1.0 / frequency,
         sigma_porb_over_prot: covariance.map(|c| c[(2, 2)].sqrt() / (frequency * frequency)),
         orbit,
@@ -116,7 +124,15 @@ pub fn peaks(
         let Trial { frequency, orbit: Some(orbit), .. } = trials[k] else { continue };
         let on_edge = k == 0 || k == last;
         let porb_over_prot = 1.0 / frequency;
-        let start = Peak { porb_over_prot, sigma_porb_over_prot: None, orbit, on_edge, alias: None, imitation: None };
+        let start = Peak {
+            porb_over_prot,
+            sigma_porb_over_prot: None,
+            covariance: None,
+            orbit,
+            on_edge,
+            alias: None,
+            imitation: None,
+        };
         let peak = if on_edge { start } else { refined(quadratic, frequencies, &start) };
         let near = |other: &Peak| {
             let apart = (1.0 / other.porb_over_prot - 1.0 / peak.porb_over_prot).abs();
@@ -182,6 +198,7 @@ mod tests {
             let start = Peak {
                 porb_over_prot: 1.7,
                 sigma_porb_over_prot: None,
+                covariance: None,
                 orbit,
                 on_edge: false,
                 alias: None,

@@ -13,7 +13,7 @@ use crate::figure::{Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, Marker, P
 use crate::io::landscape;
 use crate::landscape::{Axis as GridAxis, Grid, Landscape};
 use crate::origin;
-use crate::survey::{HEADER, Header, NODES, PARABOLOID};
+use crate::survey::{Header, NODES, PARABOLOID};
 use std::path::Path;
 
 /// Root of the largest difference of chi2 that has a colour of its own.
@@ -27,6 +27,8 @@ struct Scene {
     grid: Grid,
     /// Values of the nodes along each axis, rising.
     nodes: Vec<Vec<f64>>,
+    /// Nodes that are there.
+    computed: usize,
     /// chi2 minus the lowest, of each node; NaN without a value.
     delta: Vec<f64>,
     /// Place of the lowest on each axis.
@@ -39,15 +41,22 @@ struct Scene {
 /// The figures of the landscape in `folder`, with the chain of the run in folder `run`.
 pub(super) fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
     let scene = Scene::read(folder, run)?;
-    Ok(vec![match scene.grid.axes.len() {
+    let mut figure = match scene.grid.axes.len() {
         1 => scene.curve(),
         _ => scene.planes(),
-    }])
+    };
+    if scene.computed < scene.grid.len() {
+        let note =
+            format!("{NODES}: {} of {} nodes are there, the rest is left white", scene.computed, scene.grid.len());
+        figure.caption += &format!(" Not the whole landscape: {note}.");
+        figure.notes.push(note);
+    }
+    Ok(vec![figure])
 }
 
 impl Scene {
     fn read(folder: &Path, run: Option<&Path>) -> Result<Self, PlotError> {
-        let header: Header = origin::read(folder, HEADER)?;
+        let header = Header::read(folder)?;
         let landscape: Landscape = landscape::read(&folder.join(NODES), header.grid.clone())?;
         let wrong = |file: &str, problem: &str| PlotError::Content { path: folder.join(file), problem: problem.into() };
         let (top, best) = landscape.best().ok_or_else(|| wrong(NODES, "no node has a value"))?;
@@ -84,6 +93,7 @@ impl Scene {
             paraboloid: paraboloid.and_then(|file| Paraboloid::of(file, &header.grid, &nodes)),
             grid: header.grid,
             nodes,
+            computed: landscape.nodes().len(),
             delta,
             lowest,
             chain,

@@ -1,6 +1,6 @@
 //! The detection map: which share of the orbits of each period and semi-amplitude a blind search recovers.
 
-use super::PlotError;
+use super::{POSITIVE, PlotError};
 use crate::figure::colour::{ColourMap, GREY, VERMILION, WHITE};
 use crate::figure::panel::{Marker, Shade, Sides, Tile};
 use crate::figure::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
@@ -18,6 +18,7 @@ const TABLE: &str = "limits.csv";
 /// What is used of the file.
 #[derive(Deserialize)]
 struct LimitsFile {
+    k_kms: Vec<f64>,
     limits: Vec<Limit>,
     comparisons: Vec<Comparison>,
 }
@@ -46,11 +47,13 @@ struct Outcome {
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let file: LimitsFile = origin::read(folder, FILE)?;
     let table = Columns::read(&folder.join(TABLE))?;
+    let tried = file.limits.len() * file.k_kms.len();
+    table.check_rows(tried, &format!("periods times semi-amplitudes, by {FILE}"))?;
     Ok(vec![figure(&file, &table)?])
 }
 
 fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
-    let (period, k) = (table.column("period_d")?, table.column("k_kms")?);
+    let (period, k) = (table.column_within("period_d", POSITIVE)?, table.column_within("k_kms", POSITIVE)?);
     let (phases, recovered) = (table.column("phases")?, table.column("recovered")?);
     let mut figure = Figure::new("limits", PAGE_MM, 92.0);
     figure.caption = CAPTION.into();

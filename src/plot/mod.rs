@@ -75,6 +75,12 @@ pub enum PlotError {
     },
 }
 
+/// Periods (d), periods over that of the rotation, and semi-amplitudes (km/s) that a logarithmic axis may show.
+const POSITIVE: [f64; 2] = [1e-12, 1e12];
+
+/// Times (d), rotation cycles and velocities (km/s).
+const ANY: [f64; 2] = [-1e12, 1e12];
+
 /// Draws the figures of one kind of folder.
 type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 

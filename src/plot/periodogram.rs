@@ -2,7 +2,7 @@
 //! alone do, and how well K is known.
 
 use super::symbols::PERIOD_DIGITS;
-use super::{PlotError, velocities};
+use super::{POSITIVE, PlotError, velocities};
 use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
 use crate::figure::panel::Sides;
 use crate::figure::{
@@ -25,8 +25,14 @@ struct SearchFile {
     truth: Option<BTreeMap<String, f64>>,
     false_alarm: FalseAlarm,
     peaks: Vec<OrbitFile>,
+    search: SearchedFile,
     offset: Option<Offset>,
     second: Option<Second>,
+}
+
+#[derive(Deserialize)]
+struct SearchedFile {
+    periods: usize,
 }
 
 /// A search for a second planet, the first one's period kept.
@@ -83,10 +89,10 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         peaks: &file.peaks,
         truth: injected.and_then(|truth| truth.get("porb_over_prot")).copied(),
     };
-    figures.push(figure(TABLES[0].1, &Columns::read(&folder.join(TABLES[0].0))?, &first)?);
+    figures.push(figure(TABLES[0].1, &table(folder, TABLES[0].0, &file)?, &first)?);
     if let Some(second) = &file.second {
         let marks = Marks { levels: &second.false_alarm.levels, peaks: &second.peaks, truth: None };
-        let mut beside = figure(TABLES[1].1, &Columns::read(&folder.join(TABLES[1].0))?, &marks)?;
+        let mut beside = figure(TABLES[1].1, &table(folder, TABLES[1].0, &file)?, &marks)?;
         beside.caption.insert_str(0, "A second planet beside the best orbit. ");
         figures.push(beside);
     }
@@ -98,10 +104,17 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(figures)
 }
 
+/// A table of the periods searched.
+fn table(folder: &Path, name: &str, file: &SearchFile) -> Result<Columns, PlotError> {
+    let table = Columns::read(&folder.join(name))?;
+    table.check_rows(file.search.periods, &format!("the periods searched, by {FILE}"))?;
+    Ok(table)
+}
+
 /// The figure of a table.
 fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotError> {
-    let period = table.column("period_d")?;
-    let ratio = table.column("porb_over_prot")?;
+    let period = table.column_within("period_d", POSITIVE)?;
+    let ratio = table.column_within("porb_over_prot", POSITIVE)?;
     let mut figure = Figure::new(name, PAGE_MM, 128.0);
     figure.caption = CAPTION.into();
     let (left, right, top, gap, bottom) = (40.0, 58.0, 28.0, 5.0, 28.0);

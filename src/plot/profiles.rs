@@ -1,17 +1,25 @@
 //! Line profiles below each other in the order of their rotation phase, observed and modelled.
 
-use super::PlotError;
 use super::star_map::TRUTH;
+use super::velocities::FIT;
+use super::{ANY, PlotError};
 use crate::figure::colour::{BLACK, GREY, VERMILION};
 use crate::figure::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
 use crate::io::csv::Columns;
 use crate::io::lsd::{self, ReadOptions};
 use crate::origin;
+use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
 
 /// The table of profiles that `map` writes.
 pub(super) const FILE: &str = "profiles.csv";
+
+/// What is used of `fit.json`.
+#[derive(Deserialize)]
+struct FitFile {
+    data: usize,
+}
 
 /// A profile.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,9 +42,13 @@ impl Line {
 /// The profiles of a map, in the order of their phase.
 pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
+    if folder.join(FIT).is_file() {
+        let fit: FitFile = origin::read(folder, FIT)?;
+        table.check_rows(fit.data, &format!("the data, by {FIT}"))?;
+    }
     let numbers = table.column("profile")?;
-    let [cycle, velocity, observed] =
-        [table.column("cycle")?, table.column("velocity_kms")?, table.column("observed")?];
+    let [cycle, velocity] = [table.column_within("cycle", ANY)?, table.column_within("velocity_kms", ANY)?];
+    let observed = table.column_within("observed", ANY)?;
     let [sigma, model] = [table.column("sigma")?, table.column("model")?];
     let mut lines: Vec<Line> = Vec::new();
     for k in 0..numbers.len() {

@@ -5,12 +5,15 @@ use crate::objective::Parameter;
 /// Decimals of a period in days, in figures and tables alike.
 pub const PERIOD_DIGITS: usize = 4;
 
+/// Unit of phi: the part of an orbit from the epoch to the largest radial velocity.
+const PHASE_UNIT: &str = "cycles to max. RV";
+
 /// Symbol and unit of a parameter by its name in files; the name itself if it is another one.
 pub fn symbol(name: &str) -> (&str, &'static str) {
     match Parameter::from_name(name) {
         Some(Parameter::K) => ("*K*", "km/s"),
         Some(Parameter::PorbOverProt) => ("*P*_{orb}/*P*_{rot}", ""),
-        Some(Parameter::Phi) => ("*φ*", "orbital cycles"),
+        Some(Parameter::Phi) => ("*φ*", PHASE_UNIT),
         Some(Parameter::OmegaEq) => ("*Ω*_{eq}", "rad/d"),
         Some(Parameter::DOmega) => ("d*Ω*", "rad/d"),
         Some(Parameter::Inclination) => ("*i*", "°"),
@@ -20,6 +23,10 @@ pub fn symbol(name: &str) -> (&str, &'static str) {
         Some(Parameter::LineSigma) => ("*σ*_{line}", "km/s"),
         Some(Parameter::EquivalentWidth) => ("*W*_{line}", "km/s"),
         Some(Parameter::Contrast) => ("*c*", ""),
+        None if name == "period_d" => ("*P*_{orb}", "d"),
+        None if name == "t_max_rv_d" => ("*T*_{max RV}", "d"),
+        None if name == "t_conjunction_d" => ("*T*_{conj}", "d"),
+        None if name == "msini_mjup" => ("*M* sin *i*", "*M*_{Jup}"),
         // columns of the experiments' tables
         None if name == "assumed_deg" => ("assumed *i*", "°"),
         None => (name, ""),
@@ -39,7 +46,7 @@ pub fn label(name: &str) -> String {
 
 /// Short label of an axis, for narrow panels.
 pub fn short_label(name: &str) -> String {
-    label(name).replace("orbital cycles", "cycles")
+    label(name).replace(PHASE_UNIT, "cycles")
 }
 
 /// What is said of a parameter above a panel.
@@ -62,7 +69,7 @@ impl Title {
         let (symbol, unit) = symbol(name);
         let unit = match unit {
             // those of a phase go without saying
-            "" | "orbital cycles" => String::new(),
+            "" | PHASE_UNIT => String::new(),
             "°" => "°".to_owned(),
             unit => format!(" {unit}"),
         };

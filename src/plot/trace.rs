@@ -1,7 +1,7 @@
 //! A chain: what was sampled as figures need it, its walkers over the steps, and how long it remembers.
 
 use super::PlotError;
-use super::symbols::{label, nearest_turn, symbol};
+use super::symbols::{nearest_turn, short_label, symbol};
 use crate::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
 use crate::chain::statistics::{quantile, unwrap_around};
 use crate::chain::{Chain, Goals, ParameterKind, Series, Summary};
@@ -11,6 +11,7 @@ use crate::figure::{Align, Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rec
 use crate::io::journal;
 use crate::manifest::{Manifest, kinds_and_goals};
 use crate::run::CHAIN;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A chain with its summary.
@@ -26,6 +27,8 @@ pub struct Sampled {
     pub goals: Goals,
     /// What the chain says.
     pub summary: Summary,
+    /// Injected values of the parameters and of what follows from them.
+    pub truth: Option<BTreeMap<String, f64>>,
 }
 
 impl Sampled {
@@ -39,8 +42,9 @@ impl Sampled {
         let settings = manifest.settings(folder)?;
         let (kinds, goals) = kinds_and_goals(&settings);
         let wrong = |problem: String| PlotError::Content { path: folder.join(CHAIN), problem };
-        let summary = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
-        Ok(Sampled { manifest, chain, kinds, goals, summary })
+        let (summary, _) = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
+        let truth = manifest.truth(&settings, &summary);
+        Ok(Sampled { manifest, chain, kinds, goals, summary, truth })
     }
 
     /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
@@ -131,7 +135,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         let shown = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
         let values: Vec<f64> = shown.flatten().copied().chain(sampled.near_truth(i)).collect();
         let scale = sampled.scale(i);
-        let y = Axis { label: label(name), range: range_of(values.into_iter(), scale, 0.05), scale };
+        let y = Axis { label: short_label(name), range: range_of(values.into_iter(), scale, 0.05), scale };
         let panel = Panel { frame, x: Axis::linear("step", [0.0, (steps - 1).max(1) as f64]), y };
         let kept = sampled.summary.discarded_steps as f64;
         let [low, high] = panel.y.range;

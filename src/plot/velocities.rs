@@ -1,7 +1,7 @@
 //! Radial velocities: first moments with the spots in them, and what is left when these are taken out; over time and folded
 //! with the orbit.
 
-use super::PlotError;
+use super::{ANY, PlotError};
 use crate::figure::colour::{BLACK, BLUE, GREY, VERMILION};
 use crate::figure::panel::Sides;
 use crate::figure::{Axis, COLUMN_MM, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
@@ -15,6 +15,9 @@ use std::path::Path;
 /// The table of velocities that `map` and `periodogram` write.
 pub(super) const FILE: &str = "rv.csv";
 
+/// The covariance of those of `periodogram`, a row a profile.
+const COVARIANCE: &str = "covariance.csv";
+
 /// How good the fit of `map` is.
 pub(super) const FIT: &str = "fit.json";
 
@@ -22,6 +25,7 @@ pub(super) const FIT: &str = "fit.json";
 #[derive(Deserialize)]
 struct FitFile {
     parameters: BTreeMap<String, f64>,
+    profiles: usize,
 }
 
 /// A velocity with its error bar, or without where that is 0.
@@ -49,6 +53,7 @@ struct Curves<'a> {
 pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
     let fit: FitFile = origin::read(folder, FIT)?;
+    table.check_rows(fit.profiles, &format!("the profiles, by {FIT}"))?;
     let value = |name: &str| fit.parameters.get(name).copied().unwrap_or(0.0);
     let [observed, modelled, filtered] =
         [table.column("observed_kms")?, table.column("modelled_kms")?, table.column("filtered_kms")?];
@@ -57,7 +62,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     let errors = |y: Vec<f64>, label| Series { class: "observed", label, y, sigma: sigma.to_vec(), marker: POINT };
     let model = Series { class: "model", label: "model", y: modelled.to_vec(), sigma: Vec::new(), marker: MODEL };
     let curves = Curves {
-        cycle: table.column("cycle")?,
+        cycle: table.column_within("cycle", ANY)?,
         panels: vec![
             ("RV (km/s)", vec![errors(observed.to_vec(), "first moment"), model]),
             ("RV − spots (km/s)", vec![errors(clean, "")]),
@@ -79,6 +84,9 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
 /// The velocities of a blind search, with the orbit that it found.
 pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<Figure, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
+    if let Ok(covariance) = std::fs::read_to_string(folder.join(COVARIANCE)) {
+        table.check_rows(covariance.lines().count(), &format!("those of {COVARIANCE}"))?;
+    }
     let series = |class, label, y: &str, sigma: &str, marker| {
         Ok::<_, PlotError>(Series {
             class,
@@ -89,7 +97,7 @@ pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<
         })
     };
     let curves = Curves {
-        cycle: table.column("cycle")?,
+        cycle: table.column_within("cycle", ANY)?,
         panels: vec![
             ("RV (km/s)", vec![series("observed", "", "first_moment_kms", "first_moment_sigma_kms", POINT)?]),
             ("RV − spots (km/s)", vec![series("observed", "", "rv_kms", "rv_sigma_kms", POINT)?]),
@@ -162,7 +170,7 @@ impl Curves<'_> {
     fn fold(&self, figure: &mut Figure, frame: Rect) {
         let (label, series) = &self.panels[self.orbital];
         let y = Axis::linear(label, range(series, self.vsys_kms));
-        let panel = Panel { frame, x: Axis::linear("orbital phase", [0.0, 1.0]), y };
+        let panel = Panel { frame, x: Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]), y };
         let phase = |cycle: &f64| (cycle / self.orbit.porb_over_prot - self.orbit.phi).rem_euclid(1.0);
         let curve: Vec<[f64; 2]> = (0..=200)
             .map(|i| f64::from(i) / 200.0)

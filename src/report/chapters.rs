@@ -2,10 +2,10 @@
 
 use super::{Chapter, Table, injection, run};
 use crate::manifest;
-use crate::objective::Parameter;
+use crate::objective::{OrbitQuantity, Parameter, definition};
 use crate::origin;
 use crate::plot::PlotError;
-use crate::plot::symbols::{decimals, label};
+use crate::plot::symbols::{decimals, label, symbol};
 use crate::survey::PARABOLOID;
 use serde_json::Value;
 use std::path::Path;
@@ -140,6 +140,17 @@ fn periodogram(file: &Value) -> Chapter {
     let mut orbit: Vec<Vec<String>> =
         rows.into_iter().map(|(key, sigma)| [vec![label(key)], best(key, sigma)].concat()).collect();
     orbit.insert(1, [vec!["*P*_{orb} (d)".into()], best("period_d", "sigma_period_d")].concat());
+    let quantities = ["t_max_rv_d", "t_conjunction_d", "msini_mjup"];
+    orbit.extend(
+        quantities.into_iter().filter(|name| file.pointer(&format!("/best/{name}")).is_some_and(Value::is_number)).map(
+            |name| {
+                let mut cells = best(name, &format!("sigma_{name}"));
+                let digits = file.pointer(&format!("/best/sigma_{name}")).and_then(Value::as_f64).map_or(3, decimals);
+                cells[2] = number(file, &format!("/derived_truth/{name}"), digits);
+                [vec![label(name)], cells].concat()
+            },
+        ),
+    );
     let peak = |peak: &Value| {
         let probability = share(peak).map_or_else(|| "–".into(), |p| format!("{p:.1e}"));
         vec![
@@ -152,6 +163,10 @@ fn periodogram(file: &Value) -> Chapter {
         ]
     };
     let mut notes = texts(file, "warnings");
+    notes.extend(["phi"].into_iter().chain(quantities).filter_map(|name| {
+        file.pointer(&format!("/best/{name}")).filter(|value| value.is_number())?;
+        Some(format!("{}: {}.", symbol(name).0, definition(name)?))
+    }));
     notes.extend(file.pointer("/co_rotation/statement").and_then(Value::as_str).map(str::to_owned));
     let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias"];
     Chapter {
@@ -258,6 +273,18 @@ fn optimum(file: &Value) -> Chapter {
         let value = |section: &str| number(file, &format!("/{section}/{name}"), digits);
         vec![label(name), value("parameters"), value("sd"), value("truth")]
     };
+    let derived = OrbitQuantity::ALL.map(OrbitQuantity::name);
+    let derived = derived.into_iter().filter(|name| file.pointer(&format!("/derived/{name}")).is_some());
+    let derived_row = |name: &str| {
+        let sd = format!("/derived/{name}/sd");
+        let digits = file.pointer(&sd).and_then(Value::as_f64).map_or(4, decimals);
+        let value = |pointer: &str| number(file, pointer, digits);
+        let [best, truth] = [format!("/derived/{name}/value"), format!("/derived_truth/{name}")];
+        vec![label(name), value(&best), value(&sd), value(&truth)]
+    };
+    let rows = names.iter().map(row).chain(derived.clone().map(derived_row)).collect();
+    let shown = names.iter().map(String::as_str).chain(derived);
+    let notes = shown.filter_map(|name| Some(format!("{}: {}.", symbol(name).0, definition(name)?))).collect();
     let is = |key: &str| file.get(key).and_then(Value::as_bool).unwrap_or(false);
     let (defined, converged) = (is("well_defined"), is("converged"));
     let sentence = match (defined, converged) {
@@ -270,9 +297,9 @@ fn optimum(file: &Value) -> Chapter {
         verdict: Some((defined && converged, sentence.into())),
         tables: vec![(
             "The best parameters, with errors from the curvature.".into(),
-            table(&["parameter", "best", "error", "injected"], names.iter().map(row).collect()),
+            table(&["parameter", "best", "error", "injected"], rows),
         )],
-        notes: Vec::new(),
+        notes,
     }
 }
 

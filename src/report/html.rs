@@ -6,6 +6,9 @@ use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("style.css");
 
+/// What every page begins with.
+pub(super) const BEGINNING: &str = "<!doctype html>\n";
+
 /// Points in the width of a column, and some: figures that are not wider fit a phone.
 const NARROW_PT: f64 = 1.3 * COLUMN_MM * 72.0 / 25.4;
 
@@ -13,7 +16,7 @@ const NARROW_PT: f64 = 1.3 * COLUMN_MM * 72.0 / 25.4;
 pub(super) fn page(page: &Page) -> String {
     let title = escape(&page.title);
     let mut html = format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+        "{BEGINNING}<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{title}: dimcmc \
          report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{}</p>\n",
         escape(&subtitle(page))
@@ -121,7 +124,11 @@ fn footer(html: &mut String, page: &Page) {
     html.push_str("</footer>\n");
 }
 
+/// Control characters but the line feed, which HTML does not know, are written as escapes.
 fn escape(text: &str) -> String {
+    let is_odd = |c: char| c.is_control() && c != '\n';
+    let shown = |c: char| if is_odd(c) { c.escape_default().to_string() } else { c.to_string() };
+    let text: String = text.chars().map(shown).collect();
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

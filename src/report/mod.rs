@@ -11,7 +11,9 @@ mod run;
 
 use crate::figure::Figure;
 use crate::plot::{self, PlotError};
+use crate::text::escaped;
 use serde_json::Value;
+use std::io::Read as _;
 use std::path::Path;
 
 /// A table of text.
@@ -69,10 +71,17 @@ pub fn report(folder: &Path) -> Result<String, PlotError> {
     Ok(html::page(&page))
 }
 
+/// Whether the file begins as a page does.
+pub fn is_page(file: &Path) -> bool {
+    let mut beginning = vec![0; html::BEGINNING.len()];
+    let read = std::fs::File::open(file).and_then(|mut file| file.read_exact(&mut beginning));
+    read.is_ok() && beginning == html::BEGINNING.as_bytes()
+}
+
 /// The folder's own name.
 fn title(folder: &Path) -> String {
     let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    whole.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned()
+    escaped(&whole.file_name().unwrap_or(folder.as_os_str()).to_string_lossy()).into_owned()
 }
 
 fn provenance(file: &Value) -> Vec<(String, String)> {

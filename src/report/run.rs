@@ -2,7 +2,7 @@
 
 use super::{Chapter, Table};
 use crate::chain::{ParameterSummary, Summary};
-use crate::plot::symbols::{decimals, label};
+use crate::plot::symbols::{decimals, label, symbol};
 use crate::plot::{PlotError, Sampled};
 use std::path::Path;
 
@@ -13,7 +13,7 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
     let mut notes = manifest.warnings();
     notes.extend(manifest.co_rotation(summary));
     notes.extend(upper_limits(summary));
-    let truth = manifest.origin.truth.as_ref();
+    let truth = sampled.truth.as_ref();
     let mut head = ["parameter", "median", "68 % interval", "95 % interval", "95 % HDI", "R-hat", "ESS", "τ (steps)"]
         .map(String::from)
         .to_vec();
@@ -29,7 +29,18 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
         }
         row
     };
-    let parameters = Table { head, rows: summary.names.iter().map(row).collect() };
+    let parameters = Table { head: head.clone(), rows: summary.names.iter().map(row).collect() };
+    let derived = summary.derived_names.iter().filter_map(|name| {
+        let one = summary.derived.get(name)?;
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let digits = decimals(one.sd);
+            row.insert(1, truth.get(name).map_or_else(|| "–".into(), |value| format!("{value:.digits$}")));
+        }
+        Some(row)
+    });
+    let derived = Table { head, rows: derived.collect() };
+    notes.extend(meanings(summary));
     let chain = Table {
         head: ["steps", "burn-in", "ensembles × walkers", "evaluations", "failed", "accepted"]
             .map(String::from)
@@ -46,7 +57,15 @@ pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
     Ok(Chapter {
         heading: "Posterior".into(),
         verdict: Some((summary.converged, verdict(summary))),
-        tables: vec![("The sampled parameters.".into(), parameters), ("The chain.".into(), chain)],
+        tables: [
+            ("The sampled parameters.", parameters),
+            ("What follows from them, draw by draw.", derived),
+            ("The chain.", chain),
+        ]
+        .into_iter()
+        .filter(|(_, table)| !table.rows.is_empty())
+        .map(|(caption, table)| (caption.to_owned(), table))
+        .collect(),
         notes,
     })
 }
@@ -85,10 +104,16 @@ fn verdict(summary: &Summary) -> String {
     )
 }
 
+/// What parameters and quantities are, where their names do not say it.
+fn meanings(summary: &Summary) -> impl Iterator<Item = String> {
+    let names = summary.names.iter().chain(&summary.derived_names);
+    names.filter_map(|name| Some(format!("{}: {}.", symbol(name).0, summary.definitions.get(name)?)))
+}
+
 fn upper_limits(summary: &Summary) -> Vec<String> {
     let limit = |(name, one): (&String, &ParameterSummary)| {
         let digits = decimals(one.sd);
         Some(format!("{} is compatible with zero: below {:.digits$} at 95 %.", label(name), one.upper95?))
     };
-    summary.parameters.iter().filter_map(limit).collect()
+    summary.parameters.iter().chain(&summary.derived).filter_map(limit).collect()
 }

@@ -12,7 +12,8 @@ use crate::blind_search::BlindSearch;
 use crate::chain::{Chain, Convergence, Goals, ParameterKind, Record};
 use crate::ensemble::{self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason};
 use crate::io::journal::{Journal, JournalError};
-use crate::manifest::{Manifest, kinds_and_goals};
+use crate::io::lines;
+use crate::manifest::{self, Manifest, kinds_and_goals};
 use crate::origin::Origin;
 use crate::pool::{Asked, Evaluations, Pool, Target, Task};
 use crate::scene::Scene;
@@ -25,6 +26,11 @@ pub const CHAIN: &str = "chain.jsonl";
 
 /// Name of its analysis.
 pub const SUMMARY: &str = "summary.json";
+
+/// Whether nothing but an empty chain is in `folder`, and with `manifest` perhaps that: such a run may begin again.
+pub fn is_false_start(folder: &Path, manifest: bool) -> bool {
+    lines::is_false_start(folder, manifest.then_some(manifest::FILE), CHAIN)
+}
 
 /// Where the walkers start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,7 +95,7 @@ impl Run {
         let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
         // what was not evaluated looks like a start that is none
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
-        let manifest = manifest(scene, origin, BlindSearch::of(scene), start);
+        let manifest = new_manifest(scene, origin, BlindSearch::of(scene), start);
         std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
         // the chain first: whoever holds it may write the manifest
         let mut journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
@@ -207,7 +213,7 @@ impl Run {
     }
 }
 
-fn manifest(scene: &Scene, origin: Origin, blind_search: Option<BlindSearch>, start: Positions) -> Manifest {
+fn new_manifest(scene: &Scene, origin: Origin, blind_search: Option<BlindSearch>, start: Positions) -> Manifest {
     let prior = |f: &crate::objective::FreeParameter| {
         (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
     };

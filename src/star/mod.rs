@@ -17,6 +17,7 @@ mod moments;
 mod nearby;
 pub mod orbit;
 mod placement;
+pub mod planet;
 pub mod response;
 pub mod rotation;
 mod sorting;

@@ -6,6 +6,15 @@ use crate::observation::{Observations, Profile};
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Name of the list that is written.
+const LIST: &str = "observations.txt";
+
+/// Whether [`write()`] may write a file of this name.
+pub fn is_written(name: &str) -> bool {
+    let number = name.strip_prefix('p').and_then(|rest| rest.strip_suffix(".prof"));
+    name == LIST || number.is_some_and(|number| number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit()))
+}
+
 /// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The list
 /// comes last, so that where it is the profiles are; files of these names are replaced.
 ///
@@ -22,7 +31,7 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError>
         // Writing to a String cannot fail.
         let _ = writeln!(list, "{name} {}", profile.time_d);
     }
-    save(&folder.join("observations.txt"), &list)
+    save(&folder.join(LIST), &list)
 }
 
 /// The same for what became of observed profiles, one of the `labels` each: VRAD stays in the list and in the velocity axis, and
@@ -39,7 +48,7 @@ pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], wh
         // Writing to a String cannot fail.
         let _ = writeln!(list, "{name} {} {vrad_kms}  # {file}", profile.time_d);
     }
-    save(&folder.join("observations.txt"), &list)
+    save(&folder.join(LIST), &list)
 }
 
 fn profile_text(title: &str, profile: &Profile, vrad_kms: f64, step_kms: f64) -> String {

@@ -4,11 +4,10 @@
 //! Left out: the numbers themselves (`detection`, `periodogram`).
 
 mod alarm;
+mod quantities;
 mod record;
 mod report;
 mod robustness;
-
-pub use record::{OrbitRecord, PeakRecord};
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
@@ -42,6 +41,8 @@ pub struct PeriodogramResult<'a> {
     pub fit: &'a Fit,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
+    /// Mass of the star (solar masses), for the minimum mass of the planet.
+    pub mass_msun: Option<f64>,
     /// Config, data and program.
     pub provenance: &'a Provenance,
 }
@@ -61,6 +62,9 @@ const COLUMNS: [&str; 12] = [
     "k_limit_kms",
     "k_limit95_kms",
 ];
+
+/// Names of all files that a search may write.
+pub const FILES: [&str; 5] = ["rv.csv", "covariance.csv", "periodogram.csv", "periodogram_2.csv", "periodogram.json"];
 
 impl PeriodogramResult<'_> {
     /// Names of the files, in the order in which they are written.

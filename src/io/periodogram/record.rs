@@ -3,6 +3,7 @@
 use super::super::provenance::Provenance;
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
+use super::quantities::QuantitiesRecord;
 use super::robustness::RobustnessRecord;
 use crate::detection::View;
 use crate::objective::ParameterValues;
@@ -10,7 +11,8 @@ use crate::periodogram::offset::Offset;
 use crate::periodogram::peaks::Peak;
 use crate::periodogram::{KeplerianOrbit, Search};
 use crate::verdict::Verdict;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use std::collections::BTreeMap;
 
 #[derive(Serialize)]
 pub(super) struct Record<'a> {
@@ -19,6 +21,9 @@ pub(super) struct Record<'a> {
     /// In the expansion around its own image; its errors count the period's.
     pub best: OrbitRecord,
     pub truth: Option<ParameterValues>,
+    /// The same of what is usually quoted of the orbit, times nearest to those found.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived_truth: BTreeMap<&'static str, f64>,
     /// Of the highest peak without a planet.
     pub false_alarm: FalseAlarmRecord,
     /// Around the planet-free image, from high to low.
@@ -38,10 +43,8 @@ pub(super) struct Record<'a> {
     pub provenance: &'a Provenance,
 }
 
-/// An orbit in `periodogram.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs)]
-pub struct OrbitRecord {
+#[derive(Serialize)]
+pub(super) struct OrbitRecord {
     pub k_kms: f64,
     pub sigma_k_kms: f64,
     pub period_d: f64,
@@ -52,12 +55,12 @@ pub struct OrbitRecord {
     pub sigma_phi: f64,
     pub delta_ln_l: f64,
     pub on_edge: bool,
+    #[serde(flatten)]
+    pub quantities: QuantitiesRecord,
 }
 
-/// A peak of the periodogram.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PeakRecord {
-    /// The orbit.
+#[derive(Serialize)]
+pub(super) struct PeakRecord {
     #[serde(flatten)]
     pub orbit: OrbitRecord,
     /// How often a star without a planet shows one as high.
@@ -65,17 +68,14 @@ pub struct PeakRecord {
     /// How it is an alias of the highest peak.
     pub alias: Option<AliasRecord>,
     /// The period of the star, or alias of one, that it is not told from: spots imitate orbits there.
-    #[serde(default)]
     pub rotation: Option<String>,
 }
 
-/// A peak as an alias of the highest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs)]
-pub struct AliasRecord {
+#[derive(Serialize)]
+pub(super) struct AliasRecord {
     pub window_frequency_per_d: f64,
     pub window: f64,
-    pub relation: String,
+    pub relation: &'static str,
 }
 
 #[derive(Serialize)]
@@ -92,6 +92,8 @@ pub(super) struct KeplerianRecord {
     pub sigma_periastron_d: f64,
     pub delta_ln_l: f64,
     pub gain_over_circle: f64,
+    #[serde(flatten)]
+    pub quantities: QuantitiesRecord,
 }
 
 #[derive(Serialize)]
@@ -150,6 +152,7 @@ impl PeriodogramResult<'_> {
             verdict: self.verdict,
             best: self.orbit(&found.best),
             truth: self.truth,
+            derived_truth: self.derived_truth(),
             false_alarm: false_alarm(&found.blind),
             peaks: self.peaks(&found.blind),
             keplerian: self.settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
@@ -188,11 +191,36 @@ impl PeriodogramResult<'_> {
     }
 
     pub(super) fn orbit(&self, peak: &Peak) -> OrbitRecord {
-        OrbitRecord::of(peak, self.imager.star.rotation_period_d)
+        let prot = self.imager.star.rotation_period_d;
+        let orbit = &peak.orbit;
+        OrbitRecord {
+            k_kms: orbit.k_kms,
+            sigma_k_kms: orbit.sigma_k_kms,
+            period_d: prot * peak.porb_over_prot,
+            sigma_period_d: peak.sigma_porb_over_prot.map(|sigma| prot * sigma),
+            porb_over_prot: peak.porb_over_prot,
+            sigma_porb_over_prot: peak.sigma_porb_over_prot,
+            phi: orbit.phi,
+            sigma_phi: orbit.sigma_phi,
+            delta_ln_l: orbit.delta_ln_l,
+            on_edge: peak.on_edge,
+            quantities: self.quantities(peak),
+        }
     }
 
     pub(super) fn peaks(&self, search: &Search) -> Vec<PeakRecord> {
-        PeakRecord::of_search(search, self.imager.star.rotation_period_d)
+        let prot = self.imager.star.rotation_period_d;
+        let record = |peak: &Peak| PeakRecord {
+            orbit: self.orbit(peak),
+            false_alarm_probability: search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
+            alias: peak.alias.map(|alias| AliasRecord {
+                window_frequency_per_d: alias.window.frequency / prot,
+                window: alias.window.height,
+                relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" },
+            }),
+            rotation: peak.imitation.map(|imitation| imitation.words(prot)),
+        };
+        search.peaks.iter().map(record).collect()
     }
 
     pub(super) fn keplerian(&self, orbit: &KeplerianOrbit) -> KeplerianRecord {
@@ -211,42 +239,7 @@ impl PeriodogramResult<'_> {
             sigma_periastron_d: prot * orbit.sigma_periastron_cycle,
             delta_ln_l: orbit.delta_ln_l,
             gain_over_circle: orbit.gain_over_circle,
+            quantities: self.eccentric_quantities(orbit),
         }
-    }
-}
-
-impl OrbitRecord {
-    /// Of a peak, for a star of that rotation period.
-    pub fn of(peak: &Peak, rotation_period_d: f64) -> Self {
-        let orbit = &peak.orbit;
-        OrbitRecord {
-            k_kms: orbit.k_kms,
-            sigma_k_kms: orbit.sigma_k_kms,
-            period_d: rotation_period_d * peak.porb_over_prot,
-            sigma_period_d: peak.sigma_porb_over_prot.map(|sigma| rotation_period_d * sigma),
-            porb_over_prot: peak.porb_over_prot,
-            sigma_porb_over_prot: peak.sigma_porb_over_prot,
-            phi: orbit.phi,
-            sigma_phi: orbit.sigma_phi,
-            delta_ln_l: orbit.delta_ln_l,
-            on_edge: peak.on_edge,
-        }
-    }
-}
-
-impl PeakRecord {
-    /// The peaks of a search, from high to low.
-    pub fn of_search(search: &Search, rotation_period_d: f64) -> Vec<Self> {
-        let record = |peak: &Peak| PeakRecord {
-            orbit: OrbitRecord::of(peak, rotation_period_d),
-            false_alarm_probability: search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
-            alias: peak.alias.map(|alias| AliasRecord {
-                window_frequency_per_d: alias.window.frequency / rotation_period_d,
-                window: alias.window.height,
-                relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" }.to_owned(),
-            }),
-            rotation: peak.imitation.map(|imitation| imitation.words(rotation_period_d)),
-        };
-        search.peaks.iter().map(record).collect()
     }
 }

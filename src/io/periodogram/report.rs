@@ -3,7 +3,7 @@
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::record::{OrbitRecord, PeakRecord};
-use crate::objective::Parameter;
+use crate::objective::{OrbitQuantity, Parameter};
 use crate::text::aligned;
 use crate::verdict::probability;
 
@@ -14,8 +14,9 @@ impl PeriodogramResult<'_> {
     /// The text, a line or a table after the other.
     pub fn table(&self) -> String {
         let found = self.detection;
-        let mut text = format!("{}\n\n", self.verdict.sentence);
-        text += &self.orbits(&[self.orbit(&found.best)]);
+        let best = self.orbit(&found.best);
+        let meanings = self.meanings(&best.quantities);
+        let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(&[best]) + &meanings;
         text += &format!("{}\n", chance(&false_alarm(&found.blind)));
         text += &peaks(&self.peaks(&found.blind));
         for orbit in found.keplerian.iter().take(1).flatten() {
@@ -28,6 +29,11 @@ impl PeriodogramResult<'_> {
                 orbit.sigma_omega_deg,
                 orbit.gain_over_circle
             );
+            for quantity in OrbitQuantity::ALL {
+                if let Some((value, Some(sigma))) = orbit.quantities.of(quantity) {
+                    text += &format!("  its {}: {value:.1$} +- {sigma:.1$}\n", quantity.name(), decimals(sigma));
+                }
+            }
         }
         if let Some(second) = &found.second {
             text += &format!("second planet: {}\n", chance(&false_alarm(&second.search)));
@@ -77,7 +83,28 @@ impl PeriodogramResult<'_> {
             }
             rows.push(row);
         }
+        rows.extend(self.quantity_rows(orbits, truth.is_some()));
         aligned(&rows)
+    }
+
+    /// Rows of what is usually quoted of the same orbits.
+    fn quantity_rows(&self, orbits: &[OrbitRecord], with_truth: bool) -> Vec<Vec<String>> {
+        let row = |quantity: OrbitQuantity| {
+            let all: Option<Vec<_>> = orbits.iter().map(|orbit| orbit.quantities.of(quantity)).collect();
+            let all = all?;
+            let digits = |sigma: Option<f64>| decimals(sigma.unwrap_or(f64::NAN));
+            let mut row = vec![quantity.name().to_owned()];
+            if let Some((found, sigma)) = all.first().filter(|_| with_truth) {
+                let injected = self.true_quantity(quantity, *found);
+                row.push(injected.map_or("-".into(), |value| format!("{value:.*}", digits(*sigma))));
+            }
+            for (value, sigma) in all {
+                row.push(format!("{value:.*}", digits(sigma)));
+                row.push(sigma.map_or("-".into(), |error| format!("{error:.*}", digits(sigma))));
+            }
+            Some(row)
+        };
+        OrbitQuantity::ALL.into_iter().filter_map(row).collect()
     }
 }
 

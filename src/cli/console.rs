@@ -1,0 +1,64 @@
+//! The only way to the terminal: results on stdout, errors on stderr. Nothing that happens to either stream stops a command or
+//! the thread that waits for signals: a stream that is gone is written to in vain, and results that a full disk has swallowed are
+//! a failure once the command has ended.
+
+use super::Failure;
+use dimcmc::text::escaped;
+use std::fmt::Display;
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
+use std::process::ExitCode;
+use std::sync::Mutex;
+
+/// What the system said when results could not be printed for the first time.
+static LOST: Mutex<Option<String>> = Mutex::new(None);
+
+/// Prints results, control characters in them escaped.
+pub fn print(text: impl Display) {
+    let lines: Vec<String> = text.to_string().split('\n').map(|line| escaped(line).into_owned()).collect();
+    print_bytes(lines.join("\n").as_bytes());
+}
+
+/// Prints a line of results.
+pub fn line(text: impl Display) {
+    print(format_args!("{text}\n"));
+}
+
+/// Prints what a command is for as it is. That nobody reads on (a closed pipe) is no failure.
+pub fn print_bytes(bytes: &[u8]) {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            let mut lost = LOST.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            lost.get_or_insert_with(|| error.to_string());
+        }
+        _ => {}
+    }
+}
+
+/// Says on stderr, in one line, what went wrong; in vain where stderr is gone.
+pub fn error(message: impl Display) {
+    let message = message.to_string();
+    // one write: a line of another process does not come between
+    let _ = std::io::stderr().write_all(format!("error: {}\n", escaped(&message)).as_bytes());
+}
+
+/// The same where a terminal may be in the middle of the progress line.
+pub fn error_below_progress(message: impl Display) {
+    if std::io::stderr().is_terminal() {
+        let _ = std::io::stderr().write_all(b"\n");
+    }
+    error(message);
+}
+
+/// The end of a command: its error, if it has one, and the exit code.
+pub fn end(result: Result<(), Failure>) -> ExitCode {
+    let lost = LOST.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take();
+    let lost = lost.map(|problem| Failure::failed(format!("standard output: cannot write: {problem}")));
+    match result.and_then(|()| lost.map_or(Ok(()), Err)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            error(&failure);
+            failure.exit_code()
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! What a profile is given as: the intensity I in units of the continuum, or what the line takes from it, `1 - I` (as LSD solves for
+//! it) or `I - 1`. It is told by the continuum at both ends, which is near 1 or near 0, and by the sign of the line.
+
+use super::text::RawProfile;
+
+/// What the column of intensities holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Given {
+    /// I.
+    Intensity,
+    /// 1 - I: the continuum is at 0, the line above it.
+    Depth,
+    /// I - 1: the continuum is at 0, the line below it.
+    Excess,
+}
+
+/// A continuum within this of 0 is no continuum of I.
+const NEAR_ZERO: f64 = 0.2;
+
+/// Share of the bins at either end that are taken for continuum, and of those that a running mean is over.
+const ENDS: f64 = 0.1;
+const SMOOTHED: f64 = 0.05;
+
+/// What is on the other side of the continuum, over the line, is noise or blends below this, and a Stokes V or a null above.
+const ONE_SIDED: f64 = 0.5;
+
+/// What `profile` is given as.
+///
+/// # Errors
+/// A continuum at 0 with as much above as below it.
+pub(super) fn given_as(profile: &RawProfile) -> Result<Given, String> {
+    let bins = profile.intensity.len();
+    let end = ((ENDS * bins as f64) as usize).max(2).min(bins);
+    let mut ends: Vec<f64> = profile.intensity[..end].iter().chain(&profile.intensity[bins - end..]).copied().collect();
+    ends.sort_by(f64::total_cmp);
+    let continuum = 0.5 * (ends[(ends.len() - 1) / 2] + ends[ends.len() / 2]);
+    if continuum.abs() > NEAR_ZERO {
+        return match continuum > 0.0 {
+            true => Ok(Given::Intensity),
+            false => Err(format!("the continuum is at {continuum:.3}: I in units of the continuum is due")),
+        };
+    }
+    let window = ((SMOOTHED * bins as f64) as usize).max(1);
+    let means = profile.intensity.windows(window).map(|w| w.iter().sum::<f64>() / window as f64 - continuum);
+    let (below, above) = means.fold((0.0f64, 0.0f64), |(low, high), mean| (low.max(-mean), high.max(mean)));
+    match (below < ONE_SIDED * above, above < ONE_SIDED * below) {
+        (true, _) => Ok(Given::Depth),
+        (_, true) => Ok(Given::Excess),
+        _ => Err("the continuum is at 0, with as much above as below it: is it Stokes V or a null? I in units of the continuum \
+                  is due"
+            .into()),
+    }
+}
+
+impl Given {
+    /// I.
+    pub fn intensity(self, value: f64) -> f64 {
+        match self {
+            Given::Intensity => value,
+            Given::Depth => 1.0 - value,
+            Given::Excess => 1.0 + value,
+        }
+    }
+
+    /// What to say of it.
+    pub fn remark(self) -> &'static str {
+        match self {
+            Given::Intensity => "given as I",
+            Given::Depth => "given as 1 - I (continuum at 0, line above it), turned into I",
+            Given::Excess => "given as I - 1 (continuum at 0, line below it), turned into I",
+        }
+    }
+}
