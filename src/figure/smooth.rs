@@ -28,7 +28,8 @@ pub(super) fn curve(points: &[Point]) -> Vec<Segment> {
 /// Slopes at the points: level at an extremum, elsewhere a weighted harmonic mean of those to either side.
 fn slopes(points: &[Point]) -> Vec<f64> {
     let width: Vec<f64> = points.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
-    let secant: Vec<f64> = points.windows(2).map(|pair| (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0])).collect();
+    let secant: Vec<f64> =
+        points.windows(2).map(|pair| (pair[1][1] - pair[0][1]) / (pair[1][0] - pair[0][0])).collect();
     let n = points.len();
     let at = |k: usize| match (k.checked_sub(1).map(|before| secant[before]), secant.get(k)) {
         (Some(before), Some(&after)) if before * after > 0.0 && before.is_finite() && after.is_finite() => {

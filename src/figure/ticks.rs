@@ -69,7 +69,7 @@ fn linear(low: f64, high: f64, most: usize) -> Ticks {
 fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     // no decades without end
     if !(low > 0.0 && high.is_finite()) {
-        return Ticks { major: Vec::new(), minor: Vec::new() };
+        return Ticks::default();
     }
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let inside = |value: &f64| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(value);

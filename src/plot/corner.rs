@@ -50,8 +50,7 @@ impl Corner<'_> {
         let top = 8.0 + 9.0 * titles.iter().map(Vec::len).max().unwrap_or(1) as f64;
         let height = (figure.height - top - MARGIN[1] - gap * (n as f64 - 1.0)) / n as f64;
         let named = if n > 5 { short_label } else { label };
-        let axis =
-            |i: usize| Axis { label: named(&self.names[i]), range: self.ranges[i], scale: self.scales[i] };
+        let axis = |i: usize| Axis { label: named(&self.names[i]), range: self.ranges[i], scale: self.scales[i] };
         for row in 0..n {
             for column in 0..=row {
                 let frame = Rect {

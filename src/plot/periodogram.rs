@@ -6,7 +6,8 @@ use super::{POSITIVE, PlotError, velocities};
 use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
 use crate::figure::panel::Sides;
 use crate::figure::{
-    Align, Axis, Colour, Figure, Font, Key, Legend, Marker, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of, width_pt,
+    Align, Axis, Colour, Figure, Font, Key, Legend, Marker, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of,
+    width_pt,
 };
 use crate::io::csv::Columns;
 use crate::origin;
@@ -209,13 +210,7 @@ fn marked(rotation: f64, truth: Option<f64>) -> Vec<Mark> {
     let fractions = [(1.0, "*P*_{rot}"), (2.0, "*P*_{rot}/2"), (3.0, "*P*_{rot}/3"), (4.0, "*P*_{rot}/4")];
     let grey = Stroke::new(GREY, 0.7).dotted();
     let rotation = |(n, text)| Mark { class: "rotation", text, period_d: rotation / n, pen: grey, colour: BLACK };
-    let day = Mark {
-        class: "day",
-        text: "1 d",
-        period_d: 1.0,
-        pen: Stroke::new(PURPLE, 0.9).dotted(),
-        colour: PURPLE,
-    };
+    let day = Mark { class: "day", text: "1 d", period_d: 1.0, pen: Stroke::new(PURPLE, 0.9).dotted(), colour: PURPLE };
     let injected = truth.map(|period_d| Mark {
         class: "truth",
         text: "injected",

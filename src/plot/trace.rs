@@ -232,7 +232,9 @@ pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
 fn criterion(sampled: &Sampled) -> String {
     let Goals { rhat, ess } = sampled.goals;
     let verdict = if sampled.summary.converged { "has converged" } else { "has not converged" };
-    format!("The chain {verdict}; that takes an R-hat of {rhat} at most and an effective sample size of {ess} at least.")
+    format!(
+        "The chain {verdict}; that takes an R-hat of {rhat} at most and an effective sample size of {ess} at least."
+    )
 }
 
 const DASHES: [&[f64]; 2] = [&[], &[1.0, 1.6]];
