@@ -168,3 +168,36 @@ pub(super) fn draw_right(figure: &mut Figure, frame: Rect, axis: &Axis) {
     let at = [frame.right() + GAP + widest + GAP + LABEL_PT, frame.centre()[1]];
     figure.text(&axis.label, at, Font::LABEL, Align::Centre, 90.0);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_close_panels_stay_within_their_own_width() {
+        let ranges = [[0.4, 1.9], [1.7198, 1.7202], [-0.05, 0.05], [2_459_310.2, 2_459_330.9], [0.0, 1.0]];
+        for (range, width) in ranges.into_iter().flat_map(|range| [30.0, 60.0, 200.0].map(|width| (range, width))) {
+            for scale in [Scale::Linear, Scale::Log] {
+                if scale == Scale::Log && range[0] <= 0.0 {
+                    continue;
+                }
+                let frame = Rect { left: 0.0, top: 0.0, width, height: width };
+                let axis = Axis { label: String::new(), range, scale };
+                let found = x_ticks(frame, &axis, Room::Own);
+                let ends: Vec<[f64; 2]> = found
+                    .major
+                    .iter()
+                    .map(|(value, text)| {
+                        let (at, half) = (axis.share(*value) * width, 0.5 * width_pt(text, SMALL_PT));
+                        [at - half, at + half]
+                    })
+                    .collect();
+                assert!(ends.iter().all(|[from, to]| *from >= 0.0 && *to <= width), "{range:?} {width}: {found:?}");
+                assert!(ends.windows(2).all(|pair| pair[0][1] + APART <= pair[1][0]), "{range:?} {width}: {found:?}");
+                let heights = y_ticks(frame, &axis, Room::Own).major;
+                let inside = |value: f64| (2.4..=width - 2.4).contains(&(axis.share(value) * width));
+                assert!(heights.iter().all(|(value, _)| inside(*value)), "{range:?} {width}: {heights:?}");
+            }
+        }
+    }
+}

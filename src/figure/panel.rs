@@ -157,8 +157,8 @@ impl Panel {
         self.clipped(figure, |figure| figure.path(class, path, Paint::stroke(stroke)));
     }
 
-    /// A smooth line through points in the order of their x, which rises and falls only where they do; it breaks where a value is
-    /// not finite.
+    /// A smooth line through points in the order of their x, which rises and falls only where they do; it breaks
+    /// where a value is not finite.
     pub fn smooth_line(&self, figure: &mut Figure, class: &'static str, points: &[[f64; 2]], stroke: Stroke) {
         let places = self.places(points);
         let pieces = places.split(|p| !(p[0].is_finite() && p[1].is_finite()));

@@ -1,5 +1,5 @@
-//! A smooth curve through points: cubic pieces whose slopes are chosen so that it rises and falls only where the points do, with
-//! its maxima and minima on them (Fritsch & Butland 1984).
+//! A smooth curve through points: cubic pieces whose slopes are chosen so that it rises and falls only where the
+//! points do, with its maxima and minima on them (Fritsch & Butland 1984).
 
 use super::{Point, Segment};
 

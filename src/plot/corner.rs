@@ -176,7 +176,8 @@ pub(super) fn figure(sampled: &Sampled) -> Figure {
     let injected = if corner.truth.iter().any(Option::is_some) { "; dashed: injected values" } else { "" };
     figure.caption = format!(
         "Posterior of the sampled parameters after the burn-in: histograms with the 68 % interval shaded, numbers are median and \
-         68 % interval (\"unconstrained\": the data hardly say more than the prior); contours hold 68 and 95 % of the draws{injected}."
+         68 % interval (\"unconstrained\": the data hardly say more than the prior); contours hold 68 and 95 % of the \
+         draws{injected}."
     );
     figure
 }

@@ -285,7 +285,8 @@ impl Scene {
     }
 }
 
-/// The landscape's own contours lie under all else, and are wide enough to be seen on both sides of a line that runs along them.
+/// The landscape's own contours lie under all else, and are wide enough to be seen on both sides of a line that runs
+/// along them.
 const CONTOUR_PEN: Stroke = Stroke::new(BLACK, 2.4);
 
 const CHAIN_PEN: Stroke = Stroke::new(WHITE, 1.0).dashed();

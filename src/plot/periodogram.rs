@@ -262,4 +262,5 @@ fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitFile) {
 
 const CAPTION: &str = "Periodogram. Above: gain in ln L by an orbit of each period, spots marginalised out; dashed: what chance \
                        exceeds in so many searches of stars without a planet. Middle: window function of the times. Below: best \
-                       K, its standard error and its upper limit. Dotted lines: the rotation period and its fractions, and one day.";
+                       K, its standard error and its upper limit. Dotted lines: the rotation period and its fractions, and one \
+                       day.";

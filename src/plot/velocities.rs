@@ -191,8 +191,8 @@ impl Curves<'_> {
 /// Room above the highest end of an error bar and below the lowest, as a share of half the range: that of a legend.
 const MARGIN: f64 = 0.25;
 
-/// All error bars, with as much above `middle` as below it, so that a panel shows what is not centred there; above and below their
-/// own mean where they are all to one side of it.
+/// All error bars, with as much above `middle` as below it, so that a panel shows what is not centred there; above and
+/// below their own mean where they are all to one side of it.
 fn range(series: &[Series], middle: f64) -> [f64; 2] {
     let ends = series.iter().flat_map(|one| {
         let sigma = |k: usize| one.sigma.get(k).copied().unwrap_or(0.0);

@@ -348,10 +348,17 @@ mod tests {
     fn a_search_is_headed_by_its_own_verdict_and_nothing_is_green_beside_a_warning() {
         let search = |finding: &str, warnings: &[&str]| {
             let alias = json!({ "window_frequency_per_d": 1.003, "window": 0.7 });
-            let peak = |period: f64, alias: Value| json!({ "period_d": period, "delta_ln_l": 20.0, "false_alarm_probability": 1e-5, "alias": alias });
+            let peak = |period: f64, alias: Value| {
+                json!({
+                    "period_d": period, "delta_ln_l": 20.0, "false_alarm_probability": 1e-5, "alias": alias
+                })
+            };
             let sentence = "Said once.";
             periodogram(&json!({
-                "verdict": { "finding": finding, "sentence": sentence, "false_alarm_probability": 1e-5, "signal": null, "against": [] },
+                "verdict": {
+                    "finding": finding, "sentence": sentence, "false_alarm_probability": 1e-5, "signal": null,
+                    "against": []
+                },
                 "peaks": [peak(4.0, Value::Null), peak(1.33, alias)], "warnings": warnings
             }))
         };
@@ -386,10 +393,14 @@ mod tests {
 
     #[test]
     fn an_optimum_is_headed_by_the_blind_search() {
-        let verdict = json!({ "finding": "no-planet-needed", "sentence": "No planet.", "false_alarm_probability": 0.7, "signal": null, "against": [] });
+        let verdict = json!({
+            "finding": "no-planet-needed", "sentence": "No planet.", "false_alarm_probability": 0.7, "signal": null,
+            "against": []
+        });
         let remarks = json!([{ "text": "few profiles" }]);
         let chapter = optimum(&json!({
-            "names": [], "well_defined": true, "converged": true, "blind_search": { "verdict": verdict, "remarks": remarks }
+            "names": [], "well_defined": true, "converged": true,
+            "blind_search": { "verdict": verdict, "remarks": remarks }
         }));
         let said: Vec<(Tone, &str)> = chapter.shown_verdicts().collect();
         assert_eq!(said, [(Tone::Neutral, "No planet."), (Tone::Neutral, "A well-defined maximum.")]);

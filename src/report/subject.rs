@@ -5,8 +5,8 @@ use crate::io::lsd::{self, ReadOptions};
 use serde_json::Value;
 use std::path::Path;
 
-/// Star and data of the result in `folder`, whose file says `whole`; `title` names what has no name of its own. Empty for files that
-/// say nothing of a star.
+/// Star and data of the result in `folder`, whose file says `whole`; `title` names what has no name of its own. Empty
+/// for files that say nothing of a star.
 pub(super) fn lines(folder: &Path, title: &str, whole: &Value) -> Vec<(String, String)> {
     let config = whole.get("config").unwrap_or(&Value::Null);
     let star: Vec<String> = [
