@@ -47,6 +47,10 @@ pub struct OptimumFile {
     pub reference: ReferenceRecord,
     /// Where the climbs started and ended, by regularised likelihood.
     pub starts: Vec<StartRecord>,
+    /// Number of profiles.
+    pub profiles: usize,
+    /// First and last time of the data (d).
+    pub time_span_d: Option<[f64; 2]>,
     /// Where all this came from.
     #[serde(flatten)]
     pub provenance: Provenance,
@@ -88,6 +92,8 @@ impl OptimumFile {
             derived_truth,
             reference: ReferenceRecord::of(found.posterior.reference()),
             starts: found.attempts.iter().map(StartRecord::of).collect(),
+            profiles: scene.observations.profiles.len(),
+            time_span_d: scene.observations.time_span_d(),
             provenance: scene.provenance(),
         }
     }

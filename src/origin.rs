@@ -28,6 +28,9 @@ pub struct Origin {
     /// What the config leaves to the observations.
     #[serde(default, skip_serializing_if = "Measured::is_empty")]
     pub measured: Measured,
+    /// Number of profiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profiles: Option<usize>,
     /// First and last time of the data (d).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_span_d: Option<[f64; 2]>,
@@ -147,6 +150,7 @@ impl Origin {
             data_sha256,
             config,
             measured,
+            profiles: Some(scene.observations.profiles.len()),
             time_span_d: scene.observations.time_span_d(),
             truth: scene.truth.map(|values| by_name(&values)),
             reference: ReferenceRecord::of(found.posterior.reference()),

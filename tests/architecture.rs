@@ -74,7 +74,7 @@ const MAY_SEE: &[(&str, &[&str])] = &[
             "verdict",
         ],
     ),
-    ("report", &["chain", "figure", "manifest", "objective", "origin", "plot", "survey", "text", "verdict"]),
+    ("report", &["chain", "figure", "io", "manifest", "objective", "origin", "plot", "survey", "text", "verdict"]),
 ];
 
 struct Source {

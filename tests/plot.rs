@@ -10,7 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde_json::{Value, json};
-use svg::{extent, middle, paths, texts};
+use svg::{extent, middle, paths, placed, texts};
 
 const CONFIG: &str = "config.json";
 
@@ -87,6 +87,8 @@ fn every_folder_has_its_figures() {
         }
     }
 
+    figures_say_what_the_files_do(&desk);
+
     // over the landscape, the chain
     desk.succeed(&["plot", "grid", "--with", "sample", "--out", "with"]);
     let (with, without) = (desk.read("with/landscape.svg"), desk.read("grid/figures/landscape.svg"));
@@ -102,6 +104,98 @@ fn every_folder_has_its_figures() {
             assert!((ellipse - level.sqrt() * bar).abs() < 0.3, "{level}: {ellipse} {bar}");
         }
     }
+}
+
+/// The figures of [`all`], held against the files that they are of.
+fn figures_say_what_the_files_do(desk: &Desk) {
+    let near = |a: f64, b: f64| (a - b).abs() < 0.03;
+    // the highest place of a smooth curve is the highest peak, whose period is written beside it; the day is marked
+    let svg = desk.read("periodogram/figures/periodogram.svg");
+    let peak = &desk.json("periodogram/periodogram.json")["peaks"][0];
+    let period = format!("highest: {:.4} d", peak["period_d"].as_f64().unwrap());
+    assert!(texts(&svg).contains(&period.as_str()) && texts(&svg).contains(&"1 d"), "{period}: {:?}", texts(&svg));
+    let curve = svg.split("<path class=\"delta-ln-l\" d=\"").nth(1).unwrap().split('"').next().unwrap();
+    assert!(curve.contains('C'), "straight lines from period to period");
+    let (points, marker) = (paths(&svg, "delta-ln-l"), middle(&paths(&svg, "highest")[0]));
+    let top = points[0].iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+    assert!(near(top[0], marker[0]) && near(top[1], marker[1]), "{top:?} {marker:?}");
+    // what the program does not judge by is not drawn; what it judges by is said
+    let svg = desk.read("sample/figures/autocorrelation.svg");
+    assert!(!texts(&svg).contains(&"steps/50"));
+    let said = if desk.json("sample/summary.json")["converged"] == true { "converged" } else { "not converged" };
+    let criterion = format!("{said}: R-hat ≤ 1.1, ESS ≥ 100");
+    assert!(texts(&svg).contains(&criterion.as_str()), "{:?}", texts(&svg));
+    // blue below zero, white, red above it, and grey where nothing was observed
+    let svg = desk.read("map/figures/residuals.svg");
+    let scale: Vec<&str> =
+        svg.split("<path class=\"scale\"").skip(1).map(|rest| rest.split("/>").next().unwrap()).collect();
+    assert!(scale.last().unwrap().contains("#67001f") && scale.iter().any(|cell| cell.contains("#ffffff")));
+    assert_eq!(paths(&svg, "not-observed").len(), 3);
+    // zero is in the middle of the residual velocities
+    let svg = desk.read("map/figures/rv.svg");
+    let (zero, frames) = (middle(&paths(&svg, "zero")[0]), paths(&svg, "frame"));
+    assert!(frames.iter().any(|frame| near(middle(frame)[1], zero[1])), "{zero:?}");
+    // the landscape's own contours lie under all lines, and no line hides them
+    let svg = desk.read("grid/figures/landscape.svg");
+    let place = |class: &str| svg.find(&format!("<path class=\"{class}\""));
+    assert!(svg.rfind("<path class=\"contour\"") < place("paraboloid") && place("paraboloid") < place("truth-point"));
+    let width = |class: &str| -> f64 {
+        let rest = &svg[place(class).unwrap()..];
+        rest.split("stroke-width=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+    };
+    assert!(width("contour") > 2.0 * width("paraboloid") && place("paraboloid-ground").is_none());
+}
+
+/// A run of which K, a period with a log-uniform prior, and a phase that may be anything are known.
+#[test]
+fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_touch() {
+    let desk = Desk::new(config());
+    desk.set("/sampler/steps", json!(1));
+    desk.set("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": 0.4, "max": 9.0 }));
+    // whether it converges is all the same
+    desk::dimcmc(&["sample", CONFIG, "--out", "run"], &desk.path(""));
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut text = String::new();
+    for step in 0..60 {
+        for (ensemble, walker) in (0..4).flat_map(|e| (0..8).map(move |w| (e, w))) {
+            let [k, ratio, phi]: [f64; 3] = rng.random();
+            let line = json!({
+                "ensemble": ensemble, "step": step, "walker": walker, "accepted": true, "log_prob": -1.0, "k_kms": 0.4 + 1.5 * k,
+                "porb_over_prot": 0.4 * (9.0_f64 / 0.4).powf(ratio), "phi": phi, "spottedness": 0.05, "chi2": 1.0,
+                "status": "converged", "proposed": "converged", "passes": 10
+            });
+            text += &format!("{line}\n");
+        }
+    }
+    desk.write("run/chain.jsonl", &text);
+    desk.succeed(&["plot", "run", "--out", "out"]);
+    let svg = desk.read("out/corner.svg");
+    let all = placed(&svg);
+    // titles: above the panel, no wider than it, and no number where none means anything
+    let is_title = |text: &str| text.contains("unconstrained") || text.contains('±') || text.contains('+');
+    let titles: Vec<_> = all.iter().filter(|one| is_title(one.text)).collect();
+    assert_eq!((titles.len(), titles[2].text.contains("unconstrained")), (3, true), "{:?}", texts(&svg));
+    let frames = paths(&svg, "frame");
+    let side = extent(&frames[0])[0][1] - extent(&frames[0])[0][0];
+    for title in &titles {
+        let [left, right] = title.x;
+        assert!(right - left < side + 1.0, "{}: {left} {right}", title.text);
+    }
+    // 0.5, 1 and 2 are as far from each other
+    let baseline = all.iter().map(|one| one.y).filter(|y| all.iter().filter(|one| one.y == *y).count() > 4);
+    let baseline = baseline.fold(0.0, f64::max);
+    let numbers: Vec<_> = all.iter().filter(|one| one.y == baseline).collect();
+    let centre = |text: &str| {
+        let found = numbers.iter().find(|one| one.text == text && one.x[0] > extent(&frames[0])[0][1]);
+        let found = found.unwrap_or_else(|| panic!("{text} is not among {:?}", texts(&svg)));
+        0.5 * (found.x[0] + found.x[1])
+    };
+    let (first, second) = (centre("1") - centre("0.5"), centre("2") - centre("1"));
+    assert!((first - second).abs() < 1.0, "{first} {second}");
+    // no number touches another
+    let mut ends: Vec<[f64; 2]> = numbers.iter().map(|one| one.x).collect();
+    ends.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    assert!(ends.windows(2).all(|pair| pair[0][1] + 2.0 < pair[1][0]), "{ends:?}");
 }
 
 #[test]

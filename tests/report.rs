@@ -82,6 +82,25 @@ fn every_folder_has_a_page_that_a_browser_shows() {
         desk.succeed(&["report", folder, "--out", &format!("{folder}.html")]);
         assert!(desk.read(&format!("{folder}.html")).contains(part), "{folder}: {part}");
     }
+    for folder in ["simulate", "map", "periodogram", "optimise", "grid", "sample"] {
+        let page = desk.read(&format!("{folder}.html"));
+        assert!(page.contains("<dt>Star</dt>") && page.contains("12 profiles from"), "{folder}");
+        told_in_order(folder, &page);
+    }
+    for (folder, file, pointer) in [
+        ("periodogram", "periodogram.json", "/verdict/sentence"),
+        ("optimise", "optimum.json", "/blind_search/verdict/sentence"),
+        ("sample", "summary.json", "/verdict/sentence"),
+    ] {
+        let sentence = desk.json(&format!("{folder}/{file}")).pointer(pointer).unwrap().as_str().unwrap().to_owned();
+        let page = desk.read(&format!("{folder}.html"));
+        let first = page.split("<p class=\"verdict").nth(1).unwrap().split('>').nth(1).unwrap();
+        assert!(first.starts_with(&sentence[..40]), "{folder}: {first}");
+    }
+    // the same period as in the figure
+    let period = desk.json("periodogram/periodogram.json")["peaks"][0]["period_d"].as_f64().unwrap();
+    let page = desk.read("periodogram.html");
+    assert!(page.contains(&format!("<tr><td>{period:.4}</td>")) && page.contains(&format!("highest: {period:.4} d")));
     let Some(browser) = browser() else {
         assert!(std::env::var_os("CI").is_none(), "no chromium to look at pages with");
         // past the test's capture, so that it is seen
@@ -91,6 +110,24 @@ fn every_folder_has_a_page_that_a_browser_shows() {
     for folder in ["map", "sample", "periodogram"] {
         for width in [390, 1280] {
             shown(&desk, &browser, folder, width);
+        }
+    }
+}
+
+/// In every chapter warnings stand before tables, nothing is green beside them, and no column of a table is empty.
+fn told_in_order(folder: &str, page: &str) {
+    for chapter in page.split("<section id=\"chapter").skip(1) {
+        let chapter = chapter.split("</section>").next().unwrap();
+        let table = chapter.find("<table").unwrap_or(chapter.len());
+        if let Some(warnings) = chapter.find("class=\"warnings\"") {
+            assert!(warnings < table && !chapter.contains("verdict good"), "{folder}: {chapter}");
+        }
+        for table in chapter.split("<tbody>").skip(1) {
+            let rows = table.split("</tbody>").next().unwrap().split("<tr>").skip(1);
+            let cells = |row: &str| row.split("<td>").skip(1).map(|cell| cell.starts_with("–<")).collect::<Vec<bool>>();
+            let rows: Vec<Vec<bool>> = rows.map(cells).collect();
+            let empty = |k: usize| rows.iter().all(|row| row[k]);
+            assert!(!(0..rows[0].len()).any(empty), "{folder}: {table}");
         }
     }
 }

@@ -54,6 +54,8 @@ pub enum ColourMap {
     Spots,
     /// Black over pale yellow in the middle to dark blue: darker and brighter than the photosphere.
     Brightness,
+    /// Blue over white in the middle to red: below and above zero (the ends of `RdBu`, Brewer & Harrower).
+    Diverging,
 }
 
 impl ColourMap {
@@ -91,7 +93,21 @@ impl ColourMap {
             Colour::hex(0x124c86),
             Colour::hex(0x08234f),
         ];
+        const DIVERGING: [Colour; 11] = [
+            Colour::hex(0x053061),
+            Colour::hex(0x2166ac),
+            Colour::hex(0x4393c3),
+            Colour::hex(0x92c5de),
+            Colour::hex(0xd1e5f0),
+            WHITE,
+            Colour::hex(0xfddbc7),
+            Colour::hex(0xf4a582),
+            Colour::hex(0xd6604d),
+            Colour::hex(0xb2182b),
+            Colour::hex(0x67001f),
+        ];
         match self {
+            ColourMap::Diverging => &DIVERGING,
             ColourMap::Brightness => &BRIGHTNESS,
             ColourMap::Cividis => &CIVIDIS,
             ColourMap::Spots => &SPOTS,
@@ -123,9 +139,12 @@ mod tests {
             let greys: Vec<f64> = (0..=20).map(|k| sign * luminance(map.at(f64::from(k) / 20.0))).collect();
             assert!(greys.windows(2).all(|w| w[1] > w[0] + 2.0), "{map:?}: {greys:?}");
         }
-        // either side of the photosphere by itself
-        let greys: Vec<f64> = (0..=20).map(|k| luminance(ColourMap::Brightness.at(f64::from(k) / 20.0))).collect();
-        assert!(greys[..=10].windows(2).all(|w| w[1] > w[0] + 2.0), "{greys:?}");
-        assert!(greys[10..].windows(2).all(|w| w[1] < w[0] - 2.0), "{greys:?}");
+        // either side of the photosphere, or of zero, by itself
+        for map in [ColourMap::Brightness, ColourMap::Diverging] {
+            let greys: Vec<f64> = (0..=20).map(|k| luminance(map.at(f64::from(k) / 20.0))).collect();
+            assert!(greys[..=10].windows(2).all(|w| w[1] > w[0] + 2.0), "{map:?}: {greys:?}");
+            assert!(greys[10..].windows(2).all(|w| w[1] < w[0] - 2.0), "{map:?}: {greys:?}");
+        }
+        assert_eq!(ColourMap::Diverging.at(0.5), WHITE);
     }
 }

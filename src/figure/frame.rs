@@ -1,7 +1,7 @@
 //! Frames of panels: ticks on all sides, numbers and labels below and to the left.
 
 use super::colour::BLACK;
-use super::panel::{Panel, Sides};
+use super::panel::{Panel, Scale, Sides};
 use super::ticks::{Ticks, ticks};
 use super::{Align, Axis, Figure, Font, LABEL_PT, Paint, Rect, SMALL_PT, Segment, Stroke, width_pt};
 
@@ -21,39 +21,68 @@ fn most(length: f64, apart: f64) -> usize {
     ((length / apart) as usize).clamp(2, 8)
 }
 
-fn x_ticks(frame: Rect, axis: &Axis) -> Ticks {
-    // numbers may not touch: fewer of them where they are long
-    let fits = |found: &Ticks| {
-        let widest = found.major.iter().map(|(_, text)| width_pt(text, SMALL_PT)).fold(0.0, f64::max);
-        widest + 7.0 < frame.width / (found.major.len() as f64 - 0.5).max(1.0)
-    };
-    let tried = (2..=most(frame.width, 14.0)).rev().map(|n| ticks(axis.range, axis.scale, n));
-    tried.into_iter().find(fits).unwrap_or_else(|| ticks(axis.range, axis.scale, 1))
+/// Least distance of the ends of two numbers (pt).
+const APART: f64 = 4.0;
+
+/// Where numbers may stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Room {
+    /// At every tick.
+    Free,
+    /// Within the panel's own width and height: other panels stand close by, whose numbers they would touch.
+    Own,
 }
 
-fn y_ticks(frame: Rect, axis: &Axis) -> Ticks {
+/// Ticks along x; numbers that `room` has no place for are left out.
+fn x_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
+    let half = |text: &str| 0.5 * width_pt(text, SMALL_PT);
+    let at = |value: f64| axis.share(value) * frame.width;
+    let shown = |found: Ticks| match room {
+        Room::Free => found,
+        Room::Own => found.with(|value, text| at(value) >= half(text) && at(value) + half(text) <= frame.width),
+    };
+    // numbers may not touch: fewer of them where they are long
+    let fits = |found: &Ticks| {
+        let mut ends: Vec<[f64; 2]> =
+            found.major.iter().map(|(value, text)| [at(*value) - half(text), at(*value) + half(text)]).collect();
+        ends.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let apart = if axis.scale == Scale::Linear { 1.5 * APART } else { APART };
+        ends.windows(2).all(|pair| pair[0][1] + apart <= pair[1][0])
+    };
+    let tried = (1..=most(frame.width, 14.0)).rev().map(|n| shown(ticks(axis.range, axis.scale, n)));
+    let fitting: Vec<Ticks> = tried.filter(fits).collect();
+    let best = fitting.iter().position(|found| found.major.len() >= 2).unwrap_or(0);
+    fitting.into_iter().nth(best).unwrap_or_else(|| ticks(axis.range, axis.scale, 1).with(|_, _| false))
+}
+
+fn y_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
     let first = most(frame.height, 16.0);
+    let half = 0.5 * CAPITAL * SMALL_PT;
+    let at = |value: f64| axis.share(value) * frame.height;
+    let shown = |found: Ticks| match room {
+        Room::Free => found,
+        Room::Own => found.with(|value, _| at(value) >= half && at(value) + half <= frame.height),
+    };
     // one number alone gives no scale: closer together then, as long as there is room
     let closest = ((frame.height / 9.0) as usize).max(first);
-    let tried = (first..=closest).map(|n| ticks(axis.range, axis.scale, n)).find(|found| found.major.len() >= 3);
-    tried.unwrap_or_else(|| ticks(axis.range, axis.scale, first))
+    let tried = (first..=closest).map(|n| shown(ticks(axis.range, axis.scale, n))).find(|found| found.major.len() >= 3);
+    tried.unwrap_or_else(|| shown(ticks(axis.range, axis.scale, first)))
 }
 
 /// The frame of a panel.
-pub(super) fn draw(panel: &Panel, figure: &mut Figure, sides: Sides) {
-    let y = y_ticks(panel.frame, &panel.y);
-    draw_with(panel, figure, sides, &y);
+pub(super) fn draw(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
+    let y = y_ticks(panel.frame, &panel.y, room);
+    draw_with(panel, figure, sides, &y, room);
 }
 
 /// The frame of a panel without ticks on its sides.
-pub(super) fn draw_without_y(panel: &Panel, figure: &mut Figure, sides: Sides) {
-    let none = Ticks { major: Vec::new(), minor: Vec::new() };
-    draw_with(panel, figure, sides, &none);
+pub(super) fn draw_without_y(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
+    draw_with(panel, figure, sides, &Ticks::default(), room);
 }
 
-fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks) {
+fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks, room: Room) {
     let frame = panel.frame;
-    let x = x_ticks(frame, &panel.x);
+    let x = x_ticks(frame, &panel.x, room);
     let mut path = Vec::new();
     let mut tick = |from: [f64; 2], by: [f64; 2]| {
         path.extend([Segment::Move(from), Segment::Line([from[0] + by[0], from[1] + by[1]])]);
@@ -84,7 +113,8 @@ fn draw_with(panel: &Panel, figure: &mut Figure, sides: Sides, y: &Ticks) {
 
 /// Lengths of ticks, each with the values where they are.
 fn lengths(ticks: &Ticks) -> [(f64, Vec<f64>); 2] {
-    [(MAJOR, ticks.major.iter().map(|(value, _)| *value).collect()), (MINOR, ticks.minor.clone())]
+    let major = ticks.major.iter().map(|(value, _)| *value).chain(ticks.silent.iter().copied());
+    [(MAJOR, major.collect()), (MINOR, ticks.minor.clone())]
 }
 
 fn numbers_below(figure: &mut Figure, frame: Rect, axis: &Axis, ticks: &Ticks) {
@@ -112,7 +142,7 @@ const LEFT_LABEL: f64 = 27.0;
 
 /// Ticks, numbers and label below a bar.
 pub(super) fn draw_below(figure: &mut Figure, frame: Rect, axis: &Axis) {
-    let ticks = x_ticks(frame, axis);
+    let ticks = x_ticks(frame, axis, Room::Free);
     let mut path = Vec::new();
     for (value, _) in &ticks.major {
         let at = frame.left + axis.share(*value) * frame.width;
@@ -124,7 +154,7 @@ pub(super) fn draw_below(figure: &mut Figure, frame: Rect, axis: &Axis) {
 
 /// Ticks, numbers and label to the right of a bar.
 pub(super) fn draw_right(figure: &mut Figure, frame: Rect, axis: &Axis) {
-    let ticks = y_ticks(frame, axis);
+    let ticks = y_ticks(frame, axis, Room::Free);
     let mut path = Vec::new();
     let mut widest: f64 = 0.0;
     for (value, text) in &ticks.major {
@@ -137,4 +167,37 @@ pub(super) fn draw_right(figure: &mut Figure, frame: Rect, axis: &Axis) {
     figure.path("ticks", path, Paint::stroke(PEN));
     let at = [frame.right() + GAP + widest + GAP + LABEL_PT, frame.centre()[1]];
     figure.text(&axis.label, at, Font::LABEL, Align::Centre, 90.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_close_panels_stay_within_their_own_width() {
+        let ranges = [[0.4, 1.9], [1.7198, 1.7202], [-0.05, 0.05], [2_459_310.2, 2_459_330.9], [0.0, 1.0]];
+        for (range, width) in ranges.into_iter().flat_map(|range| [30.0, 60.0, 200.0].map(|width| (range, width))) {
+            for scale in [Scale::Linear, Scale::Log] {
+                if scale == Scale::Log && range[0] <= 0.0 {
+                    continue;
+                }
+                let frame = Rect { left: 0.0, top: 0.0, width, height: width };
+                let axis = Axis { label: String::new(), range, scale };
+                let found = x_ticks(frame, &axis, Room::Own);
+                let ends: Vec<[f64; 2]> = found
+                    .major
+                    .iter()
+                    .map(|(value, text)| {
+                        let (at, half) = (axis.share(*value) * width, 0.5 * width_pt(text, SMALL_PT));
+                        [at - half, at + half]
+                    })
+                    .collect();
+                assert!(ends.iter().all(|[from, to]| *from >= 0.0 && *to <= width), "{range:?} {width}: {found:?}");
+                assert!(ends.windows(2).all(|pair| pair[0][1] + APART <= pair[1][0]), "{range:?} {width}: {found:?}");
+                let heights = y_ticks(frame, &axis, Room::Own).major;
+                let inside = |value: f64| (2.4..=width - 2.4).contains(&(axis.share(value) * width));
+                assert!(heights.iter().all(|(value, _)| inside(*value)), "{range:?} {width}: {heights:?}");
+            }
+        }
+    }
 }

@@ -36,6 +36,7 @@ mod legend;
 pub mod panel;
 mod png;
 mod scatter;
+mod smooth;
 mod svg;
 mod text;
 mod ticks;

@@ -1,7 +1,8 @@
 //! A panel: a rectangle of the page with two axes, and data drawn in it. Nothing that is drawn by its axes leaves it.
 
 use super::colour::{BLACK, Colour, ColourMap, WHITE};
-use super::{Figure, Paint, Point, Rect, Segment, Stroke, closed, open, rectangle};
+use super::frame::Room;
+use super::{Figure, Paint, Point, Rect, Segment, Stroke, closed, open, rectangle, smooth};
 use std::collections::BTreeMap;
 
 /// How values become lengths.
@@ -42,6 +43,15 @@ impl Axis {
         match self.scale {
             Scale::Linear => (value - first) / (last - first),
             Scale::Log => (value / first).ln() / (last / first).ln(),
+        }
+    }
+
+    /// The value at a share of the way from the first end to the second.
+    pub fn value(&self, share: f64) -> f64 {
+        let [first, last] = self.range;
+        match self.scale {
+            Scale::Linear => first + share * (last - first),
+            Scale::Log => first * (last / first).powf(share),
         }
     }
 }
@@ -147,6 +157,15 @@ impl Panel {
         self.clipped(figure, |figure| figure.path(class, path, Paint::stroke(stroke)));
     }
 
+    /// A smooth line through points in the order of their x, which rises and falls only where they do; it breaks
+    /// where a value is not finite.
+    pub fn smooth_line(&self, figure: &mut Figure, class: &'static str, points: &[[f64; 2]], stroke: Stroke) {
+        let places = self.places(points);
+        let pieces = places.split(|p| !(p[0].is_finite() && p[1].is_finite()));
+        let path: Vec<Segment> = pieces.flat_map(smooth::curve).collect();
+        self.clipped(figure, |figure| figure.path(class, path, Paint::stroke(stroke)));
+    }
+
     /// A closed area.
     pub fn area(&self, figure: &mut Figure, class: &'static str, points: &[[f64; 2]], paint: Paint) {
         let path = closed(&self.places(points));
@@ -189,7 +208,7 @@ impl Panel {
         self.line(figure, class, &[[self.x.range[0], y], [self.x.range[1], y]], stroke);
     }
 
-    /// Tiles from x0 to x1 and y0 to y1 in the colours of numbers; what is not finite stays white.
+    /// Tiles from x0 to x1 and y0 to y1 in the colours of numbers; what is not finite stays as it is.
     pub fn tiles(&self, figure: &mut Figure, tiles: impl Iterator<Item = Tile>, shade: Shade) {
         let mut of_colour: BTreeMap<[u8; 4], Vec<Segment>> = BTreeMap::new();
         for Tile { x: [x0, x1], y: [y0, y1], value } in tiles {
@@ -207,17 +226,23 @@ impl Panel {
 
     /// Frame, ticks, numbers and labels; after the data, so that nothing covers them.
     pub fn frame(&self, figure: &mut Figure, sides: Sides) {
-        super::frame::draw(self, figure, sides);
+        super::frame::draw(self, figure, sides, Room::Free);
+    }
+
+    /// The same where other panels stand close by: no number leaves the panel's own width or height, so that those of
+    /// neighbours cannot touch.
+    pub fn close_frame(&self, figure: &mut Figure, sides: Sides) {
+        super::frame::draw(self, figure, sides, Room::Own);
     }
 
     /// The same without ticks on its sides, where heights are only relative.
     pub fn bare_y_frame(&self, figure: &mut Figure) {
-        super::frame::draw_without_y(self, figure, Sides::BOTH);
+        super::frame::draw_without_y(self, figure, Sides::BOTH, Room::Own);
     }
 
     /// The same without numbers.
     pub fn bare_frame(&self, figure: &mut Figure) {
-        super::frame::draw_without_y(self, figure, Sides { below: false, left: false });
+        super::frame::draw_without_y(self, figure, Sides { below: false, left: false }, Room::Own);
     }
 
     /// A text within the panel, at shares of its width (from the left) and height (from above).

@@ -3,12 +3,23 @@
 use super::Scale;
 
 /// Ticks of an axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Ticks {
     /// Values with the text at them.
     pub major: Vec<(f64, String)>,
+    /// Such values without a text, for which there is no room.
+    pub silent: Vec<f64>,
     /// Values between them.
     pub minor: Vec<f64>,
+}
+
+impl Ticks {
+    /// The same with the texts that `has_room` alone.
+    pub fn with(self, has_room: impl Fn(f64, &str) -> bool) -> Self {
+        let (major, left): (Vec<_>, Vec<_>) = self.major.into_iter().partition(|(value, text)| has_room(*value, text));
+        let silent = self.silent.into_iter().chain(left.into_iter().map(|(value, _)| value)).collect();
+        Ticks { major, silent, minor: self.minor }
+    }
 }
 
 /// Ticks between the ends of `range`, about `most` of them with a number.
@@ -31,7 +42,7 @@ fn step(extent: f64, most: usize) -> (f64, i32) {
 
 fn linear(low: f64, high: f64, most: usize) -> Ticks {
     if !(high > low && (high - low).is_finite()) {
-        return Ticks { major: vec![(low, format!("{low}"))], minor: Vec::new() };
+        return Ticks { major: vec![(low, format!("{low}"))], ..Ticks::default() };
     }
     let (step, power) = step(high - low, most);
     let decimals = (-power).max(0) as usize;
@@ -50,6 +61,7 @@ fn linear(low: f64, high: f64, most: usize) -> Ticks {
     let minor = within(step / f64::from(parts)).filter(|(k, _)| k % i64::from(parts) != 0);
     Ticks {
         major: within(step).map(|(_, value)| (value, text(value))).collect(),
+        silent: Vec::new(),
         minor: minor.map(|(_, x)| x).collect(),
     }
 }
@@ -57,7 +69,7 @@ fn linear(low: f64, high: f64, most: usize) -> Ticks {
 fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     // no decades without end
     if !(low > 0.0 && high.is_finite()) {
-        return Ticks { major: Vec::new(), minor: Vec::new() };
+        return Ticks::default();
     }
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let inside = |value: &f64| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(value);
@@ -68,6 +80,10 @@ fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     const DENSITIES: [&[f64]; 4] = [&[1.0, 2.0, 3.0, 5.0, 7.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
     let factors = DENSITIES.into_iter().find(|factors| multiples(factors).count() <= most).unwrap_or(&[1.0]);
     let major: Vec<f64> = multiples(factors).collect();
+    // within less than a decade there may be hardly any of these: round numbers at equal steps then
+    if major.len() < 2 && high < 10.0 * low {
+        return linear(low, high, most);
+    }
     let all = multiples(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
     let minor = all.filter(|x| major.iter().all(|m| (m / x - 1.0).abs() > 1e-6)).collect();
     let text = |value: f64| match value {
@@ -81,7 +97,7 @@ fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
             if factor == 1.0 { format!("10^{{{power}}}") } else { format!("{factor}·10^{{{power}}}") }
         }
     };
-    Ticks { major: major.into_iter().map(|value| (value, text(value))).collect(), minor }
+    Ticks { major: major.into_iter().map(|value| (value, text(value))).collect(), silent: Vec::new(), minor }
 }
 
 /// A range that holds all finite `values` with a margin of `share` of their extent to either side; of positive values only for
@@ -119,6 +135,7 @@ mod tests {
         assert_eq!(texts([980.0, 1020.0], Scale::Linear, 4), ["980", "990", "1000", "1010", "1020"]);
         assert_eq!(texts([1.0, 1000.0], Scale::Log, 4), ["1", "10", "100", "1000"]);
         assert_eq!(texts([0.4, 12.0], Scale::Log, 6), ["0.5", "1", "2", "5", "10"]);
+        assert_eq!(texts([1.6, 1.9], Scale::Log, 4), ["1.6", "1.7", "1.8", "1.9"]);
         for range in [[0.0, 1.0], [1.0, f64::INFINITY], [-1.0, 1.0], [f64::NAN, 1.0]] {
             assert!(texts(range, Scale::Log, 4).is_empty(), "{range:?}");
         }

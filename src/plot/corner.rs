@@ -1,13 +1,14 @@
 //! Corner plots: every parameter by itself and against every other. Of a chain: histograms, and contours of 68 and 95 % of the
-//! draws; a periodic parameter is unwrapped around its mode.
+//! draws; a periodic parameter is unwrapped around its mode, and one with a log-uniform prior has a logarithmic axis.
 
 use super::density::Density;
-use super::symbols::{decimals, label, short_label, value_lines};
+use super::symbols::{Title, decimals, label, short_label};
 use super::trace::{Sampled, TRUTH, shown_range};
 use crate::figure::colour::{BLACK, BLUE, WHITE};
 use crate::figure::panel::Sides;
 use crate::figure::{
-    Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, PAGE_MM, Paint, Panel, Rect, Segment, Stroke, closed,
+    Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Segment, Stroke, closed,
+    width_pt,
 };
 
 /// A triangle of panels.
@@ -15,10 +16,12 @@ pub(super) struct Corner<'a> {
     pub names: &'a [String],
     /// From where to where each parameter is shown.
     pub ranges: Vec<[f64; 2]>,
+    /// How its values become lengths.
+    pub scales: Vec<Scale>,
     /// Injected values.
     pub truth: Vec<Option<f64>>,
-    /// What stands above each histogram: a line or two.
-    pub titles: Vec<Vec<String>>,
+    /// What stands above each histogram.
+    pub titles: Vec<Title>,
 }
 
 /// Room to the left and below (pt).
@@ -42,11 +45,12 @@ impl Corner<'_> {
         };
         let mut figure = Figure::new(name, size, size);
         let gap = 4.0;
-        let top = 8.0 + 9.0 * self.titles.iter().map(Vec::len).max().unwrap_or(1) as f64;
         let side = (figure.width - MARGIN[0] - 6.0 - gap * (n as f64 - 1.0)) / n as f64;
+        let titles = titles(&self.titles, side);
+        let top = 8.0 + 9.0 * titles.iter().map(Vec::len).max().unwrap_or(1) as f64;
         let height = (figure.height - top - MARGIN[1] - gap * (n as f64 - 1.0)) / n as f64;
         let named = if n > 5 { short_label } else { label };
-        let axis = |i: usize| Axis::linear(&named(&self.names[i]), self.ranges[i]);
+        let axis = |i: usize| Axis { label: named(&self.names[i]), range: self.ranges[i], scale: self.scales[i] };
         for row in 0..n {
             for column in 0..=row {
                 let frame = Rect {
@@ -59,11 +63,12 @@ impl Corner<'_> {
                 if row == column {
                     diagonal(&mut figure, frame, axis(row), row);
                     self.finish_diagonal(&mut figure, frame, axis(row), row, sides);
+                    write_title(&mut figure, frame, &titles[row]);
                 } else {
                     let panel = Panel { frame, x: axis(column), y: axis(row) };
                     pair(&mut figure, &panel, column, row);
                     self.truth_lines(&mut figure, &panel, column, row);
-                    panel.frame(&mut figure, sides);
+                    panel.close_frame(&mut figure, sides);
                 }
             }
         }
@@ -86,11 +91,6 @@ impl Corner<'_> {
         } else {
             panel.bare_frame(figure);
         }
-        let lines = &self.titles[i];
-        for (k, line) in lines.iter().enumerate() {
-            let up = 4.0 + 9.0 * (lines.len() - 1 - k) as f64;
-            figure.text(line, [frame.centre()[0], frame.top - up], Font::SMALL, Align::Centre, 0.0);
-        }
     }
 
     fn truth_lines(&self, figure: &mut Figure, panel: &Panel, column: usize, row: usize) {
@@ -107,6 +107,27 @@ impl Corner<'_> {
     }
 }
 
+/// Width of the widest of some lines (pt).
+fn widest(lines: &[String]) -> f64 {
+    lines.iter().map(|line| width_pt(line, Font::SMALL.size)).fold(0.0, f64::max)
+}
+
+/// All titles in as few lines as panels that wide have room for.
+fn titles(titles: &[Title], width: f64) -> Vec<Vec<String>> {
+    let all = |lines: usize| titles.iter().map(|title| title.lines(lines)).collect::<Vec<_>>();
+    let fits = |titles: &Vec<Vec<String>>| titles.iter().all(|lines| widest(lines) <= width);
+    (1..Title::LINES).map(all).find(fits).unwrap_or_else(|| all(Title::LINES))
+}
+
+/// Writes a title above a panel, in smaller letters where it would be wider.
+fn write_title(figure: &mut Figure, frame: Rect, lines: &[String]) {
+    let size = Font::SMALL.size * (frame.width / widest(lines).max(1.0)).min(1.0);
+    for (k, line) in lines.iter().enumerate() {
+        let up = 4.0 + 9.0 * (lines.len() - 1 - k) as f64;
+        figure.text(line, [frame.centre()[0], frame.top - up], Font { size, ..Font::SMALL }, Align::Centre, 0.0);
+    }
+}
+
 /// Shares of the draws that contours hold.
 pub(super) const SHARES: [f64; 2] = [0.95, 0.68];
 
@@ -119,15 +140,19 @@ pub(super) fn area_colours() -> [crate::figure::Colour; 2] {
 pub(super) fn figure(sampled: &Sampled) -> Figure {
     let names = &sampled.summary.names;
     let draws: Vec<Vec<f64>> = (0..names.len()).map(|i| sampled.draws(i)).collect();
-    let range = |i: usize| shown_range(&draws[i], sampled.bounds(i), sampled.near_truth(i));
+    let range = |i: usize| shown_range(&draws[i], sampled.bounds(i), sampled.near_truth(i), sampled.scale(i));
     let title = |name: &String| {
         let one = &sampled.summary.parameters[name];
         let errors = [one.median - one.ci68[0], one.ci68[1] - one.median];
-        value_lines(name, one.median, errors, decimals(one.sd), names.len())
+        match one.unconstrained {
+            true => Title::unconstrained(name),
+            false => Title::value(name, one.median, errors, decimals(one.sd)),
+        }
     };
     let corner = Corner {
         names,
         ranges: (0..names.len()).map(range).collect(),
+        scales: (0..names.len()).map(|i| sampled.scale(i)).collect(),
         truth: (0..names.len()).map(|i| sampled.truth(i)).collect(),
         titles: names.iter().map(title).collect(),
     };
@@ -138,18 +163,21 @@ pub(super) fn figure(sampled: &Sampled) -> Figure {
         legend.add(Key::Line(TRUTH), "injected");
     }
     let diagonal = |figure: &mut Figure, frame: Rect, x: Axis, i: usize| {
-        histogram(figure, frame, x, &draws[i], sampled.summary.parameters[&names[i]].ci68);
+        let one = &sampled.summary.parameters[&names[i]];
+        histogram(figure, frame, x, &draws[i], (!one.unconstrained).then_some(one.ci68));
     };
     let pair = |figure: &mut Figure, panel: &Panel, i: usize, j: usize| {
-        let both: Vec<[f64; 2]> = draws[i].iter().zip(&draws[j]).map(|(x, y)| [*x, *y]).collect();
-        let ranges = [panel.x.range, panel.y.range];
-        contours(figure, panel, Density::of(&both, sampled.effective(), ranges).as_ref());
+        // a share of the panel is what a density on a logarithmic axis is by
+        let both: Vec<[f64; 2]> =
+            draws[i].iter().zip(&draws[j]).map(|(x, y)| [panel.x.share(*x), panel.y.share(*y)]).collect();
+        contours(figure, panel, Density::of(&both, sampled.effective(), [[0.0, 1.0]; 2]).as_ref());
     };
     let mut figure = corner.draw("corner", diagonal, pair, &legend);
     let injected = if corner.truth.iter().any(Option::is_some) { "; dashed: injected values" } else { "" };
     figure.caption = format!(
         "Posterior of the sampled parameters after the burn-in: histograms with the 68 % interval shaded, numbers are median and \
-         68 % interval; contours hold 68 and 95 % of the draws{injected}."
+         68 % interval (\"unconstrained\": the data hardly say more than the prior); contours hold 68 and 95 % of the \
+         draws{injected}."
     );
     figure
 }
@@ -157,41 +185,39 @@ pub(super) fn figure(sampled: &Sampled) -> Figure {
 /// Bins of a histogram.
 const BINS: usize = 40;
 
-fn histogram(figure: &mut Figure, frame: Rect, x: Axis, draws: &[f64], ci68: [f64; 2]) {
+/// The histogram of draws, with their 68 % interval shaded where they have one.
+fn histogram(figure: &mut Figure, frame: Rect, x: Axis, draws: &[f64], ci68: Option<[f64; 2]>) {
     let [low, high] = x.range;
     let mut counts = vec![0.0_f64; BINS];
     for draw in draws.iter().filter(|draw| (low..=high).contains(*draw)) {
-        counts[(((draw - low) / (high - low) * BINS as f64) as usize).min(BINS - 1)] += 1.0;
+        counts[((x.share(*draw) * BINS as f64) as usize).min(BINS - 1)] += 1.0;
     }
     let highest = counts.iter().fold(1.0_f64, |a, b| a.max(*b));
     let panel = Panel { frame, x, y: Axis::linear("", [0.0, 1.12 * highest]) };
-    let edge = |k: usize| low + (high - low) * k as f64 / BINS as f64;
+    let edge = |k: usize| panel.x.value(k as f64 / BINS as f64);
     let steps: Vec<[f64; 2]> = (0..BINS).flat_map(|k| [[edge(k), counts[k]], [edge(k + 1), counts[k]]]).collect();
     let shaded = |from: f64, to: f64| {
         let inside = steps.iter().map(|[x, y]| [x.clamp(from, to), *y]);
         [[from, 0.0]].into_iter().chain(inside).chain([[to, 0.0]]).collect::<Vec<_>>()
     };
     panel.area(figure, "histogram", &shaded(low, high), Paint::fill(area_colours()[0]));
-    // the interval may be a turn away from the draws
-    let centre = 0.5 * (low + high);
-    let turn = if (0.5 * (ci68[0] + ci68[1]) - centre).abs() > 0.5 * (high - low) {
-        (centre - 0.5 * (ci68[0] + ci68[1])).round()
-    } else {
-        0.0
-    };
-    let interval = shaded((ci68[0] + turn).clamp(low, high), (ci68[1] + turn).clamp(low, high));
-    panel.area(figure, "interval68", &interval, Paint::fill(area_colours()[1]));
+    if let Some([from, to]) = ci68 {
+        let interval = shaded(from.clamp(low, high), to.clamp(low, high));
+        panel.area(figure, "interval68", &interval, Paint::fill(area_colours()[1]));
+    }
     panel.line(figure, "histogram", &steps, Stroke::new(BLACK, 0.6));
 }
 
-/// Contours of a density as filled areas.
+/// Contours of a density over shares of the panel as filled areas.
 fn contours(figure: &mut Figure, panel: &Panel, density: Option<&Density>) {
     let Some(density) = density else { return };
     for (share, (class, colour)) in
         SHARES.into_iter().zip([("area95", area_colours()[0]), ("area68", area_colours()[1])])
     {
         let lines = density.outlines(share);
-        let places = |line: &Vec<[f64; 2]>| line.iter().map(|p| panel.place(p[0], p[1])).collect::<Vec<_>>();
+        let frame = panel.frame;
+        let place = |p: &[f64; 2]| [frame.left + p[0] * frame.width, frame.bottom() - p[1] * frame.height];
+        let places = |line: &Vec<[f64; 2]>| line.iter().map(place).collect::<Vec<_>>();
         let path: Vec<Segment> = lines.iter().flat_map(|line| closed(&places(line))).collect();
         let paint = Paint { fill: Some(colour), stroke: Some(Stroke::new(BLUE, 0.7)), sharp: false };
         panel.clipped(figure, |figure| {

@@ -1,9 +1,9 @@
 //! The dynamic spectrum: what changes in the profiles with rotation phase, observed and modelled, and what is left over.
 
 use super::profiles::{Line, extent};
-use crate::figure::colour::ColourMap;
+use crate::figure::colour::{ColourMap, GREY};
 use crate::figure::panel::{Shade, Sides, Tile};
-use crate::figure::{Align, Axis, Figure, Font, PAGE_MM, Panel, Rect};
+use crate::figure::{Align, Axis, Figure, Font, PAGE_MM, Paint, Panel, Rect};
 
 /// Half the phase that a profile fills, at most.
 const HALF_ROW: f64 = 0.015;
@@ -16,7 +16,7 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     let mut figure = Figure::new("residuals", PAGE_MM, 92.0);
     figure.caption = "Dynamic spectra: observed and modelled profiles minus the mean observed profile, and observed minus \
                       modelled in units of the standard error. Rows are profiles, at their rotation phases; phases that were \
-                      not observed stay white."
+                      not observed are grey."
         .into();
     let mean = mean(lines);
     let deviation = |values: &[f64], k: usize| mean.get(k).map_or(f64::NAN, |mean| 100.0 * (values[k] - mean));
@@ -25,8 +25,10 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         .flat_map(|line| (0..line.observed.len()).map(|k| deviation(&line.observed, k).abs()))
         .filter(|x| x.is_finite())
         .fold(0.0, f64::max);
-    let change = Shade { map: ColourMap::Cividis, low: -largest, high: largest };
-    let left_over = Shade { map: ColourMap::Cividis, low: -RESIDUAL, high: RESIDUAL };
+    // of profiles that are all alike, too, zero is in the middle
+    let largest = if largest > 0.0 { largest } else { 1.0 };
+    let change = Shade { map: ColourMap::Diverging, low: -largest, high: largest };
+    let left_over = Shade { map: ColourMap::Diverging, low: -RESIDUAL, high: RESIDUAL };
     let velocities = extent(lines, |line| &line.velocity_kms);
     let (left, gap, bar) = (36.0, 12.0, 52.0);
     let width = (figure.width - left - gap - 2.0 * bar) / 3.0;
@@ -56,8 +58,9 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
                 })
             })
         });
+        figure.rect("not-observed", frame, Paint::fill(GREY.opacity(0.35)));
         panel.tiles(&mut figure, tiles, shade);
-        panel.frame(&mut figure, Sides { below: true, left: k == 0 });
+        panel.close_frame(&mut figure, Sides { below: true, left: k == 0 });
         figure.text(title, [frame.centre()[0], 10.0], Font::LABEL, Align::Centre, 0.0);
         match k {
             1 => shade.upright_bar(&mut figure, frame, "% of the continuum"),

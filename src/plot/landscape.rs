@@ -6,10 +6,10 @@ use super::paraboloid::{self, Paraboloid, ParaboloidFile};
 use super::symbols::{label, nearest_turn, symbol};
 use super::trace::Sampled;
 use super::{PlotError, corner::SHARES};
-use crate::figure::colour::{BLACK, BLUE, ColourMap, VERMILION, WHITE};
+use crate::figure::colour::{BLACK, ColourMap, VERMILION, WHITE};
 use crate::figure::contour::contour;
 use crate::figure::panel::{Shade, Sides, Tile};
-use crate::figure::{Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke};
+use crate::figure::{Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Scale, Stroke};
 use crate::io::landscape;
 use crate::landscape::{Axis as GridAxis, Grid, Landscape};
 use crate::origin;
@@ -202,17 +202,17 @@ impl Scene {
         panel.tiles(figure, (0..x.len()).flat_map(|a| (0..y.len()).map(move |b| (a, b))).map(tile), shade);
         for level in LEVELS {
             for line in contour(x, y, value, level) {
-                panel.line(figure, "contour", &line, Stroke::new(BLACK, 0.7));
+                panel.line(figure, "contour", &line, CONTOUR_PEN);
             }
+        }
+        if let Some(paraboloid) = &self.paraboloid {
+            paraboloid.draw(figure, panel, shown, &LEVELS, lowest || self.grid.axes.len() == 2);
         }
         if let Some(chain) = self.chain.as_ref().filter(|_| lowest || self.grid.axes.len() == 2) {
             self.chain_contours(figure, panel, chain, shown);
         }
         if let Some(truth) = self.truth[i].zip(self.truth[j]) {
             panel.points(figure, "truth-point", &[[truth.0, truth.1]], (Marker::Cross, 5.5, VERMILION));
-        }
-        if let Some(paraboloid) = &self.paraboloid {
-            paraboloid.draw(figure, panel, shown, &LEVELS, lowest || self.grid.axes.len() == 2);
         }
         panel.frame(figure, Sides::BOTH);
     }
@@ -239,11 +239,11 @@ impl Scene {
         });
         let both: Vec<[f64; 2]> = draws[0].iter().zip(&draws[1]).map(|(x, y)| [*x, *y]).collect();
         // where the draws are: the axes may reach much further
-        let range = draws.map(|draws| super::trace::shown_range(&draws, [f64::NEG_INFINITY, f64::INFINITY], None));
+        let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
+        let range = draws.map(|draws| super::trace::shown_range(&draws, everywhere, None, Scale::Linear));
         let Some(density) = Density::of(&both, chain.effective(), range) else { return };
         for share in SHARES {
             for line in density.contours(share) {
-                panel.line(figure, "chain-ground", &line, Stroke::new(WHITE, 2.0));
                 panel.line(figure, "chain", &line, CHAIN_PEN);
             }
         }
@@ -251,7 +251,7 @@ impl Scene {
 
     fn legend(&self) -> Legend {
         let mut legend = Legend::default();
-        legend.add(Key::Line(Stroke::new(BLACK, 0.7)), "Δ*χ*^{2} = 2.30, 5.99");
+        legend.add(Key::Line(CONTOUR_PEN), "Δ*χ*^{2} = 2.30, 5.99");
         if self.paraboloid.is_some() {
             legend.add(Key::Line(paraboloid::PEN), "paraboloid");
         }
@@ -285,7 +285,11 @@ impl Scene {
     }
 }
 
-const CHAIN_PEN: Stroke = Stroke::new(BLUE, 1.1).dashed();
+/// The landscape's own contours lie under all else, and are wide enough to be seen on both sides of a line that runs
+/// along them.
+const CONTOUR_PEN: Stroke = Stroke::new(BLACK, 2.4);
+
+const CHAIN_PEN: Stroke = Stroke::new(WHITE, 1.0).dashed();
 
 /// Values of the nodes of an axis, rising: a periodic one leaves [0, 1) rather than wrap.
 fn nodes(axis: &GridAxis) -> Vec<f64> {

@@ -2,10 +2,10 @@
 
 use super::PlotError;
 use super::corner::Corner;
-use super::symbols::{decimals, nearest_turn, value_lines};
+use super::symbols::{Title, decimals, nearest_turn};
 use super::trace::TRUTH;
 use crate::figure::colour::BLUE;
-use crate::figure::{Axis, Figure, Key, Legend, Paint, Panel, Rect, Stroke, panel::gaussian_contour};
+use crate::figure::{Axis, Figure, Key, Legend, Paint, Panel, Rect, Scale, Stroke, panel::gaussian_contour};
 use crate::objective::Parameter;
 use crate::origin;
 use serde::Deserialize;
@@ -53,10 +53,12 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         let periodic = Parameter::from_name(&file.names[i]) == Some(Parameter::Phi);
         Some(if periodic { nearest_turn(truth, best[i]) } else { truth })
     };
-    let title = |i: usize| value_lines(&file.names[i], best[i], [sd[i]; 2], decimals(sd[i]), n);
+    let title = |i: usize| Title::value(&file.names[i], best[i], [sd[i]; 2], decimals(sd[i]));
     let corner = Corner {
         names: &file.names,
         ranges: (0..n).map(|i| [best[i] - 3.6 * sd[i], best[i] + 3.6 * sd[i]]).collect(),
+        // an ellipse is one on linear axes
+        scales: vec![Scale::Linear; n],
         truth: (0..n).map(truth).collect(),
         titles: (0..n).map(title).collect(),
     };

@@ -1,7 +1,7 @@
 //! The paraboloid over a landscape: ellipses above its minimum, cut by a plane or projected onto it.
 
 use super::landscape::turned;
-use crate::figure::colour::{VERMILION, WHITE};
+use crate::figure::colour::VERMILION;
 use crate::figure::panel::gaussian_contour;
 use crate::figure::{Figure, Panel, Stroke};
 use crate::landscape::Grid;
@@ -10,7 +10,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// The pen of its lines.
-pub(super) const PEN: Stroke = Stroke::new(VERMILION, 1.2);
+pub(super) const PEN: Stroke = Stroke::new(VERMILION, 1.0);
 
 /// What is used of `paraboloid.json`.
 #[derive(Deserialize)]
@@ -61,7 +61,6 @@ impl Paraboloid {
             ellipse.iter().flat_map(|covariance| levels.iter().map(move |level| (covariance, level)))
         {
             let line = gaussian_contour(centre, *covariance, level.sqrt());
-            panel.line(figure, "paraboloid-ground", &line, Stroke::new(WHITE, 2.2));
             panel.line(figure, "paraboloid", &line, PEN);
         }
         if projected {

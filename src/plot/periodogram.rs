@@ -1,10 +1,14 @@
 //! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of observation
 //! alone do, and how well K is known.
 
+use super::symbols::PERIOD_DIGITS;
 use super::{POSITIVE, PlotError, velocities};
-use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, VERMILION, WHITE};
+use crate::figure::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
 use crate::figure::panel::Sides;
-use crate::figure::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
+use crate::figure::{
+    Align, Axis, Colour, Figure, Font, Key, Legend, Marker, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of,
+    width_pt,
+};
 use crate::io::csv::Columns;
 use crate::origin;
 use crate::star::Orbit;
@@ -42,9 +46,8 @@ struct Second {
 /// What is marked in a periodogram.
 struct Marks<'a> {
     levels: &'a [Level],
-    peak: Option<&'a OrbitFile>,
-    /// The period that is written at the peak (d).
-    period_d: f64,
+    /// From high to low.
+    peaks: &'a [OrbitFile],
     /// Injected period over rotation period.
     truth: Option<f64>,
 }
@@ -84,15 +87,12 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let injected = file.truth.as_ref().filter(|truth| truth.get("k_kms").is_some_and(|k| *k > 0.0));
     let first = Marks {
         levels: &file.false_alarm.levels,
-        peak: file.peaks.first(),
-        period_d: file.best.period_d,
+        peaks: &file.peaks,
         truth: injected.and_then(|truth| truth.get("porb_over_prot")).copied(),
     };
     figures.push(figure(TABLES[0].1, &table(folder, TABLES[0].0, &file)?, &first)?);
     if let Some(second) = &file.second {
-        let peak = second.peaks.first();
-        let period_d = peak.map_or(f64::NAN, |peak| peak.period_d);
-        let marks = Marks { levels: &second.false_alarm.levels, peak, period_d, truth: None };
+        let marks = Marks { levels: &second.false_alarm.levels, peaks: &second.peaks, truth: None };
         let mut beside = figure(TABLES[1].1, &table(folder, TABLES[1].0, &file)?, &marks)?;
         beside.caption.insert_str(0, "A second planet beside the best orbit. ");
         figures.push(beside);
@@ -118,7 +118,7 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
     let ratio = table.column_within("porb_over_prot", POSITIVE)?;
     let mut figure = Figure::new(name, PAGE_MM, 128.0);
     figure.caption = CAPTION.into();
-    let (left, right, top, gap, bottom) = (40.0, 58.0, 24.0, 5.0, 28.0);
+    let (left, right, top, gap, bottom) = (40.0, 58.0, 28.0, 5.0, 28.0);
     let width = figure.width - left - right;
     let room = figure.height - top - bottom - 2.0 * gap;
     let range = range_of(period.iter().copied(), Scale::Log, 0.0);
@@ -129,31 +129,31 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
         Ok(period.iter().zip(table.column(column)?).map(|(p, y)| [*p, *y]).collect())
     };
 
-    let likelihood = curve("delta_ln_l")?;
+    let likelihood = with_peaks(curve("delta_ln_l")?, found.peaks);
     let levels = found.levels;
     let highest = likelihood.iter().map(|p| p[1]).chain(levels.iter().map(|l| l.delta_ln_l)).fold(1.0, f64::max);
     let x = Axis::log("period (d)", range);
     let above = Panel { frame: frames[0], x: x.clone(), y: Axis::linear("Δ ln *L*", [0.0, 1.15 * highest]) };
     let rotation = period.first().zip(ratio.first()).map(|(p, r)| p / r).unwrap_or(f64::NAN);
     false_alarms(&mut figure, &above, levels);
-    above.line(&mut figure, "delta-ln-l", &likelihood, Stroke::new(BLACK, 0.9));
+    above.smooth_line(&mut figure, "delta-ln-l", &likelihood, Stroke::new(BLACK, 0.9));
 
     let window = Panel { frame: frames[1], x: x.clone(), y: Axis::linear("window", [0.0, 1.05]) };
-    window.line(&mut figure, "window", &curve("window")?, Stroke::new(BLACK, 0.9));
+    window.smooth_line(&mut figure, "window", &curve("window")?, Stroke::new(BLACK, 0.9));
 
     let (sigma, upper, fitted) = (curve("sigma_k_kms")?, curve("k_upper95_kms")?, curve("k_kms")?);
     let all = sigma.iter().chain(&upper).map(|p| p[1]);
     let amplitude = Panel { frame: frames[2], x, y: Axis::log("*K* (km/s)", range_of(all, Scale::Log, 0.08)) };
     let [sigma_pen, upper_pen] = [Stroke::new(BLUE, 1.0), Stroke::new(BLACK, 0.9).dashed()];
     let fitted_pen = Stroke::new(GREEN, 0.8).dotted();
-    amplitude.line(&mut figure, "k", &fitted, fitted_pen);
-    amplitude.line(&mut figure, "sigma-k", &sigma, sigma_pen);
-    amplitude.line(&mut figure, "k-upper", &upper, upper_pen);
+    amplitude.smooth_line(&mut figure, "k", &fitted, fitted_pen);
+    amplitude.smooth_line(&mut figure, "sigma-k", &sigma, sigma_pen);
+    amplitude.smooth_line(&mut figure, "k-upper", &upper, upper_pen);
 
     let panels = [&above, &window, &amplitude];
     marks(&mut figure, panels, rotation, found);
     for (k, panel) in panels.into_iter().enumerate() {
-        panel.frame(&mut figure, Sides { below: k == 2, left: true });
+        panel.close_frame(&mut figure, Sides { below: k == 2, left: true });
     }
     let mut legend = Legend::default();
     legend.add(Key::Line(fitted_pen), "best *K*");
@@ -162,6 +162,21 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
     let beside = Rect { left: frames[2].right() - 2.0, width: right, ..frames[2] };
     legend.draw(&mut figure, beside, [0.0, 0.0]);
     Ok(figure)
+}
+
+/// The curve through its trial periods and, between them, the peaks, which are known more closely.
+fn with_peaks(mut curve: Vec<[f64; 2]>, peaks: &[OrbitFile]) -> Vec<[f64; 2]> {
+    for peak in peaks {
+        let at = [peak.period_d, peak.delta_ln_l];
+        let inside = |pair: &[[f64; 2]]| (at[0] - pair[0][0]) * (at[0] - pair[1][0]) < 0.0;
+        if let Some(k) = curve.windows(2).position(inside) {
+            // what is lower than the curve is none of its peaks
+            if curve[k][1] <= at[1] && curve[k + 1][1] <= at[1] {
+                curve.insert(k + 1, at);
+            }
+        }
+    }
+    curve
 }
 
 /// Lines that chance exceeds once in so many times, with their shares beside the panel, none over another.
@@ -181,44 +196,71 @@ fn false_alarms(figure: &mut Figure, panel: &Panel, levels: &[Level]) {
     }
 }
 
-/// Rotation period and its fractions, the peaks, and the injected period.
+/// A period that is marked through all panels.
+struct Mark {
+    class: &'static str,
+    text: &'static str,
+    period_d: f64,
+    pen: Stroke,
+    colour: Colour,
+}
+
+/// The periods that are marked: the day, the rotation period and its fractions, the injected period.
+fn marked(rotation: f64, truth: Option<f64>) -> Vec<Mark> {
+    let fractions = [(1.0, "*P*_{rot}"), (2.0, "*P*_{rot}/2"), (3.0, "*P*_{rot}/3"), (4.0, "*P*_{rot}/4")];
+    let grey = Stroke::new(GREY, 0.7).dotted();
+    let rotation = |(n, text)| Mark { class: "rotation", text, period_d: rotation / n, pen: grey, colour: BLACK };
+    let day = Mark { class: "day", text: "1 d", period_d: 1.0, pen: Stroke::new(PURPLE, 0.9).dotted(), colour: PURPLE };
+    let injected = truth.map(|period_d| Mark {
+        class: "truth",
+        text: "injected",
+        period_d,
+        pen: Stroke::new(VERMILION, 0.8).dashed(),
+        colour: VERMILION,
+    });
+    fractions.map(rotation).into_iter().chain([day]).chain(injected).collect()
+}
+
+/// Marked periods, their texts above the panels in the lowest line that has room, and the highest peak.
 fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, found: &Marks) {
     let above = panels[0];
-    let inside = |period: f64| {
-        let share = above.x.share(period);
-        (0.0..=1.0).contains(&share)
-    };
-    for (n, text) in [(1.0, "*P*_{rot}"), (2.0, "*P*_{rot}/2"), (3.0, "*P*_{rot}/3"), (4.0, "*P*_{rot}/4")] {
-        let period = rotation / n;
-        if inside(period) {
-            for panel in panels {
-                panel.vertical(figure, "rotation", period, Stroke::new(GREY, 0.7).dotted());
-            }
-            let at = [above.place(period, 0.0)[0], above.frame.top - 4.0];
-            figure.text(text, at, Font::SMALL, Align::Centre, 0.0);
+    // from where to where each line is taken
+    let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
+    for mark in marked(rotation, found.truth.map(|truth| truth * rotation)) {
+        if !(0.0..=1.0).contains(&above.x.share(mark.period_d)) {
+            continue;
         }
-    }
-    if let Some(best) = found.peak {
-        let [x, y] = above.place(best.period_d, best.delta_ln_l);
-        // beside the peak, where the panel has room
-        let (side, align) = if x > above.frame.centre()[0] { (-1.0, Align::Right) } else { (1.0, Align::Left) };
-        figure.polyline("best", &[[x + 3.0 * side, y - 6.0], [x + 13.0 * side, y - 6.0]], Stroke::new(BLUE, 0.8));
-        let text = format!("best: {:.3} d", found.period_d);
-        let width = crate::figure::width_pt(&text, Font::SMALL.size);
-        let left = if side < 0.0 { x - 16.0 - width } else { x + 14.0 };
-        let ground = Rect { left, top: y - 10.5, width: width + 2.0, height: 9.0 };
-        figure.rect("label-ground", ground, Paint::fill(WHITE));
-        figure.text(&text, [x + 15.0 * side, y - 3.5], Font::SMALL.coloured(BLUE), align, 0.0);
-    }
-    if let Some(truth) = found.truth.filter(|truth| inside(truth * rotation)) {
         for panel in panels {
-            panel.vertical(figure, "truth", truth * rotation, Stroke::new(VERMILION, 0.8).dashed());
+            panel.vertical(figure, mark.class, mark.period_d, mark.pen);
         }
-        let at = [above.place(truth * rotation, 0.0)[0], above.frame.top - 13.0];
-        figure.text("injected", at, Font::SMALL.coloured(VERMILION), Align::Centre, 0.0);
+        let x = above.place(mark.period_d, 0.0)[0];
+        let half = 0.5 * width_pt(mark.text, Font::SMALL.size) + 1.5;
+        let is_free = |line: &Vec<[f64; 2]>| line.iter().all(|[from, to]| x + half <= *from || x - half >= *to);
+        let line = lines.iter().position(is_free).unwrap_or(lines.len());
+        lines.resize(lines.len().max(line + 1), Vec::new());
+        lines[line].push([x - half, x + half]);
+        let at = [x, above.frame.top - 4.0 - 8.0 * line as f64];
+        figure.text(mark.text, at, Font::SMALL.coloured(mark.colour), Align::Centre, 0.0);
     }
+    if let Some(peak) = found.peaks.first() {
+        highest(figure, above, peak);
+    }
+}
+
+/// A marker on the highest peak, with its period beside it.
+fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitFile) {
+    let text = format!("highest: {:.PERIOD_DIGITS$} d", peak.period_d);
+    let [x, y] = panel.place(peak.period_d, peak.delta_ln_l);
+    panel.points(figure, "highest", &[[peak.period_d, peak.delta_ln_l]], (Marker::Disc, 3.6, BLUE));
+    let width = width_pt(&text, Font::SMALL.size);
+    // beside the peak, where the panel has room
+    let left = if x > panel.frame.centre()[0] { x - 6.0 - width } else { x + 6.0 };
+    let ground = Rect { left: left - 1.0, top: y - 10.5, width: width + 2.0, height: 9.0 };
+    figure.rect("label-ground", ground, Paint::fill(WHITE));
+    figure.text(&text, [left, y - 3.5], Font::SMALL.coloured(BLUE), Align::Left, 0.0);
 }
 
 const CAPTION: &str = "Periodogram. Above: gain in ln L by an orbit of each period, spots marginalised out; dashed: what chance \
                        exceeds in so many searches of stars without a planet. Middle: window function of the times. Below: best \
-                       K, its standard error and its upper limit. Dotted lines: the rotation period and its fractions.";
+                       K, its standard error and its upper limit. Dotted lines: the rotation period and its fractions, and one \
+                       day.";

@@ -2,6 +2,9 @@
 
 use crate::objective::Parameter;
 
+/// Decimals of a period in days, in figures and tables alike.
+pub const PERIOD_DIGITS: usize = 4;
+
 /// Unit of phi: the part of an orbit from the epoch to the largest radial velocity.
 const PHASE_UNIT: &str = "cycles to max. RV";
 
@@ -46,22 +49,54 @@ pub fn short_label(name: &str) -> String {
     label(name).replace(PHASE_UNIT, "cycles")
 }
 
-/// A value with its error bars, downwards and upwards, as lines above a panel: one where there are few
-/// panels in a row, three where there are many.
-pub fn value_lines(name: &str, value: f64, [down, up]: [f64; 2], digits: usize, panels: usize) -> Vec<String> {
-    let (down, up) = (format!("{down:.digits$}"), format!("{up:.digits$}"));
-    let errors = if down == up { format!("± {up}") } else { format!("+{up} -{down}") };
-    let (symbol, unit) = symbol(name);
-    let unit = match unit {
-        // those of a phase go without saying
-        "" | PHASE_UNIT => String::new(),
-        "°" => "°".to_owned(),
-        unit => format!(" {unit}"),
-    };
-    match panels {
-        0..=3 => vec![format!("{symbol} = {value:.digits$} {errors}{unit}")],
-        4..=5 => vec![symbol.to_owned(), format!("{value:.digits$} {errors}{unit}")],
-        _ => vec![symbol.to_owned(), format!("{value:.digits$}"), errors],
+/// What is said of a parameter above a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Title {
+    symbol: String,
+    /// The value; `None` where the data do not constrain it.
+    value: Option<String>,
+    errors: String,
+    unit: String,
+}
+
+impl Title {
+    /// Lines that a title has at most.
+    pub const LINES: usize = 3;
+
+    /// A value with its error bars, downwards and upwards.
+    pub fn value(name: &str, value: f64, [down, up]: [f64; 2], digits: usize) -> Self {
+        let (down, up) = (format!("{down:.digits$}"), format!("{up:.digits$}"));
+        let (symbol, unit) = symbol(name);
+        let unit = match unit {
+            // those of a phase go without saying
+            "" | PHASE_UNIT => String::new(),
+            "°" => "°".to_owned(),
+            unit => format!(" {unit}"),
+        };
+        Title {
+            symbol: symbol.to_owned(),
+            value: Some(format!("{value:.digits$}")),
+            errors: if down == up { format!("± {up}") } else { format!("+{up} -{down}") },
+            unit,
+        }
+    }
+
+    /// Of a parameter that the data do not constrain, so that no value means anything.
+    pub fn unconstrained(name: &str) -> Self {
+        let symbol = symbol(name).0.to_owned();
+        Title { symbol, value: None, errors: String::new(), unit: String::new() }
+    }
+
+    /// In so many lines, [`Title::LINES`] at most.
+    pub fn lines(&self, lines: usize) -> Vec<String> {
+        let Title { symbol, value, errors, unit } = self;
+        match (value, lines) {
+            (None, 1) => vec![format!("{symbol} unconstrained")],
+            (None, _) => vec![symbol.clone(), "unconstrained".to_owned()],
+            (Some(value), 1) => vec![format!("{symbol} = {value} {errors}{unit}")],
+            (Some(value), 2) => vec![symbol.clone(), format!("{value} {errors}{unit}")],
+            (Some(value), _) => vec![symbol.clone(), value.clone(), errors.clone()],
+        }
     }
 }
 

@@ -4,10 +4,10 @@ use super::PlotError;
 use super::symbols::{nearest_turn, short_label, symbol};
 use crate::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
 use crate::chain::statistics::{quantile, unwrap_around};
-use crate::chain::{Chain, ParameterKind, Series, Summary};
+use crate::chain::{Chain, Goals, ParameterKind, Series, Summary};
 use crate::figure::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figure::panel::Sides;
-use crate::figure::{Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
+use crate::figure::{Align, Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
 use crate::io::journal;
 use crate::manifest::{Manifest, kinds_and_goals};
 use crate::run::CHAIN;
@@ -23,6 +23,8 @@ pub struct Sampled {
     pub chain: Chain,
     /// What sort of number each parameter is.
     pub kinds: Vec<ParameterKind>,
+    /// What every parameter must reach.
+    pub goals: Goals,
     /// What the chain says.
     pub summary: Summary,
     /// Injected values of the parameters and of what follows from them.
@@ -38,11 +40,11 @@ impl Sampled {
         let manifest = Manifest::read(folder)?;
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
         let settings = manifest.settings(folder)?;
-        let (kinds, _) = kinds_and_goals(&settings);
+        let (kinds, goals) = kinds_and_goals(&settings);
         let wrong = |problem: String| PlotError::Content { path: folder.join(CHAIN), problem };
         let (summary, _) = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
         let truth = manifest.truth(&settings, &summary);
-        Ok(Sampled { manifest, chain, kinds, summary, truth })
+        Ok(Sampled { manifest, chain, kinds, goals, summary, truth })
     }
 
     /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
@@ -55,9 +57,16 @@ impl Sampled {
         draws
     }
 
-    /// Mode of a periodic parameter.
+    /// Mode of a periodic parameter, in the turn of its median: the axis around it shows the values of tables.
     fn mode(&self, i: usize) -> Option<f64> {
-        (self.kinds[i] == ParameterKind::Periodic).then(|| self.summary.parameters[&self.summary.names[i]].mode)
+        let one = &self.summary.parameters[&self.summary.names[i]];
+        (self.kinds[i] == ParameterKind::Periodic).then(|| nearest_turn(one.mode, one.median))
+    }
+
+    /// How values of a parameter become lengths: by their logarithms where the prior is even in these.
+    pub(super) fn scale(&self, i: usize) -> Scale {
+        let prior = self.manifest.priors.get(&self.summary.names[i]).and_then(|prior| prior.get("prior")?.as_str());
+        if prior == Some("log-uniform") { Scale::Log } else { Scale::Linear }
     }
 
     /// Series of all steps, unwrapped like the draws.
@@ -125,7 +134,8 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         let series = sampled.series(i, 0);
         let shown = series.iter().flat_map(|ensemble| ensemble.iter().take(WALKERS));
         let values: Vec<f64> = shown.flatten().copied().chain(sampled.near_truth(i)).collect();
-        let y = Axis::linear(&short_label(name), range_of(values.into_iter(), Scale::Linear, 0.05));
+        let scale = sampled.scale(i);
+        let y = Axis { label: short_label(name), range: range_of(values.into_iter(), scale, 0.05), scale };
         let panel = Panel { frame, x: Axis::linear("step", [0.0, (steps - 1).max(1) as f64]), y };
         let kept = sampled.summary.discarded_steps as f64;
         let [low, high] = panel.y.range;
@@ -142,7 +152,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         if let Some(truth) = sampled.truth(i) {
             panel.horizontal(&mut figure, "truth", truth, INJECTED);
         }
-        panel.frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
+        panel.close_frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
     }
     let mut legend = Legend::default();
     for (e, colour) in SERIES.into_iter().enumerate().take(shape.ensembles) {
@@ -169,10 +179,12 @@ const INJECTED: Stroke = Stroke::new(BLACK, 1.0).dashed();
 /// Autocorrelation functions, and autocorrelation times over the length of the chain.
 pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
     let mut figure = Figure::new("autocorrelation", PAGE_MM, 70.0);
-    figure.caption = "Left: autocorrelation of the walkers around the mean of their ensemble, after the burn-in. Right: the \
-                      integrated autocorrelation time as the chain grows; above the dashed line it is a rough estimate, from \
-                      less than 50 times its length."
-        .into();
+    figure.caption = format!(
+        "Left: autocorrelation of the walkers around the mean of their ensemble, after the burn-in. Right: the integrated \
+         autocorrelation time as the chain grows. Convergence is judged between independent ensembles, not by the number of \
+         autocorrelation times. {}",
+        criterion(sampled)
+    );
     let names = &sampled.summary.names;
     let discarded = sampled.summary.discarded_steps;
     let kept = sampled.chain.steps() - discarded;
@@ -190,13 +202,13 @@ pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
     };
     let growth: Vec<Vec<[f64; 2]>> = all.iter().map(|series| growth(series, kept)).collect();
     let largest = growth.iter().flatten().map(|p| p[1]).fold(1.0, f64::max);
+    let smallest = growth.iter().flatten().map(|p| p[1]).filter(|tau| *tau > 0.0).fold(1.0, f64::min);
     let time = Panel {
         frame: frame(1.0),
         x: Axis::log("steps after the burn-in", [10.0, (kept as f64).max(20.0)]),
-        y: Axis::log("autocorrelation time *τ* (steps)", [0.15, 2.0 * largest]),
+        y: Axis::log("autocorrelation time *τ* (steps)", [0.5 * smallest, 2.0 * largest]),
     };
     function.horizontal(&mut figure, "zero", 0.0, Stroke::new(GREY, 0.6));
-    time.line(&mut figure, "limit", &[[10.0, 0.2], [1e6, 2e4]], Stroke::new(BLACK, 0.7).dashed());
     let mut legend = Legend::default();
     for (i, series) in all.iter().enumerate() {
         let pen = Stroke { dash: DASHES[i / SERIES.len() % 2], ..Stroke::new(SERIES[i % SERIES.len()], 1.0) };
@@ -206,12 +218,23 @@ pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
         time.line(&mut figure, "time", &growth[i], pen);
         legend.add(Key::Line(pen), symbol(&names[i]).0);
     }
-    legend.add(Key::Line(Stroke::new(BLACK, 0.7).dashed()), "steps/50");
     function.frame(&mut figure, Sides::BOTH);
     time.frame(&mut figure, Sides::BOTH);
+    let Goals { rhat, ess } = sampled.goals;
+    let said = if sampled.summary.converged { "converged" } else { "not converged" };
+    time.note(&mut figure, &format!("{said}: R-hat ≤ {rhat}, ESS ≥ {ess}"), [0.03, 0.07], Align::Left);
     let middle = 0.5 * figure.width;
     legend.row(&mut figure, [middle, 9.0]);
     figure
+}
+
+/// By what the chain counts as converged, and whether it does.
+fn criterion(sampled: &Sampled) -> String {
+    let Goals { rhat, ess } = sampled.goals;
+    let verdict = if sampled.summary.converged { "has converged" } else { "has not converged" };
+    format!(
+        "The chain {verdict}; that takes an R-hat of {rhat} at most and an effective sample size of {ess} at least."
+    )
 }
 
 const DASHES: [&[f64]; 2] = [&[], &[1.0, 1.6]];
@@ -230,11 +253,15 @@ fn growth(series: &Series, kept: usize) -> Vec<[f64; 2]> {
 }
 
 /// Range of draws that shows all but a thousandth to either side, with some room, within the bounds of the prior.
-pub(super) fn shown_range(draws: &[f64], bounds: [f64; 2], also: Option<f64>) -> [f64; 2] {
+pub(super) fn shown_range(draws: &[f64], bounds: [f64; 2], also: Option<f64>, scale: Scale) -> [f64; 2] {
     let mut sorted = draws.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let ends = [quantile(&sorted, 0.001), quantile(&sorted, 0.999)];
-    let [low, high] = range_of(ends.into_iter().chain(also), Scale::Linear, 0.08);
+    let [low, high] = range_of(ends.into_iter().chain(also), scale, 0.08);
     let (low, high) = (low.max(bounds[0]), high.min(bounds[1]));
-    if high > low { [low, high] } else { [ends[0] - 1.0, ends[1] + 1.0] }
+    match scale {
+        _ if high > low => [low, high],
+        Scale::Linear => [ends[0] - 1.0, ends[1] + 1.0],
+        Scale::Log => [0.5 * ends[0], 2.0 * ends[1]],
+    }
 }

@@ -134,7 +134,9 @@ impl Curves<'_> {
         let span = range_of(self.cycle.iter().copied(), crate::figure::Scale::Linear, 0.03);
         for (k, (label, series)) in self.panels.iter().enumerate() {
             let frame = Rect { left, top: top + k as f64 * (height + gap), width, height };
-            let panel = Panel { frame, x: Axis::linear("rotation cycle", span), y: Axis::linear(label, range(series)) };
+            let middle = if k > self.orbital { 0.0 } else { self.vsys_kms };
+            let y = Axis::linear(label, range(series, middle));
+            let panel = Panel { frame, x: Axis::linear("rotation cycle", span), y };
             match k {
                 k if k == self.orbital => {
                     let steps = 600;
@@ -149,7 +151,7 @@ impl Curves<'_> {
             }
             series.iter().for_each(|one| one.draw(&mut figure, &panel, self.cycle));
             let below = k + 1 == self.panels.len();
-            panel.frame(&mut figure, Sides { below, left: true });
+            panel.close_frame(&mut figure, Sides { below, left: true });
         }
         let middle = left + 0.5 * width;
         legend.row(&mut figure, [middle, 8.0]);
@@ -167,11 +169,8 @@ impl Curves<'_> {
 
     fn fold(&self, figure: &mut Figure, frame: Rect) {
         let (label, series) = &self.panels[self.orbital];
-        let panel = Panel {
-            frame,
-            x: Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]),
-            y: Axis::linear(label, range(series)),
-        };
+        let y = Axis::linear(label, range(series, self.vsys_kms));
+        let panel = Panel { frame, x: Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]), y };
         let phase = |cycle: &f64| (cycle / self.orbit.porb_over_prot - self.orbit.phi).rem_euclid(1.0);
         let curve: Vec<[f64; 2]> = (0..=200)
             .map(|i| f64::from(i) / 200.0)
@@ -189,14 +188,22 @@ impl Curves<'_> {
     }
 }
 
-/// From the lowest to the highest end of an error bar, with room for a legend above.
-fn range(series: &[Series]) -> [f64; 2] {
+/// Room above the highest end of an error bar and below the lowest, as a share of half the range: that of a legend.
+const MARGIN: f64 = 0.25;
+
+/// All error bars, with as much above `middle` as below it, so that a panel shows what is not centred there; above and
+/// below their own mean where they are all to one side of it.
+fn range(series: &[Series], middle: f64) -> [f64; 2] {
     let ends = series.iter().flat_map(|one| {
         let sigma = |k: usize| one.sigma.get(k).copied().unwrap_or(0.0);
         one.y.iter().enumerate().flat_map(move |(k, y)| [y - sigma(k), y + sigma(k)])
     });
-    let [low, high] = range_of(ends, crate::figure::Scale::Linear, 0.06);
-    [low, high + 0.12 * (high - low)]
+    let [low, high] = range_of(ends, crate::figure::Scale::Linear, 0.0);
+    let all = || series.iter().flat_map(|one| &one.y).filter(|y| y.is_finite());
+    let mean = || all().sum::<f64>() / all().count() as f64;
+    let middle = if (low..=high).contains(&middle) { middle } else { mean() };
+    let half = (1.0 + MARGIN) * (high - middle).max(middle - low);
+    if half.is_finite() { [middle - half, middle + half] } else { [low, high] }
 }
 
 fn legend(series: &[Series]) -> Legend {

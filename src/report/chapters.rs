@@ -1,12 +1,13 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, Table, injection, run};
+use super::{Chapter, NOTHING, Table, Tone, injection, is_empty, run, verdicts};
 use crate::manifest;
 use crate::objective::{OrbitQuantity, Parameter, definition};
 use crate::origin;
 use crate::plot::PlotError;
-use crate::plot::symbols::{decimals, label, symbol};
+use crate::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::survey::PARABOLOID;
+use crate::verdict::probability;
 use serde_json::Value;
 use std::path::Path;
 
@@ -35,7 +36,7 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<(Chapter, Value), 
 
 /// A number of a file with so many decimals; a dash where there is none.
 pub(super) fn number(file: &Value, pointer: &str, digits: usize) -> String {
-    file.pointer(pointer).and_then(Value::as_f64).map_or_else(|| "–".into(), |x| format!("{x:.digits$}"))
+    file.pointer(pointer).and_then(Value::as_f64).map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"))
 }
 
 pub(super) fn texts(file: &Value, key: &str) -> Vec<String> {
@@ -43,8 +44,10 @@ pub(super) fn texts(file: &Value, key: &str) -> Vec<String> {
     list.into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
 }
 
+/// A table of names and values, those without one left out.
 pub(super) fn pairs(rows: &[(&str, String)]) -> Table {
-    Table { head: Vec::new(), rows: rows.iter().map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
+    let told = rows.iter().filter(|(_, value)| !is_empty(value));
+    Table { head: Vec::new(), rows: told.map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
 }
 
 fn table(head: &[&str], rows: Vec<Vec<String>>) -> Table {
@@ -55,7 +58,9 @@ fn map(fit: &Value) -> Chapter {
     let converged = fit.get("status").and_then(Value::as_str) == Some("converged");
     let sentence = match converged {
         true => "The map reaches the target chi2 and is the one of greatest entropy that does.",
-        false => "The reconstruction did not converge: this map is not the one of greatest entropy at the target chi2.",
+        false => {
+            "The reconstruction stopped short of the target chi2: this map is not the one of greatest entropy there."
+        }
     };
     let spottedness = match fit.get("darkness") {
         None => ("spot coverage", number(fit, "/spottedness", 4)),
@@ -74,10 +79,15 @@ fn map(fit: &Value) -> Chapter {
     ];
     Chapter {
         heading: "Map".into(),
-        verdict: Some((converged, sentence.into())),
+        verdicts: vec![(tone(converged), sentence.into())],
+        warnings: fit.get("checks").map(|checks| texts(checks, "warnings")).unwrap_or_default(),
         tables: vec![("The fit.".into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters(fit))],
-        notes: Vec::new(),
+        ..Chapter::default()
     }
+}
+
+fn tone(good: bool) -> Tone {
+    if good { Tone::Good } else { Tone::Doubt }
 }
 
 /// How far the brightness is from that of the photosphere.
@@ -111,23 +121,7 @@ fn simulation(truth: &Value) -> Chapter {
 }
 
 fn periodogram(file: &Value) -> Chapter {
-    let probability = file.pointer("/false_alarm/false_alarm_probability").and_then(Value::as_f64);
     let peaks = file.get("peaks").and_then(Value::as_array).cloned().unwrap_or_default();
-    let share = |peak: &Value| peak.get("false_alarm_probability").and_then(Value::as_f64);
-    let first = peaks.first().and_then(share).or(probability);
-    let rivals = rivals(&peaks);
-    let verdict = first.map(|p| match p {
-        p if p < 1e-2 => {
-            let sure = if p < 1e-3 { "A significant signal" } else { "A signal, though not a sure one" };
-            let shown = if p < 1e-3 { format!("{p:.1e}") } else { format!("{p:.4}") };
-            let what = format!("{sure}: the probability that chance gives such a peak is {shown}");
-            match &rivals {
-                Some(rivals) => (false, format!("{what}. But the period is ambiguous: {rivals}.")),
-                None => (p < 1e-3, format!("{what}. The notes say what else may.")),
-            }
-        }
-        p => (false, format!("No significant signal: the probability that chance gives such a peak is {p:.2}.")),
-    });
     let best = |key: &str, sigma: &str| {
         let digits = file.pointer(&format!("/best/{sigma}")).and_then(Value::as_f64).map_or(3, decimals);
         vec![
@@ -152,51 +146,32 @@ fn periodogram(file: &Value) -> Chapter {
         ),
     );
     let peak = |peak: &Value| {
-        let probability = share(peak).map_or_else(|| "–".into(), |p| format!("{p:.1e}"));
+        let chance = peak.get("false_alarm_probability").and_then(Value::as_f64);
+        let chance = chance.map_or_else(|| NOTHING.into(), probability);
         vec![
-            number(peak, "/period_d", 4),
+            number(peak, "/period_d", PERIOD_DIGITS),
             number(peak, "/k_kms", 3),
             number(peak, "/sigma_k_kms", 3),
             number(peak, "/delta_ln_l", 2),
-            probability,
-            alias(peak).unwrap_or_else(|| "–".into()),
+            chance,
+            alias(peak).unwrap_or_else(|| NOTHING.into()),
+            peak.get("rotation").and_then(Value::as_str).unwrap_or(NOTHING).to_owned(),
         ]
     };
-    let mut notes = texts(file, "warnings");
-    notes.extend(["phi"].into_iter().chain(quantities).filter_map(|name| {
-        file.pointer(&format!("/best/{name}")).filter(|value| value.is_number())?;
-        Some(format!("{}: {}.", symbol(name).0, definition(name)?))
-    }));
+    let told = |name: &&str| file.pointer(&format!("/best/{name}")).is_some_and(Value::is_number);
+    let meaning = |name: &str| Some(format!("{}: {}.", symbol(name).0, definition(name)?));
+    let mut notes: Vec<String> = ["phi"].into_iter().chain(quantities).filter(told).filter_map(meaning).collect();
     notes.extend(file.pointer("/co_rotation/statement").and_then(Value::as_str).map(str::to_owned));
-    let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias"];
+    let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias", "period of the star"];
     Chapter {
         heading: "Search for a planet".into(),
-        verdict,
+        verdicts: verdicts::at(file, "/verdict").into_iter().collect(),
+        warnings: texts(file, "warnings"),
+        notes,
         tables: vec![
             ("The best orbit.".into(), table(&["parameter", "best", "error", "injected"], orbit)),
             ("Peaks of the periodogram.".into(), table(&head, peaks.iter().map(peak).collect())),
         ],
-        notes,
-    }
-}
-
-/// Peaks that are lower than the highest by less than this in ln L may be the true one: odds of 20 to 1.
-const AMBIGUOUS: f64 = 3.0;
-
-/// The peaks that may as well be the true one, in words.
-fn rivals(peaks: &[Value]) -> Option<String> {
-    let height = |peak: &Value| peak.get("delta_ln_l").and_then(Value::as_f64);
-    let highest = peaks.first().and_then(height)?;
-    let rival = |peak: &Value| {
-        let below = highest - height(peak).filter(|height| highest - height < AMBIGUOUS)?;
-        let alias = alias(peak).map(|_| ", an alias").unwrap_or_default();
-        Some(format!("{} d{alias} (ln *L* lower by {below:.1})", number(peak, "/period_d", 4)))
-    };
-    let all: Vec<String> = peaks[1..].iter().filter_map(rival).collect();
-    match all.len() {
-        0 => None,
-        1..=3 => Some(format!("it may as well be {}", all.join(" or "))),
-        more => Some(format!("it may as well be {}, or one of {} more", all[..3].join(" or "), more - 3)),
     }
 }
 
@@ -221,19 +196,21 @@ fn landscape(header: &Value, paraboloid: &Value) -> Chapter {
     };
     let refused = paraboloid.get("refused").and_then(Value::as_str);
     let verdict = match (paraboloid, refused) {
-        (Value::Null, _) => Some((false, "The landscape is not finished, or has no paraboloid.".to_owned())),
-        (_, Some(why)) => Some((false, format!("There is no paraboloid: {why}."))),
-        _ => Some(match unbounded(&axes, paraboloid) {
+        (Value::Null, _) => (Tone::Doubt, "The landscape is not finished, or has no paraboloid.".to_owned()),
+        (_, Some(why)) => (Tone::Doubt, format!("There is no paraboloid: {why}.")),
+        _ => match unbounded(&axes, paraboloid) {
             Some(name) => (
-                false,
+                Tone::Doubt,
                 format!(
                     "A paraboloid fits around the highest node, but the error bar of {} is more than half its axis: the nodes \
                      do not bound it.",
                     label(&name)
                 ),
             ),
-            None => (true, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned()),
-        }),
+            None => {
+                (Tone::Good, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned())
+            }
+        },
     };
     let fit = [
         ("nodes that it was fitted to", number(paraboloid, "/nodes", 0)),
@@ -244,12 +221,12 @@ fn landscape(header: &Value, paraboloid: &Value) -> Chapter {
     let head = ["parameter", "axis", "nodes", "vertex", "error", "injected"];
     Chapter {
         heading: "Landscape".into(),
-        verdict,
+        verdicts: vec![verdict],
         tables: vec![
             ("Axes and paraboloid.".into(), table(&head, axes.iter().map(row).collect())),
             ("Fit of the paraboloid.".into(), fitted),
         ],
-        notes: Vec::new(),
+        ..Chapter::default()
     }
 }
 
@@ -292,14 +269,22 @@ fn optimum(file: &Value) -> Chapter {
         (true, false) => "The search ran out of steps; the values may be improved from there.",
         (false, _) => "No well-defined maximum: on the edge of a prior, or the data leave some direction open.",
     };
+    let mut verdicts: Vec<(Tone, String)> = verdicts::at(file, "/blind_search/verdict").into_iter().collect();
+    verdicts.push((tone(defined && converged), sentence.into()));
+    let remarks = file.pointer("/blind_search/remarks").and_then(Value::as_array).into_iter().flatten();
+    let remarks = remarks.filter_map(|remark| remark.get("text")?.as_str().map(str::to_owned));
+    let reference = file
+        .get("reference")
+        .and_then(|record| serde_json::from_value::<origin::ReferenceRecord>(record.clone()).ok()?.warning());
     Chapter {
         heading: "Optimum".into(),
-        verdict: Some((defined && converged, sentence.into())),
+        verdicts,
+        warnings: remarks.chain(reference).collect(),
+        notes,
         tables: vec![(
             "The best parameters, with errors from the curvature.".into(),
             table(&["parameter", "best", "error", "injected"], rows),
         )],
-        notes,
     }
 }
 
@@ -325,7 +310,7 @@ fn comparison(file: &Value) -> Chapter {
             }
         }
         if get("truth").is_some() {
-            let dash = || "–".to_owned();
+            let dash = || NOTHING.to_owned();
             rows.push(vec![
                 label(&name),
                 "injected".into(),
@@ -344,12 +329,13 @@ fn comparison(file: &Value) -> Chapter {
     };
     Chapter {
         heading: "Chain against landscape".into(),
-        verdict: Some((converged, sentence.into())),
+        verdicts: vec![(tone(converged), sentence.into())],
+        warnings: texts(file, "notes"),
         tables: vec![(
             "Estimates; differences and widths in error bars of the chain.".into(),
             table(&["parameter", "by", "value", "68 % interval", "difference", "width"], rows),
         )],
-        notes: texts(file, "notes"),
+        ..Chapter::default()
     }
 }
 
@@ -359,23 +345,66 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn another_peak_nearly_as_high_makes_a_period_ambiguous() {
-        let search = |second: f64| {
+    fn a_search_is_headed_by_its_own_verdict_and_nothing_is_green_beside_a_warning() {
+        let search = |finding: &str, warnings: &[&str]| {
             let alias = json!({ "window_frequency_per_d": 1.003, "window": 0.7 });
-            let peak = |period: f64, height: f64, alias: Value| json!({ "period_d": period, "delta_ln_l": height, "false_alarm_probability": 1e-5, "alias": alias });
-            periodogram(&json!({ "peaks": [peak(4.0, 20.0, Value::Null), peak(1.33, second, alias)] }))
+            let peak = |period: f64, alias: Value| {
+                json!({
+                    "period_d": period, "delta_ln_l": 20.0, "false_alarm_probability": 1e-5, "alias": alias
+                })
+            };
+            let sentence = "Said once.";
+            periodogram(&json!({
+                "verdict": {
+                    "finding": finding, "sentence": sentence, "false_alarm_probability": 1e-5, "signal": null,
+                    "against": []
+                },
+                "peaks": [peak(4.0, Value::Null), peak(1.33, alias)], "warnings": warnings
+            }))
         };
-        let (good, sentence) = search(16.0).verdict.unwrap();
-        assert!(good && !sentence.contains("ambiguous"), "{sentence}");
-        let chapter = search(17.5);
-        let (good, sentence) = chapter.verdict.unwrap();
-        assert!(
-            !good && sentence.contains("ambiguous: it may as well be 1.3300 d, an alias (ln *L* lower by 2.5)"),
-            "{sentence}"
-        );
-        let peaks = &chapter.tables[1].1;
-        assert_eq!((peaks.head.last().unwrap().as_str(), peaks.rows[0][5].as_str()), ("alias", "–"));
-        assert_eq!(peaks.rows[1][5], "of the first, by 1.003/d");
+        let tone = |finding: &str, warnings: &[&str]| {
+            let chapter = search(finding, warnings);
+            let (tone, sentence) = chapter.shown_verdicts().next().unwrap();
+            assert_eq!(sentence, "Said once.");
+            tone
+        };
+        assert_eq!(tone("detection", &[]), Tone::Good);
+        assert_eq!(tone("detection", &["one night decides"]), Tone::Neutral);
+        assert_eq!(tone("candidate", &[]), Tone::Doubt);
+        assert_eq!(tone("no-planet-needed", &[]), Tone::Neutral);
+        let chapter = search("detection", &[]);
+        // errors and spots are nowhere, aliases are
+        let peaks = chapter.tables[1].1.without_empty_columns();
+        assert_eq!(peaks.head, ["period (d)", "Δ ln *L*", "false alarm", "alias"]);
+        assert_eq!(peaks.rows[1], ["1.3300", "20.00", "1.0e-5", "of the first, by 1.003/d"]);
+    }
+
+    #[test]
+    fn what_a_map_warns_of_is_told_and_it_does_not_converge() {
+        let fit = json!({ "status": "max-passes", "checks": { "warnings": ["neighbours go together"] } });
+        let chapter = map(&fit);
+        assert_eq!(chapter.warnings, ["neighbours go together"]);
+        let (tone, sentence) = chapter.shown_verdicts().next().unwrap();
+        assert_eq!(tone, Tone::Doubt);
+        assert!(sentence.contains("stopped short of the target chi2") && !sentence.contains("converge"), "{sentence}");
+        let fit = json!({ "status": "converged", "checks": { "warnings": ["neighbours go together"] } });
+        assert_eq!(map(&fit).shown_verdicts().next().unwrap().0, Tone::Neutral);
+    }
+
+    #[test]
+    fn an_optimum_is_headed_by_the_blind_search() {
+        let verdict = json!({
+            "finding": "no-planet-needed", "sentence": "No planet.", "false_alarm_probability": 0.7, "signal": null,
+            "against": []
+        });
+        let remarks = json!([{ "text": "few profiles" }]);
+        let chapter = optimum(&json!({
+            "names": [], "well_defined": true, "converged": true,
+            "blind_search": { "verdict": verdict, "remarks": remarks }
+        }));
+        let said: Vec<(Tone, &str)> = chapter.shown_verdicts().collect();
+        assert_eq!(said, [(Tone::Neutral, "No planet."), (Tone::Neutral, "A well-defined maximum.")]);
+        assert_eq!(chapter.warnings, ["few profiles"]);
     }
 
     #[test]
@@ -383,11 +412,10 @@ mod tests {
         let good = |error: f64| {
             let header = json!({ "grid": { "axes": [{ "name": "k_kms", "min": 0.1, "max": 0.3, "nodes": 9 }] } });
             let estimate = json!({ "vertex": 0.2, "error": error });
-            landscape(&header, &json!({ "parameters": { "k_kms": estimate }, "nodes": 9, "rms_chi2": 0.01 }))
-                .verdict
-                .unwrap()
-                .0
+            landscape(&header, &json!({ "parameters": { "k_kms": estimate }, "nodes": 9, "rms_chi2": 0.01 })).verdicts
+                [0]
+            .0
         };
-        assert!(good(0.09) && !good(0.11));
+        assert_eq!((good(0.09), good(0.11)), (Tone::Good, Tone::Doubt));
     }
 }

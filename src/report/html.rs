@@ -1,6 +1,6 @@
 //! The page as HTML.
 
-use super::{Chapter, Page, Table, citation};
+use super::{Chapter, Page, Table, Tone, citation};
 use crate::figure::{COLUMN_MM, Figure, plain};
 use std::fmt::Write as _;
 
@@ -21,6 +21,13 @@ pub(super) fn page(page: &Page) -> String {
          report</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{}</p>\n",
         escape(&subtitle(page))
     );
+    if !page.subject.is_empty() {
+        html += "<dl class=\"subject\">";
+        for (label, text) in &page.subject {
+            let _ = write!(html, "<dt>{}</dt><dd>{}</dd>", escape(label), markup(text));
+        }
+        html += "</dl>\n";
+    }
     html += "<nav>";
     for (k, chapter) in page.chapters.iter().enumerate() {
         let _ = write!(html, "<a href=\"#chapter{k}\">{}</a> ", escape(&chapter.heading));
@@ -49,21 +56,34 @@ fn subtitle(page: &Page) -> String {
 
 fn chapter(html: &mut String, k: usize, chapter: &Chapter) {
     let _ = writeln!(html, "<section id=\"chapter{k}\">\n<h2>{}</h2>", escape(&chapter.heading));
-    if let Some((good, sentence)) = &chapter.verdict {
-        let class = if *good { "verdict" } else { "verdict doubt" };
+    for (tone, sentence) in chapter.shown_verdicts() {
+        let class = match tone {
+            Tone::Good => "verdict good",
+            Tone::Neutral => "verdict",
+            Tone::Doubt => "verdict doubt",
+        };
         let _ = writeln!(html, "<p class=\"{class}\">{}</p>", markup(sentence));
     }
-    for (caption, one) in chapter.tables.iter().filter(|(_, table)| !table.rows.is_empty()) {
-        table(html, caption, one);
-    }
-    if !chapter.notes.is_empty() {
-        html.push_str("<h3>Notes</h3>\n<ul class=\"notes\">\n");
-        for note in &chapter.notes {
-            let _ = writeln!(html, "<li>{}</li>", markup(note));
+    list(html, "Warnings", "warnings", &chapter.warnings);
+    list(html, "Notes", "notes", &chapter.notes);
+    for (caption, one) in &chapter.tables {
+        let filled = one.without_empty_columns();
+        if !filled.rows.is_empty() {
+            table(html, caption, &filled);
         }
-        html.push_str("</ul>\n");
     }
     html.push_str("</section>\n");
+}
+
+fn list(html: &mut String, heading: &str, class: &str, lines: &[String]) {
+    if lines.is_empty() {
+        return;
+    }
+    let _ = writeln!(html, "<h3>{heading}</h3>\n<ul class=\"{class}\">");
+    for line in lines {
+        let _ = writeln!(html, "<li>{}</li>", markup(line));
+    }
+    html.push_str("</ul>\n");
 }
 
 fn table(html: &mut String, caption: &str, table: &Table) {

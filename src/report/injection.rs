@@ -40,5 +40,5 @@ pub(super) fn limits(file: &Value) -> Chapter {
         ];
         tables.push(("The linear shortcut against resampled profiles.".into(), pairs(&rows)));
     }
-    Chapter { heading: "Detection limits".into(), tables, notes: texts(file, "warnings"), ..Chapter::default() }
+    Chapter { heading: "Detection limits".into(), tables, warnings: texts(file, "warnings"), ..Chapter::default() }
 }

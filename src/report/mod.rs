@@ -1,5 +1,5 @@
-//! One page of what a folder holds: tables, the verdict in plain words, notes, figures, the config and how to cite. A single
-//! HTML file that needs nothing else: no network, no script, figures as SVG within it.
+//! One page of what a folder holds: star and data, the verdict in plain words and what speaks against it, tables,
+//! figures, the config and how to cite. A single HTML file that needs nothing else: no network, no script, figures as SVG within it.
 //!
 //! Left out: figures (`plot`), and how the page looks (`html`).
 
@@ -8,6 +8,8 @@ mod citation;
 mod html;
 mod injection;
 mod run;
+mod subject;
+mod verdicts;
 
 use crate::figure::Figure;
 use crate::plot::{self, PlotError};
@@ -25,17 +27,60 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
 }
 
+impl Table {
+    /// The same without columns that say nothing in any row.
+    fn without_empty_columns(&self) -> Table {
+        let says = |k: &usize| self.rows.iter().any(|row| row.get(*k).is_some_and(|cell| !is_empty(cell)));
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let kept: Vec<usize> = (0..columns).filter(says).collect();
+        let of = |row: &Vec<String>| kept.iter().filter_map(|k| row.get(*k).cloned()).collect::<Vec<_>>();
+        Table { head: of(&self.head), rows: self.rows.iter().map(of).collect() }
+    }
+}
+
+/// What stands in a cell for which there is no number.
+const NOTHING: &str = "–";
+
+fn is_empty(cell: &str) -> bool {
+    cell.is_empty() || cell == NOTHING
+}
+
+/// How a sentence is meant, for the colour that it has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tone {
+    /// It can be relied on.
+    Good,
+    /// It is neither good nor bad.
+    #[default]
+    Neutral,
+    /// It is to be doubted.
+    Doubt,
+}
+
 /// What is said of one kind of result.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chapter {
     /// Its heading.
     pub heading: String,
-    /// Whether it can be trusted, and a sentence that says so.
-    pub verdict: Option<(bool, String)>,
+    /// What it comes to, a sentence each, the one that heads the result first.
+    pub verdicts: Vec<(Tone, String)>,
+    /// What speaks against it, or must be known beside it.
+    pub warnings: Vec<String>,
+    /// What helps to read it.
+    pub notes: Vec<String>,
     /// Tables, each with a line above it.
     pub tables: Vec<(String, Table)>,
-    /// What to bear in mind.
-    pub notes: Vec<String>,
+}
+
+impl Chapter {
+    /// The verdicts with the tones that they are shown in: nothing is good beside a warning.
+    pub fn shown_verdicts(&self) -> impl Iterator<Item = (Tone, &str)> {
+        let doubted = !self.warnings.is_empty() || self.verdicts.iter().any(|(tone, _)| *tone == Tone::Doubt);
+        self.verdicts.iter().map(move |(tone, sentence)| match tone {
+            Tone::Good if doubted => (Tone::Neutral, sentence.as_str()),
+            tone => (*tone, sentence.as_str()),
+        })
+    }
 }
 
 /// The page.
@@ -43,6 +88,8 @@ pub struct Chapter {
 pub struct Page {
     /// Name of the folder.
     pub title: String,
+    /// Star and data, label and text a line.
+    pub subject: Vec<(String, String)>,
     /// What the folder holds, kind by kind.
     pub chapters: Vec<Chapter>,
     /// All figures.
@@ -59,10 +106,15 @@ pub struct Page {
 /// [`PlotError`]: a folder that is not there or holds nothing that is known, files that are wrong.
 pub fn report(folder: &Path) -> Result<String, PlotError> {
     let figures = plot::figures(folder, None)?;
-    let mut page = Page { title: title(folder), chapters: Vec::new(), figures, config: None, provenance: Vec::new() };
+    let title = title(folder);
+    let mut page =
+        Page { title, subject: Vec::new(), chapters: Vec::new(), figures, config: None, provenance: Vec::new() };
     for file in plot::kinds(folder) {
         let (chapter, whole) = chapters::of(folder, file)?;
         page.chapters.push(chapter);
+        if page.subject.is_empty() {
+            page.subject = subject::lines(folder, &page.title, &whole);
+        }
         page.config = page.config.or_else(|| whole.get("config").cloned());
         if page.provenance.is_empty() {
             page.provenance = provenance(&whole);

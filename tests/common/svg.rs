@@ -42,3 +42,29 @@ pub fn middle(points: &[[f64; 2]]) -> [f64; 2] {
 pub fn texts(svg: &str) -> Vec<&str> {
     svg.split("aria-label=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect()
 }
+
+/// A text that lies: what it says, from where to where along x, about, and its baseline.
+pub struct Placed<'a> {
+    pub text: &'a str,
+    pub x: [f64; 2],
+    pub y: f64,
+}
+
+/// All texts that lie.
+pub fn placed(svg: &str) -> Vec<Placed<'_>> {
+    let one = |rest| {
+        let group: &str = str::split(rest, "</g>").next().unwrap();
+        let glyphs: Vec<&str> = group.split("transform=\"translate(").skip(1).collect();
+        if glyphs.is_empty() || group.contains("rotate(") {
+            return None;
+        }
+        let numbers = |glyph: &str| -> Vec<f64> {
+            glyph.split(['(', ')', ' ', '"']).filter_map(|word| word.parse().ok()).collect()
+        };
+        let (first, last) = (numbers(glyphs[0]), numbers(glyphs[glyphs.len() - 1]));
+        // a digit is 0.57 times as wide as the font's size, which is 2048 units
+        let x = [first[0], last[0] + 0.57 * 2048.0 * last[2]];
+        Some(Placed { text: rest.split('"').next().unwrap(), x, y: first[1] })
+    };
+    svg.split("aria-label=\"").skip(1).filter_map(one).collect()
+}
