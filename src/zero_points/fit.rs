@@ -361,7 +361,6 @@ mod tests {
             let pull = |found: &MeasuredJitter| (found.value_kms - s) / found.without_planet.error_kms;
             let squares = fits.iter().map(|found| pull(found).powi(2)).sum::<f64>() / fits.len() as f64;
             let mean = fits.iter().map(|found| found.value_kms).sum::<f64>() / fits.len() as f64;
-            println!("{s}: {mean}, pulls {}", squares.sqrt());
             // one in 30 profiles knows it to 13 %, sixty of them to 2 %; a mean of squares is above the most likely
             // value
             assert!((mean / s - 1.0).abs() < 0.1 && (0.5..1.5).contains(&squares.sqrt()), "{s}: {mean} {squares}");
@@ -374,7 +373,6 @@ mod tests {
     fn without_zero_points_little_is_found() {
         let fits = fits(0.0, 0.0);
         let square = fits.iter().map(|found| found.value_kms.powi(2)).sum::<f64>() / fits.len() as f64;
-        println!("{}", square.sqrt());
         // 30 profiles know the square of 0.03 to 26 %
         assert!(square.sqrt() < 0.02, "{}", square.sqrt());
         assert!(counted(&fits) <= 2);
