@@ -5,7 +5,7 @@
 
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Planet, Star};
 use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
-use super::{Automatic, EquivalentWidth, ImagingSettings};
+use super::{Automatic, EquivalentWidth, ImagingSettings, VelocityJitter};
 use crate::noise::Weights;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -54,6 +54,8 @@ pub struct Draft {
     pub sigma_scale: Automatic,
     /// Level of the continuum in the files, where it is not 1.
     pub continuum_level: Option<f64>,
+    /// Scatter of the velocity zero points.
+    pub velocity_jitter: VelocityJitter,
     /// The image.
     pub imaging: ImagingSettings,
     /// Starts of the orbit: semi-amplitude (km/s), 0 for no planet; period over the rotation period; phase.
@@ -100,7 +102,7 @@ impl Draft {
                 sigma_scale: Some(self.sigma_scale),
                 continuum_level: self.continuum_level,
                 weights: Weights::default(),
-                velocity_jitter_kms: Default::default(),
+                velocity_jitter_kms: self.velocity_jitter,
                 simulate: None,
             },
             imaging: self.imaging.clone(),

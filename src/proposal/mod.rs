@@ -156,6 +156,7 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     let trial = trial::run(&mut draft, place, Profiles { whole: &whole, cut: &cut }, &values, known)?;
     notes.extend(trial.notes(&draft));
     values.note_errors(known, trial.errors.as_ref(), &mut ledger);
+    Values::note_jitter(draft.velocity_jitter, &mut ledger);
     if trial.measured_vsini {
         ledger.replace(
             "star.vsini_kms",

@@ -4,7 +4,7 @@
 use super::digits::rounded;
 use super::values::Values;
 use super::{Known, Place, ProposalError, to_json};
-use crate::config::{self, Automatic, ConfigError, Draft};
+use crate::config::{self, Automatic, ConfigError, Draft, VelocityJitter};
 use crate::diagnosis::{Diagnosis, Reason};
 use crate::noise::MeasuredErrors;
 use crate::objective::{Parameter, Reference, ReferenceError};
@@ -64,6 +64,9 @@ pub(super) enum End {
     Failed(String),
 }
 
+/// The key of the velocity zero points.
+const JITTER: &str = "observations.velocity_jitter_kms";
+
 /// One draft, tried.
 struct Attempt {
     /// The draft with its profiles; `None` where their errors cannot be measured.
@@ -89,12 +92,23 @@ pub(super) fn run(
 ) -> Result<Trial, ProposalError> {
     let mut trial = Trial { end: End::Untried, errors: None, diagnosis: None, orbit: false, measured_vsini: false };
     if draft.rotation_period_d.is_none() {
-        let stand_in =
-            Draft { rotation_period_d: Some(STAND_IN_D), sigma_scale: Automatic::Fixed(1.0), ..draft.clone() };
+        let stand_in = Draft {
+            rotation_period_d: Some(STAND_IN_D),
+            sigma_scale: Automatic::Fixed(1.0),
+            velocity_jitter: VelocityJitter::default(),
+            ..draft.clone()
+        };
         scene(&stand_in, config, profiles)?;
         return Ok(trial);
     }
-    let mut attempt = attempt_of(draft, config, profiles)?;
+    let mut attempt = match attempt_of(draft, config, profiles) {
+        // few profiles do not tell how much their zero points scatter
+        Err(ProposalError::Config(ConfigError::Key { key, .. })) if key == JITTER => {
+            draft.velocity_jitter = VelocityJitter::default();
+            attempt_of(draft, config, profiles)?
+        }
+        attempt => attempt?,
+    };
     if attempt.misfits && values.is_another_star(known) {
         let measured = Draft { vsini_kms: rounded(values.look.unspotted.vsini_kms, 1), ..draft.clone() };
         let other = attempt_of(&measured, config, profiles)?;
@@ -138,7 +152,9 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attemp
     let scene = match scene(draft, config, profiles) {
         Ok(scene) => scene,
         // what is measured, not what is given
-        Err(ProposalError::Config(ConfigError::Key { key, problem, .. })) if key == "observations.sigma_scale" => {
+        Err(ProposalError::Config(ConfigError::Key { key, problem, .. }))
+            if key == "observations.sigma_scale" || key == JITTER && draft.velocity_jitter != VelocityJitter::Fitted =>
+        {
             let reached = Err(format!("{key}: {problem}"));
             return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
         }

@@ -3,7 +3,7 @@
 use super::digits::{rounded, significant};
 use super::ledger::{Ledger, Source};
 use super::{Given, Known, line};
-use crate::config::{Automatic, Draft, EquivalentWidth, ImagingSettings};
+use crate::config::{Automatic, Draft, EquivalentWidth, ImagingSettings, VelocityJitter};
 use crate::first_look::{Continuum, FirstLook, LineModel, LookError};
 use crate::noise::MeasuredErrors;
 use crate::nuisances::LineAndContinuum;
@@ -139,6 +139,7 @@ impl Values {
             velocity_range_kms: self.velocity_range_kms,
             sigma_scale: known.sigma_scale.as_ref().map_or(Automatic::Auto, |given| Automatic::Fixed(given.value)),
             continuum_level: self.continuum_level,
+            velocity_jitter: VelocityJitter::Fitted,
             imaging: ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) },
             orbit: (0.0, porb_over_prot, 0.0),
             porb_over_prot_range,
@@ -206,6 +207,21 @@ impl Values {
         let given =
             known.sigma_scale.as_ref().map(|given| Given { value: given.value.to_string(), by: given.by.clone() });
         ledger.settle(("observations.sigma_scale", ""), &given, ("auto".to_owned(), Source::Data, &auto));
+    }
+
+    /// The scatter of zero points with its reason.
+    pub fn note_jitter(jitter: VelocityJitter, ledger: &mut Ledger) {
+        const KEY: &str = "observations.velocity_jitter_kms";
+        match jitter {
+            VelocityJitter::Fitted => {
+                let remark = "measured by every command: zero points of single profiles, counted as noise";
+                ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
+            }
+            VelocityJitter::Known(kms) => {
+                let remark = "the profiles do not tell how much their zero points scatter";
+                ledger.note(KEY, kms, "km/s", Source::Assumed, remark);
+            }
+        }
     }
 
     fn vsys_range(&self, vsys_kms: f64, ledger: &mut Ledger) -> (f64, f64) {
