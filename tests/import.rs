@@ -259,7 +259,7 @@ fn zdipys_own_example_reaches_its_target() {
         profiles += &format!("{line}\n");
     }
     desk.write("lopeg/model-voigt-line.dat", "650.0 0.6306 2.41 0.89 1.195 0.66 0.5\n");
-    for (entropy, target) in [(1, 0.10), (2, 0.20)] {
+    for (entropy, target) in [(1, 0.1_f64), (2, 0.2)] {
         let star = "45.0 67.7 0.4232 0.02\n0.0 0.0\n40\n";
         let fit = format!("C {target} 20\n0.0001\n0 15 100.0 Full\n0 none\n1 1.0 1.0\n{entropy} 1.0 1.01\n0 none\n1\n");
         let rest = format!("65000.\n-80.0 80.0\n2456892.015\n{profiles}");

@@ -84,6 +84,8 @@ pub fn read(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
 /// As [`read`].
 pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<DataSet, LsdError> {
     let entries = parse_list(list, &String::from_utf8_lossy(bytes))?;
+    // a list that is none, a profile for one, is told of by what it names
+    entries.iter().filter(|entry| !entry.path.exists()).try_for_each(|entry| read_profile(list, entry).map(drop))?;
     times::check(&entries).map_err(|(line, problem)| LsdError::Line { path: list.into(), line, problem })?;
     read_entries(list, bytes, &entries, options)
 }
