@@ -29,7 +29,9 @@ const APART: f64 = 4.0;
 pub(super) enum Room {
     /// At every tick.
     Free,
-    /// Within the panel's own width and height: other panels stand close by, whose numbers they would touch.
+    /// Within the panel's own width: other panels stand close by to its sides, whose numbers they would touch.
+    OwnWidth,
+    /// Within its own width and height.
     Own,
 }
 
@@ -39,7 +41,9 @@ fn x_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
     let at = |value: f64| axis.share(value) * frame.width;
     let shown = |found: Ticks| match room {
         Room::Free => found,
-        Room::Own => found.with(|value, text| at(value) >= half(text) && at(value) + half(text) <= frame.width),
+        Room::OwnWidth | Room::Own => {
+            found.with(|value, text| at(value) >= half(text) && at(value) + half(text) <= frame.width)
+        }
     };
     // numbers may not touch: fewer of them where they are long
     let fits = |found: &Ticks| {
@@ -60,7 +64,7 @@ fn y_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
     let half = 0.5 * CAPITAL * SMALL_PT;
     let at = |value: f64| axis.share(value) * frame.height;
     let shown = |found: Ticks| match room {
-        Room::Free => found,
+        Room::Free | Room::OwnWidth => found,
         Room::Own => found.with(|value, _| at(value) >= half && at(value) + half <= frame.height),
     };
     // one number alone gives no scale: closer together then, as long as there is room

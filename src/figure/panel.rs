@@ -235,6 +235,11 @@ impl Panel {
         super::frame::draw(self, figure, sides, Room::Own);
     }
 
+    /// The same where other panels stand close by to its sides alone.
+    pub fn narrow_frame(&self, figure: &mut Figure, sides: Sides) {
+        super::frame::draw(self, figure, sides, Room::OwnWidth);
+    }
+
     /// The same without ticks on its sides, where heights are only relative.
     pub fn bare_y_frame(&self, figure: &mut Figure) {
         super::frame::draw_without_y(self, figure, Sides::BOTH, Room::Own);

@@ -60,7 +60,7 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         });
         figure.rect("not-observed", frame, Paint::fill(GREY.opacity(0.35)));
         panel.tiles(&mut figure, tiles, shade);
-        panel.close_frame(&mut figure, Sides { below: true, left: k == 0 });
+        panel.narrow_frame(&mut figure, Sides { below: true, left: k == 0 });
         figure.text(title, [frame.centre()[0], 10.0], Font::LABEL, Align::Centre, 0.0);
         match k {
             1 => shade.upright_bar(&mut figure, frame, "% of the continuum"),

@@ -6,7 +6,7 @@ use super::paraboloid::{self, Paraboloid, ParaboloidFile};
 use super::symbols::{label, nearest_turn, symbol};
 use super::trace::Sampled;
 use super::{PlotError, corner::SHARES};
-use crate::figure::colour::{BLACK, ColourMap, VERMILION, WHITE};
+use crate::figure::colour::{BLACK, BLUE, Colour, ColourMap, VERMILION};
 use crate::figure::contour::contour;
 use crate::figure::panel::{Shade, Sides, Tile};
 use crate::figure::{Align, Axis, COLUMN_MM, Figure, Font, Key, Legend, Marker, PAGE_MM, Panel, Rect, Scale, Stroke};
@@ -287,9 +287,9 @@ impl Scene {
 
 /// The landscape's own contours lie under all else, and are wide enough to be seen on both sides of a line that runs
 /// along them.
-const CONTOUR_PEN: Stroke = Stroke::new(BLACK, 2.4);
+const CONTOUR_PEN: Stroke = Stroke::new(Colour([40, 40, 40, 150]), 2.4);
 
-const CHAIN_PEN: Stroke = Stroke::new(WHITE, 1.0).dashed();
+const CHAIN_PEN: Stroke = Stroke::new(BLUE, 1.1).dashed();
 
 /// Values of the nodes of an axis, rising: a periodic one leaves [0, 1) rather than wrap.
 fn nodes(axis: &GridAxis) -> Vec<f64> {

@@ -118,7 +118,7 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
     let ratio = table.column_within("porb_over_prot", POSITIVE)?;
     let mut figure = Figure::new(name, PAGE_MM, 128.0);
     figure.caption = CAPTION.into();
-    let (left, right, top, gap, bottom) = (40.0, 58.0, 28.0, 5.0, 28.0);
+    let (left, right, top, gap, bottom) = (40.0, 58.0, 28.0, 8.0, 28.0);
     let width = figure.width - left - right;
     let room = figure.height - top - bottom - 2.0 * gap;
     let range = range_of(period.iter().copied(), Scale::Log, 0.0);
@@ -153,7 +153,7 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
     let panels = [&above, &window, &amplitude];
     marks(&mut figure, panels, rotation, found);
     for (k, panel) in panels.into_iter().enumerate() {
-        panel.close_frame(&mut figure, Sides { below: k == 2, left: true });
+        panel.frame(&mut figure, Sides { below: k == 2, left: true });
     }
     let mut legend = Legend::default();
     legend.add(Key::Line(fitted_pen), "best *K*");

@@ -124,7 +124,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
     let rows = names.len() as f64;
     let row_mm = if names.len() > 4 { 22.0 } else { 28.0 };
     let mut figure = Figure::new("traces", PAGE_MM, 22.0 + row_mm * rows);
-    let (left, top, gap) = (46.0, 20.0, 4.0);
+    let (left, top, gap) = (46.0, 20.0, 8.0);
     let height = (figure.height - top - 28.0 - gap * (rows - 1.0)) / rows;
     let steps = sampled.chain.steps();
     let stride = steps.div_ceil(STEPS).max(1);
@@ -152,7 +152,7 @@ pub(super) fn traces(sampled: &Sampled) -> Figure {
         if let Some(truth) = sampled.truth(i) {
             panel.horizontal(&mut figure, "truth", truth, INJECTED);
         }
-        panel.close_frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
+        panel.frame(&mut figure, Sides { below: i + 1 == names.len(), left: true });
     }
     let mut legend = Legend::default();
     for (e, colour) in SERIES.into_iter().enumerate().take(shape.ensembles) {

@@ -128,7 +128,7 @@ impl Curves<'_> {
         let mut figure = Figure::new("rv", if folds { PAGE_MM } else { COLUMN_MM }, 24.0 + 26.0 * rows);
         let mut legend = legend(&self.panels[0].1);
         legend.add(Key::Line(ORBIT), self.orbit_is);
-        let (left, top, gap) = (38.0, 16.0, 5.0);
+        let (left, top, gap) = (38.0, 16.0, 8.0);
         let width = if folds { 0.56 * figure.width - left } else { figure.width - left - 8.0 };
         let height = (figure.height - top - 28.0 - gap * (rows - 1.0)) / rows;
         let span = range_of(self.cycle.iter().copied(), crate::figure::Scale::Linear, 0.03);
@@ -151,7 +151,7 @@ impl Curves<'_> {
             }
             series.iter().for_each(|one| one.draw(&mut figure, &panel, self.cycle));
             let below = k + 1 == self.panels.len();
-            panel.close_frame(&mut figure, Sides { below, left: true });
+            panel.frame(&mut figure, Sides { below, left: true });
         }
         let middle = left + 0.5 * width;
         legend.row(&mut figure, [middle, 8.0]);

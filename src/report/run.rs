@@ -108,12 +108,16 @@ fn period_modes(manifest: &Manifest, summary: &Summary) -> Table {
         return Table::default();
     }
     let rotation_period = manifest.origin.config.pointer("/star/rotation_period_d").and_then(serde_json::Value::as_f64);
+    let days = |p: f64, mode: &PeriodMode| {
+        let digits = decimals(0.5 * p * (mode.ci68[1] - mode.ci68[0])).min(PERIOD_DIGITS);
+        format!("{:.digits$}", p * mode.porb_over_prot)
+    };
     let row = |mode: &PeriodMode| {
         let [low, high] = mode.ci68;
         let digits = decimals(0.5 * (high - low));
         vec![
             format!("{:.0} %", 100.0 * mode.weight),
-            rotation_period.map_or_else(|| NOTHING.into(), |p| format!("{:.PERIOD_DIGITS$}", p * mode.porb_over_prot)),
+            rotation_period.map_or_else(|| NOTHING.into(), |p| days(p, mode)),
             format!("{:.digits$}", mode.porb_over_prot),
             format!("{low:.digits$} to {high:.digits$}"),
             format!("{:.3}", mode.k_kms),
