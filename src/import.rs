@@ -2,8 +2,7 @@
 //! of what has no counterpart here.
 //!
 //! Angles, signs, epoch, units and the Voigt profile of the local line are the same in both (`io::zdipy`). A target
-//! chi2 far from 1 says that the errors are wrong, and becomes a factor on them (the image is the same, and so the
-//! posterior is as wide as it should be).
+//! chi2 far from 1 says that the errors are wrong: they are measured here, with what noise neighbouring bins share.
 
 use crate::config::EquivalentWidth;
 use crate::io::zdipy::{BrightnessEntropy, Field, Input, LocalLineFile, Target};
@@ -71,7 +70,6 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
     let here = |line: usize| place(&input.path, line);
     let given = |field: Field<f64>| Some(Given { value: field.value, by: here(field.line) });
     let (start, end) = input.velocity_range_kms.value;
-    let (chi2_target, sigma_scale) = misfit(input);
     let mut known = Known {
         rotation_period_d: given(input.period_d),
         epoch_d: given(input.epoch_d),
@@ -92,8 +90,7 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
             },
             by: here(input.entropy.line),
         }),
-        chi2_target,
-        sigma_scale,
+        chi2_target: chi2_target(input),
         ..Known::default()
     };
     if let Some(line) = line {
@@ -118,20 +115,23 @@ fn pixels(rings: usize) -> usize {
     ((4.0 / std::f64::consts::PI * (rings * rings) as f64).round() as usize).max(FEWEST)
 }
 
-/// Target chi2 and factor on the errors. A target that is for the magnetic field alone is not taken.
-fn misfit(input: &Input) -> (Option<Given<f64>>, Option<Given<f64>>) {
-    let own_scale = 1.0 / input.chi2_scale.sqrt();
-    let at = place(&input.path, input.target.line);
-    let (target, scale, by) = match input.target.value {
-        Target::Chi2(target) if input.brightness.value => match FAIR_TARGET.contains(&target) {
-            true => (Some(target), own_scale, at),
-            false => (Some(1.0), own_scale * target.sqrt(), format!("{at}, chi^2 of {target} with errors as quoted")),
-        },
-        _ if own_scale != 1.0 => (None, own_scale, place(&input.path, input.brightness.line)),
-        _ => return (None, None),
-    };
-    let given = |value| Given { value, by: by.clone() };
-    (target.map(given), Some(given(digits(scale, 1e-4))))
+/// A target chi2 near 1 for the brightness map; another one says that errors are wrong, which are measured here.
+fn chi2_target(input: &Input) -> Option<Given<f64>> {
+    match input.target.value {
+        Target::Chi2(target) if input.brightness.value && FAIR_TARGET.contains(&target) => {
+            Some(Given { value: target, by: place(&input.path, input.target.line) })
+        }
+        _ => None,
+    }
+}
+
+/// Factor on the errors that the file's target and scaling of chi2 stand for; 1 where they say nothing.
+fn own_scale(input: &Input) -> f64 {
+    let scale = 1.0 / input.chi2_scale.sqrt();
+    match input.target.value {
+        Target::Chi2(target) if input.brightness.value && !FAIR_TARGET.contains(&target) => scale * target.sqrt(),
+        _ => scale,
+    }
 }
 
 fn digits(value: f64, step: f64) -> f64 {
@@ -171,6 +171,18 @@ fn leave_out(input: &Input, rows: &mut Vec<[String; 3]>) {
             );
         }
         Target::Chi2(_) => {}
+    }
+    let scale = digits(own_scale(input), 1e-4);
+    if scale != 1.0 {
+        let target = match input.target.value {
+            Target::Chi2(target) if input.brightness.value => format!("chi^2 of {target} with errors as quoted"),
+            _ => format!("scaling {} of chi^2", input.chi2_scale),
+        };
+        row(
+            input.target.line,
+            target,
+            &format!("errors are measured on the profiles; \"sigma_scale\": {scale} would repeat the file's"),
+        );
     }
     if input.magnetic.value {
         row(input.magnetic.line, "magnetic field".into(), "Stokes V is not modelled here");

@@ -153,7 +153,8 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attemp
         Ok(scene) => scene,
         // what is measured, not what is given
         Err(ProposalError::Config(ConfigError::Key { key, problem, .. }))
-            if key == "observations.sigma_scale" || key == JITTER && draft.velocity_jitter != VelocityJitter::Fitted =>
+            if key == "observations.sigma_scale"
+                || key == JITTER && draft.velocity_jitter != VelocityJitter::Fitted =>
         {
             let reached = Err(format!("{key}: {problem}"));
             return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
