@@ -9,7 +9,8 @@ use crate::chain::modes::period_modes;
 use crate::chain::statistics::quantile;
 use crate::chain::{Chain, ParameterSummary, PeriodMode, Summary};
 use crate::config::Settings;
-use crate::objective::{FreeParameter, Parameter, Prior};
+use crate::objective::{FreeParameter, OrbitQuantity, Parameter, Prior};
+use crate::periodogram::RotationPeriods;
 use crate::verdict::{Finding, Remark, Verdict};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -17,11 +18,21 @@ use rand_chacha::ChaCha8Rng;
 /// A parameter whose 68 % interval is wider than this share of its prior's is not constrained.
 const UNCONSTRAINED: f64 = 0.7;
 
+/// A mode that is wider than this (inverse time bases) is none: the data do not tell its periods from each other.
+const BROAD: f64 = 1.0;
+
 /// A period in no more modes than this, which hold at least that share of the draws, is constrained.
 const FEW_MODES: (usize, f64) = (3, 0.68);
 
 /// A mode of more weight than this has no rival.
 const ALONE: f64 = 0.95;
+
+/// What follows from the orbit means nothing where one of these is not constrained.
+const DERIVED: [(OrbitQuantity, &[Parameter]); 3] = [
+    (OrbitQuantity::Period, &[Parameter::PorbOverProt]),
+    (OrbitQuantity::Maximum, &[Parameter::PorbOverProt, Parameter::Phi]),
+    (OrbitQuantity::Conjunction, &[Parameter::PorbOverProt, Parameter::Phi]),
+];
 
 /// Draws of a prior by which its width is known, to 2 %.
 const PRIOR_DRAWS: usize = 4001;
@@ -31,9 +42,15 @@ impl Manifest {
     pub(super) fn conclude(&self, settings: &Settings, chain: &Chain, summary: &mut Summary) {
         summary.period_modes = self.period_modes(settings, chain, summary.discarded_steps);
         for f in &settings.free {
-            let few = f.parameter == Parameter::PorbOverProt && is_in_few_modes(summary);
+            let few = f.parameter == Parameter::PorbOverProt && self.is_in_few_modes(summary);
             if let Some(one) = summary.parameters.get_mut(f.parameter.name()) {
                 one.unconstrained = !few && is_as_wide(one, f);
+            }
+        }
+        for (name, of) in DERIVED {
+            let open = of.iter().any(|p| summary.parameters.get(p.name()).is_some_and(|one| one.unconstrained));
+            if let Some(one) = summary.derived.get_mut(name.name()) {
+                one.unconstrained = open;
             }
         }
         if let Some((verdict, remarks)) = self.verdict(summary, settings) {
@@ -53,11 +70,22 @@ impl Manifest {
         let draws: Vec<(f64, f64)> = draws(period).zip(draws(k)).collect();
         let mut modes = period_modes(&draws, rotation.time_base_cycles);
         for mode in &mut modes {
+            if is_broad(mode, rotation) {
+                continue;
+            }
             let sigma = 0.5 * (mode.ci68[1] - mode.ci68[0]);
             let imitation = rotation.imitated(mode.porb_over_prot, Some(sigma));
             mode.rotation = imitation.map(|imitation| imitation.words(settings.star.rotation_period_d));
         }
         modes
+    }
+
+    /// Whether a few narrow modes hold most of the draws.
+    fn is_in_few_modes(&self, summary: &Summary) -> bool {
+        let rotation = self.blind_search.as_ref().and_then(|search| search.rotation.as_ref());
+        let Some(rotation) = rotation else { return false };
+        let narrow = summary.period_modes.iter().filter(|mode| !is_broad(mode, rotation));
+        narrow.take(FEW_MODES.0).map(|mode| mode.weight).sum::<f64>() >= FEW_MODES.1
     }
 
     /// The verdict of the blind search, and what the chain has to say to it.
@@ -115,10 +143,9 @@ fn of_the_period(summary: &Summary) -> Vec<Remark> {
     remarks
 }
 
-fn is_in_few_modes(summary: &Summary) -> bool {
-    let weight: f64 = summary.period_modes.iter().take(FEW_MODES.0).map(|mode| mode.weight).sum();
-    // one mode that is as wide as the prior is none
-    summary.period_modes.len() > 1 && weight >= FEW_MODES.1
+fn is_broad(mode: &PeriodMode, rotation: &RotationPeriods) -> bool {
+    let [low, high] = mode.ci68;
+    (1.0 / low - 1.0 / high) * rotation.time_base_cycles > BROAD
 }
 
 /// Whether the posterior is about as wide as the prior.

@@ -4,7 +4,7 @@ use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::record::{OrbitRecord, PeakRecord};
 use crate::objective::{OrbitQuantity, Parameter};
-use crate::text::aligned;
+use crate::text::{Align, aligned, columns};
 use crate::verdict::probability;
 
 /// Peaks shown; the file has the others.
@@ -147,6 +147,7 @@ fn peaks(peaks: &[PeakRecord]) -> String {
             notes.join(", "),
         ]);
     }
-    // notes are of different lengths, or there is none
-    aligned(&rows).lines().map(|line| format!("{}\n", line.trim_end())).collect()
+    let mut aligns = [Align::Right; 8];
+    (aligns[0], aligns[7]) = (Align::Left, Align::Left);
+    columns(&rows, &aligns)
 }
