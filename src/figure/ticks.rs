@@ -81,7 +81,7 @@ fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     let factors = DENSITIES.into_iter().find(|factors| multiples(factors).count() <= most).unwrap_or(&[1.0]);
     let major: Vec<f64> = multiples(factors).collect();
     // within less than a decade there may be hardly any of these: round numbers at equal steps then
-    if major.len() < 2 && high < 10.0 * low {
+    if major.len() < 2 && high > low && high < 10.0 * low {
         return linear(low, high, most);
     }
     let all = multiples(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
