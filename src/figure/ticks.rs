@@ -24,6 +24,9 @@ impl Ticks {
 
 /// Ticks between the ends of `range`, about `most` of them with a number.
 pub(super) fn ticks(range: [f64; 2], scale: Scale, most: usize) -> Ticks {
+    if range.iter().any(|end| end.is_nan()) {
+        return Ticks::default();
+    }
     let (low, high) = (range[0].min(range[1]), range[0].max(range[1]));
     match scale {
         Scale::Linear => linear(low, high, most),
