@@ -24,6 +24,9 @@ impl Ticks {
 
 /// Ticks between the ends of `range`, about `most` of them with a number.
 pub(super) fn ticks(range: [f64; 2], scale: Scale, most: usize) -> Ticks {
+    if range.iter().any(|end| end.is_nan()) {
+        return Ticks::default();
+    }
     let (low, high) = (range[0].min(range[1]), range[0].max(range[1]));
     match scale {
         Scale::Linear => linear(low, high, most),
@@ -81,7 +84,7 @@ fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     let factors = DENSITIES.into_iter().find(|factors| multiples(factors).count() <= most).unwrap_or(&[1.0]);
     let major: Vec<f64> = multiples(factors).collect();
     // within less than a decade there may be hardly any of these: round numbers at equal steps then
-    if major.len() < 2 && high < 10.0 * low {
+    if major.len() < 2 && high > low && high < 10.0 * low {
         return linear(low, high, most);
     }
     let all = multiples(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
