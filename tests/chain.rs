@@ -199,7 +199,7 @@ fn a_good_chain_is_summarised() {
     let rows: Vec<&str> = text.lines().take(4).collect();
     assert!(rows.iter().all(|row| row.chars().count() == rows[0].chars().count()), "{text}");
     assert!(rows[1].contains("0.100") && rows[0].contains("truth") && text.contains("k_kms touches zero"), "{text}");
-    assert!(text.lines().last().unwrap().starts_with("converged"), "{text}");
+    assert!(text.lines().last().unwrap().starts_with("the chain has converged"), "{text}");
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn a_displaced_ensemble_and_a_stuck_walker_are_not_converged() {
     assert!(summary.parameters["phi"].rhat.unwrap() < 1.01, "the other parameter is fine");
     let text = table(&summary, None);
     let last = text.lines().last().unwrap();
-    assert!(last.starts_with("NOT converged: k_kms: R-hat 1.") && last.contains("--extend"), "{last}");
+    assert!(last.starts_with("the chain has NOT converged: k_kms: R-hat 1.") && last.contains("--extend"), "{last}");
 
     let good = chain(&["k_kms"], [4, 8, 400], &mut |rng, _| vec![normal(rng)]);
     let mut stuck = Chain::new(good.shape().clone());

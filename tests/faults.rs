@@ -403,12 +403,13 @@ fn control_characters_in_names_are_escaped() {
     says(&message, &["a\\nb\\u{1b}[31mc: cannot read"]);
     desk.write(odd, &desk.config.to_string().replacen("vsini_kms", "vsi\\nni\\u001b_kms", 1));
     says(&desk.refusal(&["map", odd, "--out", "x"]), &["a\\nb\\u{1b}[31mc: unknown key star.vsi\\nni\\u{1b}_kms"]);
+    std::fs::remove_file(desk.path(odd)).unwrap();
     let table = desk.succeed(&["map", "config.json", "--out", odd]);
     says(&table, &["a\\nb\\u{1b}[31mc: map.json"]);
     assert!(!table.contains('\u{1b}'));
     let page = desk.succeed(&["report", odd, "--out", "report.html"]);
     assert!(page.contains("report.html"));
     let html = desk.read("report.html");
-    says(&html[..600], &["<h1>a\\nb\\u{1b}[31mc</h1>"]);
+    says(&html, &["<h1>a\\nb\\u{1b}[31mc</h1>"]);
     assert!(!html.contains(|c: char| c.is_control() && c != '\n'));
 }

@@ -65,20 +65,20 @@ fn faculae() -> Value {
 }
 
 fn stars() -> Vec<Star> {
-    let fast = Star { rotation_period_d: 0.4232, vsini_kms: 67.0, porb_over_prot: 3.37, ..PLAIN };
-    let slow = Star { rotation_period_d: 5.1, vsini_kms: 21.3, line_sigma_kms: 4.3, porb_over_prot: 1.57, ..PLAIN };
+    let fast = || Star { rotation_period_d: 0.4232, vsini_kms: 67.0, porb_over_prot: 3.37, ..PLAIN };
+    let slow = || Star { rotation_period_d: 5.1, vsini_kms: 21.3, line_sigma_kms: 4.3, porb_over_prot: 1.57, ..PLAIN };
     vec![
         Star { name: "few spots", spots: few(), ..PLAIN },
-        Star { name: "polar cap, fast", spots: polar(), inclination_deg: 40.0, ..fast },
+        Star { name: "polar cap, fast", spots: polar(), inclination_deg: 40.0, ..fast() },
         Star { name: "many small spots", spots: many(), inclination_deg: 70.0, vsini_kms: 55.0, ..PLAIN },
         Star { name: "faculae", spots: few(), faculae: faculae(), ..PLAIN },
-        Star { name: "slow, wide line", spots: few(), ..slow },
-        Star { name: "slow, wide line, zero points", spots: polar(), jitter_kms: 0.1, ..slow },
+        Star { name: "slow, wide line", spots: few(), ..slow() },
+        Star { name: "slow, wide line, zero points", spots: polar(), jitter_kms: 0.1, ..slow() },
         Star { name: "correlated noise", spots: polar(), correlated_bins: 4.0, snr: 500.0, ..PLAIN },
         Star { name: "continua scatter by 1 %", spots: few(), continuum: (0.01, 1.0), ..PLAIN },
-        Star { name: "continuum at 0.977", spots: many(), continuum: (0.0, 0.977), ..fast },
+        Star { name: "continuum at 0.977", spots: many(), continuum: (0.0, 0.977), ..fast() },
         Star { name: "zero points", spots: few(), jitter_kms: 0.1, ..PLAIN },
-        Star { name: "zero points, fast", spots: many(), jitter_kms: 0.1, snr: 700.0, ..fast },
+        Star { name: "zero points, fast", spots: many(), jitter_kms: 0.1, snr: 700.0, ..fast() },
         Star {
             name: "everything",
             spots: polar(),
@@ -107,7 +107,7 @@ impl Star {
         let mut simulate = json!({
             "spots": self.spots, "cycles": self.cycles(), "snr": self.snr, "seed": seed, "pixels": 20000,
             "velocity_kms": { "min": -reach, "max": reach, "step": 1.8 },
-            "continuum": { "continuum_offset": self.continuum.0 },
+            "continuum": { "offset": self.continuum.0 },
             "velocity_jitter_kms": self.jitter_kms, "correlated_bins": self.correlated_bins
         });
         if !self.faculae.is_null() {

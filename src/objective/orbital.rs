@@ -277,7 +277,7 @@ mod tests {
     fn errors_are_propagated() {
         let orbit = Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.3 };
         // period and phi of which only a combination is known, the phase 107 cycles after the epoch
-        let (sp, sphi, sk, small): (f64, f64, f64, f64) = (1e-3, 1e-3 * 62.7, 0.01, 1e-3);
+        let (sp, sphi, sk, small): (f64, f64, f64, f64) = (1e-3, 1e-3 * 62.7 / 1.7, 0.01, 1e-3);
         let covariance =
             [[sk * sk, 0.0, 0.0], [0.0, sp * sp, -sp * sphi], [0.0, -sp * sphi, sphi * sphi + small * small]];
         for quantity in OrbitQuantity::ALL {
