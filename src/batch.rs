@@ -12,6 +12,7 @@ use crate::pool::{Answer, Brief, Pool, Question};
 use crate::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
 use crate::scene::Scene;
 use crate::search::{self, SearchSettings};
+use crate::verdict::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -158,6 +159,9 @@ pub struct Row {
     pub end: End,
     /// Whether its chain has converged.
     pub converged: Option<bool>,
+    /// What is said of a planet.
+    #[serde(default)]
+    pub verdict: Option<Verdict>,
     /// Evaluations of its chain.
     pub evaluations: Option<usize>,
     /// The parameters by name.
@@ -175,6 +179,7 @@ pub fn rows(stars: &[Star], ends: &[End]) -> Vec<Row> {
             config: star.config.clone(),
             end: end.clone(),
             converged: summary.as_ref().map(|summary| summary.converged),
+            verdict: summary.as_ref().and_then(|summary| summary.verdict.clone()),
             evaluations: summary.as_ref().map(|summary| summary.evaluations),
             parameters: summary.map(|summary| summary.parameters).unwrap_or_default(),
         }

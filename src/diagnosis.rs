@@ -7,7 +7,7 @@
 
 mod change;
 
-use crate::noise::{FITTED, MeasuredErrors, chi2_at, factor_to_fit};
+use crate::noise::{FITTED, chi2_at, factor_to_fit};
 use crate::observation::Observations;
 use crate::scene::{self, Scene};
 use change::{Change, Patient};
@@ -16,12 +16,6 @@ use serde::Serialize;
 
 /// Pixels of the maps: enough to see whether a change helps.
 const PIXELS: usize = 500;
-
-/// Errors of a map larger than those of the continuum by more than this have a reason.
-const MISFIT: f64 = 1.3;
-
-/// The same where there is no continuum to hold them against, but only errors as quoted.
-const MISFIT_OF_QUOTED: f64 = 2.0;
 
 /// A change is a reason when chi2 falls to less than this share of what it was, and what it has above its target likewise.
 const HELPS: f64 = 0.8;
@@ -79,14 +73,6 @@ pub struct Tried {
 }
 
 impl Diagnosis {
-    /// Whether errors that were measured are so large because the model does not fit.
-    pub fn is_called_for(errors: &MeasuredErrors) -> bool {
-        match errors.misfit() {
-            Some(misfit) => misfit > MISFIT,
-            None => errors.residual.is_some_and(|residual| residual > MISFIT_OF_QUOTED),
-        }
-    }
-
     /// Of a scene that no map fits as well as its errors promise, by trying; `whole` are its profiles in their whole width, in units
     /// of their continuum, if they are at hand. `None` where there is no map at all.
     pub fn of(scene: &Scene, whole: Option<&Observations>) -> Option<Self> {

@@ -115,6 +115,12 @@ const MOST_MAPS: usize = 12;
 /// Errors with which no map is found are tried again larger by this.
 const FAR_TOO_SMALL: f64 = 3.0;
 
+/// Errors of a map larger than those of the continuum by more than this have a reason.
+const MISFIT: f64 = 1.3;
+
+/// The same where there is no continuum to hold them against, but only errors as quoted.
+const MISFIT_OF_QUOTED: f64 = 2.0;
+
 /// Beyond this many local line widths from the limb there is continuum.
 const BEYOND: f64 = 3.0;
 
@@ -190,6 +196,24 @@ impl MeasuredErrors {
     /// By how much the residuals of a map are larger than the scatter of the continuum, where both were measured.
     pub fn misfit(&self) -> Option<f64> {
         Some(self.residual? / self.continuum?)
+    }
+
+    /// Whether errors are so large because the model does not fit.
+    pub fn is_misfit(&self) -> bool {
+        match self.misfit() {
+            Some(misfit) => misfit > MISFIT,
+            None => self.residual.is_some_and(|residual| residual > MISFIT_OF_QUOTED),
+        }
+    }
+
+    /// That in a sentence, where it is so.
+    pub fn misfit_text(&self) -> Option<String> {
+        let text = match self.misfit() {
+            Some(misfit) => format!("maps leave {misfit:.1} times the scatter of the continuum"),
+            None => format!("maps leave {:.1} times the quoted errors", self.residual?),
+        };
+        let more = "the model of star or line is not right; `dimcmc map` tries out why";
+        self.is_misfit().then(|| format!("{text}: {more}"))
     }
 
     /// Multiplies the errors of `observations` by all that was measured.

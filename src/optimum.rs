@@ -76,6 +76,8 @@ impl OptimumFile {
     pub fn new(scene: &Scene, found: &Found) -> Self {
         let optimum = &found.optimum;
         let (derived, derived_truth) = derived(scene, optimum);
+        let prot = scene.imager.star.rotation_period_d;
+        let porb_over_prot = scene.space.values_at(&optimum.theta)[Parameter::PorbOverProt];
         let rows = |m: &nalgebra::DMatrix<f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect();
         OptimumFile {
             names: scene.space.names().to_vec(),
@@ -86,7 +88,7 @@ impl OptimumFile {
             converged: optimum.converged,
             covariance: rows(&optimum.written_covariance),
             internal_curvature: rows(&optimum.curvature),
-            blind_search: BlindSearch::of(scene),
+            blind_search: BlindSearch::of(scene).map(|search| search.beside(porb_over_prot, prot)),
             derived,
             truth: scene.truth.map(|values| by_name(&values)),
             derived_truth,

@@ -53,7 +53,7 @@ fn the_config_is_taken_as_it_is() {
             "--rotation-period",
             "assumed, please check\n",
             "--resolving-power",
-            "note: tried out: spots on ",
+            "note: tried out: a brightness that varies by ",
             "written: star.json\n",
             "  dimcmc map star.json --out map ",
         ],
@@ -159,7 +159,15 @@ fn wrong_errors_are_scaled() {
             });
         }
         let table = desk.succeed(&INIT);
-        says(&table, &["observations.sigma_scale", "auto", "times the quoted ones", "note: tried out: spots on "]);
+        says(
+            &table,
+            &[
+                "observations.sigma_scale",
+                "auto",
+                "times the quoted ones",
+                "note: tried out: a brightness that varies by ",
+            ],
+        );
         assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
         desk.succeed(&["map", "star.json", "--out", "map"]);
         let found = number(&desk.json("map/fit.json"), "/measured/errors/sigma_scale");
@@ -188,7 +196,12 @@ fn a_continuum_that_is_not_at_one_is_recognised() {
     let table = desk.succeed(&INIT);
     says(
         &table,
-        &["observations.continuum_level", "0.97", "the continuum beside the line is there", "tried out: spots on"],
+        &[
+            "observations.continuum_level",
+            "0.97",
+            "the continuum beside the line is there",
+            "tried out: a brightness that varies by",
+        ],
     );
     let config = desk.json("star.json");
     // 16 profiles of some 40 bins of S/N 300: good to 1e-4

@@ -54,19 +54,22 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
 fn table(rows: &[Row]) -> String {
     let head = ["star", "parameter", "median", "- 68%", "+ 68%", "R-hat", "ESS", "converged"];
     let mut cells = vec![head.map(str::to_owned).to_vec()];
-    let mut failures = String::new();
+    let (mut failures, mut verdicts) = (String::new(), String::new());
     for row in rows {
         match &row.end {
             End::Sampled => {}
             End::Interrupted => failures += &format!("{}: interrupted\n", escaped(&row.name)),
             End::Failed(why) => failures += &format!("{}: {}\n", escaped(&row.name), escaped(why)),
         }
+        if let Some(verdict) = &row.verdict {
+            verdicts += &format!("{}: {}\n", row.name, verdict.sentence);
+        }
         for (name, one) in &row.parameters {
             cells.push([vec![escaped(&row.name).into_owned(), name.clone()], numbers(one, row.converged)].concat());
         }
     }
     let aligns: Vec<Align> = (0..head.len()).map(|k| if k < 2 { Align::Left } else { Align::Right }).collect();
-    if cells.len() == 1 { failures } else { columns(&cells, &aligns) + &failures }
+    if cells.len() == 1 { failures } else { verdicts + "\n" + &columns(&cells, &aligns) + &failures }
 }
 
 fn numbers(one: &ParameterSummary, converged: Option<bool>) -> Vec<String> {

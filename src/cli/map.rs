@@ -6,6 +6,7 @@ use super::{Failure, Global, progress};
 use dimcmc::diagnosis::Diagnosis;
 use dimcmc::fit::{Deviation, Fit, FitSummary};
 use dimcmc::io::map::{FILES, MapResult};
+use dimcmc::noise::MeasuredErrors;
 use dimcmc::objective::{Reference, ReferenceError};
 use dimcmc::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -30,13 +31,13 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let spinner = progress::bar(global, None, "reconstructing");
     let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target.value());
-    if let Err(error @ ReferenceError::TargetBelowFloor { .. }) = reference {
+    if let Err(error) = reference {
         spinner.set_message("looking for the reason");
         let failure = unreached(&args.config, &scene, error);
         spinner.finish_and_clear();
         return Err(failure);
     }
-    let misfits = scene.measured.errors.as_ref().is_some_and(Diagnosis::is_called_for);
+    let misfits = scene.measured.errors.as_ref().is_some_and(MeasuredErrors::is_misfit);
     let diagnosis = if misfits { diagnosis(&scene) } else { None };
     spinner.finish_and_clear();
     let reference = reference.map_err(|e| Failure::reference(&args.config, e))?;

@@ -72,7 +72,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let choices = choices.map_err(|e| failure(&args.config, *e))?;
     let detection = found.map_err(|e| failure(&args.config, e))?;
     let fit = |view: &View| Fit::new(&scene.imager, &scene.observations, &view.reference);
-    let misfit = fit(detection.last()).checks.warnings;
+    let mut misfit = fit(detection.last()).checks.warnings;
+    misfit.extend(scene.measured.misfit_text());
     let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
     let remarks = detection.remarks(&evidence);
     let result = PeriodogramResult {

@@ -11,6 +11,9 @@ use crate::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict};
 /// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
 const FAR: f64 = 5.0;
 
+/// A target is missed by more than this factor; errors that were measured are such that it is just reached.
+const MISSED: f64 = 1.02;
+
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
 const FEW: usize = 12;
 
@@ -100,8 +103,8 @@ impl Detection {
         let data = imager.data.depth.len() as f64;
         let chi2 = view.reference.solution.chi2 / data;
         let far = (chi2 * correlated_bins - 1.0) / (2.0 * correlated_bins / data).sqrt();
-        if !view.on_target {
-            let target = settings.chi2_target;
+        let target = settings.chi2_target;
+        if !view.on_target && chi2 > MISSED * target {
             remarks.push(Remark::against(
                 "no map fits to the target chi2",
                 format!(
@@ -160,10 +163,11 @@ impl Detection {
                     format!("with this sampling the best period is not told from {} ({words})", imitation.period())
                 }
             };
-            remarks.push(Remark::against(
-                format!("the period is {}{words}", if imitation.alias.is_some() { "an " } else { "" }),
-                format!("{what}, where spots imitate orbits: look at the other peaks before believing it"),
-            ));
+            let text = format!("{what}, where spots imitate orbits: look at the other peaks before believing it");
+            remarks.push(match imitation.is_likely() {
+                true => Remark::against(format!("the period is {words}"), text),
+                false => Remark::note(text),
+            });
         }
         let rivals = self.rivals();
         if !rivals.is_empty() {

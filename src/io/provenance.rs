@@ -44,6 +44,11 @@ impl Measured {
         *self == Measured::default()
     }
 
+    /// That the model does not fit as well as the continuum promises, where the errors say so.
+    pub fn misfit_text(&self) -> Option<String> {
+        self.errors.as_ref().and_then(MeasuredErrors::misfit_text)
+    }
+
     /// It in words, label and text a line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let profiles = self.profiles.iter().map(|remark| ("profiles", remark.clone()));

@@ -53,6 +53,10 @@ impl Manifest {
                 one.unconstrained = open;
             }
         }
+        if self.blind_search.is_none() && summary.parameters.contains_key(Parameter::K.name()) {
+            let why = "this run was begun by a version that made no blind search";
+            summary.verdict = Some(Verdict::not_judged(why));
+        }
         if let Some((verdict, remarks)) = self.verdict(summary, settings) {
             summary.remarks = remarks.into_iter().map(|remark| remark.text).filter(|text| !text.is_empty()).collect();
             summary.verdict = Some(verdict);
@@ -85,7 +89,8 @@ impl Manifest {
         let rotation = self.blind_search.as_ref().and_then(|search| search.rotation.as_ref());
         let Some(rotation) = rotation else { return false };
         let narrow = summary.period_modes.iter().filter(|mode| !is_broad(mode, rotation));
-        narrow.take(FEW_MODES.0).map(|mode| mode.weight).sum::<f64>() >= FEW_MODES.1
+        // a single one that is as wide as the prior is none
+        summary.period_modes.len() > 1 && narrow.take(FEW_MODES.0).map(|mode| mode.weight).sum::<f64>() >= FEW_MODES.1
     }
 
     /// The verdict of the blind search, and what the chain has to say to it.
@@ -106,6 +111,9 @@ impl Manifest {
         }
         if is_found {
             remarks.extend(of_the_period(summary));
+            let heaviest = summary.period_modes.first().map(|mode| mode.porb_over_prot);
+            let period = heaviest.unwrap_or(settings.values[Parameter::PorbOverProt]);
+            remarks.extend(search.of_another_orbit(period, settings.star.rotation_period_d));
         }
         if !summary.converged {
             let text = "the chain has not converged: its intervals are not to be quoted";
@@ -130,7 +138,7 @@ fn of_the_period(summary: &Summary) -> Vec<Remark> {
     if let Some(words) = &heaviest.rotation {
         remarks.push(Remark::against(
             format!("the period is {words}"),
-            format!("the chain's period is {words}, where spots imitate orbits"),
+            format!("the chain's period is {words}: spots may imitate an orbit there"),
         ));
     }
     if heaviest.weight < ALONE {

@@ -41,12 +41,18 @@ impl Imitation {
         }
     }
 
-    /// In a few words: `close to 2 Prot`, `alias of Prot/3 by 1.003/d`.
+    /// Whether spots are likely to make a signal there: at the rotation period, its fractions and multiples, and at aliases of the first
+    /// two, where most of their power is. Aliases of all others fill a large part of all periods.
+    pub fn is_likely(&self) -> bool {
+        self.alias.is_none() || self.numerator == 1 && self.denominator <= 2
+    }
+
+    /// In a few words: `close to 2 Prot`, `an alias of Prot/3 by 1.003/d`.
     pub fn words(&self, rotation_period_d: f64) -> String {
         match &self.alias {
             None => format!("close to {}", self.period()),
             Some(alias) => {
-                format!("alias of {} by {:.3}/d", self.period(), alias.window.frequency / rotation_period_d)
+                format!("an alias of {} by {:.3}/d", self.period(), alias.window.frequency / rotation_period_d)
             }
         }
     }
@@ -115,7 +121,7 @@ mod tests {
         assert!(periods.window.iter().any(|peak| (peak.frequency - rotation_period_d).abs() < 1e-12), "{periods:?}");
         let words = |period: f64, sigma: f64| periods.imitated(period, Some(sigma)).map(|i| i.words(rotation_period_d));
         assert_eq!(words(1.985, 0.007).as_deref(), Some("close to 2 Prot"));
-        assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("alias of Prot by 1.000/d"));
+        assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("an alias of Prot by 1.000/d"));
         assert_eq!(words(0.501, 0.0003).as_deref(), Some("close to Prot/2"));
         assert_eq!(words(1.45, 0.004), None);
     }

@@ -170,7 +170,7 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attemp
     let errors = scene.measured.errors.as_ref();
     let larger = errors.and_then(|errors| errors.misfit()).map_or(1.0, |misfit| misfit.max(1.0));
     Ok(Attempt {
-        misfits: floor.is_some() || errors.is_some_and(Diagnosis::is_called_for),
+        misfits: floor.is_some() || errors.is_some_and(MeasuredErrors::is_misfit),
         misfit: larger * floor.unwrap_or(1.0),
         reached: reference.map(|reference| reference.solution.spottedness).map_err(|error| error.to_string()),
         scene: Some(scene),

@@ -9,6 +9,7 @@ use crate::noise::MeasuredErrors;
 use crate::nuisances::LineAndContinuum;
 use crate::observation::Observations;
 use crate::periodogram::{Frequencies, FrequencySettings};
+use crate::star::BrightnessModel;
 use crate::units::instrumental_sigma_kms;
 
 /// What is assumed where nobody says otherwise.
@@ -43,12 +44,16 @@ const ANOTHER_STAR: f64 = 5.0;
 const SOLAR_DOMEGA_RAD_D: f64 = 0.055;
 const SHEAR_RAD: f64 = 0.2;
 
+/// Profiles that show an orbit.
+const FEWEST_FOR_AN_ORBIT: usize = 3;
+
 /// What is needed before the velocity range is cut.
 pub(super) struct Values {
     pub look: FirstLook,
     pub velocity_range_kms: (f64, f64),
     /// Level of the continuum that the profiles were divided by, if they were.
     pub continuum_level: Option<f64>,
+    profiles: usize,
     line_sigma_kms: f64,
     resolving_power: f64,
     limb_darkening: f64,
@@ -90,7 +95,16 @@ impl Values {
         line::note_continuum(&look, continuum_level, ledger);
         let line_sigma_kms = line::sigma_kms(&look, model, known, ledger);
         let velocity_range_kms = line::velocity_range(&look, model, whole.step_kms, known, ledger);
-        Ok(Values { look, velocity_range_kms, continuum_level, line_sigma_kms, resolving_power, limb_darkening })
+        let profiles = whole.profiles.len();
+        Ok(Values {
+            look,
+            velocity_range_kms,
+            continuum_level,
+            profiles,
+            line_sigma_kms,
+            resolving_power,
+            limb_darkening,
+        })
     }
 
     /// The config's values, from the profiles within the velocity range.
@@ -280,7 +294,13 @@ impl Values {
                 shear.to_degrees()
             )
         });
-        vsini.into_iter().chain(domega).collect()
+        let few = (self.profiles < FEWEST_FOR_AN_ORBIT).then(|| {
+            format!(
+                "{} profiles make a map, and show no orbit: `periodogram` and `sample` take {FEWEST_FOR_AN_ORBIT} or more",
+                self.profiles
+            )
+        });
+        vsini.into_iter().chain(domega).chain(few).collect()
     }
 }
 
@@ -306,11 +326,13 @@ fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> E
 }
 
 fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
-    let mut imaging = ImagingSettings::default();
-    if let Some(given) = &known.brightness {
-        imaging.brightness = given.value;
-        ledger.note("imaging.brightness", given.value.name(), "", Source::Given, given.by.as_str());
-    }
+    let brightness = known.brightness.as_ref().map_or(BrightnessModel::BrightAndDark, |given| given.value);
+    let mut imaging = ImagingSettings { brightness, ..ImagingSettings::default() };
+    let (source, remark) = match &known.brightness {
+        Some(given) => (Source::Given, given.by.as_str()),
+        None => (Source::Assumed, "a star with faculae is no map of spots, and what does not fit looks like an orbit"),
+    };
+    ledger.note("imaging.brightness", brightness.name(), "", source, remark);
     if let Some(given) = &known.pixels {
         imaging.pixels = given.value;
         ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());

@@ -12,7 +12,7 @@
 //! odds for an orbit of any period (uniform in frequency) against none, both hypotheses with s and f integrated over,
 //! are those of the densities; they exceed c by chance, without an orbit, with a probability of at most 1/c. So s is
 //! taken beside the orbit of the highest density where the odds are larger than the inverse of the false-alarm
-//! probability of a detection.
+//! probability of a candidate.
 
 use super::MeasuredJitter;
 use crate::expansion::{Expansion, SPOTS_LEFT};
