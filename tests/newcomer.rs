@@ -127,12 +127,12 @@ impl Star {
     }
 
     /// The whole path of the README; what each step says.
-    fn walked(&self, k_kms: f64, seed: u64) -> Walk {
+    fn walked(&self, k_kms: f64, seed: u64, pixels: &str) -> Walk {
         let desk = Desk::new(self.config(k_kms, seed));
         desk.succeed(&["simulate", "config.json", "--out", "data"]);
         self.level_continua(&desk);
         let (prot, inclination) = (self.rotation_period_d.to_string(), self.inclination_deg.to_string());
-        let given = ["--rotation-period", &prot, "--inclination", &inclination];
+        let given = ["--rotation-period", &prot, "--inclination", &inclination, "--pixels", pixels];
         let init = desk.succeed(&[&["init", "data/observations.txt"][..], &given].concat());
         let map = desk.succeed(&["map", "star.json", "--out", "map"]);
         let search = desk.succeed(&["periodogram", "star.json", "--out", "search"]);
@@ -225,13 +225,13 @@ impl Walk {
 /// No star without a planet is claimed to have one; of one with a planet of ten errors it is found.
 #[test]
 fn one_star() {
-    let star = Star { spots: few(), nights: (9, 3), continuum: (0.0, 0.985), ..PLAIN };
-    let alone = star.walked(0.0, 11);
+    let star = Star { spots: few(), nights: (9, 2), continuum: (0.0, 0.985), ..PLAIN };
+    let alone = star.walked(0.0, 11, "500");
     println!("{}", alone.texts.concat());
     assert!(!alone.claims(), "{:?}", alone.verdicts);
     says(&alone.texts[0], &["observations.continuum_level", "observations.sigma_scale", "auto"]);
     let k_kms = 12.0 * star.sigma_k_kms(&alone);
-    let found = star.walked(k_kms, 11);
+    let found = star.walked(k_kms, 11, "500");
     assert!(found.finds(&star), "{:?}", found.verdicts);
 }
 
@@ -245,12 +245,12 @@ fn twelve_stars() {
     let only = std::env::var("STAR").ok();
     let (mut claims, mut found, mut all) = (0, 0, 0);
     for (k, star) in stars().iter().enumerate().filter(|(_, star)| only.as_ref().is_none_or(|name| name == star.name)) {
-        let alone = star.walked(0.0, 100 + k as u64);
+        let alone = star.walked(0.0, 100 + k as u64, "2000");
         if only.is_some() {
             println!("{}", alone.texts.concat());
         }
         let k_kms = 10.0 * star.sigma_k_kms(&alone);
-        let with = star.walked(k_kms, 200 + k as u64);
+        let with = star.walked(k_kms, 200 + k as u64, "2000");
         if only.is_some() {
             println!("{}", with.texts.concat());
         }

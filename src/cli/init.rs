@@ -6,6 +6,7 @@ use dimcmc::config::ConfigError;
 use dimcmc::io::lsd::LsdError;
 use dimcmc::io::{atomic, lsd};
 use dimcmc::proposal::{Given, Known, Place, Proposal, ProposalError, propose};
+use dimcmc::star::BrightnessModel;
 use dimcmc::text::shown;
 use std::path::{Path, PathBuf};
 
@@ -64,6 +65,12 @@ pub struct KnownArgs {
     /// Resolving power of the spectrograph
     #[arg(long, value_name = "R")]
     resolving_power: Option<f64>,
+    /// What the map may hold: brightnesses above and below that of the photosphere, or spots alone
+    #[arg(long, value_name = "MODEL", value_parser = ["bright-and-dark", "spots"])]
+    brightness: Option<String>,
+    /// Pixels of the image
+    #[arg(long, value_name = "N")]
+    pixels: Option<usize>,
 }
 
 /// Where an option's value goes.
@@ -99,6 +106,14 @@ impl KnownArgs {
                 *slot(&mut known) = Some(Given { value, by: name.to_owned() });
             }
         }
+        if let Some(name) = &self.brightness {
+            let model = |model: &BrightnessModel| model.name() == name;
+            let value = [BrightnessModel::Spots, BrightnessModel::BrightAndDark].into_iter().find(model);
+            known.brightness = value.map(|value| Given { value, by: "--brightness".to_owned() });
+        }
+        if let Some(value) = self.pixels {
+            known.pixels = Some(Given { value, by: "--pixels".to_owned() });
+        }
         Ok(known)
     }
 
@@ -108,7 +123,8 @@ impl KnownArgs {
             let at_fault =
                 |given: &str| key == given || key.strip_prefix(given).is_some_and(|rest| rest.starts_with('.'));
             let option = self.options().into_iter().find(|(_, value, given, _)| value.is_some() && at_fault(given));
-            if let Some((name, ..)) = option {
+            let pixels = (self.pixels.is_some() && at_fault("imaging.pixels")).then_some("--pixels");
+            if let Some(name) = option.map(|(name, ..)| name).or(pixels) {
                 return Failure::input(format!("{name}: {key}: {problem}"));
             }
         }
