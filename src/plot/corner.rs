@@ -51,7 +51,7 @@ impl Corner<'_> {
         let height = (figure.height - top - MARGIN[1] - gap * (n as f64 - 1.0)) / n as f64;
         let named = if n > 5 { short_label } else { label };
         let axis = |i: usize| Axis { label: named(&self.names[i]), range: self.ranges[i], scale: self.scales[i] };
-        for row in 0..n {
+        for (row, title) in titles.iter().enumerate() {
             for column in 0..=row {
                 let frame = Rect {
                     left: MARGIN[0] + column as f64 * (side + gap),
@@ -63,7 +63,7 @@ impl Corner<'_> {
                 if row == column {
                     diagonal(&mut figure, frame, axis(row), row);
                     self.finish_diagonal(&mut figure, frame, axis(row), row, sides);
-                    write_title(&mut figure, frame, &titles[row]);
+                    write_title(&mut figure, frame, title);
                 } else {
                     let panel = Panel { frame, x: axis(column), y: axis(row) };
                     pair(&mut figure, &panel, column, row);
