@@ -1,0 +1,117 @@
+//! `dimcmc limits` as users run it: against the closed form of the periodogram, against the whole way, with a planet in the
+//! profiles, refusals.
+
+use crate::desk::{Desk, says, star};
+use serde_json::{Value, json};
+
+/// A spotted star with a planet of that K at 2.3 rotations.
+fn desk(k_kms: f64) -> Desk {
+    Desk::new(json!({
+        "star": star(),
+        "planet": { "porb_over_prot": 2.3, "phi": 0.2 },
+        "observations": { "simulate": {
+            "spots": [[40, 30, 20, 1], [200, 60, 25, 0.8]],
+            "cycles": (0..24).map(|k| 0.31 * f64::from(k) + 0.04 * f64::from(k % 3)).collect::<Vec<_>>(),
+            "velocity_kms": { "min": -34.2, "max": 34.2, "step": 1.8 }, "snr": 400, "pixels": 500,
+            "truth": { "k_kms": k_kms }
+        } },
+        "imaging": { "pixels": 300, "chi2_target": 1.0 }
+    }))
+}
+
+const SMALL: [&str; 12] = [
+    "limits",
+    "config.json",
+    "--min-period-d",
+    "1.7",
+    "--max-period-d",
+    "15",
+    "--periods",
+    "7",
+    "--amplitudes",
+    "12",
+    "--phases",
+    "8",
+];
+
+fn limits(desk: &Desk, options: &[&str]) -> String {
+    desk.succeed(&[&SMALL[..], options].concat())
+}
+
+/// Numbers of a column of a table.
+fn column(table: &str, name: &str) -> Vec<f64> {
+    let mut lines = table.lines();
+    let k = lines.next().unwrap().split(',').position(|one| one == name).unwrap();
+    lines.map(|line| line.split(',').nth(k).unwrap().parse().unwrap()).collect()
+}
+
+#[test]
+fn both_ways_and_the_closed_form_agree() {
+    let desk = desk(0.0);
+    let table = limits(&desk, &["--full", "10", "--out", "a"]);
+    says(&table, &["K 50 %", "K 95 %", "false alarms below 1 %", "the whole way:", "a: limits.csv, limits.json"]);
+    let file = desk.json("a/limits.json");
+    // ten orbits within a factor of 2 of the limit, where the shortcut's second order and the noise of resampling decide
+    assert!(file["agreement"]["agree"].as_u64().unwrap() >= 8, "{}", file["agreement"]);
+    assert!(file["before"]["false_alarm_probability"].as_f64().unwrap() > 0.01);
+    desk.succeed(&["periodogram", "config.json", "--min-period-d", "1.7", "--max-period-d", "15", "--out", "search"]);
+    let table = desk.read("search/periodogram.csv");
+    let (periods, closed) = (column(&table, "period_d"), column(&table, "k_limit_kms"));
+    let mut ratios = Vec::new();
+    for limit in file["limits"].as_array().unwrap() {
+        let period = limit["period_d"].as_f64().unwrap();
+        // spots imitate an orbit at the rotation period of 3 d, the ends of the search see half a peak
+        if (period / 3.0 - 1.0).abs() < 0.3 || !(1.8..=14.0).contains(&period) {
+            continue;
+        }
+        let nearest =
+            (0..periods.len()).min_by(|a, b| (periods[*a] - period).abs().total_cmp(&(periods[*b] - period).abs()));
+        let ratio = limit["k50_kms"].as_f64().unwrap() / closed[nearest.unwrap()];
+        // the closed form takes a mean over noise, here is one noise; and an orbit counts among the spots left over, which raises
+        // the limit
+        assert!((0.4..2.5).contains(&ratio), "{period}: {ratio}");
+        ratios.push(ratio);
+    }
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios[ratios.len() / 2];
+    assert!((0.6..1.7).contains(&median), "{ratios:?}");
+    let cells = desk.read("a/limits.csv");
+    let (k, recovered) = (column(&cells, "k_kms"), column(&cells, "recovered"));
+    let share = |wanted: f64| {
+        let of: Vec<f64> = k.iter().zip(&recovered).filter(|(k, _)| **k == wanted).map(|(_, r)| *r).collect();
+        of.iter().sum::<f64>() / (8.0 * of.len() as f64)
+    };
+    assert!(share(k[0]) < 0.1 && share(k[11]) > 0.6, "{} {}", share(k[0]), share(k[11]));
+    // the same for any number of threads
+    limits(&desk, &["--full", "10", "--out", "b", "--threads", "1"]);
+    for file in ["limits.csv", "limits.json"] {
+        assert_eq!(desk.read(&format!("a/{file}")), desk.read(&format!("b/{file}")), "{file}");
+    }
+    says(&desk.succeed(&["plot", "a"]), &["limits.svg"]);
+    says(&desk.succeed(&["report", "a"]), &["report.html"]);
+}
+
+#[test]
+fn a_planet_that_is_there_can_be_taken_out() {
+    let desk = desk(0.5);
+    says(&limits(&desk, &["--out", "with"]), &["the profiles show a planet as they are, of 6.", "--without-best"]);
+    limits(&desk, &["--without-best", "--full", "4", "--out", "without"]);
+    let (with, without) = (desk.json("with/limits.json"), desk.json("without/limits.json"));
+    let alarm = |file: &Value| file["before"]["false_alarm_probability"].as_f64().unwrap();
+    assert!(alarm(&with) < 1e-3 && alarm(&without) > 0.01, "{} {}", alarm(&with), alarm(&without));
+    assert_eq!(with["removed"], Value::Null);
+    let removed = &without["removed"];
+    // to second order around an image without the planet
+    assert!((removed["k_kms"].as_f64().unwrap() + 0.5).abs() < 0.1, "{removed}");
+    assert!((removed["porb_over_prot"].as_f64().unwrap() - 2.3).abs() < 0.1, "{removed}");
+}
+
+#[test]
+fn ranges_that_make_no_sense_are_refused() {
+    let desk = desk(0.0);
+    let refused = |options: &[&str]| desk.refusal(&[&SMALL[..], options, &["--out", "x"]].concat());
+    says(&refused(&["--min-k-kms", "2", "--max-k-kms", "1"]), &["--min-k-kms, --max-k-kms: 2 to 1 km/s is no range"]);
+    says(&refused(&["--min-k-kms", "0"]), &["is no range"]);
+    desk.set("/observations/simulate/cycles", json!([0.0, 0.5]));
+    says(&refused(&[]), &["observations", "three different times"]);
+}

@@ -1,0 +1,30 @@
+//! The program as users run it: one module for each command or task.
+
+#[path = "../common/desk.rs"]
+mod desk;
+#[path = "../common/python.rs"]
+mod python;
+#[path = "../common/svg.rs"]
+mod svg;
+
+mod batch;
+mod bright_and_dark;
+mod cli;
+mod compare;
+mod export;
+mod faults;
+mod grid;
+mod import;
+mod init;
+mod injection;
+mod limits;
+mod merge;
+mod newcomer;
+mod noise;
+mod orbit_quantities;
+mod periodogram;
+mod plot;
+mod report;
+mod reproduce;
+mod sample;
+mod zero_points;

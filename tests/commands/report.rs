@@ -1,0 +1,170 @@
+//! `report` as users run it: one page that needs nothing else, and that a browser shows on a desk and on a phone.
+
+use crate::desk::{Desk, says, text, two_spots};
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::process::Command;
+
+const CONFIG: &str = "config.json";
+
+fn config() -> Value {
+    two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 100, "ess": 100, "rhat": 1.1 }))
+}
+
+#[test]
+fn a_run_has_a_page() {
+    let desk = Desk::new(config());
+    desk.succeed(&["sample", CONFIG, "--out", "run"]);
+    says(&desk.succeed(&["report", "run"]), &["written  run/report.html"]);
+    let page = desk.read("run/report.html");
+    let summary = desk.json("run/summary.json");
+    let [median, sd] = ["median", "sd"].map(|key| summary["parameters"]["k_kms"][key].as_f64().unwrap());
+    // two digits of the error
+    let digits = (1.0 - sd.log10().floor()) as usize;
+    assert_eq!(summary["converged"], true);
+    for part in [
+        "The chain has converged",
+        "R-hat",
+        &format!("<td>{median:.digits$}</td>"),
+        "vsini_kms",
+        "10.1051/0004-6361/201525993",
+        concat!("version ", env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"), ".</p>"),
+        "Posterior of the sampled parameters",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    // three figures, and nothing from elsewhere but a link to the paper
+    assert_eq!(page.matches("<svg").count(), 3);
+    for part in ["<script", "src=", "@import", "<link rel=\"stylesheet"] {
+        assert!(!page.contains(part), "{part}");
+    }
+    let addresses: Vec<&str> =
+        page.match_indices("http").map(|(at, _)| page[at..].split(['"', '<', ' ']).next().unwrap()).collect();
+    for address in addresses {
+        let allowed = ["http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink", "https://doi.org/"];
+        assert!(allowed.iter().any(|a| address.starts_with(a)), "{address}");
+    }
+    // nothing is overwritten, and the same bytes come out again
+    says(&desk.refusal(&["report", "run"]), &["run/report.html", "--force"]);
+    says(&desk.refusal(&["report", "run", "--out", "run"]), &["run", "is a folder"]);
+    desk.succeed(&["report", "run", "--force"]);
+    assert!(page == desk.read("run/report.html"));
+    says(&desk.refusal(&["report", "absent"]), &["absent", "no such folder"]);
+    // a chain that has not converged says so
+    let mut manifest = desk.json("run/manifest.json");
+    manifest["config"]["sampler"]["ess"] = json!(1_000_000);
+    desk.write("run/manifest.json", &manifest.to_string());
+    desk.succeed(&["report", "run", "--out", "short.html"]);
+    assert!(desk.read("short.html").contains("The chain has not converged"));
+}
+
+#[test]
+fn every_folder_has_a_page_that_a_browser_shows() {
+    let desk = Desk::new(config());
+    desk.set("/grid", json!({ "axes": { "k_kms": [0.15, 0.25, 5], "phi": [-0.05, 0.04, 5] } }));
+    for command in ["simulate", "map", "optimise", "grid", "sample"] {
+        desk.succeed(&[command, CONFIG, "--out", command]);
+    }
+    desk.succeed(&["periodogram", CONFIG, "--out", "periodogram", "--draws", "1000"]);
+    desk.succeed(&["compare", "sample", "grid", "--out", "compare"]);
+    for (folder, part) in [
+        ("simulate", "Injected parameters"),
+        ("map", "greatest entropy"),
+        ("periodogram", "Peaks of the periodogram"),
+        ("optimise", "A well-defined maximum"),
+        ("grid", "Axes and paraboloid"),
+        ("sample", "The sampled parameters"),
+        ("compare", "Chain against landscape"),
+    ] {
+        desk.succeed(&["report", folder, "--out", &format!("{folder}.html")]);
+        assert!(desk.read(&format!("{folder}.html")).contains(part), "{folder}: {part}");
+    }
+    for folder in ["simulate", "map", "periodogram", "optimise", "grid", "sample"] {
+        let page = desk.read(&format!("{folder}.html"));
+        assert!(page.contains("<dt>Star</dt>") && page.contains("12 profiles from"), "{folder}");
+        told_in_order(folder, &page);
+    }
+    for (folder, file, pointer) in [
+        ("periodogram", "periodogram.json", "/verdict/sentence"),
+        ("optimise", "optimum.json", "/blind_search/verdict/sentence"),
+        ("sample", "summary.json", "/verdict/sentence"),
+    ] {
+        let sentence = desk.json(&format!("{folder}/{file}")).pointer(pointer).unwrap().as_str().unwrap().to_owned();
+        let page = desk.read(&format!("{folder}.html"));
+        let first = page.split("<p class=\"verdict").nth(1).unwrap().split('>').nth(1).unwrap();
+        assert!(first.starts_with(&sentence[..40]), "{folder}: {first}");
+    }
+    // the same period as in the figure
+    let period = desk.json("periodogram/periodogram.json")["peaks"][0]["period_d"].as_f64().unwrap();
+    let page = desk.read("periodogram.html");
+    assert!(page.contains(&format!("<tr><td>{period:.4}</td>")) && page.contains(&format!("highest: {period:.4} d")));
+    let Some(browser) = browser() else {
+        assert!(std::env::var_os("CI").is_none(), "no chromium to look at pages with");
+        // past the test's capture, so that it is seen
+        let _ = writeln!(std::io::stderr(), "skipped: no chromium to look at pages with");
+        return;
+    };
+    for folder in ["map", "sample", "periodogram"] {
+        for width in [390, 1280] {
+            shown(&desk, &browser, folder, width);
+        }
+    }
+}
+
+/// In every chapter warnings stand before tables, nothing is green beside them, and no column of a table is empty.
+fn told_in_order(folder: &str, page: &str) {
+    for chapter in page.split("<section id=\"chapter").skip(1) {
+        let chapter = chapter.split("</section>").next().unwrap();
+        let table = chapter.find("<table").unwrap_or(chapter.len());
+        if let Some(warnings) = chapter.find("class=\"warnings\"") {
+            assert!(warnings < table && !chapter.contains("verdict good"), "{folder}: {chapter}");
+        }
+        for table in chapter.split("<tbody>").skip(1) {
+            let rows = table.split("</tbody>").next().unwrap().split("<tr>").skip(1);
+            let cells = |row: &str| row.split("<td>").skip(1).map(|cell| cell.starts_with("–<")).collect::<Vec<bool>>();
+            let rows: Vec<Vec<bool>> = rows.map(cells).collect();
+            let empty = |k: usize| rows.iter().all(|row| row[k]);
+            assert!(!(0..rows[0].len()).any(empty), "{folder}: {table}");
+        }
+    }
+}
+
+/// The name of a browser that is there.
+fn browser() -> Option<String> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let there = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
+    names.into_iter().find(there).map(str::to_owned)
+}
+
+/// Opens the page in a frame of so many pixels: no error, and nothing wider than the frame.
+fn shown(desk: &Desk, browser: &str, folder: &str, width: u32) {
+    // a script of the test's own looks at the page; the page has none
+    let frame = format!(
+        "<!doctype html><body><iframe id=f src=\"{folder}.html\" style=\"width:{width}px;height:2000px;border:0\"></iframe>\
+         <p id=out></p><script>f.onload=()=>{{const d=f.contentDocument;out.textContent=['seen',d.documentElement.scrollWidth,\
+         d.querySelectorAll('svg').length,d.querySelectorAll('table').length].join(' ')}}</script>"
+    );
+    desk.write("frame.html", &frame);
+    let profile = desk.path("browser");
+    let output = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--allow-file-access-from-files",
+            "--enable-logging=stderr",
+        ])
+        .arg(format!("--user-data-dir={}", profile.display()))
+        .args(["--window-size=1400,2200", "--virtual-time-budget=10000", "--dump-dom"])
+        .arg(format!("file://{}", desk.path("frame.html").display()))
+        .output()
+        .unwrap();
+    let (page, log) = (text(&output.stdout), String::from_utf8_lossy(&output.stderr).into_owned());
+    assert!(!log.contains("CONSOLE"), "{folder} at {width}: {log}");
+    let seen = page.split("<p id=\"out\">seen ").nth(1).unwrap_or_else(|| panic!("{folder} at {width}: {page}"));
+    let numbers: Vec<u32> =
+        seen.split('<').next().unwrap().split_whitespace().map(|number| number.parse().unwrap()).collect();
+    println!("{folder} at {width}: {numbers:?}");
+    assert!(numbers[0] <= width, "{folder}: {} pixels wide in {width}", numbers[0]);
+    assert!(numbers[1] > 0 && numbers[2] > 0, "{folder}: {numbers:?}");
+}

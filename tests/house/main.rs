@@ -1,0 +1,10 @@
+//! What holds the house together: the source tree, configs, examples and documents.
+
+#[path = "../common/desk.rs"]
+mod desk;
+
+mod architecture;
+mod config;
+mod examples;
+mod readme;
+mod schema;

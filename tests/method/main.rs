@@ -1,0 +1,23 @@
+//! The method against independent numbers, limit cases and itself: the library alone.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod chain;
+mod ensemble;
+mod expansion;
+mod figure;
+mod first_look;
+mod forward;
+mod imaging;
+mod lsd;
+mod nuisances;
+mod objective;
+mod oracle;
+mod paraboloid;
+mod pixels;
+mod plain_loop;
+mod posterior;
+mod simulate;
+mod surface;
+mod surrogate;
