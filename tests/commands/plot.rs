@@ -1,11 +1,11 @@
 //! `plot` as users run it: every folder gives its figures, and what is injected is drawn where it is.
 
 use crate::desk::{Desk, says, two_spots};
+use crate::svg::{extent, middle, paths, placed, texts};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde_json::{Value, json};
-use crate::svg::{extent, middle, paths, placed, texts};
 
 const CONFIG: &str = "config.json";
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// What is installed, in whatever version there is today: users have no other.
-const PACKAGES: [&str; 8] = ["arviz", "corner", "emcee", "getdist", "h5py", "pandas", "xarray", "zarr"];
+const PACKAGES: &str = include_str!("packages.txt");
 
 /// The interpreter, or `None`, said aloud, where it cannot be had. In continuous integration (`CI` is set) it must be had.
 pub fn python() -> Option<PathBuf> {
@@ -23,20 +23,20 @@ pub fn python() -> Option<PathBuf> {
 /// Makes the environment, or takes the one that is there if it has all packages.
 fn environment() -> Result<PathBuf, String> {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().ok_or("no target folder")?;
-    let (folder, wanted) = (target.join("python"), PACKAGES.join(" "));
+    let (folder, wanted) = (target.join("python"), PACKAGES.split_whitespace().collect::<Vec<_>>());
     let python = folder.join("bin/python");
     // one process makes it, others wait
     let lock = File::create(target.join("python.lock")).map_err(|e| e.to_string())?;
     lock.lock().map_err(|e| e.to_string())?;
     let complete = folder.join("packages");
-    if std::fs::read_to_string(&complete).is_ok_and(|there| there == wanted) {
+    if std::fs::read_to_string(&complete).is_ok_and(|there| there == PACKAGES) {
         return Ok(python);
     }
     let _ = std::fs::remove_dir_all(&folder);
     run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
     let options = ["-m", "pip", "install", "--quiet", "--no-input", "--disable-pip-version-check"];
-    run(Command::new(&python).args(options).args(["--retries", "2", "--timeout", "20"]).args(PACKAGES))?;
-    std::fs::write(&complete, wanted).map_err(|e| e.to_string())?;
+    run(Command::new(&python).args(options).args(["--retries", "2", "--timeout", "20"]).args(wanted))?;
+    std::fs::write(&complete, PACKAGES).map_err(|e| e.to_string())?;
     Ok(python)
 }
 

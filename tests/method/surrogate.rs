@@ -141,7 +141,7 @@ fn a_poor_surrogate_changes_nothing_but_the_cost() {
     // a planet of twice the amplitude at another inclination, told more sharply than the surrogate thinks
     let tilt = |theta: &[f64]| -0.5 * ((theta[0] - 0.12) / 0.01).powi(2) - 0.5 * ((theta[3] - 38.6) / 0.3).powi(2);
     let density = Tilted { surrogate: &surrogate, space: &space, tilt };
-    same(&chain(&density, 1500, 0.0), &chain(&density, 1500, 2.0));
+    same(&chain(&density, 800, 0.0), &chain(&density, 800, 2.0));
 }
 
 /// Also where a chain stays for long at places that the surrogate hardly ever proposes.
