@@ -8,8 +8,8 @@ mod common;
 use common::paper::{Bulk, Free, Passes, Size, scene};
 use common::stopwatch::{Candidate, by_criterion, criterion, quantile, seconds};
 use common::table::{Table, Target, thousands};
-use dimcmc::log_density::{LogDensity, Status};
-use dimcmc::maxent::SolverSettings;
+use dimcmc::internals::maxent::SolverSettings;
+use dimcmc::internals::sampling::log_density::{LogDensity, Status};
 use std::hint::black_box;
 
 /// An evaluation over its passes.

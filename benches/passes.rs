@@ -10,8 +10,8 @@ use common::paper::{Free, Passes, Size, scene, truth, uneven_map};
 use common::stopwatch::{Candidate, by_criterion, criterion, fastest, in_turn};
 use common::table::{Table, Target, thousands};
 use criterion::Criterion;
-use dimcmc::scene::Scene;
-use dimcmc::vector::{self, Instructions, Task};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::numerics::vector::{self, Instructions, Task};
 use plain_loop::PlainLoop;
 use std::hint::black_box;
 

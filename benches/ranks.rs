@@ -8,16 +8,16 @@ mod common;
 use common::paper::{Free, Size, scene};
 use common::stopwatch::{Candidate, fastest, in_turn, quantile, seconds};
 use common::table::{Table, Target, thousands};
-use dimcmc::cluster::{Answer, Queue, Rank, join};
-use dimcmc::config::{self, Settings};
-use dimcmc::ensemble::{Sampler, StartDraw, draw_start};
-use dimcmc::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
-use dimcmc::objective::Posterior;
-use dimcmc::origin::Origin;
-use dimcmc::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
-use dimcmc::scene::Scene;
-use dimcmc::search::{self, SearchSettings};
-use dimcmc::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::data::config::{self, Settings};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{self, SearchSettings};
+use dimcmc::internals::posterior::objective::Posterior;
+use dimcmc::internals::posterior::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
+use dimcmc::internals::runs::origin::Origin;
+use dimcmc::internals::runs::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
+use dimcmc::internals::sampling::ensemble::{Sampler, StartDraw, draw_start};
+use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
 use std::convert::Infallible;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
@@ -109,7 +109,7 @@ fn rank() {
                 let echo: Answer = Box::new(|question, _| question.to_vec());
                 match Brief::from_bytes(brief) {
                     None => Ok::<Answer, Infallible>(echo),
-                    Some(_) => Ok(dimcmc::batch::learn(brief).unwrap()),
+                    Some(_) => Ok(dimcmc::internals::runs::batch::learn(brief).unwrap()),
                 }
             };
             let Ok(()) = worker.serve(learn);

@@ -7,7 +7,7 @@ mod common;
 use common::paper::{Bulk, Free, Size, scene};
 use common::stopwatch::{Candidate, fastest, in_turn};
 use common::table::{Table, Target, thousands};
-use dimcmc::log_density::{Evaluator, Threads};
+use dimcmc::internals::sampling::log_density::{Evaluator, Threads};
 
 /// Times as many evaluations a second.
 const TWICE: Target = Target::AtLeast(1.8);

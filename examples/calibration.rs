@@ -5,17 +5,17 @@
 //!
 //! writes null.csv and planet.csv (a line a star) and prints the tables of `results/calibration.md`.
 
-use dimcmc::config;
-use dimcmc::detection::{Detection, DetectionSettings};
-use dimcmc::expansion::Expansion;
-use dimcmc::imaging::Imager;
-use dimcmc::io::csv::Table;
-use dimcmc::objective::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
-use dimcmc::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings};
-use dimcmc::scene::Scene;
-use dimcmc::simulate::Simulation;
-use dimcmc::star::Spot;
-use dimcmc::surrogate::Surrogate;
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::io::csv::Table;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings};
+use dimcmc::internals::posterior::detection::{Detection, DetectionSettings};
+use dimcmc::internals::posterior::expansion::Expansion;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
+use dimcmc::internals::posterior::simulate::Simulation;
+use dimcmc::internals::posterior::surrogate::Surrogate;
+use dimcmc::internals::star::Spot;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -6,12 +6,12 @@
 //! print the tables of `results/lopeg.md`. Chains are kept in `runs/lopeg` and gone on with. The profiles are not part of this
 //! repository: see `configs/lopeg.json` for where they are looked for.
 
-use dimcmc::experiments::{Case, ExperimentError, Laboratory, Outcome, star};
-use dimcmc::injection::inject;
-use dimcmc::io::lsd;
-use dimcmc::pool::Pool;
-use dimcmc::scene::Scene;
-use dimcmc::star::Orbit;
+use dimcmc::internals::data::io::lsd;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::runs::experiments::{Case, ExperimentError, Laboratory, Outcome, star};
+use dimcmc::internals::runs::pool::Pool;
+use dimcmc::internals::star::Orbit;
+use dimcmc::internals::star::injection::inject;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};

@@ -3,13 +3,13 @@
 //!
 //! Left out: anything that takes a reconstruction but for [`Bulk`].
 
-use dimcmc::config::{self, ObservationSource};
-use dimcmc::ensemble::{StartDraw, draw_start};
-use dimcmc::objective::Posterior;
-use dimcmc::pool::Target as Density;
-use dimcmc::scene::Scene;
-use dimcmc::search::{self, SearchSettings};
-use dimcmc::star::{Response, StarState};
+use dimcmc::internals::data::config::{self, ObservationSource};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{self, SearchSettings};
+use dimcmc::internals::posterior::objective::Posterior;
+use dimcmc::internals::runs::pool::Target as Density;
+use dimcmc::internals::sampling::ensemble::{StartDraw, draw_start};
+use dimcmc::internals::star::{Response, StarState};
 use serde_json::{Value, json};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};

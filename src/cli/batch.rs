@@ -3,10 +3,10 @@
 use super::output::Output;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
-use dimcmc::batch::{End, FILE, Row, read_list, rows, sample_all};
-use dimcmc::chain::ParameterSummary;
-use dimcmc::io::atomic::write_json;
-use dimcmc::text::{Align, columns, escaped, shown};
+use crate::data::io::atomic::write_json;
+use crate::numerics::text::{Align, columns, escaped, shown};
+use crate::runs::batch::{End, FILE, Row, read_list, rows, sample_all};
+use crate::sampling::chain::ParameterSummary;
 use std::path::PathBuf;
 
 /// Sample the posteriors of many stars

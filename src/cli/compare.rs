@@ -2,12 +2,12 @@
 
 use super::output::Output;
 use super::{Failure, Global, console};
-use dimcmc::comparison::{Comparison, FILE, Pair};
-use dimcmc::io::atomic::write_json;
-use dimcmc::io::paraboloid;
-use dimcmc::run::CHAIN;
-use dimcmc::survey::PARABOLOID;
-use dimcmc::text::shown;
+use crate::data::io::atomic::write_json;
+use crate::data::io::paraboloid;
+use crate::numerics::text::shown;
+use crate::runs::comparison::{Comparison, FILE, Pair};
+use crate::runs::grid_scan::PARABOLOID;
+use crate::runs::run::CHAIN;
 use std::path::PathBuf;
 
 /// Compare a chain with a landscape of the same data

@@ -3,11 +3,11 @@
 use super::init::{KnownArgs, next_commands};
 use super::output::{ConfigFile, folder_of};
 use super::{Failure, Global, console, progress};
-use dimcmc::import::Import;
-use dimcmc::io::atomic;
-use dimcmc::io::zdipy::{Input, LINE_FILE, LocalLineFile};
-use dimcmc::proposal::{Place, propose};
-use dimcmc::text::shown;
+use crate::data::import::Import;
+use crate::data::init::{Place, propose};
+use crate::data::io::atomic;
+use crate::data::io::zdipy::{Input, LINE_FILE, LocalLineFile};
+use crate::numerics::text::shown;
 use std::path::{Path, PathBuf};
 
 /// Write a config from ZDIpy's input files

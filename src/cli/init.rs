@@ -2,12 +2,12 @@
 
 use super::output::ConfigFile;
 use super::{Failure, Global, console, progress};
-use dimcmc::config::ConfigError;
-use dimcmc::io::lsd::LsdError;
-use dimcmc::io::{atomic, lsd};
-use dimcmc::proposal::{Given, Known, Place, Proposal, ProposalError, propose};
-use dimcmc::star::BrightnessModel;
-use dimcmc::text::shown;
+use crate::data::config::ConfigError;
+use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
+use crate::data::io::lsd::LsdError;
+use crate::data::io::{atomic, lsd};
+use crate::numerics::text::shown;
+use crate::star::BrightnessModel;
 use std::path::{Path, PathBuf};
 
 /// Write a first config for observed profiles

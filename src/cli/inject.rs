@@ -3,14 +3,14 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
-use dimcmc::config::{self, Settings};
-use dimcmc::injection::inject;
-use dimcmc::io::truth::InjectedTruth;
-use dimcmc::io::{atomic, lsd, truth};
-use dimcmc::objective::Parameter;
-use dimcmc::observation::Observations;
-use dimcmc::scene::Scene;
-use dimcmc::star::Orbit;
+use crate::data::config::{self, Settings};
+use crate::data::io::truth::InjectedTruth;
+use crate::data::io::{atomic, lsd, truth};
+use crate::data::scene::Scene;
+use crate::posterior::objective::Parameter;
+use crate::star::Orbit;
+use crate::star::injection::inject;
+use crate::star::observation::Observations;
 use std::path::PathBuf;
 
 /// Name of the config that is written beside the profiles.

@@ -3,14 +3,14 @@
 use super::output::{Output, remarks};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
-use dimcmc::detection::{DetectionError, DetectionSettings};
-use dimcmc::expansion::nuisances;
-use dimcmc::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
-use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
-use dimcmc::pool::Brief;
-use dimcmc::scene::Scene;
-use dimcmc::star::Orbit;
-use dimcmc::text::shown;
+use crate::data::scene::Scene;
+use crate::numerics::text::shown;
+use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::posterior::detection::{DetectionError, DetectionSettings};
+use crate::posterior::expansion::nuisances;
+use crate::runs::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
+use crate::runs::pool::Brief;
+use crate::star::Orbit;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -153,7 +153,8 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
 
 /// The orbits that are put in.
 fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
-    let unbounded = || Failure::failed(format!("{}: {}", args.config.display(), dimcmc::periodogram::Unbounded));
+    let unbounded =
+        || Failure::failed(format!("{}: {}", args.config.display(), crate::planets::periodogram::Unbounded));
     let (least, most) = shortcut.k_range_kms().ok_or_else(unbounded)?;
     let (min, max) = (args.min_k_kms.unwrap_or(least), args.max_k_kms.unwrap_or(most));
     if !(min > 0.0 && min < max && max.is_finite()) {

@@ -2,9 +2,9 @@
 
 use super::output::Output;
 use super::{Failure, console};
+use crate::data::io::atomic;
+use crate::numerics::text::shown;
 use clap_mangen::Man;
-use dimcmc::io::atomic;
-use dimcmc::text::shown;
 
 /// Write the manual pages
 ///

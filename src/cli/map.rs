@@ -3,12 +3,12 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
-use dimcmc::diagnosis::Diagnosis;
-use dimcmc::fit::{Deviation, Fit, FitSummary};
-use dimcmc::io::map::{FILES, MapResult};
-use dimcmc::noise::MeasuredErrors;
-use dimcmc::objective::{Reference, ReferenceError};
-use dimcmc::scene::Scene;
+use crate::data::diagnosis::Diagnosis;
+use crate::data::io::map::{FILES, MapResult};
+use crate::data::scene::Scene;
+use crate::posterior::fit::{Deviation, Fit, FitSummary};
+use crate::posterior::noise::MeasuredErrors;
+use crate::posterior::objective::{Reference, ReferenceError};
 use std::path::{Path, PathBuf};
 
 /// Reconstruct the spots at the config's parameter values

@@ -2,8 +2,8 @@
 
 use super::output::Output;
 use super::{Failure, Global, analyse, console};
-use dimcmc::merge::{MergeError, merge};
-use dimcmc::text::shown;
+use crate::numerics::text::shown;
+use crate::runs::merge::{MergeError, merge};
 use std::path::PathBuf;
 
 /// Join runs of the same config but for the seed into one

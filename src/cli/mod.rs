@@ -34,8 +34,7 @@ mod search;
 mod signals;
 mod simulate;
 
-pub use console::end;
-pub use failure::Failure;
+use failure::Failure;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use std::num::NonZeroUsize;
@@ -46,7 +45,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"));
 /// Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
 #[derive(Debug, Parser)]
 #[command(name = "dimcmc", version = VERSION, arg_required_else_help = true)]
-pub struct Cli {
+struct Cli {
     #[command(flatten)]
     global: Global,
     #[command(subcommand)]
@@ -107,13 +106,18 @@ fn command() -> clap::Command {
     groups::grouped(Cli::command())
 }
 
+/// The whole program: reads the command line, runs the command, prints what went wrong.
+pub fn main() -> std::process::ExitCode {
+    console::end(run(&parse()))
+}
+
 /// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to do.
-pub fn parse() -> Cli {
+fn parse() -> Cli {
     Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|e| e.exit())
 }
 
 /// Runs the command.
-pub fn run(cli: &Cli) -> Result<(), Failure> {
+fn run(cli: &Cli) -> Result<(), Failure> {
     if cluster::join(&cli.global)? == cluster::Done::Everything {
         return Ok(());
     }

@@ -3,9 +3,9 @@
 use super::output::{Output, remarks};
 use super::search::search;
 use super::{Failure, Global, console};
-use dimcmc::io::atomic::write_json;
-use dimcmc::optimum::OptimumFile;
-use dimcmc::scene::Scene;
+use crate::data::io::atomic::write_json;
+use crate::data::scene::Scene;
+use crate::runs::optimum::OptimumFile;
 use std::path::PathBuf;
 
 /// Name of the file.

@@ -2,13 +2,13 @@
 
 use super::output::Output;
 use super::{Failure, Global, console, progress};
-use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
-use dimcmc::expansion::nuisances;
-use dimcmc::fit::Fit;
-use dimcmc::io::periodogram::{FILES, PeriodogramResult};
-use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
-use dimcmc::scene::Scene;
-use dimcmc::text::shown;
+use crate::data::io::periodogram::{FILES, PeriodogramResult};
+use crate::data::scene::Scene;
+use crate::numerics::text::shown;
+use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
+use crate::posterior::expansion::nuisances;
+use crate::posterior::fit::Fit;
 use std::path::{Path, PathBuf};
 
 /// Search for a planet at every period, the star's spots marginalised out

@@ -3,8 +3,8 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global};
-use dimcmc::plot::{self, DPI};
-use dimcmc::survey::HEADER;
+use crate::figures::plot::{self, DPI};
+use crate::runs::grid_scan::HEADER;
 use std::path::PathBuf;
 
 /// Draw whatever a folder holds, as SVG and PNG

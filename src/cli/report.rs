@@ -2,8 +2,8 @@
 
 use super::report_lines::Report;
 use super::{Failure, Global};
-use dimcmc::io::atomic;
-use dimcmc::report;
+use crate::data::io::atomic;
+use crate::figures::report;
 use std::path::PathBuf;
 
 /// Write one HTML page of whatever a folder holds

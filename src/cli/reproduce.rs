@@ -2,11 +2,11 @@
 
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
-use dimcmc::experiments::files::{Made, SUMMARY, TABLE};
-use dimcmc::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
-use dimcmc::plot::{self, DPI};
-use dimcmc::run::RunError;
-use dimcmc::text::shown;
+use crate::figures::plot::{self, DPI};
+use crate::numerics::text::shown;
+use crate::runs::experiments::files::{Made, SUMMARY, TABLE};
+use crate::runs::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
+use crate::runs::run::RunError;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

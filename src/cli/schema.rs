@@ -1,7 +1,7 @@
 //! `dimcmc schema`: the JSON Schema of the config.
 
 use super::{Failure, console};
-use dimcmc::config;
+use crate::data::config;
 
 /// Print the JSON Schema of the config
 ///

@@ -1,8 +1,8 @@
 //! Conjugate gradients for the Newton system in the entropy's metric, `(1 + lambda M) z = b` (Hestenes & Stiefel 1952;
 //! truncated Newton as in Steihaug 1983: a direction of negative curvature ends it).
 
-use crate::vector::Number;
-use crate::vector::linear::{axpy, combine, dot};
+use crate::numerics::vector::Number;
+use crate::numerics::vector::linear::{axpy, combine, dot};
 
 /// When to stop, and what to do it with.
 #[derive(Clone, Copy, Debug)]

@@ -7,8 +7,8 @@
 
 mod rows;
 
-use crate::vector::Number;
-use crate::vector::linear::dot;
+use crate::numerics::vector::Number;
+use crate::numerics::vector::linear::dot;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

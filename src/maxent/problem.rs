@@ -1,6 +1,6 @@
 //! What an inversion needs to know of its data: a misfit, its gradient and its curvature, as functions of an image.
 
-use crate::vector::Number;
+use crate::numerics::vector::Number;
 
 /// Which second derivative of the misfit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,8 +13,8 @@ use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
 use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing};
-use crate::vector::Number;
-use crate::vector::linear::{combine, combine_two, dot, norm, rounded, scale_by, widened};
+use crate::numerics::vector::Number;
+use crate::numerics::vector::linear::{combine, combine_two, dot, norm, rounded, scale_by, widened};
 
 /// Largest change of a coordinate in one step.
 const STEP_CAP: f32 = 2.0;

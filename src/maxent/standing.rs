@@ -10,8 +10,8 @@ use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
 use super::problem::Problem;
 use super::solution::{Best, Goal};
-use crate::vector::linear::{combine, combined, dot, weighted_dots};
-use crate::vector::{self, Instructions, Task};
+use crate::numerics::vector::linear::{combine, combined, dot, weighted_dots};
+use crate::numerics::vector::{self, Instructions, Task};
 
 /// Largest change of ln(lambda) in one step.
 const LN_LAMBDA_CAP: f64 = 1.5;

@@ -5,7 +5,7 @@
 
 use super::correlate::{self, CHUNK, correlate};
 use super::line_profile::LineKernel;
-use crate::vector::Instructions;
+use crate::numerics::vector::Instructions;
 use std::ops::Range;
 
 /// The velocity grid, as far as filters need to know it.

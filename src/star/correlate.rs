@@ -2,7 +2,7 @@
 //!
 //! Left out: what is filtered; the caller sees to it that rows reach far enough.
 
-use crate::vector::Instructions;
+use crate::numerics::vector::Instructions;
 
 /// Results that are kept in registers together.
 pub const CHUNK: usize = 32;

@@ -15,7 +15,7 @@ use super::line_profile::DEPOSIT_NODES;
 use super::placement::{Arrangement, Placement, Scale};
 use super::sorting::{Order, Sort};
 use super::view::Viewer;
-use crate::vector::{self, Instructions, Number};
+use crate::numerics::vector::{self, Instructions, Number};
 use std::sync::Arc;
 
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.

@@ -10,7 +10,7 @@ use super::grid::SurfaceGrid;
 use super::moments::CHUNK;
 use super::placement::{Arrangement, Placement, spare_blocks};
 use super::view::{Part, Seen, Viewer};
-use crate::vector::{Instructions, Registers, Scattered, Task};
+use crate::numerics::vector::{Instructions, Registers, Scattered, Task};
 use std::sync::Arc;
 
 /// Which of the pixels that an observation sees are in the lanes of a block.

@@ -7,7 +7,7 @@
 
 use super::block::{Group, LANES};
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
-use crate::vector::{self, Number, Registers, Scattered};
+use crate::numerics::vector::{self, Number, Registers, Scattered};
 
 /// Blocks (96 bytes each, and 32 of pixels) from the one at work to the one that is asked for; all of an observation follow each other.
 const AHEAD: usize = 32;
@@ -150,8 +150,8 @@ fn polynomial<R: Registers>(r: R, coefficients: &[R::Lanes], t: R::Lanes, square
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::vector::{self, Instructions, Task};
     use crate::star::block::{Block, Pixels};
-    use crate::vector::{self, Instructions, Task};
 
     const PIXELS: usize = 190;
     const GRID: usize = 20;

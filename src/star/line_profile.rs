@@ -12,8 +12,8 @@
 
 use super::LocalLine;
 use super::voigt;
-use crate::vector::elementary::exp_minus;
-use crate::vector::{self, Instructions, Task};
+use crate::numerics::vector::elementary::exp_minus;
+use crate::numerics::vector::{self, Instructions, Task};
 use std::f64::consts::TAU;
 
 /// Reach of a Gaussian kernel in standard deviations; the tail left out is 4e-8 of the line's area.

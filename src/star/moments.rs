@@ -6,8 +6,8 @@
 //! turn. Left out: which pixels.
 
 use super::limb_darkening::LimbDarkening;
-use crate::vector::Instructions;
-use crate::vector::elementary::{nearest_integer, sin_cos};
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::{nearest_integer, sin_cos};
 
 /// Numbers that are computed side by side: pixels of a ring, and rings.
 pub const CHUNK: usize = 16;

@@ -11,7 +11,7 @@
 //! planet's own mass is counted as its minimum: exact for an orbit seen edge-on.
 
 use super::Orbit;
-use crate::units::{JUPITERS_PER_SUN, SECONDS_PER_DAY, SOLAR_GM_KM3_S2};
+use crate::numerics::units::{JUPITERS_PER_SUN, SECONDS_PER_DAY, SOLAR_GM_KM3_S2};
 use std::f64::consts::TAU;
 
 /// From the largest radial velocity of a circular orbit to the inferior conjunction (orbital cycles).

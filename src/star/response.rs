@@ -9,8 +9,8 @@ use super::deposit::{Deposit, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
-use crate::observation::Observations;
-use crate::vector::{self, Instructions, Number, Task};
+use crate::numerics::vector::{self, Instructions, Number, Task};
+use crate::star::observation::Observations;
 use std::sync::Arc;
 
 /// When and at which velocities the star is observed.
@@ -25,7 +25,7 @@ pub struct Sampling {
 impl Sampling {
     /// The sampling of a set of observations.
     pub fn of(observations: &Observations) -> Self {
-        let profile = |p: &crate::observation::Profile| (p.time_d, p.first_velocity_kms, p.intensity.len());
+        let profile = |p: &crate::star::observation::Profile| (p.time_d, p.first_velocity_kms, p.intensity.len());
         Sampling { step_kms: observations.step_kms, profiles: observations.profiles.iter().map(profile).collect() }
     }
 
@@ -294,8 +294,8 @@ fn total(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::vector::Portable;
     use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation};
-    use crate::vector::Portable;
 
     fn noise(n: usize) -> Vec<f64> {
         (0..n).map(|i| (0.7 * (i * i) as f64).sin()).collect()

@@ -9,8 +9,8 @@ use super::filling::{Seats, Source, fill};
 use super::grid::SurfaceGrid;
 use super::placement::{Arrangement, Cells, Placement, Scale, spare_blocks, spare_pixels};
 use super::view::{NOTHING, Part, Seen, Sight, Viewer};
-use crate::vector::elementary::SINGLE_INTEGERS;
-use crate::vector::{Instructions, Task};
+use crate::numerics::vector::elementary::SINGLE_INTEGERS;
+use crate::numerics::vector::{Instructions, Task};
 use std::sync::Arc;
 
 /// The work that makes a [`Placement`]: looks at the pixels of every observation and sorts the visible ones into cells.
@@ -257,11 +257,11 @@ impl Sorter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::vector;
     use crate::star::block::Group;
     use crate::star::kernel;
     use crate::star::line_profile::DEPOSIT_NODES;
     use crate::star::{LimbDarkening, Orbit, Quadrature, Rotation, StarState};
-    use crate::vector;
 
     /// Deposits `x` as an observation sees it on so many nodes, and gives a map what it gets from others.
     struct Both<'a>(&'a Placement, usize, &'a [f64], usize);

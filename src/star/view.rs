@@ -7,8 +7,8 @@ use super::grid::{Ring, RingPoint, SurfaceGrid};
 use super::limb_darkening::LimbDarkening;
 use super::moments::{CHUNK, Moments, Point, Rings};
 use super::{Rotation, StarState};
-use crate::vector::Instructions;
-use crate::vector::elementary::INTEGERS;
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::INTEGERS;
 use std::f64::consts::TAU;
 
 /// The star's orientation, shared by all observations.

@@ -2,12 +2,12 @@
 //! put, and every command with them.
 
 use crate::desk::{Desk, says, two_spots};
-use dimcmc::config;
-use dimcmc::imaging::Imager;
+use dimcmc::data::config;
+use dimcmc::data::scene::Scene;
 use dimcmc::maxent::entropy::Entropy;
 use dimcmc::maxent::{Curvature, Problem, SolverSettings};
-use dimcmc::objective::{ObjectiveKind, Posterior, Reference};
-use dimcmc::scene::Scene;
+use dimcmc::posterior::imaging::Imager;
+use dimcmc::posterior::objective::{ObjectiveKind, Posterior, Reference};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -4,10 +4,10 @@
 #[cfg(unix)]
 use crate::desk::interrupt;
 use crate::desk::{Desk, dimcmc, kill, says, text, two_spots};
-use dimcmc::log_density::{LogDensity, Status};
-use dimcmc::objective::{Parameter, Posterior, Reference};
-use dimcmc::scene::Scene;
-use dimcmc::search::{SearchSettings, find};
+use dimcmc::data::scene::Scene;
+use dimcmc::data::search::{SearchSettings, find};
+use dimcmc::posterior::objective::{Parameter, Posterior, Reference};
+use dimcmc::sampling::log_density::{LogDensity, Status};
 use serde_json::{Value, json};
 use std::path::Path;
 

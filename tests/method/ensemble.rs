@@ -1,12 +1,12 @@
 //! The sampler from outside: threads, starts, wraps, and a chain cut and resumed through its journal.
 
-use dimcmc::chain::{Chain, ParameterKind, Record, Shape, summarise};
-use dimcmc::ensemble::moves::{DifferentialEvolution, Stretch};
-use dimcmc::ensemble::{
+use crate::data::io::journal::{self, Journal};
+use crate::sampling::chain::{Chain, ParameterKind, Record, Shape, summarise};
+use crate::sampling::ensemble::moves::{DifferentialEvolution, Stretch};
+use crate::sampling::ensemble::{
     EnsembleError, Mix, Positions, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start, run,
 };
-use dimcmc::io::journal::{self, Journal};
-use dimcmc::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
+use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
 use nalgebra::DMatrix;
 use std::cell::Cell;
 use std::convert::Infallible;

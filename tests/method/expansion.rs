@@ -1,15 +1,15 @@
 //! The quadratic against full reconstructions and against the independent posterior, on the oracle's data and pixels.
 
-use crate::common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
-use dimcmc::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
-use dimcmc::imaging::Imager;
-use dimcmc::maxent::SolverSettings;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::objective::{
+use super::common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
+use crate::maxent::SolverSettings;
+use crate::maxent::entropy::Entropy;
+use crate::posterior::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
-use dimcmc::star::{Quadrature, SurfaceGrid};
-use dimcmc::surrogate::Surrogate;
+use crate::posterior::surrogate::Surrogate;
+use crate::star::{Quadrature, SurfaceGrid};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -1,11 +1,11 @@
 //! The first look at simulated stars: vsini and centre within the errors that it gives, lines found where they are, and every
 //! reason to see nothing.
 
-use dimcmc::first_look::{FirstLook, LineModel, LookError, MeanProfile};
-use dimcmc::objective::{Parameter, ParameterValues};
-use dimcmc::observation::{Observations, Profile};
-use dimcmc::simulate::Simulation;
-use dimcmc::star::{LimbDarkening, LocalLine, Spot, StarSettings};
+use crate::posterior::first_look::{FirstLook, LineModel, LookError, MeanProfile};
+use crate::posterior::objective::{Parameter, ParameterValues};
+use crate::posterior::simulate::Simulation;
+use crate::star::observation::{Observations, Profile};
+use crate::star::{LimbDarkening, LocalLine, Spot, StarSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

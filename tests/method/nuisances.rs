@@ -1,18 +1,18 @@
 //! Nuisances of line and continuum against dense algebra, differences and simulated stars whose continua wander.
 
-use crate::common::{imager, oracle, truth};
-use dimcmc::config;
-use dimcmc::expansion::{Expansion, STELLAR};
-use dimcmc::fit::Fit;
-use dimcmc::imaging::Imager;
-use dimcmc::maxent::{Curvature, Problem, SolverSettings};
-use dimcmc::nuisances::LineAndContinuum;
-use dimcmc::objective::{
+use super::common::{imager, oracle, truth};
+use crate::data::config;
+use crate::data::scene::Scene;
+use crate::maxent::{Curvature, Problem, SolverSettings};
+use crate::posterior::expansion::{Expansion, STELLAR};
+use crate::posterior::fit::Fit;
+use crate::posterior::imaging::Imager;
+use crate::posterior::nuisances::LineAndContinuum;
+use crate::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
-use dimcmc::observation::{Observations, Profile};
-use dimcmc::scene::Scene;
-use dimcmc::star::{Quadrature, SurfaceGrid};
+use crate::star::observation::{Observations, Profile};
+use crate::star::{Quadrature, SurfaceGrid};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::path::Path;

@@ -1,12 +1,14 @@
 //! Truths about the objectives: gradients, agreement near the optimum, precision, and a monotone fall far from it.
 
-use crate::common::{oracle, values, whole_truth};
-use dimcmc::imaging::Imager;
-use dimcmc::log_density::{Gradient, LogDensity, Status};
-use dimcmc::maxent::SolverSettings;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference};
-use dimcmc::star::{Quadrature, SurfaceGrid};
+use super::common::{oracle, values, whole_truth};
+use crate::maxent::SolverSettings;
+use crate::maxent::entropy::Entropy;
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::{
+    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
+};
+use crate::sampling::log_density::{Gradient, LogDensity, Status};
+use crate::star::{Quadrature, SurfaceGrid};
 
 const KINDS: [ObjectiveKind; 3] =
     [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];

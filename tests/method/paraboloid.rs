@@ -1,9 +1,9 @@
 //! The paraboloid and the marginals of landscapes whose answer is known.
 
-use dimcmc::landscape::{
+use crate::sampling::landscape::{
     Axis, Grid, Landscape, Marginal, Node, Paraboloid, Rule, Undefined, paraboloid, paraboloid_table,
 };
-use dimcmc::log_density::{Likelihood, Reconstruction, Status};
+use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
 use nalgebra::{DMatrix, DVector};
 
 fn axis(name: &str, min: f64, max: f64, nodes: usize) -> Axis {

@@ -1,11 +1,13 @@
 //! Moment-matched pixels: the star's parameters do not depend on how many there are.
 
-use crate::common::{oracle, values};
-use dimcmc::imaging::Imager;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference};
-use dimcmc::optimise::climb;
-use dimcmc::star::{Quadrature, SurfaceGrid};
+use super::common::{oracle, values};
+use crate::maxent::entropy::Entropy;
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::{
+    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
+};
+use crate::sampling::optimise::climb;
+use crate::star::{Quadrature, SurfaceGrid};
 
 /// Best vsini and its standard deviation, the rest fixed at the injected values.
 fn vsini(pixels: usize) -> (f64, f64) {

@@ -1,10 +1,10 @@
 //! Parameters of the star's surface as free parameters: a star simulated with others than the config's is found again, and what
 //! does not free them does not know of them.
 
-use dimcmc::config;
-use dimcmc::objective::{ObjectiveKind, Parameter, Posterior, Reference};
-use dimcmc::scene::Scene;
-use dimcmc::search::{self, SearchSettings};
+use crate::data::config;
+use crate::data::scene::Scene;
+use crate::data::search::{self, SearchSettings};
+use crate::posterior::objective::{ObjectiveKind, Parameter, Posterior, Reference};
 use serde_json::{Value, json};
 use std::path::Path;
 

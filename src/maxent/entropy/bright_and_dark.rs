@@ -9,8 +9,8 @@
 //! Left out: which entropy an image has (`entropy`), data.
 
 use super::pixels::{Pixel, spottedness};
-use crate::vector::Instructions;
-use crate::vector::elementary::{exp_minus, ln_1p_single};
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::{exp_minus, ln_1p_single};
 
 /// A pixel.
 #[derive(Clone, Copy)]

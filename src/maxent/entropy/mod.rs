@@ -8,8 +8,8 @@ mod bright_and_dark;
 mod pixels;
 mod spots;
 
-use crate::vector;
-use crate::vector::linear::{combine_two, combined};
+use crate::numerics::vector;
+use crate::numerics::vector::linear::{combine_two, combined};
 use bright_and_dark::Brightness;
 use pixels::{Advance, Pixel, Step, Value, spottedness};
 use spots::Filling;

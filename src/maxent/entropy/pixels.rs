@@ -3,8 +3,8 @@
 //! Left out: what an entropy is (`spots`, `bright_and_dark`).
 
 use super::{MetricStep, Worth};
-use crate::vector::linear::short_dot;
-use crate::vector::{Instructions, Task};
+use crate::numerics::vector::linear::short_dot;
+use crate::numerics::vector::{Instructions, Task};
 
 /// Pixels whose terms are summed at a time.
 const CHUNK: usize = 512;

@@ -4,8 +4,8 @@
 //! The coordinate is `u = logit(s)`, which keeps s inside (0, 1). Left out: which entropy an image has (`entropy`), data.
 
 use super::pixels::Pixel;
-use crate::vector::Instructions;
-use crate::vector::elementary::{exp_minus, ln_1p_and_inverse, ln_1p_single};
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::{exp_minus, ln_1p_and_inverse, ln_1p_single};
 
 /// A pixel with its default.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 //! An application reads every entry twice, and waits for memory: two bytes or one instead of four (`results/performance.md`). Left out:
 //! what the eigenvectors are of, and which pixels have them (`preconditioner`).
 
-use crate::vector::{self, Instructions, Number, Registers, Task};
+use crate::numerics::vector::{self, Instructions, Number, Registers, Task};
 use nalgebra::DMatrix;
 
 /// Eigenvectors on some of the pixels.

@@ -1,0 +1,22 @@
+//! The method against independent numbers, limit cases and itself: the library alone.
+
+mod common;
+
+mod chain;
+mod ensemble;
+mod expansion;
+mod figure;
+mod first_look;
+mod forward;
+mod imaging;
+mod lsd;
+mod nuisances;
+mod objective;
+mod oracle;
+mod paraboloid;
+mod pixels;
+mod posterior;
+mod response;
+mod simulate;
+mod surface;
+mod surrogate;
