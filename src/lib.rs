@@ -51,15 +51,37 @@ mod runs;
 mod sampling;
 mod star;
 
-#[cfg(test)]
-#[path = "../tests/method/mod.rs"]
-mod method;
-
-/// All rooms, for the benchmarks. Not part of the public interface: anything here may change without notice.
-#[cfg(feature = "internals")]
+/// All rooms, for tests and benchmarks. Not part of the public interface: anything here may change without notice.
 #[doc(hidden)]
 pub mod internals {
-    pub use crate::{data, maxent, numerics, planets, posterior, runs, sampling, star};
+    #![allow(missing_docs)]
+    pub mod data {
+        pub use crate::data::*;
+    }
+    pub mod figures {
+        pub use crate::figures::*;
+    }
+    pub mod maxent {
+        pub use crate::maxent::*;
+    }
+    pub mod numerics {
+        pub use crate::numerics::*;
+    }
+    pub mod planets {
+        pub use crate::planets::*;
+    }
+    pub mod posterior {
+        pub use crate::posterior::*;
+    }
+    pub mod runs {
+        pub use crate::runs::*;
+    }
+    pub mod sampling {
+        pub use crate::sampling::*;
+    }
+    pub mod star {
+        pub use crate::star::*;
+    }
 }
 
 pub use cli::main as command_line;

@@ -3,9 +3,9 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
+use crate::data::config::{self, ObservationSource};
 use crate::data::io::{lsd, truth};
 use crate::data::scene::Scene;
-use crate::{data::config, data::config::ObservationSource};
 use std::path::PathBuf;
 
 /// Simulate observations of a spotted star with a planet

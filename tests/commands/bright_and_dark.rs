@@ -2,12 +2,12 @@
 //! put, and every command with them.
 
 use crate::desk::{Desk, says, two_spots};
-use dimcmc::data::config;
-use dimcmc::data::scene::Scene;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::maxent::{Curvature, Problem, SolverSettings};
-use dimcmc::posterior::imaging::Imager;
-use dimcmc::posterior::objective::{ObjectiveKind, Posterior, Reference};
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{ObjectiveKind, Posterior, Reference};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -93,7 +93,7 @@ fn the_solution_meets_its_optimality_conditions_and_shows_what_is_there() {
     assert!(correlation > 0.8);
     let inside = |disc: &[f64]| {
         let [longitude, latitude, radius] = [0, 1, 2].map(|k| disc[k].to_radians());
-        let disc = dimcmc::star::Disc { longitude, latitude, radius };
+        let disc = dimcmc::internals::star::Disc { longitude, latitude, radius };
         let grid = &imager.grid;
         let pixels = seen.iter().filter(|&&p| disc.contains(grid.longitude[p], grid.latitude[p]));
         let (count, sum) = pixels.fold((0.0, 0.0), |(count, sum), &p| (count + 1.0, sum + b[p]));

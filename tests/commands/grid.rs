@@ -4,10 +4,10 @@
 #[cfg(unix)]
 use crate::desk::interrupt;
 use crate::desk::{Desk, dimcmc, kill, says, text, two_spots};
-use dimcmc::data::scene::Scene;
-use dimcmc::data::search::{SearchSettings, find};
-use dimcmc::posterior::objective::{Parameter, Posterior, Reference};
-use dimcmc::sampling::log_density::{LogDensity, Status};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{SearchSettings, find};
+use dimcmc::internals::posterior::objective::{Parameter, Posterior, Reference};
+use dimcmc::internals::sampling::log_density::{LogDensity, Status};
 use serde_json::{Value, json};
 use std::path::Path;
 

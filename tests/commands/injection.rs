@@ -2,8 +2,8 @@
 //! make of it.
 
 use crate::desk::{Desk, says, star};
-use dimcmc::data::io::lsd::{self, ReadOptions};
-use dimcmc::star::observation::Observations;
+use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::star::observation::Observations;
 use serde_json::{Value, json};
 
 const ORBIT: [&str; 6] = ["--k-kms", "0.7", "--porb-over-prot", "1.7", "--phi", "0.3"];

@@ -2,8 +2,8 @@
 //! noisier weigh less, and everything after it is as with the same numbers written down.
 
 use crate::desk::{Desk, says, star};
-use dimcmc::data::io::lsd::{self, ReadOptions};
-use dimcmc::star::observation::Observations;
+use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::star::observation::Observations;
 use serde_json::{Value, json};
 
 /// A spotted star of S/N 500 with a wide continuum, its profiles in `data` after `change`.

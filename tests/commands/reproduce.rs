@@ -2,8 +2,8 @@
 //! command on a row of them.
 
 use crate::desk::{dimcmc, text};
-use dimcmc::runs::experiments::{Case, Nodes, Outcome, ROWS, star};
-use dimcmc::runs::pool::Pool;
+use dimcmc::internals::runs::experiments::{Case, Nodes, Outcome, ROWS, star};
+use dimcmc::internals::runs::pool::Pool;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -52,7 +52,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
 
 /// Deviation of every route from the injected value, in its error bars.
 fn deviations(outcome: &Outcome, name: &str) -> Vec<(&'static str, f64)> {
-    let of_route = |(route, found): (&'static str, &dimcmc::runs::experiments::Route)| {
+    let of_route = |(route, found): (&'static str, &dimcmc::internals::runs::experiments::Route)| {
         let estimate = found.parameters.get(name).unwrap_or_else(|| panic!("{route}: {:?}", found.note));
         (route, outcome.deviation(name, estimate).unwrap() / estimate.error())
     };

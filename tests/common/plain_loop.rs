@@ -6,7 +6,7 @@
 //! windows but not the loop.
 #![allow(dead_code)]
 
-use dimcmc::star::{Sampling, StarSettings, StarState, SurfaceGrid};
+use dimcmc::internals::star::{Sampling, StarSettings, StarState, SurfaceGrid};
 use std::f64::consts::TAU;
 
 /// The response in windows of `WINDOW` bins; of the line, what lies outside is dropped.

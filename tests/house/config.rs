@@ -1,7 +1,7 @@
 //! Configs: those that ship resolve, their resolved form is stable, and every mistake gets one line that names file and key.
 
-use dimcmc::data::config::{self, EquivalentWidth, ObservationSource, Settings};
-use dimcmc::posterior::objective::{Parameter, Prior};
+use dimcmc::internals::data::config::{self, EquivalentWidth, ObservationSource, Settings};
+use dimcmc::internals::posterior::objective::{Parameter, Prior};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -96,7 +96,7 @@ fn lo_peg_resolves() {
     assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 1.0));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
-        let data = dimcmc::data::io::lsd::read(list, options).unwrap().observations;
+        let data = dimcmc::internals::data::io::lsd::read(list, options).unwrap().observations;
         assert!((settings.star_for(&data).unwrap().line.equivalent_width_kms - 2.6700).abs() < 1e-3);
     }
 }

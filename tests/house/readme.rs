@@ -1,6 +1,6 @@
 //! What the README and `configs/` show is what the program takes.
 
-use dimcmc::data::config;
+use dimcmc::internals::data::config;
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {

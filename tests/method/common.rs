@@ -1,11 +1,11 @@
 //! The independent reference numbers under `tests/data/oracle` (see the README there), in this crate's types.
 #![allow(dead_code)]
 
-use crate::maxent::entropy::Entropy;
-use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use crate::posterior::imaging::{Data, Imager};
-use crate::posterior::objective::{Parameter, ParameterValues};
-use crate::star::{LimbDarkening, LocalLine, Sampling, StarSettings, SurfaceGrid};
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::numerics::units::{instrumental_sigma_kms, planck_contrast};
+use dimcmc::internals::posterior::imaging::{Data, Imager};
+use dimcmc::internals::posterior::objective::{Parameter, ParameterValues};
+use dimcmc::internals::star::{LimbDarkening, LocalLine, Sampling, StarSettings, SurfaceGrid};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::path::PathBuf;

@@ -1,12 +1,12 @@
 //! The sampler from outside: threads, starts, wraps, and a chain cut and resumed through its journal.
 
-use crate::data::io::journal::{self, Journal};
-use crate::sampling::chain::{Chain, ParameterKind, Record, Shape, summarise};
-use crate::sampling::ensemble::moves::{DifferentialEvolution, Stretch};
-use crate::sampling::ensemble::{
+use dimcmc::internals::data::io::journal::{self, Journal};
+use dimcmc::internals::sampling::chain::{Chain, ParameterKind, Record, Shape, summarise};
+use dimcmc::internals::sampling::ensemble::moves::{DifferentialEvolution, Stretch};
+use dimcmc::internals::sampling::ensemble::{
     EnsembleError, Mix, Positions, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start, run,
 };
-use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
+use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
 use nalgebra::DMatrix;
 use std::cell::Cell;
 use std::convert::Infallible;

@@ -1,15 +1,15 @@
 //! The quadratic against full reconstructions and against the independent posterior, on the oracle's data and pixels.
 
-use super::common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
-use crate::maxent::SolverSettings;
-use crate::maxent::entropy::Entropy;
-use crate::posterior::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
-use crate::posterior::imaging::Imager;
-use crate::posterior::objective::{
+use crate::common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
+use dimcmc::internals::maxent::SolverSettings;
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::posterior::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
-use crate::posterior::surrogate::Surrogate;
-use crate::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::posterior::surrogate::Surrogate;
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

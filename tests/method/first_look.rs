@@ -1,11 +1,11 @@
 //! The first look at simulated stars: vsini and centre within the errors that it gives, lines found where they are, and every
 //! reason to see nothing.
 
-use crate::posterior::first_look::{FirstLook, LineModel, LookError, MeanProfile};
-use crate::posterior::objective::{Parameter, ParameterValues};
-use crate::posterior::simulate::Simulation;
-use crate::star::observation::{Observations, Profile};
-use crate::star::{LimbDarkening, LocalLine, Spot, StarSettings};
+use dimcmc::internals::posterior::first_look::{FirstLook, LineModel, LookError, MeanProfile};
+use dimcmc::internals::posterior::objective::{Parameter, ParameterValues};
+use dimcmc::internals::posterior::simulate::Simulation;
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{LimbDarkening, LocalLine, Spot, StarSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

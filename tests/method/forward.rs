@@ -1,7 +1,9 @@
 //! Truths about the forward model: symmetry, limit cases, adjointness, convergence with the number of pixels.
 
-use super::common::{oracle, values};
-use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid};
+use crate::common::{oracle, values};
+use dimcmc::internals::star::{
+    LimbDarkening, LocalLine, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid,
+};
 
 fn state() -> StarState {
     StarState {
@@ -243,7 +245,7 @@ fn surface_parameters_stand_in_place_of_settings() {
     other.contrast = 0.3;
     other.line.sigma_kms = 4.0f64.hypot(other.line.instrumental_sigma_kms);
     other.line.equivalent_width_kms = 7.0;
-    let surface = crate::star::Surface {
+    let surface = dimcmc::internals::star::Surface {
         limb_darkening: Some(0.4),
         line_sigma_kms: Some(4.0),
         equivalent_width_kms: Some(7.0),

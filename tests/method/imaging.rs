@@ -1,15 +1,15 @@
 //! Truths about the maximum-entropy image: derivatives of the misfit, the solver's optimality conditions, and that the answer
 //! does not depend on the way to it.
 
-use super::common::{Oracle, oracle, values};
-use crate::maxent::entropy::Entropy;
-use crate::maxent::{
+use crate::common::{Oracle, oracle, values};
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::maxent::{
     Curvature, Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
 };
-use crate::posterior::imaging::{Data, Imager, ImagingProblem};
-use crate::posterior::objective::{Parameter, Reference};
-use crate::star::observation::{Observations, Profile};
-use crate::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::posterior::imaging::{Data, Imager, ImagingProblem};
+use dimcmc::internals::posterior::objective::{Parameter, Reference};
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 
 fn imager(oracle: &Oracle) -> Imager {
     Imager {

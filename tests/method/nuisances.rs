@@ -1,18 +1,18 @@
 //! Nuisances of line and continuum against dense algebra, differences and simulated stars whose continua wander.
 
-use super::common::{imager, oracle, truth};
-use crate::data::config;
-use crate::data::scene::Scene;
-use crate::maxent::{Curvature, Problem, SolverSettings};
-use crate::posterior::expansion::{Expansion, STELLAR};
-use crate::posterior::fit::Fit;
-use crate::posterior::imaging::Imager;
-use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::{
+use crate::common::{imager, oracle, truth};
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
+use dimcmc::internals::posterior::expansion::{Expansion, STELLAR};
+use dimcmc::internals::posterior::fit::Fit;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::nuisances::LineAndContinuum;
+use dimcmc::internals::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
-use crate::star::observation::{Observations, Profile};
-use crate::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::path::Path;

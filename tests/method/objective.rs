@@ -1,14 +1,14 @@
 //! Truths about the objectives: gradients, agreement near the optimum, precision, and a monotone fall far from it.
 
-use super::common::{oracle, values, whole_truth};
-use crate::maxent::SolverSettings;
-use crate::maxent::entropy::Entropy;
-use crate::posterior::imaging::Imager;
-use crate::posterior::objective::{
+use crate::common::{oracle, values, whole_truth};
+use dimcmc::internals::maxent::SolverSettings;
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
 };
-use crate::sampling::log_density::{Gradient, LogDensity, Status};
-use crate::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::sampling::log_density::{Gradient, LogDensity, Status};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 
 const KINDS: [ObjectiveKind; 3] =
     [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];

@@ -1,11 +1,11 @@
 //! Forward model and maximum entropy against an independent implementation.
 
-use super::common::{json, numbers, oracle, values};
-use crate::maxent::entropy::Entropy;
-use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
-use crate::posterior::imaging::ImagingProblem;
-use crate::star::spots::filling_at;
-use crate::star::{Quadrature, Response, Sampling, Spot, SurfaceGrid};
+use crate::common::{json, numbers, oracle, values};
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
+use dimcmc::internals::posterior::imaging::ImagingProblem;
+use dimcmc::internals::star::spots::filling_at;
+use dimcmc::internals::star::{Quadrature, Response, Sampling, Spot, SurfaceGrid};
 use serde_json::Value;
 
 /// Relative accuracy asked for against the oracle's numbers.

@@ -1,9 +1,9 @@
 //! The paraboloid and the marginals of landscapes whose answer is known.
 
-use crate::sampling::landscape::{
+use dimcmc::internals::sampling::landscape::{
     Axis, Grid, Landscape, Marginal, Node, Paraboloid, Rule, Undefined, paraboloid, paraboloid_table,
 };
-use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
+use dimcmc::internals::sampling::log_density::{Likelihood, Reconstruction, Status};
 use nalgebra::{DMatrix, DVector};
 
 fn axis(name: &str, min: f64, max: f64, nodes: usize) -> Axis {

@@ -3,8 +3,8 @@
 #[path = "../common/plain_loop.rs"]
 mod plain_loop;
 
-use super::common::{oracle, values};
-use crate::star::{Quadrature, Response, SurfaceGrid};
+use crate::common::{oracle, values};
+use dimcmc::internals::star::{Quadrature, Response, SurfaceGrid};
 use plain_loop::PlainLoop;
 
 fn noise(n: usize, a: f64) -> Vec<f64> {

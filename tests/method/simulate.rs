@@ -1,11 +1,11 @@
 //! Simulated observations and first-moment velocities, against the oracle's star and against statistics.
 
-use super::common::{json, numbers, oracle};
-use crate::data::config;
-use crate::data::scene::{Scene, fingerprint};
-use crate::posterior::simulate::{SIGMA_WITHOUT_NOISE, Simulation};
-use crate::star::observation::{Observations, Profile};
-use crate::star::{Disc, Facula, Quadrature, Spot, SurfaceGrid};
+use crate::common::{json, numbers, oracle};
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::{Scene, fingerprint};
+use dimcmc::internals::posterior::simulate::{SIGMA_WITHOUT_NOISE, Simulation};
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{Disc, Facula, Quadrature, Spot, SurfaceGrid};
 use std::path::Path;
 
 /// The demo's star, which is the oracle's, with `change` made to its simulation.

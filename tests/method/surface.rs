@@ -1,10 +1,10 @@
 //! Parameters of the star's surface as free parameters: a star simulated with others than the config's is found again, and what
 //! does not free them does not know of them.
 
-use crate::data::config;
-use crate::data::scene::Scene;
-use crate::data::search::{self, SearchSettings};
-use crate::posterior::objective::{ObjectiveKind, Parameter, Posterior, Reference};
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{self, SearchSettings};
+use dimcmc::internals::posterior::objective::{ObjectiveKind, Parameter, Posterior, Reference};
 use serde_json::{Value, json};
 use std::path::Path;
 

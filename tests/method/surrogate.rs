@@ -1,13 +1,13 @@
 //! The surrogate posterior: its draws follow its density, and the move leaves any posterior as it is, however poor the
 //! surrogate.
 
-use super::common::{imager, oracle, truth};
-use crate::posterior::objective::{FreeParameter, Parameter, ParameterSpace, Prior, Reference};
-use crate::posterior::surrogate::{Surrogate, SurrogateMove};
-use crate::sampling::chain::{Chain, Goals, MoveKind, ParameterKind, Shape, Summary, summarise};
-use crate::sampling::ensemble::{Sampler, SamplerSettings};
-use crate::sampling::log_density::{Evaluation, LogDensity, Status, Threads};
-use crate::star::{Quadrature, SurfaceGrid};
+use crate::common::{imager, oracle, truth};
+use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterSpace, Prior, Reference};
+use dimcmc::internals::posterior::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::sampling::chain::{Chain, Goals, MoveKind, ParameterKind, Shape, Summary, summarise};
+use dimcmc::internals::sampling::ensemble::{Sampler, SamplerSettings};
+use dimcmc::internals::sampling::log_density::{Evaluation, LogDensity, Status, Threads};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::sync::atomic::AtomicBool;
