@@ -21,7 +21,7 @@ const ERROR: Target = Target::AtMost(1.0);
 /// Times that everything is timed; the fastest counts.
 const ROUNDS: usize = 5;
 
-/// Passes of an evaluation: median and 95 %.
+/// Model applications per evaluation: median and 95 %.
 fn most_passes(free: Free) -> [Target; 2] {
     match free {
         Free::Three => [Target::AtMost(30.0), Target::AtMost(80.0)],

@@ -40,7 +40,7 @@ fn main() {
         return;
     }
     let (pass, evaluation) = (format!("pass, ms ({EXPONENT})"), format!("evaluation, ms ({EXPONENT})"));
-    let mut table = Table::new("Growth", &["", "size", &pass, &evaluation, "passes each"]);
+    let mut table = Table::new("Growth", &["", "size", &pass, &evaluation, "model applications each"]);
     let pixels = [1250, 5000, 20_000, 80_000];
     family("pixels", &pixels, Size::pixels, &mut table);
     let profiles = [25, 50, 100, 200, 400];
@@ -92,7 +92,7 @@ impl Case {
         self.points.iter().map(|x| self.posterior.evaluate(x)).collect()
     }
 
-    /// Passes of an evaluation in the mean, all of which reach their target.
+    /// Model applications per evaluation in the mean, all of which reach their target.
     fn passes(&self) -> f64 {
         let evaluations = self.evaluate();
         assert!(evaluations.iter().all(|evaluation| evaluation.status == Status::Converged), "{evaluations:?}");

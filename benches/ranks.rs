@@ -134,7 +134,7 @@ impl Case {
         let settings = SearchSettings { other_starts: 0, ..SearchSettings::new(&scene.settings) };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let task = Task::new(&scene, &Origin::of(&scene, &found), scene.space.names(), Asked::LogProbability);
-        let target = Density::new(found.posterior.clone(), scene.settings.imaging.spots_left).unwrap();
+        let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();
         let (centre, covariance) = (&found.optimum.theta[..], &found.optimum.covariance);
         let draw = StartDraw { centre, covariance, scale: 1.0, ensembles: 1, walkers: BATCH, seed: 1 };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();

@@ -29,7 +29,7 @@ const NUISANCES: (&str, fn() -> Value) =
     ("/imaging/nuisances", || json!({ "continuum_offset": 5e-4, "continuum_slope": 5e-4, "equivalent_width": 0.02 }));
 const VOIGT: (&str, fn() -> Value) =
     ("/star/line", || json!({ "shape": "voigt", "sigma_kms": 1.7, "gamma_kms": 2.1, "equivalent_width_kms": "auto" }));
-const SPOTS_LEFT: (&str, fn() -> Value) = ("/imaging/spots_left", || json!("fitted"));
+const UNRESOLVED_SPOTS: (&str, fn() -> Value) = ("/imaging/unresolved_spots", || json!("fitted"));
 
 const MODELS: [Model; 10] = [
     ("spots", &[]),
@@ -40,12 +40,12 @@ const MODELS: [Model; 10] = [
     ("bright and dark, nuisances, errors measured", &[BRIGHT, NUISANCES, MEASURED]),
     ("spots, Voigt, errors measured", &[VOIGT, MEASURED]),
     ("bright and dark, Voigt, errors measured", &[BRIGHT, VOIGT, MEASURED]),
-    ("spots, errors measured, spots left over", &[MEASURED, SPOTS_LEFT]),
+    ("spots, errors measured, unresolved spots", &[MEASURED, UNRESOLVED_SPOTS]),
     RECOMMENDED,
 ];
 
 /// The model that is recommended for a real star.
-const RECOMMENDED: Model = ("bright and dark, errors measured, spots left over", &[BRIGHT, MEASURED, SPOTS_LEFT]);
+const RECOMMENDED: Model = ("bright and dark, errors measured, unresolved spots", &[BRIGHT, MEASURED, UNRESOLVED_SPOTS]);
 
 /// Orbits that are put in: K (km/s), Porb/Prot, phases.
 const K_KMS: [f64; 3] = [0.3, 0.6, 1.0];
@@ -76,7 +76,7 @@ fn base() -> Result<Value, Failure> {
         ("/observations/path", json!(list)),
         // white errors and the entropy's spots, until a model says otherwise
         ("/observations/sigma_scale", json!(0.3)),
-        ("/imaging/spots_left", json!("entropy")),
+        ("/imaging/unresolved_spots", json!("entropy")),
         ("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": 0.5, "max": 4.0 })),
         ("/planet", json!({ "k_kms": 0.1, "porb_over_prot": 1.7, "phi": 0.5 })),
         ("/sampler/walkers", json!(24)),

@@ -131,7 +131,7 @@ fn any_number_of_ranks() {
 /// What a rank makes of a config comes from the config alone, whatever it asks for.
 fn other_models() {
     for (pointer, value) in [
-        ("/imaging/spots_left", json!("fitted")),
+        ("/imaging/unresolved_spots", json!("fitted")),
         ("/imaging/brightness", json!("bright-and-dark")),
         ("/imaging/chi2_target", json!("auto")),
         ("/imaging/nuisances", json!({ "equivalent_width": 0.02 })),

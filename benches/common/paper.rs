@@ -124,7 +124,7 @@ impl Passes {
 /// A posterior and points drawn from its bulk: a Gaussian around the maximum, as wide as the curvature there says.
 pub struct Bulk {
     pub posterior: Posterior,
-    /// What a chain samples: the posterior with its footholds.
+    /// What a chain samples: the posterior with its warm starts.
     pub target: Density,
     pub points: Vec<Vec<f64>>,
 }
@@ -144,7 +144,7 @@ impl Bulk {
         };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
         let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
-        let target = Density::new(found.posterior.clone(), scene.settings.imaging.spots_left).unwrap();
+        let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();
         Bulk { posterior: found.posterior, target, points }
     }
 }

@@ -13,7 +13,7 @@ use crate::figures::plot::PlotError;
 use crate::posterior::objective::ReferenceError;
 use crate::runs::comparison::PairError;
 use crate::runs::export::ExportError;
-use crate::runs::grid_scan::SurveyError;
+use crate::runs::grid_scan::GridScanError;
 use crate::runs::origin::OriginError;
 use crate::runs::run::RunError;
 use std::error::Error;
@@ -96,18 +96,18 @@ impl Failure {
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
             RunError::Merged(_) => Failure::of(error),
-            RunError::PriorStart | RunError::SpotsLeft(_) => Failure::input(format!("{}: {error}", path.display())),
+            RunError::PriorStart | RunError::UnresolvedSpots(_) => Failure::input(format!("{}: {error}", path.display())),
             RunError::Journal(error) => error.into(),
             RunError::Interrupted => Failure::failed(error),
         }
     }
 
     /// A landscape of the config at `path` that cannot begin or go on.
-    pub fn survey(path: &Path, error: SurveyError) -> Self {
+    pub fn survey(path: &Path, error: GridScanError) -> Self {
         match error {
-            SurveyError::Origin(error) => Failure::origin(path, error),
-            SurveyError::Journal(error) => error.into(),
-            SurveyError::Write(_) | SurveyError::Landscape(_) => Failure::failed(error),
+            GridScanError::Origin(error) => Failure::origin(path, error),
+            GridScanError::Journal(error) => error.into(),
+            GridScanError::Write(_) | GridScanError::Landscape(_) => Failure::failed(error),
         }
     }
 

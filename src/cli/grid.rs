@@ -8,7 +8,7 @@ use crate::data::io::effort::{EFFORT, Effort};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::scene::Scene;
 use crate::numerics::text::shown;
-use crate::runs::grid_scan::{HEADER, NODES, PARABOLOID, Survey};
+use crate::runs::grid_scan::{HEADER, NODES, PARABOLOID, GridScan};
 use crate::sampling::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -59,7 +59,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut survey = if resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the landscape, reference image");
-        let survey = Survey::resume(&scene, plan, folder);
+        let survey = GridScan::resume(&scene, plan, folder);
         spinner.finish_and_clear();
         survey.map_err(failed)?
     } else {
@@ -67,7 +67,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         signals.defer();
         let folder = args.output.create()?;
         let spinner = progress::bar(global, None, "images that nodes far from the best one start from");
-        let survey = Survey::begin(&scene, plan, found, folder, args.output.replaces());
+        let survey = GridScan::begin(&scene, plan, found, folder, args.output.replaces());
         spinner.finish_and_clear();
         survey.map_err(failed)?
     };
@@ -82,7 +82,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         )));
     }
     noted?;
-    let Survey { header, landscape, .. } = &survey;
+    let GridScan { header, landscape, .. } = &survey;
     let truth = header.origin.truth.as_ref();
     let rule = Rule { nodes: args.fit_nodes.map(NonZeroUsize::get), radius: args.fit_radius.map(NonZeroUsize::get) };
     let found = paraboloid(landscape, rule);
@@ -90,7 +90,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     // whoever reads may stop reading
     console::print(table(landscape, truth));
     console::print(paraboloid_table(&found, landscape.grid(), truth));
-    let images = match survey.footholds() {
+    let images = match survey.warm_starts() {
         0 => String::new(),
         others => format!(" from {} images", others + 1),
     };

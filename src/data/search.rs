@@ -56,7 +56,7 @@ const CLIMB: usize = 15;
 /// One start of the search and where it led.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// Where it started (written coordinates); the first attempt is from the config's values.
+    /// Where it started (physical coordinates); the first attempt is from the config's values.
     pub start: Vec<f64>,
     /// Where it ended, or why it did not.
     pub end: Result<Optimum, OptimiseError>,
@@ -146,7 +146,7 @@ pub fn find(
             evaluations.fetch_add(1, Relaxed);
             climbing();
         };
-        let near = smooth.clone().with_footholds_for(std::slice::from_ref(&start), CLIMB);
+        let near = smooth.clone().with_warm_starts_for(std::slice::from_ref(&start), CLIMB);
         let end = climb(&near, &start, &tick);
         done.fetch_add(1, Relaxed);
         climbing();
@@ -194,7 +194,7 @@ fn other_starts(
         return Ok((0..settings.other_starts).map(|_| with_other_orbit(space, from, &mut rng)).collect());
     };
     let peaks = surrogate.peaks(PEAK_DROP, settings.other_starts + 1);
-    let starts = peaks.iter().map(|peak| within(space, space.to_written(&peak.position)));
+    let starts = peaks.iter().map(|peak| within(space, space.to_physical(&peak.position)));
     let reached = |theta: &Vec<f64>| first.end.as_ref().is_ok_and(|end| shift(space, theta, end) < RIVAL_DISTANCE);
     let allowed = |theta: &Vec<f64>| space.log_prior(theta).is_finite();
     Ok(starts.filter(|theta| allowed(theta) && !reached(theta)).take(settings.other_starts).collect())
@@ -242,7 +242,7 @@ fn with_other_orbit(space: &ParameterSpace, theta: &[f64], rng: &mut ChaCha8Rng)
 
 /// Distance of an optimum from `theta`, in standard deviations of the curvature.
 fn shift(space: &ParameterSpace, theta: &[f64], to: &Optimum) -> f64 {
-    let (a, b) = (space.to_internal(theta), space.to_internal(&to.theta));
+    let (a, b) = (space.to_sampling(theta), space.to_sampling(&to.theta));
     let d = nalgebra::DVector::from_iterator(a.len(), a.iter().zip(&b).map(|(a, b)| b - a));
     (&to.curvature * &d).dot(&d).max(0.0).sqrt()
 }

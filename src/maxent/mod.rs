@@ -10,7 +10,7 @@ pub mod preconditioner;
 pub mod problem;
 pub mod solution;
 pub mod solver;
-mod standing;
+mod convergence;
 
 pub use parallelism::parallelism;
 pub use preconditioner::Preconditioner;

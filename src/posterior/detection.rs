@@ -62,8 +62,8 @@ pub struct View {
     pub quadratic: VelocityQuadratic,
     /// The same with spots as the entropy sees them: the regularised likelihood itself.
     pub regularised: VelocityQuadratic,
-    /// How many times larger than the entropy expects the spots left over are, in variance.
-    pub spots_left: f64,
+    /// How many times larger than the entropy expects the unresolved spots are, in variance.
+    pub unresolved_spots: f64,
     /// Whether the image reaches the target chi2.
     pub on_target: bool,
 }
@@ -84,7 +84,7 @@ pub struct Detection {
     pub frequencies: Frequencies,
     /// Without a planet; its quadratic is the one that `search` is of.
     pub planet_free: View,
-    /// The blind search there, by which a planet is found or not. The planet itself counts among the spots left over, which
+    /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots, which
     /// makes the false-alarm probability a cautious one.
     pub blind: Search,
     /// At the best orbit; `None` if it was not imaged, because its period lies on the edge of the search.
@@ -150,9 +150,9 @@ impl View {
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
         let expansion = Expansion::of(imager, &reference, &stellar);
         let regularised = expansion.velocities(nuisances);
-        let spots_left = expansion.spots_left(nuisances).ok_or(Unbounded)?;
-        let quadratic = expansion.with_spots_left(spots_left).ok_or(Unbounded)?.velocities(nuisances);
-        Ok(View { reference, expansion, quadratic, regularised, spots_left, on_target })
+        let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
+        let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
+        Ok(View { reference, expansion, quadratic, regularised, unresolved_spots, on_target })
     }
 }
 

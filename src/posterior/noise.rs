@@ -231,7 +231,7 @@ impl MeasuredErrors {
         if let Some(scale) = self.sigma_scale {
             let together = match self.correlated_bins {
                 1.0 => String::new(),
-                bins => format!(", noise goes together over {bins} bins"),
+                bins => format!(", noise correlated over {bins} bins"),
             };
             line = format!(
                 "{scale} times the quoted ones ({line}, residuals of a map {}{together})",

@@ -72,10 +72,10 @@ impl Header {
 }
 
 /// A landscape with its nodes so far.
-pub struct Survey {
+pub struct GridScan {
     /// What it was begun with.
     pub header: Header,
-    /// What is evaluated at the nodes, without its prior; of a whole landscape without its footholds.
+    /// What is evaluated at the nodes, without its prior; of a whole landscape without its warm starts.
     posterior: Posterior,
     /// The nodes so far.
     pub landscape: Landscape,
@@ -85,7 +85,7 @@ pub struct Survey {
 
 /// Why a landscape cannot begin, or go on.
 #[derive(Debug, thiserror::Error)]
-pub enum SurveyError {
+pub enum GridScanError {
     /// What it was begun with is missing, wrong, or not what is there now.
     #[error(transparent)]
     Origin(#[from] OriginError),
@@ -100,19 +100,19 @@ pub enum SurveyError {
     Landscape(#[from] LandscapeError),
 }
 
-impl Survey {
+impl GridScan {
     /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes `found`.
     /// A landscape that is there already is replaced if `replace`, and refused otherwise.
     ///
     /// # Errors
-    /// [`SurveyError`]: files that are there already, or cannot be written.
+    /// [`GridScanError`]: files that are there already, or cannot be written.
     pub fn begin(
         scene: &Scene,
         plan: &GridSettings,
         found: Found,
         folder: &Path,
         replace: bool,
-    ) -> Result<Self, SurveyError> {
+    ) -> Result<Self, GridScanError> {
         let grid = &plan.grid;
         let header = Header { origin: Origin::of(scene, &found), grid: grid.clone() };
         // the nodes first: whoever holds them may write the header
@@ -123,14 +123,14 @@ impl Survey {
             _ => {}
         }
         write_json(&folder.join(HEADER), &header)?;
-        Ok(Survey::new(scene, header, found.posterior, Landscape::new(grid.clone()), file))
+        Ok(GridScan::new(scene, header, found.posterior, Landscape::new(grid.clone()), file))
     }
 
     /// Goes on with the landscape of `plan` in `folder`.
     ///
     /// # Errors
-    /// [`SurveyError`]: no landscape there, changed config, grid or data, broken lines.
-    pub fn resume(scene: &Scene, plan: &GridSettings, folder: &Path) -> Result<Self, SurveyError> {
+    /// [`GridScanError`]: no landscape there, changed config, grid or data, broken lines.
+    pub fn resume(scene: &Scene, plan: &GridSettings, folder: &Path) -> Result<Self, GridScanError> {
         let header = Header::read(folder)?;
         header.origin.check(scene, folder)?;
         if let Some(what) = change(&header.grid, &plan.grid) {
@@ -138,25 +138,25 @@ impl Survey {
         }
         let (file, landscape) = landscape::recover(&folder.join(NODES), plan.grid.clone())?;
         let posterior = header.origin.posterior(scene, scene.space_of(&plan.free), folder)?;
-        Ok(Survey::new(scene, header, posterior, landscape, file))
+        Ok(GridScan::new(scene, header, posterior, landscape, file))
     }
 
-    /// With footholds where nodes far from the reference are worth them.
+    /// With warm starts where nodes far from the reference are worth them.
     fn new(scene: &Scene, header: Header, posterior: Posterior, landscape: Landscape, file: LineFile) -> Self {
         let grid = landscape.grid();
-        // all nodes, whatever is left of them: a landscape that goes on has the footholds that it began with
+        // all nodes, whatever is left of them: a landscape that goes on has the warm starts that it began with
         let nodes = if landscape.is_whole() { 0 } else { grid.len() };
         let thetas: Vec<Vec<f64>> = (0..nodes).map(|index| grid.theta(index)).collect();
-        let posterior = posterior.with_footholds_for(&thetas, nodes);
-        let footholds = posterior.footholds().map(<[f64]>::to_vec).collect();
+        let posterior = posterior.with_warm_starts_for(&thetas, nodes);
+        let warm_starts = posterior.warm_starts().map(<[f64]>::to_vec).collect();
         let names = posterior.space().names();
-        let task = Task::new(scene, &header.origin, names, Asked::Likelihood { footholds });
-        Survey { header, posterior, landscape, task, file }
+        let task = Task::new(scene, &header.origin, names, Asked::Likelihood { warm_starts });
+        GridScan { header, posterior, landscape, task, file }
     }
 
     /// Images, besides the reference, that nodes start from; none where no node is left.
-    pub fn footholds(&self) -> usize {
-        self.posterior.footholds().count()
+    pub fn warm_starts(&self) -> usize {
+        self.posterior.warm_starts().count()
     }
 
     /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one, and of the
@@ -164,8 +164,8 @@ impl Survey {
     ///
     /// # Errors
     /// Nodes that cannot be written.
-    pub fn go(&mut self, pool: &Pool, mut on_batch: impl FnMut(&Landscape)) -> Result<bool, SurveyError> {
-        let Survey { header: Header { grid, .. }, posterior, landscape, task, file } = self;
+    pub fn go(&mut self, pool: &Pool, mut on_batch: impl FnMut(&Landscape)) -> Result<bool, GridScanError> {
+        let GridScan { header: Header { grid, .. }, posterior, landscape, task, file } = self;
         let brief = Brief::Density(Box::new(task.clone())).to_bytes();
         while !landscape.is_whole() {
             if pool.stopped() {

@@ -70,7 +70,7 @@ impl Manifest {
     /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an orbit
     /// there, and the posterior does not know of them.
     pub fn co_rotation(&self, summary: &Summary) -> Option<String> {
-        let counted = self.origin.config.pointer("/imaging/spots_left").is_some_and(|value| value != "entropy");
+        let counted = self.origin.config.pointer("/imaging/unresolved_spots").is_some_and(|value| value != "entropy");
         let period = summary.parameters.get(Parameter::PorbOverProt.name()).filter(|_| !counted)?;
         let [low, high] = period.ci68;
         // a period that may be anything says nothing
@@ -84,7 +84,7 @@ impl Manifest {
         let rotation = if fraction == 1 { "Prot".to_owned() } else { format!("Prot/{fraction}") };
         Some(format!(
             "the period is within {:.0} % of {rotation}, where spots imitate an orbit: K is less certain than its interval \
-             says; see what `dimcmc periodogram` or imaging.spots_left \"fitted\" makes of it",
+             says; see what `dimcmc periodogram` or imaging.unresolved_spots \"fitted\" makes of it",
             100.0 * NEAR_ROTATION
         ))
     }

@@ -90,7 +90,7 @@ pub struct Reconstruction {
 /// A posterior density over named parameters.
 ///
 /// `theta` is always in the coordinates of [`LogDensity::names`] (the *written* coordinates). Samplers may move in
-/// *internal* coordinates, a one-to-one map of the written ones given by `to_internal` and `to_written`.
+/// *internal* coordinates, a one-to-one map of the written ones given by `to_sampling` and `to_physical`.
 pub trait LogDensity: Sync {
     /// Names of the parameters, in the order of every vector.
     fn names(&self) -> &[String];
@@ -99,16 +99,16 @@ pub trait LogDensity: Sync {
     fn evaluate(&self, theta: &[f64]) -> Evaluation;
 
     /// Internal coordinates of `theta`.
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         theta.to_vec()
     }
 
     /// Written coordinates of `internal`, periodic ones wrapped into their range.
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         internal.to_vec()
     }
 
-    /// ln |d(written) / d(internal)| at `theta`: what turns a density in written coordinates into one in internal ones.
+    /// ln |d(written) / d(internal)| at `theta`: what turns a density in physical coordinates into one in internal ones.
     fn log_jacobian(&self, _theta: &[f64]) -> f64 {
         0.0
     }
@@ -116,11 +116,11 @@ pub trait LogDensity: Sync {
 
 /// A density whose gradient comes at the price of a few forward models.
 pub trait Gradient: LogDensity {
-    /// The evaluation at `theta`, and the gradient of its log-probability with respect to the internal coordinates
+    /// The evaluation at `theta`, and the gradient of its log-probability with respect to the sampling coordinates
     /// (empty where the log-probability is minus infinity).
     fn evaluate_with_gradient(&self, theta: &[f64]) -> (Evaluation, Vec<f64>);
 
-    /// Natural steps of the internal coordinates: what a search is scaled with.
+    /// Natural steps of the sampling coordinates: what a search is scaled with.
     fn scales(&self) -> Vec<f64>;
 }
 

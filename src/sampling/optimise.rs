@@ -1,5 +1,5 @@
 //! The maximum of a log-density and its curvature: a trust-region Newton method (argmin; Nocedal & Wright 2006, chapter 4) in
-//! scaled internal coordinates, with Hessians from differences of gradients.
+//! scaled sampling coordinates, with Hessians from differences of gradients.
 //!
 //! Knows densities through [`Gradient`] alone. Left out: where to start, and what the parameters mean.
 
@@ -19,15 +19,15 @@ type Matrix = DMatrix<f64>;
 /// A local maximum.
 #[derive(Clone, Debug)]
 pub struct Optimum {
-    /// The point, in written coordinates.
+    /// The point, in physical coordinates.
     pub theta: Vec<f64>,
     /// The evaluation there.
     pub evaluation: Evaluation,
-    /// Minus the Hessian of the log-probability in internal coordinates.
+    /// Minus the Hessian of the log-probability in sampling coordinates.
     pub curvature: Matrix,
     /// Inverse of the curvature. Directions that the data leave open (curvature not positive) get a large variance instead.
     pub covariance: Matrix,
-    /// The covariance in written coordinates, to first order.
+    /// The covariance in physical coordinates, to first order.
     pub written_covariance: Matrix,
     /// Whether the curvature is positive definite: a proper maximum, not an edge or a saddle.
     pub well_defined: bool,
@@ -62,7 +62,7 @@ const HESSIAN_STEP: f64 = 0.25;
 /// Directions in which the curvature is less than this, in units of 1 / (natural scale)^2, count as left open by the data.
 const OPEN_CURVATURE: f64 = 1e-3;
 
-/// Climbs from `start` (written coordinates) to a local maximum of `density`; `tick` is called at every evaluation.
+/// Climbs from `start` (physical coordinates) to a local maximum of `density`; `tick` is called at every evaluation.
 ///
 /// # Errors
 /// If the log-probability at the start is minus infinity.
@@ -121,7 +121,7 @@ fn bounded_inverse(hessian: &Matrix) -> Matrix {
     symmetric(&(&eigen.eigenvectors * Matrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()))
 }
 
-/// Minus the log-density over scaled internal coordinates, as argmin sees it.
+/// Minus the log-density over scaled sampling coordinates, as argmin sees it.
 struct Landscape<'a, D: Gradient> {
     density: &'a D,
     scales: Vec<f64>,
@@ -141,13 +141,13 @@ impl<D: Gradient> Landscape<'_, D> {
     }
 
     fn scaled(&self, theta: &[f64]) -> Vector {
-        let internal = self.density.to_internal(theta);
+        let internal = self.density.to_sampling(theta);
         Vector::from_iterator(theta.len(), internal.iter().zip(&self.scales).map(|(x, s)| x / s))
     }
 
     fn written(&self, x: &Vector) -> Vec<f64> {
         let internal: Vec<f64> = x.iter().zip(&self.scales).map(|(x, s)| x * s).collect();
-        self.density.to_written(&internal)
+        self.density.to_physical(&internal)
     }
 
     /// Gradient of the cost; `None` where the density is zero.
@@ -162,14 +162,14 @@ impl<D: Gradient> Landscape<'_, D> {
 
     /// d(written) / d(internal), by differences that respect periodic coordinates.
     fn jacobian(&self, theta: &[f64]) -> Matrix {
-        let internal = self.density.to_internal(theta);
+        let internal = self.density.to_sampling(theta);
         let mut jacobian = Matrix::zeros(theta.len(), theta.len());
         for j in 0..theta.len() {
             let h = 1e-4 * self.scales[j];
             let shifted = |h: f64| {
                 let mut x = internal.clone();
                 x[j] += h;
-                self.density.to_written(&x)
+                self.density.to_physical(&x)
             };
             for (i, (plus, minus)) in shifted(h).into_iter().zip(shifted(-h)).enumerate() {
                 let difference = plus - minus;

@@ -101,8 +101,8 @@ fn the_landscape_is_that_of_the_chain() {
     let scene = Scene::load(&desk.path(CONFIG)).unwrap();
     let place = |node: &Value| scene.space.names().iter().map(|name| node[name].as_f64().unwrap()).collect();
     let thetas: Vec<Vec<f64>> = nodes.iter().map(place).collect();
-    let posterior = sampled(&scene).with_footholds_for(&thetas, COUNT);
-    assert!(posterior.footholds().count() > 0, "nodes far from the best one are worth an image there");
+    let posterior = sampled(&scene).with_warm_starts_for(&thetas, COUNT);
+    assert!(posterior.warm_starts().count() > 0, "nodes far from the best one are worth an image there");
     for (index, node) in nodes.iter().enumerate() {
         assert_eq!(node["index"], index);
         let theta = &thetas[index];

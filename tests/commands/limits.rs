@@ -67,7 +67,7 @@ fn both_ways_and_the_closed_form_agree() {
         let nearest =
             (0..periods.len()).min_by(|a, b| (periods[*a] - period).abs().total_cmp(&(periods[*b] - period).abs()));
         let ratio = limit["k50_kms"].as_f64().unwrap() / closed[nearest.unwrap()];
-        // the closed form takes a mean over noise, here is one noise; and an orbit counts among the spots left over, which raises
+        // the closed form takes a mean over noise, here is one noise; and an orbit counts among the unresolved spots, which raises
         // the limit
         assert!((0.4..2.5).contains(&ratio), "{period}: {ratio}");
         ratios.push(ratio);

@@ -141,7 +141,7 @@ fn noise_that_goes_together_makes_errors_larger() {
     let mut config: Value = serde_json::from_str(&desk.read("config.json")).unwrap();
     config["star"]["line"]["sigma_kms"] = json!(2.5_f64.hypot(1.8 * 0.5_f64.sqrt()));
     desk.write("config.json", &config.to_string());
-    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["noise goes together over"]);
+    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["noise correlated over"]);
     let fit = desk.json("map/fit.json");
     let errors = &fit["measured"]["errors"];
     // the variance of a smoothed bin is 6/16

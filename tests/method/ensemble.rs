@@ -46,10 +46,10 @@ impl LogDensity for Orbit {
         };
         Evaluation { log_prob, spottedness: 0.06 + 1e-3 * k, chi2: 2764.5 - v, passes: 20 + (v.abs() as u32), status }
     }
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         vec![theta[0] * (TAU * theta[1]).cos(), theta[0] * (TAU * theta[1]).sin(), theta[2]]
     }
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         let phi = (internal[1].atan2(internal[0]) / TAU).rem_euclid(1.0);
         vec![internal[0].hypot(internal[1]), if phi < 1.0 { phi } else { 0.0 }, internal[2]]
     }
@@ -222,7 +222,7 @@ impl LogDensity for Phase {
         let log_prob = (TAU * (theta[0] - 0.1)).cos();
         Evaluation { log_prob, spottedness: 0.0, chi2: 0.0, passes: 1, status: Status::Converged }
     }
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         vec![internal[0].rem_euclid(1.0).min(1.0 - f64::EPSILON)]
     }
 }
@@ -272,7 +272,7 @@ fn degenerate_and_forbidden_starts_name_the_culprit() {
     assert_eq!(equal, EnsembleError::StartNoSpread { ensemble: 1, name: "vsys_kms".to_owned() });
     let plane = refused(&|p| {
         p[0].iter_mut().for_each(|theta| {
-            let internal = density.to_internal(theta);
+            let internal = density.to_sampling(theta);
             theta[2] = 20.0 * internal[0] - 70.0 * internal[1] + 2.0;
         });
     });

@@ -149,7 +149,7 @@ fn posterior_of_the_orbit() {
     let space = space(&imager, reference.values, &free);
     let surrogate = Surrogate::new(&imager, &space, &reference).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let draws: Vec<Vec<f64>> = (0..20_000).map(|_| space.to_written(&surrogate.draw(&mut rng).unwrap())).collect();
+    let draws: Vec<Vec<f64>> = (0..20_000).map(|_| space.to_physical(&surrogate.draw(&mut rng).unwrap())).collect();
     let wanted = json("posterior.json");
     for (i, key) in ["K", "P", "phi"].into_iter().enumerate() {
         let mut values: Vec<f64> = draws.iter().map(|theta| theta[i]).collect();
@@ -231,11 +231,11 @@ fn co_rotation_hides_a_planet() {
     assert!(eigen.min() > -1e-2 * quadratic.information.diagonal().max());
 }
 
-/// Spots left over counted in the posterior: the same at the reference; near it ln of the density of the gradient, its size
+/// Unresolved spots counted in the posterior: the same at the reference; near it ln of the density of the gradient, its size
 /// integrated over by a sum of its own; everywhere a fall, not faster than without them, and one that goes on where the
 /// quadratics would have turned the sum of exact ln L and their difference upwards.
 #[test]
-fn a_posterior_that_counts_spots_left_over() {
+fn a_posterior_that_counts_unresolved_spots() {
     let oracle = oracle();
     let imager = imager(&oracle, oracle.grid.clone());
     let at = truth(&oracle);
@@ -295,7 +295,7 @@ fn a_posterior_that_counts_spots_left_over() {
 /// What ln L has beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the reference, as it is
 /// next to one that is not its maximum, and the density of the gradient below it.
 #[test]
-fn spots_left_over_magnify_nothing() {
+fn unresolved_spots_magnify_nothing() {
     let oracle = oracle();
     let imager = imager(&oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2));
     let mut at = truth(&oracle);

@@ -73,13 +73,13 @@ fn gradients_match_differences_of_reconstructions() {
         let exact = posterior.with_settings(SolverSettings::exact());
         let theta = nearby(exact.space(), 1);
         let (_, gradient) = exact.evaluate_with_gradient(&theta);
-        let x = exact.to_internal(&theta);
+        let x = exact.to_sampling(&theta);
         for (j, scale) in exact.scales().iter().enumerate() {
             let h = 0.05 * scale;
             let at = |h: f64| {
                 let mut y = x.clone();
                 y[j] += h;
-                exact.evaluate(&exact.to_written(&y)).log_prob
+                exact.evaluate(&exact.to_physical(&y)).log_prob
             };
             let difference = (at(h) - at(-h)) / (2.0 * h);
             let size = difference.abs() + 0.3 / scale;
@@ -250,7 +250,7 @@ fn evaluations_are_as_precise_as_they_say() {
 }
 
 #[test]
-fn footholds_save_passes_and_change_nothing_else() {
+fn warm_starts_save_passes_and_change_nothing_else() {
     for posterior in MAPS.into_iter().flat_map(posteriors) {
         let start = posterior.space().start();
         let other = |k: f64, phi: f64| {
@@ -261,8 +261,8 @@ fn footholds_save_passes_and_change_nothing_else() {
         // two places in half a turn of the orbit, and one that is none
         let thetas: Vec<Vec<f64>> = (0..8).map(|i| other(0.09, 0.3 + 0.01 * f64::from(i))).collect();
         let absurd = other(f64::INFINITY, 0.3);
-        let placed = posterior.clone().with_footholds(&[thetas[2].clone(), absurd, thetas[6].clone()]);
-        assert_eq!(placed.footholds().collect::<Vec<_>>(), [&thetas[2], &thetas[6]]);
+        let placed = posterior.clone().with_warm_starts(&[thetas[2].clone(), absurd, thetas[6].clone()]);
+        assert_eq!(placed.warm_starts().collect::<Vec<_>>(), [&thetas[2], &thetas[6]]);
         let best = posterior.evaluate(&start).log_prob;
         assert_eq!(placed.evaluate(&start), posterior.evaluate(&start), "the reference is the nearest there");
         let exact = posterior.clone().with_settings(SolverSettings::exact());
@@ -276,15 +276,15 @@ fn footholds_save_passes_and_change_nothing_else() {
         println!("{:?}: {with} passes instead of {without}", posterior.kind());
         assert!(3 * with < 2 * without, "{:?}: {with} passes instead of {without}", posterior.kind());
         // as many as they are worth, and none where nothing is far
-        assert_eq!(posterior.clone().with_footholds_for(std::slice::from_ref(&start), 10_000).footholds().count(), 0);
-        let few = posterior.clone().with_footholds_for(&thetas, 1).footholds().count();
-        let many = posterior.with_footholds_for(&thetas, 100_000).footholds().count();
+        assert_eq!(posterior.clone().with_warm_starts_for(std::slice::from_ref(&start), 10_000).warm_starts().count(), 0);
+        let few = posterior.clone().with_warm_starts_for(&thetas, 1).warm_starts().count();
+        let many = posterior.with_warm_starts_for(&thetas, 100_000).warm_starts().count();
         assert!(few == 0 && many > 0, "{few} {many}");
     }
 }
 
 #[test]
-fn a_foothold_out_of_the_targets_reach_is_right_for_those_within() {
+fn a_warm_start_out_of_the_targets_reach_is_right_for_those_within() {
     for posterior in MAPS.map(|entropy| posteriors(entropy).swap_remove(0)) {
         assert_eq!(posterior.kind(), ObjectiveKind::Spottedness);
         let exact = posterior.clone().with_settings(SolverSettings::exact());
@@ -295,8 +295,8 @@ fn a_foothold_out_of_the_targets_reach_is_right_for_those_within() {
             theta
         };
         let beyond = (1..100).find(|i| posterior.evaluate(&at(*i)).status == Status::Unreachable).unwrap();
-        let placed = posterior.with_footholds(&[at(beyond)]);
-        assert_eq!(placed.footholds().count(), 1);
+        let placed = posterior.with_warm_starts(&[at(beyond)]);
+        assert_eq!(placed.warm_starts().count(), 1);
         let best = exact.evaluate(&start).log_prob;
         for theta in (1..4).map(|i| at(beyond - i)) {
             let (got, wanted) = (placed.evaluate(&theta), exact.evaluate(&theta).log_prob);

@@ -70,8 +70,8 @@ fn sample(posterior: &Posterior, surrogate: bool, ess: f64) -> Summary {
 /// Medians within `sigmas` and widths within `ratio` of the oracle's.
 fn compare(summary: &Summary, sigmas: f64, ratio: f64) {
     let wanted = json("posterior.json");
-    println!("{} evaluations, {} passes each", summary.evaluations, summary.passes_median);
-    assert!(summary.passes_median <= 60.0, "{} passes each", summary.passes_median);
+    println!("{} evaluations, {} model applications each", summary.evaluations, summary.passes_median);
+    assert!(summary.passes_median <= 60.0, "{} model applications each", summary.passes_median);
     for (name, key) in [("k_kms", "K"), ("porb_over_prot", "P"), ("phi", "phi")] {
         let q = numbers(&wanted[key]);
         let (median, width) = (q[2], 0.5 * (q[3] - q[1]));

@@ -47,9 +47,9 @@ pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<D
     let without_parameters = |resolved: &Value| {
         let mut section = resolved.get(name).cloned().unwrap_or(Value::Null);
         if let Some(map) = section.as_object_mut() {
-            // a landscape has spots left over as the entropy has them, whatever the chain does
+            // a landscape has unresolved spots as the entropy has them, whatever the chain does
             let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_surface());
-            map.retain(|key, _| !free(key) && key != "spots_left" && key != "mass_msun");
+            map.retain(|key, _| !free(key) && key != "unresolved_spots" && key != "mass_msun");
         }
         section
     };

@@ -5,7 +5,7 @@ use crate::data::io::lsd::ReadOptions;
 use crate::maxent::entropy::Entropy;
 use crate::posterior::noise::ErrorSettings;
 use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, SpotsLeft};
+use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, UnresolvedSpots};
 use crate::posterior::simulate::Simulation;
 use crate::sampling::landscape::Grid;
 use crate::star::observation::Observations;
@@ -83,7 +83,7 @@ pub struct ImagingSettings {
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
     /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
-    pub spots_left: SpotsLeft,
+    pub unresolved_spots: UnresolvedSpots,
     /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors around 0, from
     /// 0 (no nuisance) to 10.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -98,7 +98,7 @@ impl Default for ImagingSettings {
             default_spot: 1e-4,
             chi2_target: Automatic::Fixed(0.97),
             objective: ObjectiveKind::default(),
-            spots_left: SpotsLeft::default(),
+            unresolved_spots: UnresolvedSpots::default(),
             nuisances: None,
         }
     }

@@ -381,13 +381,13 @@ mod tests {
 
     #[test]
     fn what_a_map_warns_of_is_told_and_it_does_not_converge() {
-        let fit = json!({ "status": "max-passes", "checks": { "warnings": ["neighbours go together"] } });
+        let fit = json!({ "status": "max-passes", "checks": { "warnings": ["neighbours are correlated"] } });
         let chapter = map(&fit);
-        assert_eq!(chapter.warnings, ["neighbours go together"]);
+        assert_eq!(chapter.warnings, ["neighbours are correlated"]);
         let (tone, sentence) = chapter.shown_verdicts().next().unwrap();
         assert_eq!(tone, Tone::Doubt);
         assert!(sentence.contains("stopped short of the target chi2") && !sentence.contains("converge"), "{sentence}");
-        let fit = json!({ "status": "converged", "checks": { "warnings": ["neighbours go together"] } });
+        let fit = json!({ "status": "converged", "checks": { "warnings": ["neighbours are correlated"] } });
         assert_eq!(map(&fit).shown_verdicts().next().unwrap().0, Tone::Neutral);
     }
 

@@ -4,7 +4,7 @@ use super::{Detection, DetectionSettings, Robustness};
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict};
-use crate::posterior::expansion::SPOTS_LEFT;
+use crate::posterior::expansion::UNRESOLVED_SPOTS;
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::Parameter;
 
@@ -143,7 +143,7 @@ impl Detection {
                 ),
             ));
         }
-        if view.spots_left > 0.5 * SPOTS_LEFT.1 {
+        if view.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
             remarks.push(Remark::against(
                 "the model of the star is wrong",
                 "the profiles have nothing to do with the model of the star: what the map leaves over is without bounds",

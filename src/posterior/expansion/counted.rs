@@ -1,20 +1,20 @@
 //! What a posterior becomes where the spots that the map leaves over are counted as noise, their size unknown.
 //!
 //! With x the coordinates of an expansion relative to its centre, its gradient g there scatters around `I x` with the covariance
-//! `S = noise + f (I - noise)`, f the size of spots left over in variance (`spots`). Close to the rotation period, an orbit can
-//! stand for spots left over and they for an orbit: which of them it is is not settled by the size that is most probable with
+//! `S = noise + f (I - noise)`, f the size of unresolved spots in variance (`spots`). Close to the rotation period, an orbit can
+//! stand for unresolved spots and they for an orbit: which of them it is is not settled by the size that is most probable with
 //! one or the other, so that the size is integrated over, uniform in its logarithm:
 //! `p(x) = sum_f |S_f|^-1/2 exp(-(g - I x) S_f^-1 (g - I x) / 2)`.
 //!
 //! ln L as the objective has it is more than the quadratic q, the more so the farther from the reference. A map answers a large
 //! change of the velocities as q says that it would a smaller one in the same direction (or a larger one): in place of x stands
 //! `c x` with `q(c x) = ln L`, on the same side of the highest q in that direction. Next to that height, where c would jump, it is
-//! softened, and of the rest every term has the share `rho_f = x I S_f^-1 I x / x I x`, at most 1, that spots left over leave of what q
+//! softened, and of the rest every term has the share `rho_f = x I S_f^-1 I x / x I x`, at most 1, that unresolved spots leave of what q
 //! does along x. So nothing is better than what explains all velocities but for the rest, and with spots of the entropy's
 //! own size ln L comes back as it is.
 //! Left out: where the reference is.
 
-use super::spots::SPOTS_LEFT;
+use super::spots::UNRESOLVED_SPOTS;
 use super::{Expansion, free_stellar, nuisances};
 use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues, Posterior};
 use crate::sampling::log_density::{Evaluation, Status};
@@ -26,7 +26,7 @@ const SOFT: f64 = 1.0;
 /// Sizes that are integrated over, for each factor of ten.
 const SIZES_PER_DECADE: f64 = 4.0;
 
-/// What a posterior becomes where spots left over count as noise.
+/// What a posterior becomes where unresolved spots count as noise.
 #[derive(Clone, Debug)]
 pub struct SpotsCounted {
     /// ln L as the objective has it at the reference, and the density of the gradient there, ln of it.
@@ -37,7 +37,7 @@ pub struct SpotsCounted {
     sizes: Vec<Size>,
 }
 
-/// The density of the gradient for one size of the spots left over: with `S = L L^t`, `L^-1 I`, `L^-1 g` and `ln |S|^-1/2`.
+/// The density of the gradient for one size of the unresolved spots: with `S = L L^t`, `L^-1 I`, `L^-1 g` and `ln |S|^-1/2`.
 #[derive(Clone, Debug)]
 struct Size {
     information: DMatrix<f64>,
@@ -53,14 +53,14 @@ impl SpotsCounted {
         let entropy = Expansion::of(posterior.imager(), reference, &free_stellar(free));
         let mut without_planet = reference.values;
         without_planet[Parameter::K] = 0.0;
-        // an orbit that stands for spots left over makes them look small
+        // an orbit that stands for unresolved spots makes them look small
         let size = [reference.values, without_planet]
             .iter()
-            .filter_map(|values| entropy.recentred(values).spots_left(&nuisances(free)))
+            .filter_map(|values| entropy.recentred(values).unresolved_spots(&nuisances(free)))
             .reduce(f64::max)?;
-        let cautious = entropy.with_spots_left(size)?;
-        let places = (SIZES_PER_DECADE * (SPOTS_LEFT.1 / SPOTS_LEFT.0).log10()).ceil() as i32;
-        let factor = |place: i32| SPOTS_LEFT.0 * 10f64.powf(f64::from(place) / SIZES_PER_DECADE);
+        let cautious = entropy.with_unresolved_spots(size)?;
+        let places = (SIZES_PER_DECADE * (UNRESOLVED_SPOTS.1 / UNRESOLVED_SPOTS.0).log10()).ceil() as i32;
+        let factor = |place: i32| UNRESOLVED_SPOTS.0 * 10f64.powf(f64::from(place) / SIZES_PER_DECADE);
         let sizes = (0..=places).filter_map(|place| Size::new(&entropy, factor(place))).collect();
         let theta = posterior.space().theta_of(&reference.values);
         let at_reference = posterior.likelihood(&theta).likelihood?.log_likelihood;
@@ -74,13 +74,13 @@ impl SpotsCounted {
         SpotsCounted { density_at_reference: counted.ln_density(&nowhere, 1.0, 0.0), ..counted }
     }
 
-    /// ln L at the reference to second order, with spots left over of the larger of the sizes that are most probable with the
+    /// ln L at the reference to second order, with unresolved spots of the larger of the sizes that are most probable with the
     /// reference's orbit and without a planet: what a surrogate is made of.
     pub fn expansion(&self) -> &Expansion {
         &self.cautious
     }
 
-    /// ln L with spots left over counted, where it is `log_likelihood` with spots as the entropy has them.
+    /// ln L with unresolved spots counted, where it is `log_likelihood` with spots as the entropy has them.
     pub fn log_likelihood(&self, values: &ParameterValues, log_likelihood: f64) -> f64 {
         let step = self.entropy.coordinates(values) - &self.entropy.centre;
         let (answer, rest) = self.answer(&step, log_likelihood - self.at_reference);
@@ -112,7 +112,7 @@ impl SpotsCounted {
         largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
     }
 
-    /// The posterior's `evaluation` at `theta`, spots left over counted.
+    /// The posterior's `evaluation` at `theta`, unresolved spots counted.
     pub fn recount(&self, space: &ParameterSpace, theta: &[f64], evaluation: Evaluation) -> Evaluation {
         if !evaluation.log_prob.is_finite() {
             return evaluation;
@@ -127,9 +127,9 @@ impl SpotsCounted {
 }
 
 impl Size {
-    /// Of spots left over `factor` times as large in variance as the entropy expects; `None` where that is no covariance.
+    /// Of unresolved spots `factor` times as large in variance as the entropy expects; `None` where that is no covariance.
     fn new(expansion: &Expansion, factor: f64) -> Option<Self> {
-        let lower = expansion.covariance_with_spots_left(factor).cholesky()?.unpack();
+        let lower = expansion.covariance_with_unresolved_spots(factor).cholesky()?.unpack();
         Some(Size {
             information: lower.solve_lower_triangular(&expansion.information)?,
             gradient: lower.solve_lower_triangular(&expansion.gradient)?,

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 pub use counted::SpotsCounted;
 pub use marginal::{Nuisance, nuisances};
 pub use model::velocity_slopes;
-pub use spots::SPOTS_LEFT;
+pub use spots::UNRESOLVED_SPOTS;
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
 pub const STELLAR: [Parameter; 8] = [
@@ -57,7 +57,7 @@ pub struct Expansion {
     pub gradient: DVector<f64>,
     /// Minus the second derivative.
     pub information: DMatrix<f64>,
-    /// Covariance of the gradient that photon noise makes, and spots left over where they are counted as noise. Otherwise it is
+    /// Covariance of the gradient that photon noise makes, and unresolved spots where they are counted as noise. Otherwise it is
     /// smaller than the information, which counts spots that might be there as well.
     pub noise: DMatrix<f64>,
 }

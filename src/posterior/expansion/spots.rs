@@ -12,12 +12,12 @@ use super::{Expansion, Nuisance};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Range of the factor on the variance of what spots add.
-pub const SPOTS_LEFT: (f64, f64) = (1.0, 1e6);
+pub const UNRESOLVED_SPOTS: (f64, f64) = (1.0, 1e6);
 
 impl Expansion {
-    /// How many times larger than the entropy expects the spots left over are, in variance: the factor with which the gradient
+    /// How many times larger than the entropy expects the unresolved spots are, in variance: the factor with which the gradient
     /// at the centre is most probable, the `nuisances` being anywhere within their priors. `None` where none is possible.
-    pub fn spots_left(&self, nuisances: &[Nuisance]) -> Option<f64> {
+    pub fn unresolved_spots(&self, nuisances: &[Nuisance]) -> Option<f64> {
         let moved = &self.information * self.columns(nuisances);
         let (sd, offset) = self.priors(nuisances);
         let scaled = &moved * DMatrix::from_diagonal(&sd);
@@ -32,32 +32,32 @@ impl Expansion {
                 log_determinant + left.dot(&factor.solve(&left))
             })
         };
-        let best = minimum(misfit, (SPOTS_LEFT.0.ln(), SPOTS_LEFT.1.ln()));
+        let best = minimum(misfit, (UNRESOLVED_SPOTS.0.ln(), UNRESOLVED_SPOTS.1.ln()));
         misfit(best).is_finite().then(|| best.exp())
     }
 
-    /// The same expansion with spots left over, `factor` times as large as the entropy expects in variance, counted as noise.
+    /// The same expansion with unresolved spots, `factor` times as large as the entropy expects in variance, counted as noise.
     /// `None` where the information is singular.
     ///
     /// With `S = noise + factor (information - noise)` the covariance of the gradient, the best coordinates `centre + I^-1 g`
     /// stay, and their covariance is `I^-1 S I^-1`: the new information is `I S^-1 I`, the new gradient `I S^-1 g`.
-    pub fn with_spots_left(&self, factor: f64) -> Option<Self> {
-        let answer = self.covariance_with_spots_left(factor).cholesky()?.solve(&self.information);
+    pub fn with_unresolved_spots(&self, factor: f64) -> Option<Self> {
+        let answer = self.covariance_with_unresolved_spots(factor).cholesky()?.solve(&self.information);
         let information = symmetric(self.information.tr_mul(&answer));
         let gradient = answer.tr_mul(&self.gradient);
         Some(Expansion { gradient, noise: information.clone(), information, ..self.clone() })
     }
 
-    /// Covariance of the gradient with spots left over, `factor` times as large as the entropy expects in variance.
-    pub(super) fn covariance_with_spots_left(&self, factor: f64) -> DMatrix<f64> {
+    /// Covariance of the gradient with unresolved spots, `factor` times as large as the entropy expects in variance.
+    pub(super) fn covariance_with_unresolved_spots(&self, factor: f64) -> DMatrix<f64> {
         &self.noise + factor * self.spots()
     }
 
-    /// Covariance of the most likely coordinates, `I^-1 (noise + factor (I - noise)) I^-1`, with spots left over
+    /// Covariance of the most likely coordinates, `I^-1 (noise + factor (I - noise)) I^-1`, with unresolved spots
     /// `factor` times as large as the entropy expects in variance; `None` where the information is singular.
     pub fn covariance_of_best(&self, factor: f64) -> Option<DMatrix<f64>> {
         let inverse = self.information.clone().cholesky()?.inverse();
-        Some(symmetric(&inverse * self.covariance_with_spots_left(factor) * &inverse))
+        Some(symmetric(&inverse * self.covariance_with_unresolved_spots(factor) * &inverse))
     }
 
     /// What spots add to the covariance of the gradient, as the entropy has it: positive, whatever rounding and the curvature of
@@ -111,7 +111,7 @@ mod tests {
     /// Gradients drawn with spots 30 times what the information says, and a systemic velocity within its prior: the factor
     /// comes back, the velocities stay, their covariance is the one that they have, and the prior is left alone.
     #[test]
-    fn the_size_of_spots_left_over_is_found() {
+    fn the_size_of_unresolved_spots_is_found() {
         let n = 60;
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let mut normal =
@@ -135,8 +135,8 @@ mod tests {
                 information,
                 noise: noise.clone(),
             };
-            let factor = expansion.spots_left(&[vsys]).unwrap();
-            let honest = expansion.with_spots_left(factor).unwrap();
+            let factor = expansion.unresolved_spots(&[vsys]).unwrap();
+            let honest = expansion.with_unresolved_spots(factor).unwrap();
             let (before, _) = expansion.velocities(&[]).radial_velocities().unwrap();
             let (after, alone) = honest.velocities(&[]).radial_velocities().unwrap();
             assert!((&before - &after).amax() < 1e-9);

@@ -1,4 +1,4 @@
-//! Free parameters, their joint prior, and the internal coordinates that samplers and optimisers move in.
+//! Free parameters, their joint prior, and the sampling coordinates that samplers and optimisers move in.
 //!
 //! Where K and phi are both free they become `(K cos, K sin)` of the orbital phase at mid-time (method section 5): K near 0
 //! and the wrap of phi are then no special case, and phi no longer hangs on the period. Left out: the likelihood.
@@ -108,7 +108,7 @@ impl ParameterSpace {
     }
 
     /// Internal coordinates of `theta`.
-    pub fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
+    pub fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         let mut x = theta.to_vec();
         if let Some((k, phi)) = self.polar {
             let (sin, cos) = (self.mid_angle(theta) - TAU * theta[phi]).sin_cos();
@@ -118,7 +118,7 @@ impl ParameterSpace {
     }
 
     /// Written coordinates of `internal`, periodic ones wrapped.
-    pub fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+    pub fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         let mut theta = internal.to_vec();
         if let Some((k, phi)) = self.polar {
             let (x, y) = (internal[k], internal[phi]);
@@ -139,7 +139,7 @@ impl ParameterSpace {
         self.polar.map_or(0.0, |(k, _)| -(TAU * theta[k].max(SMALLEST_K_KMS)).ln())
     }
 
-    /// Steps of the internal coordinates over which profiles change by a percent or so of their features: what numerical
+    /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what numerical
     /// derivatives and a first trust region are scaled with.
     pub fn scales(&self) -> Vec<f64> {
         // a change of angular velocity that turns the star by this angle (rad) in half the time base
@@ -194,13 +194,13 @@ mod tests {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         for _ in 0..200 {
             let theta = space.sample_prior(&mut rng);
-            let back = space.to_written(&space.to_internal(&theta));
+            let back = space.to_physical(&space.to_sampling(&theta));
             for (a, b) in theta.iter().zip(&back) {
                 assert!((a - b).abs() < 1e-9, "{theta:?} {back:?}");
             }
             // x is the velocity at mid-time
             let velocity = space.values_at(&theta).state().orbit.velocity_kms(1.47);
-            assert!((space.to_internal(&theta)[0] - velocity).abs() < 1e-12);
+            assert!((space.to_sampling(&theta)[0] - velocity).abs() < 1e-12);
         }
     }
 
@@ -213,7 +213,7 @@ mod tests {
             let shifted = |h: f64| {
                 let mut t = theta;
                 t[i] += h;
-                space.to_internal(&t)
+                space.to_sampling(&t)
             };
             let (plus, minus) = (shifted(h), shifted(-h));
             [0, 1, 2].map(|j| (plus[j] - minus[j]) / (2.0 * h))

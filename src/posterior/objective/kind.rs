@@ -31,7 +31,7 @@ impl ObjectiveKind {
 /// What is known of the spots that a map leaves over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum SpotsLeft {
+pub enum UnresolvedSpots {
     /// As the entropy has them (the paper's method): small and independent. Intervals are too narrow where spots have edges, above
     /// all near Porb = Prot.
     Entropy,

@@ -13,7 +13,7 @@ use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
 const FAR: f64 = 1.05;
 
 impl Posterior {
-    /// The likelihood at `theta` (written coordinates). The log-probability there is its logarithm plus that of the prior.
+    /// The likelihood at `theta` (physical coordinates). The log-probability there is its logarithm plus that of the prior.
     pub fn likelihood(&self, theta: &[f64]) -> Reconstruction {
         if !self.is_physical(theta) {
             return Reconstruction { likelihood: None, passes: 0, status: Status::NonFinite };

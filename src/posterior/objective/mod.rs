@@ -1,7 +1,7 @@
 //! What a point of parameter space is worth: parameters, priors, trade-off curve, objectives (method section 3).
 
 pub mod coordinates;
-mod foothold;
+mod warm_start;
 pub mod kind;
 mod likelihood;
 pub mod orbital;
@@ -14,7 +14,7 @@ pub mod target;
 pub mod tradeoff;
 
 pub use coordinates::{FreeParameter, ParameterSpace};
-pub use kind::{ObjectiveKind, SpotsLeft};
+pub use kind::{ObjectiveKind, UnresolvedSpots};
 pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 pub use parameters::{Parameter, ParameterValues};
 pub use posterior::Posterior;

@@ -4,7 +4,7 @@
 //! Left out: what a reconstruction is worth (`likelihood`), how the reference was found, and who explores the posterior.
 
 use super::coordinates::ParameterSpace;
-use super::foothold::{Foothold, nearest, place, sampled, worthwhile};
+use super::warm_start::{WarmStart, nearest, place, sampled, worthwhile};
 use super::kind::ObjectiveKind;
 use super::parameters::Parameter;
 use super::prediction::{Prediction, Solved};
@@ -26,7 +26,7 @@ pub struct Posterior {
     reference: Reference,
     settings: SolverSettings,
     /// Where evaluations start: the reference, and others.
-    footholds: Vec<Foothold>,
+    warm_starts: Vec<WarmStart>,
     /// What responses of stars close to the reference have in common; nothing where only orbit and systemic velocity are free, so that
     /// pixels are looked at once for all evaluations.
     nearby: Option<Arc<Nearby>>,
@@ -35,7 +35,7 @@ pub struct Posterior {
 /// Fastest velocity of any latitude (km/s, projected) that is tried; beyond it a parameter vector is absurd.
 const LARGEST_VSINI_KMS: f64 = 2000.0;
 
-/// Newton steps from a foothold before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
+/// Newton steps from a warm start before an evaluation starts afresh from a blank star; near by it takes 2 to 5.
 const NEWTON_STEPS: usize = 25;
 
 /// Numerical derivatives of forward models step by this share of a coordinate's natural scale.
@@ -53,44 +53,44 @@ impl Posterior {
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
         let nearby = (!velocities_only).then(|| Arc::new(imager.nearby(&here.state())));
-        let footholds = Vec::new();
-        let mut posterior = Posterior { imager, space, kind, reference, settings, footholds, nearby };
+        let warm_starts = Vec::new();
+        let mut posterior = Posterior { imager, space, kind, reference, settings, warm_starts, nearby };
         let Posterior { space, reference, .. } = &posterior;
         let (theta, solution) = (space.theta_of(&reference.values), &reference.solution);
         let (response, preconditioner) = (&reference.response, reference.preconditioner.clone());
-        let mut foothold = posterior.foothold(theta, response, solution, preconditioner);
+        let mut warm_start = posterior.warm_start(theta, response, solution, preconditioner);
         if velocities_only && kind != ObjectiveKind::RegularisedLikelihood {
-            foothold.prediction = posterior.second_order(&foothold);
+            warm_start.prediction = posterior.second_order(&warm_start);
         }
-        posterior.footholds = vec![foothold];
+        posterior.warm_starts = vec![warm_start];
         posterior
     }
 
-    /// The same posterior with footholds at `thetas` (written coordinates) besides the reference, and no others: evaluations start
+    /// The same posterior with warm starts at `thetas` (physical coordinates) besides the reference, and no others: evaluations start
     /// from the nearest. Places without an image get none.
-    pub fn with_footholds(mut self, thetas: &[Vec<f64>]) -> Self {
-        self.footholds.truncate(1);
-        let more = thetas.par_iter().with_max_len(1).filter_map(|theta| self.another_foothold(theta));
-        let more: Vec<Foothold> = more.collect();
-        self.footholds.extend(more);
+    pub fn with_warm_starts(mut self, thetas: &[Vec<f64>]) -> Self {
+        self.warm_starts.truncate(1);
+        let more = thetas.par_iter().with_max_len(1).filter_map(|theta| self.another_warm_start(theta));
+        let more: Vec<WarmStart> = more.collect();
+        self.warm_starts.extend(more);
         self
     }
 
-    /// Where its footholds are, but for the reference (written coordinates).
-    pub fn footholds(&self) -> impl Iterator<Item = &[f64]> {
-        self.footholds[1..].iter().map(|foothold| foothold.theta.as_slice())
+    /// Where its warm starts are, but for the reference (physical coordinates).
+    pub fn warm_starts(&self) -> impl Iterator<Item = &[f64]> {
+        self.warm_starts[1..].iter().map(|warm_start| warm_start.theta.as_slice())
     }
 
-    /// The same posterior with the footholds that so many `evaluations`, spread like `thetas`, are worth.
-    pub fn with_footholds_for(self, thetas: &[Vec<f64>], evaluations: usize) -> Self {
+    /// The same posterior with the warm starts that so many `evaluations`, spread like `thetas`, are worth.
+    pub fn with_warm_starts_for(self, thetas: &[Vec<f64>], evaluations: usize) -> Self {
         let thetas: Vec<&Vec<f64>> = sampled(thetas).into_iter().filter(|theta| self.is_physical(theta)).collect();
         let places: Vec<Vec<f64>> = thetas.iter().map(|theta| place(&self.imager, &self.space, theta)).collect();
-        let chosen = worthwhile(&self.footholds[0], &places, evaluations);
+        let chosen = worthwhile(&self.warm_starts[0], &places, evaluations);
         let chosen: Vec<Vec<f64>> = chosen.into_iter().map(|i| thetas[i].clone()).collect();
-        self.with_footholds(&chosen)
+        self.with_warm_starts(&chosen)
     }
 
-    fn another_foothold(&self, theta: &[f64]) -> Option<Foothold> {
+    fn another_warm_start(&self, theta: &[f64]) -> Option<WarmStart> {
         if !self.is_physical(theta) {
             return None;
         }
@@ -110,18 +110,18 @@ impl Posterior {
             }
             Termination::StepLimit | Termination::NonFinite => return None,
         }
-        let foothold = self.foothold(theta.to_vec(), problem.response(), &solution, Arc::new(preconditioner));
-        foothold.prediction.is_finite().then_some(foothold)
+        let warm_start = self.warm_start(theta.to_vec(), problem.response(), &solution, Arc::new(preconditioner));
+        warm_start.prediction.is_finite().then_some(warm_start)
     }
 
-    /// The foothold of a solution.
-    fn foothold(
+    /// The warm start of a solution.
+    fn warm_start(
         &self,
         theta: Vec<f64>,
         response: &Response,
         solution: &Solution,
         preconditioner: Arc<Preconditioner>,
-    ) -> Foothold {
+    ) -> WarmStart {
         let Posterior { imager, space, kind, reference, .. } = self;
         // at the bound of lambda the image moves at that lambda
         let goal = match solution.termination {
@@ -131,20 +131,20 @@ impl Posterior {
         let solved = Solved { theta: &theta, response, goal, solution, preconditioner: &preconditioner };
         let prediction = Prediction::new(imager, space, solved, *kind, |theta| self.response(theta));
         let start = Start { best: Some(reference.best()), ..start(solution) };
-        Foothold { place: place(imager, space, &theta), theta, start, preconditioner, prediction }
+        WarmStart { place: place(imager, space, &theta), theta, start, preconditioner, prediction }
     }
 
-    /// A foothold's prediction to second order. For orbits around the reference it is worth its passes (those of an evaluation become a
+    /// A warm start's prediction to second order. For orbits around the reference it is worth its passes (those of an evaluation become a
     /// quarter fewer). Rotation, inclination and vsini change maps too much within their errors: in 7-D it saves none; nor does it
     /// at a fixed lambda, where the first order leaves little.
-    fn second_order(&self, foothold: &Foothold) -> Prediction {
+    fn second_order(&self, warm_start: &WarmStart) -> Prediction {
         let settings = SolverSettings { tolerance: BEND_TOLERANCE, leniency: 0.0, ..SolverSettings::patient() };
         let solve = |x: &[f64]| {
-            let theta = Some(self.space.to_written(x)).filter(|theta| self.is_physical(theta))?;
-            let solution = self.solve_near(foothold, &theta, settings, &mut self.imager.problem(self.response(&theta)));
+            let theta = Some(self.space.to_physical(x)).filter(|theta| self.is_physical(theta))?;
+            let solution = self.solve_near(warm_start, &theta, settings, &mut self.imager.problem(self.response(&theta)));
             (solution.termination == Termination::Converged).then_some(solution.image)
         };
-        foothold.prediction.clone().with_second_order(&self.imager, &foothold.start, solve)
+        warm_start.prediction.clone().with_second_order(&self.imager, &warm_start.start, solve)
     }
 
     /// The same posterior with other solver settings than those that a chain needs.
@@ -199,8 +199,8 @@ impl Posterior {
             && values[Parameter::PorbOverProt] > 0.0
     }
 
-    fn nearest(&self, theta: &[f64]) -> &Foothold {
-        nearest(&self.footholds, &self.imager, &self.space, theta)
+    fn nearest(&self, theta: &[f64]) -> &WarmStart {
+        nearest(&self.warm_starts, &self.imager, &self.space, theta)
     }
 
     pub(super) fn goal(&self) -> Goal {
@@ -214,7 +214,7 @@ impl Posterior {
         if solution.termination != Termination::StepLimit {
             return (solution, problem);
         }
-        // so far from all footholds that a blank star is the better start
+        // so far from all warm starts that a blank star is the better start
         let none = Preconditioner::identity();
         let settings = SolverSettings { cg_iterations: SolverSettings::patient().cg_iterations, ..self.settings };
         let far = Solver { preconditioner: &none, settings, entropy: self.imager.entropy };
@@ -222,18 +222,18 @@ impl Posterior {
         (solution, problem)
     }
 
-    /// The solution of the problem at `theta` from a foothold, in a few steps or not at all.
+    /// The solution of the problem at `theta` from a warm start, in a few steps or not at all.
     fn solve_near(
         &self,
-        foothold: &Foothold,
+        warm_start: &WarmStart,
         theta: &[f64],
         settings: SolverSettings,
         problem: &mut ImagingProblem,
     ) -> Solution {
         let settings = SolverSettings { newton_steps: NEWTON_STEPS, ..settings };
-        let near = Solver { preconditioner: &foothold.preconditioner, settings, entropy: self.imager.entropy };
-        let internal = self.space.to_internal(theta);
-        let start = foothold.prediction.start(&self.imager, &foothold.start, &internal);
+        let near = Solver { preconditioner: &warm_start.preconditioner, settings, entropy: self.imager.entropy };
+        let internal = self.space.to_sampling(theta);
+        let start = warm_start.prediction.start(&self.imager, &warm_start.start, &internal);
         near.solve(problem, self.goal(), start)
     }
 
@@ -317,12 +317,12 @@ impl LogDensity for Posterior {
         }
     }
 
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
-        self.space.to_internal(theta)
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
+        self.space.to_sampling(theta)
     }
 
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
-        self.space.to_written(internal)
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
+        self.space.to_physical(internal)
     }
 
     fn log_jacobian(&self, theta: &[f64]) -> f64 {
@@ -343,12 +343,12 @@ impl Gradient for Posterior {
         }
         let image = self.imager.entropy.image(&solution.image.coordinates);
         let (weight, direction) = self.sensitivity(theta, solution, &mut problem);
-        let internal = self.space.to_internal(theta);
+        let internal = self.space.to_sampling(theta);
         let response = problem.response().clone();
         let at_fixed_map = |i: usize, h: f64| {
             let mut shifted = internal.clone();
             shifted[i] += h;
-            let shifted = self.space.to_written(&shifted);
+            let shifted = self.space.to_physical(&shifted);
             let response = if self.space.free()[i].parameter.only_shifts() {
                 let state = self.space.values_at(&shifted).state();
                 response.with_velocities(&self.imager.star, &state, &self.imager.sampling)

@@ -13,7 +13,7 @@ use crate::numerics::vector::linear::axpy;
 use crate::posterior::imaging::Imager;
 use crate::star::Response;
 
-/// Derivatives of a solution with respect to internal coordinates.
+/// Derivatives of a solution with respect to sampling coordinates.
 #[derive(Clone, Debug)]
 pub struct Prediction {
     /// Internal coordinates of the solution.
@@ -77,7 +77,7 @@ pub struct Solved<'a> {
 }
 
 impl Prediction {
-    /// Of the solutions around `solved` for `kind`, with `response(theta)` at points of `space` (written coordinates).
+    /// Of the solutions around `solved` for `kind`, with `response(theta)` at points of `space` (physical coordinates).
     pub fn new(
         imager: &Imager,
         space: &ParameterSpace,
@@ -86,7 +86,7 @@ impl Prediction {
         response: impl Fn(&[f64]) -> Response,
     ) -> Self {
         let Solved { solution, goal, preconditioner, .. } = solved;
-        let origin = space.to_internal(solved.theta);
+        let origin = space.to_sampling(solved.theta);
         let scales = space.scales();
         let settings = SolverSettings { cg_tolerance: 0.01, ..SolverSettings::patient() };
         let solver = Solver { entropy: imager.entropy, preconditioner, settings };
@@ -116,7 +116,7 @@ impl Prediction {
             let at = |h: f64| {
                 let mut x = origin.clone();
                 x[i] += h;
-                let mut problem = imager.problem(response(&space.to_written(&x)));
+                let mut problem = imager.problem(response(&space.to_physical(&x)));
                 let chi2 = problem.linearise(&map);
                 let mut gradient = vec![0.0; n];
                 problem.gradient(&mut gradient);
@@ -140,7 +140,7 @@ impl Prediction {
         Prediction { origin, map, scales, image, ln_lambda, adjoint, bends: Vec::new() }
     }
 
-    /// The same to second order, with `solve` giving the images at internal coordinates around that of the solution and `known` as in
+    /// The same to second order, with `solve` giving the images at sampling coordinates around that of the solution and `known` as in
     /// [`Prediction::start`]; to first order where an image is missing.
     pub fn with_second_order(self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Self {
         let is_finite = |bend: &Bend| bend.change.iter().all(|x| x.is_finite());
@@ -189,7 +189,7 @@ impl Prediction {
         image + size_of_val(&self.map[..]) + size_of_val(&self.adjoint[..])
     }
 
-    /// Where an evaluation at the internal coordinates `x` starts, if one at the known solution starts from `known`.
+    /// Where an evaluation at the sampling coordinates `x` starts, if one at the known solution starts from `known`.
     pub fn start(&self, imager: &Imager, known: &Start, x: &[f64]) -> Start {
         let away = x.iter().zip(&self.origin).zip(&self.scales);
         let shifts: Vec<f64> = away.map(|((x, x0), scale)| (x - x0) / scale).collect();

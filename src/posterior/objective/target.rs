@@ -62,7 +62,7 @@ struct Place {
     rms_kms: f64,
 }
 
-/// The target at `values`, for data of which noise goes together over `correlated_bins`: per datum, not per independent one.
+/// The target at `values`, for data of which noise correlated over `correlated_bins`: per datum, not per independent one.
 ///
 /// # Errors
 /// If the solver fails.

@@ -83,7 +83,7 @@ impl Surrogate {
         moved * pairs.sum::<f64>() / (total * TRIALS as f64)
     }
 
-    /// So many draws: internal and written coordinates, and log-probability.
+    /// So many draws: internal and physical coordinates, and log-probability.
     fn evaluated(
         &self,
         draws: usize,
@@ -92,7 +92,7 @@ impl Surrogate {
     ) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let positions: Vec<Vec<f64>> = (0..draws).filter_map(|_| self.draw(&mut rng)).collect();
-        let thetas: Vec<Vec<f64>> = positions.iter().map(|x| density.to_written(x)).collect();
+        let thetas: Vec<Vec<f64>> = positions.iter().map(|x| density.to_physical(x)).collect();
         let evaluations = evaluator.evaluate(&thetas);
         let all = positions.into_iter().zip(thetas).zip(evaluations);
         all.map(|((position, theta), evaluation)| (position, theta, evaluation.log_prob)).collect()

@@ -51,7 +51,7 @@ pub struct Peak {
 #[derive(Clone, Debug)]
 struct Place {
     position: Vec<f64>,
-    /// ln of the surrogate density in internal coordinates.
+    /// ln of the surrogate density in sampling coordinates.
     log_density: f64,
     /// ln of the density with which [`Surrogate::propose`] comes here.
     log_proposal: f64,
@@ -87,7 +87,7 @@ impl Surrogate {
         Surrogate::of(self.model.clone(), self.space.clone(), self.time_base_cycles, temperature)
     }
 
-    /// ln of the density at internal coordinates, up to a constant; minus infinity outside the priors.
+    /// ln of the density at sampling coordinates, up to a constant; minus infinity outside the priors.
     pub fn log_density(&self, position: &[f64]) -> f64 {
         let period = self.model.period_of(position);
         match self.model.at(period, self.temperature) {
@@ -97,7 +97,7 @@ impl Surrogate {
     }
 
     fn density(&self, conditional: &Conditional, position: &[f64]) -> f64 {
-        let theta = self.space.to_written(position);
+        let theta = self.space.to_physical(position);
         let log_prior = self.space.log_prior(&theta);
         if !log_prior.is_finite() {
             return f64::NEG_INFINITY;
@@ -145,7 +145,7 @@ impl Surrogate {
         place
     }
 
-    /// A draw in internal coordinates; `None` if the priors leave no place.
+    /// A draw in sampling coordinates; `None` if the priors leave no place.
     pub fn draw(&self, rng: &mut dyn RngCore) -> Option<Vec<f64>> {
         const TRIES: usize = 200;
         let first = (0..TRIES).find_map(|_| self.propose(rng).filter(|place| place.log_density.is_finite()))?;

@@ -17,7 +17,7 @@
 use super::MeasuredJitter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::planets::verdict::CANDIDATE_FAP;
-use crate::posterior::expansion::{Expansion, SPOTS_LEFT};
+use crate::posterior::expansion::{Expansion, UNRESOLVED_SPOTS};
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -123,8 +123,8 @@ pub(super) fn fit(expansion: &Expansion, counted_kms: f64, rotation_period_d: f6
 
 /// Sizes of unresolved spots, in variance over that which the entropy expects.
 fn factors() -> impl Iterator<Item = f64> {
-    let places = (SIZES_PER_DECADE * (SPOTS_LEFT.1 / SPOTS_LEFT.0).log10()).round() as i32;
-    (0..=places).map(|place| SPOTS_LEFT.0 * 10f64.powf(f64::from(place) / SIZES_PER_DECADE))
+    let places = (SIZES_PER_DECADE * (UNRESOLVED_SPOTS.1 / UNRESOLVED_SPOTS.0).log10()).round() as i32;
+    (0..=places).map(|place| UNRESOLVED_SPOTS.0 * 10f64.powf(f64::from(place) / SIZES_PER_DECADE))
 }
 
 /// Values from the first to the last of `range`, each larger than the one before by this share.

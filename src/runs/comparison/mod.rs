@@ -15,7 +15,7 @@ pub use cost::{ChainCost, Cost, LandscapeCost};
 pub use draws::Distance;
 pub use pair::{Pair, PairError};
 
-use crate::posterior::objective::{Parameter, SpotsLeft};
+use crate::posterior::objective::{Parameter, UnresolvedSpots};
 use crate::sampling::chain::statistics::wrap;
 use crate::sampling::chain::{ChainError, Summary};
 use crate::sampling::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
@@ -141,8 +141,8 @@ impl Comparison {
             parameters,
         };
         comparison.notes = notes::notes(&comparison, &summary);
-        if pair.settings.imaging.spots_left == SpotsLeft::Fitted {
-            comparison.notes.push("the chain counts spots left over as noise, the landscape does not".into());
+        if pair.settings.imaging.unresolved_spots == UnresolvedSpots::Fitted {
+            comparison.notes.push("the chain counts unresolved spots as noise, the landscape does not".into());
         }
         Ok(comparison)
     }

@@ -64,8 +64,8 @@ fn cost(cost: &Cost) -> String {
         landscape.paraboloid_nodes.map_or_else(String::new, |nodes| format!(", {nodes} of them in the paraboloid"));
     let seconds = |seconds: Option<f64>| seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.1} s"));
     format!(
-        "chain: {} reconstructions{}, {:.0} passes each in the median, {} in all{draws}\n\
-         landscape: {} reconstructions{}, {} passes each in the median, {} in all{used}\n",
+        "chain: {} reconstructions{}, {:.0} model applications each in the median, {} in all{draws}\n\
+         landscape: {} reconstructions{}, {} model applications each in the median, {} in all{used}\n",
         chain.reconstructions,
         seconds(chain.seconds),
         chain.passes_median,

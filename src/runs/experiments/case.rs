@@ -15,7 +15,7 @@ use crate::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings
 use crate::posterior::detection::{Detection, DetectionSettings};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::objective::{Parameter, Reference, ReferenceError};
-use crate::runs::grid_scan::{PARABOLOID, Survey, SurveyError};
+use crate::runs::grid_scan::{PARABOLOID, GridScan, GridScanError};
 use crate::runs::origin::by_name;
 use crate::runs::pool::Pool;
 use crate::runs::run::{CHAIN, Run, RunError, StartFrom};
@@ -193,15 +193,15 @@ pub fn landscape(
     grid: Grid,
     folder: &Path,
     pool: &Pool,
-) -> Result<(Route, Survey), ExperimentError> {
+) -> Result<(Route, GridScan), ExperimentError> {
     let began = Instant::now();
     let names: Vec<String> = grid.names().map(str::to_owned).collect();
     let free = scene.settings.free.iter().filter(|f| names.iter().any(|name| name == f.parameter.name()));
     let plan = GridSettings { free: free.copied().collect(), grid };
     std::fs::create_dir_all(folder).map_err(|source| ExperimentError::Folder { path: folder.into(), source })?;
     // one that was stopped goes on
-    let mut survey = match Survey::resume(scene, &plan, folder) {
-        Err(SurveyError::Origin(_)) => Survey::begin(scene, &plan, found, folder, true)?,
+    let mut survey = match GridScan::resume(scene, &plan, folder) {
+        Err(GridScanError::Origin(_)) => GridScan::begin(scene, &plan, found, folder, true)?,
         resumed => resumed?,
     };
     let resumed = !survey.landscape.nodes().is_empty();

@@ -19,13 +19,13 @@ use serde_json::{Value, json};
 struct Judge {
     name: &'static str,
     objective: &'static str,
-    spots_left: &'static str,
+    unresolved_spots: &'static str,
 }
 
 const JUDGES: [Judge; 3] = [
-    Judge { name: "spottedness", objective: "spottedness", spots_left: "entropy" },
-    Judge { name: "regularised_likelihood", objective: "regularised-likelihood", spots_left: "entropy" },
-    Judge { name: "spots_left_fitted", objective: "spottedness", spots_left: "fitted" },
+    Judge { name: "spottedness", objective: "spottedness", unresolved_spots: "entropy" },
+    Judge { name: "regularised_likelihood", objective: "regularised-likelihood", unresolved_spots: "entropy" },
+    Judge { name: "unresolved_spots_fitted", objective: "spottedness", unresolved_spots: "fitted" },
 ];
 
 /// Parameters that are sampled.
@@ -59,7 +59,7 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
             name: format!("{}_map_{map}_seed_{seed}", judge.name),
             config: with(
                 config.clone(),
-                &[("/imaging/objective", json!(judge.objective)), ("/imaging/spots_left", json!(judge.spots_left))],
+                &[("/imaging/objective", json!(judge.objective)), ("/imaging/unresolved_spots", json!(judge.unresolved_spots))],
             ),
             grid: None,
             chain: true,

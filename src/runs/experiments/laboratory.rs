@@ -12,7 +12,7 @@ use crate::planets::periodogram::FrequencyError;
 use crate::posterior::detection::DetectionError;
 use crate::posterior::objective::ReferenceError;
 use crate::runs::comparison::PairError;
-use crate::runs::grid_scan::SurveyError;
+use crate::runs::grid_scan::GridScanError;
 use crate::runs::pool::Pool;
 use crate::runs::run::RunError;
 use crate::sampling::chain::ChainError;
@@ -50,7 +50,7 @@ pub enum ExperimentError {
     Reference(#[from] ReferenceError),
     /// No landscape.
     #[error(transparent)]
-    Survey(#[from] SurveyError),
+    GridScan(#[from] GridScanError),
     /// No chain.
     #[error(transparent)]
     Run(#[from] RunError),
@@ -83,7 +83,7 @@ impl ExperimentError {
     /// Whether it lies in the star: one that cannot be imaged, or has no best orbit, is a result of an experiment.
     pub(super) fn is_of_the_star(&self) -> bool {
         use ExperimentError::{Detection, Reference, Run, Search};
-        matches!(self, Search(_) | Reference(_) | Detection(_) | Run(RunError::SpotsLeft(_) | RunError::PriorStart))
+        matches!(self, Search(_) | Reference(_) | Detection(_) | Run(RunError::UnresolvedSpots(_) | RunError::PriorStart))
     }
 }
 

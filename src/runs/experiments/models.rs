@@ -146,7 +146,7 @@ fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64),
     let plain = [
         ("/planet", json!({ "k_kms": k_kms, "porb_over_prot": period, "phi": phi })),
         ("/imaging/pixels", json!(laboratory.full_or_quick(2000, 1000))),
-        ("/imaging/spots_left", json!("fitted")),
+        ("/imaging/unresolved_spots", json!("fitted")),
         ("/parameters/k_kms/max", json!(0.4)),
         ("/parameters/porb_over_prot/min", json!(1.2)),
         ("/parameters/porb_over_prot/max", json!(2.4)),

@@ -85,17 +85,17 @@ fn tabulated(
 }
 
 /// Columns that say in which of two ways a star was modelled.
-const WAYS: [&str; 3] = ["equatorial_velocity_kept", "rotation_fitted", SPOTS_LEFT_FITTED];
+const WAYS: [&str; 3] = ["equatorial_velocity_kept", "rotation_fitted", UNRESOLVED_SPOTS_FITTED];
 
 /// The way in which the chain counts what maps leave over of spots.
-const SPOTS_LEFT_FITTED: &str = "spots_left_fitted";
+const UNRESOLVED_SPOTS_FITTED: &str = "unresolved_spots_fitted";
 
 /// What is varied, and the change of the config that it takes.
 type Way = ((&'static str, f64), Option<(&'static str, Value)>);
 
 /// Both ways of taking what maps leave over of spots.
-fn ways_with_spots_left() -> [Way; 2] {
-    [((SPOTS_LEFT_FITTED, 0.0), None), ((SPOTS_LEFT_FITTED, 1.0), Some(("/imaging/spots_left", json!("fitted"))))]
+fn ways_with_unresolved_spots() -> [Way; 2] {
+    [((UNRESOLVED_SPOTS_FITTED, 0.0), None), ((UNRESOLVED_SPOTS_FITTED, 1.0), Some(("/imaging/unresolved_spots", json!("fitted"))))]
 }
 
 const ROUTES: [&str; 3] = ["grid", "chain", "periodogram"];
@@ -224,22 +224,22 @@ fn all_the_periods() -> [(&'static str, Value); 2] {
     [("/parameters/porb_over_prot/min", json!(0.5)), ("/parameters/porb_over_prot/max", json!(4.0))]
 }
 
-/// R4. The landscape knows nothing of spots left over, so that only the chain is made in both ways.
+/// R4. The landscape knows nothing of unresolved spots, so that only the chain is made in both ways.
 pub(super) fn no_planet(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let mut stars = Vec::new();
-    for (way, spots_left) in ways_with_spots_left() {
+    for (way, unresolved_spots) in ways_with_unresolved_spots() {
         for seed in 1..=5_u32 {
             let mut changes = vec![(SEED, json!(seed))];
             changes.extend(all_the_periods());
-            changes.extend(spots_left.clone());
+            changes.extend(unresolved_spots.clone());
             let mut star = star(laboratory, &[("seed", f64::from(seed)), way], [0.0, 1.7, 0.5], &changes);
             let [k, period, phi] = laboratory.full_or_quick([11, 15, 12], [5, 5, 5]);
             let nodes = Nodes::At([(0.0, 0.2, k), (0.5, 4.0, period), (0.0, 1.0, phi)]);
-            star.case.grid = spots_left.is_none().then_some(nodes);
+            star.case.grid = unresolved_spots.is_none().then_some(nodes);
             stars.push(star);
         }
     }
-    tabulated(laboratory, "R4", &["seed", SPOTS_LEFT_FITTED], stars)
+    tabulated(laboratory, "R4", &["seed", UNRESOLVED_SPOTS_FITTED], stars)
 }
 
 /// R5.
@@ -356,14 +356,14 @@ pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Experimen
 pub(super) fn co_rotation(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     const PROFILES: u32 = 50;
     let mut stars = Vec::new();
-    for (way, spots_left) in ways_with_spots_left() {
+    for (way, unresolved_spots) in ways_with_unresolved_spots() {
         for (rotations, seed) in
             [1, 2, 3, 4, 6, 8].into_iter().flat_map(|rotations| (1..=3).map(move |seed| (rotations, seed)))
         {
             let cycle = |k: u32| f64::from(k * rotations) / f64::from(PROFILES);
             let cycles: Vec<f64> = (0..PROFILES).map(cycle).collect();
             let mut changes = vec![("/observations/simulate/cycles", json!(cycles)), (SEED, json!(seed))];
-            changes.extend(spots_left.clone());
+            changes.extend(unresolved_spots.clone());
             let varied = [("rotations", f64::from(rotations)), ("seed", f64::from(seed)), way];
             let mut star = star(laboratory, &varied, [0.1, 1.0, 0.5], &changes);
             // that it agrees with the chain is seen in the other rows
@@ -371,5 +371,5 @@ pub(super) fn co_rotation(laboratory: &Laboratory) -> Result<Report, ExperimentE
             stars.push(star);
         }
     }
-    tabulated(laboratory, "co-rotation", &["rotations", "seed", SPOTS_LEFT_FITTED], stars)
+    tabulated(laboratory, "co-rotation", &["rotations", "seed", UNRESOLVED_SPOTS_FITTED], stars)
 }

@@ -116,8 +116,8 @@ fn with(expansion: &Expansion, orbit: &Orbit) -> Expansion {
     moved
 }
 
-/// The quadratic of the orbit's velocities, spots left over counted as noise of the size that the gradient says.
+/// The quadratic of the orbit's velocities, unresolved spots counted as noise of the size that the gradient says.
 fn counted(expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
-    let spots_left = expansion.spots_left(nuisances)?;
-    Some(expansion.with_spots_left(spots_left)?.velocities(nuisances))
+    let unresolved_spots = expansion.unresolved_spots(nuisances)?;
+    Some(expansion.with_unresolved_spots(unresolved_spots)?.velocities(nuisances))
 }

@@ -1,9 +1,9 @@
-//! What a run samples: the posterior, with spots left over counted as noise or not.
+//! What a run samples: the posterior, with unresolved spots counted as noise or not.
 //!
 //! Left out: what the posterior is worth anywhere (`objective`, `expansion`).
 
 use crate::posterior::expansion::SpotsCounted;
-use crate::posterior::objective::{Posterior, SpotsLeft};
+use crate::posterior::objective::{Posterior, UnresolvedSpots};
 use crate::posterior::surrogate::Surrogate;
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
 use rand::SeedableRng;
@@ -23,23 +23,23 @@ const DRAWS: usize = 200;
 /// Evaluations that a chain is expected to take at least.
 const EVALUATIONS: usize = 3000;
 
-/// The spots left over have no size that fits.
+/// The unresolved spots have no size that fits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "imaging.spots_left: no size of the spots left over fits the data; \"entropy\" takes them as the entropy has them"
+    "imaging.unresolved_spots: no size of the unresolved spots fits the data; \"entropy\" takes them as the entropy has them"
 )]
-pub struct SpotsLeftError;
+pub struct UnresolvedSpotsError;
 
 impl Target {
-    /// Of `posterior`, spots left over taken as the config says, with footholds where the surrogate says that a chain goes: a
+    /// Of `posterior`, unresolved spots taken as the config says, with warm starts where the surrogate says that a chain goes: a
     /// function of posterior and config alone, so that a resumed run, or another process, has the same.
     ///
     /// # Errors
-    /// [`SpotsLeftError`].
-    pub fn new(posterior: Posterior, spots_left: SpotsLeft) -> Result<Self, SpotsLeftError> {
-        let counted = match spots_left {
-            SpotsLeft::Entropy => None,
-            SpotsLeft::Fitted => Some(SpotsCounted::new(&posterior).ok_or(SpotsLeftError)?),
+    /// [`UnresolvedSpotsError`].
+    pub fn new(posterior: Posterior, unresolved_spots: UnresolvedSpots) -> Result<Self, UnresolvedSpotsError> {
+        let counted = match unresolved_spots {
+            UnresolvedSpots::Entropy => None,
+            UnresolvedSpots::Fitted => Some(SpotsCounted::new(&posterior).ok_or(UnresolvedSpotsError)?),
         };
         let (imager, space) = (posterior.imager(), posterior.space());
         let surrogate = match &counted {
@@ -48,8 +48,8 @@ impl Target {
         };
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let draws = (0..DRAWS).filter_map(|_| surrogate.as_ref()?.draw(&mut rng));
-        let draws: Vec<Vec<f64>> = draws.map(|position| space.to_written(&position)).collect();
-        let posterior = posterior.with_footholds_for(&draws, EVALUATIONS);
+        let draws: Vec<Vec<f64>> = draws.map(|position| space.to_physical(&position)).collect();
+        let posterior = posterior.with_warm_starts_for(&draws, EVALUATIONS);
         Ok(Target { posterior, counted, surrogate })
     }
 
@@ -78,12 +78,12 @@ impl LogDensity for Target {
         }
     }
 
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
-        self.posterior.to_internal(theta)
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
+        self.posterior.to_sampling(theta)
     }
 
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
-        self.posterior.to_written(internal)
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
+        self.posterior.to_physical(internal)
     }
 
     fn log_jacobian(&self, theta: &[f64]) -> f64 {

@@ -3,7 +3,7 @@
 //! It builds scene, reference and density as a resumed computation does, and with the same checks. Left out: how it comes there.
 
 use super::message::{Answer as _, numbers_from_bytes};
-use super::target::{SpotsLeftError, Target};
+use super::target::{UnresolvedSpotsError, Target};
 use crate::data::scene::{Scene, SceneError};
 use crate::posterior::objective::FreeParameter;
 use crate::runs::limits::{WholeWay, WholeWayError};
@@ -44,7 +44,7 @@ pub enum Asked {
     /// The likelihood of a landscape.
     Likelihood {
         /// Where evaluations start, besides the reference.
-        footholds: Vec<Vec<f64>>,
+        warm_starts: Vec<Vec<f64>>,
     },
 }
 
@@ -60,9 +60,9 @@ pub enum TaskError {
     /// Orbits cannot be put in there.
     #[error(transparent)]
     Injections(#[from] WholeWayError),
-    /// Spots left over have no size there.
+    /// Unresolved spots have no size there.
     #[error(transparent)]
-    SpotsLeft(#[from] SpotsLeftError),
+    UnresolvedSpots(#[from] UnresolvedSpotsError),
 }
 
 /// Answers questions, from any thread.
@@ -102,11 +102,11 @@ impl Task {
         let posterior = self.origin.posterior(&scene, space, place)?;
         Ok(match &self.asked {
             Asked::LogProbability => {
-                let target = Target::new(posterior, settings.imaging.spots_left)?;
+                let target = Target::new(posterior, settings.imaging.unresolved_spots)?;
                 Box::new(move |question| target.evaluate(&numbers_from_bytes(question)).to_bytes())
             }
-            Asked::Likelihood { footholds } => {
-                let posterior = posterior.with_footholds(footholds);
+            Asked::Likelihood { warm_starts } => {
+                let posterior = posterior.with_warm_starts(warm_starts);
                 Box::new(move |question| posterior.likelihood(&numbers_from_bytes(question)).to_bytes())
             }
         })

@@ -6,7 +6,7 @@ use super::start;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::JournalError;
 use crate::runs::origin::OriginError;
-use crate::runs::pool::SpotsLeftError;
+use crate::runs::pool::UnresolvedSpotsError;
 use crate::sampling::ensemble::EnsembleError;
 use std::path::PathBuf;
 
@@ -22,9 +22,9 @@ pub enum RunError {
         start::PRIOR_TRIES
     )]
     PriorStart,
-    /// The spots left over have no size that fits.
+    /// The unresolved spots have no size that fits.
     #[error(transparent)]
-    SpotsLeft(#[from] SpotsLeftError),
+    UnresolvedSpots(#[from] UnresolvedSpotsError),
     /// Several runs joined have no common random numbers to go on with.
     #[error("{}: several runs joined; go on with each of them, and join them again", .0.display())]
     Merged(PathBuf),

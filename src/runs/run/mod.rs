@@ -81,7 +81,7 @@ impl Run {
     ) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
         let needed = from == StartFrom::Optimum || scene.settings.sampler.moves.surrogate > 0.0;
-        let target = Target::new(found.posterior.clone(), scene.settings.imaging.spots_left)?;
+        let target = Target::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots)?;
         let origin = Origin::of(scene, &found);
         let task = Task::new(scene, &origin, scene.space.names(), Asked::LogProbability);
         let evaluator = Evaluations::new(pool, &target, &task);
@@ -126,7 +126,7 @@ impl Run {
         manifest.origin.check(scene, folder)?;
         let (mut journal, mut chain) = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
         let posterior = manifest.origin.posterior(scene, scene.space.clone(), folder)?;
-        let target = Target::new(posterior, scene.settings.imaging.spots_left)?;
+        let target = Target::new(posterior, scene.settings.imaging.unresolved_spots)?;
         let task = Task::new(scene, &manifest.origin, scene.space.names(), Asked::LogProbability);
         let evaluator = Evaluations::new(pool, &target, &task);
         if chain.steps() == 0 {

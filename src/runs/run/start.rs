@@ -30,7 +30,7 @@ pub(super) fn from_surrogate(
     scene: &Scene,
 ) -> Option<Positions> {
     let wide = surrogate.tempered(OVERDISPERSION.powi(2))?;
-    let draw = |rng: &mut ChaCha8Rng| Some(target.to_written(&wide.draw(rng)?));
+    let draw = |rng: &mut ChaCha8Rng| Some(target.to_physical(&wide.draw(rng)?));
     reconstructed(evaluator, scene, DRAW_TRIES, draw)
 }
 

@@ -44,9 +44,9 @@ pub struct Record {
     pub walker: usize,
     /// Whether the position is new at this step (true for every walker of step 0).
     pub accepted: bool,
-    /// Log-probability of the position, in written coordinates; always finite.
+    /// Log-probability of the position, in physical coordinates; always finite.
     pub log_prob: f64,
-    /// The position, in written coordinates, in the order of the names.
+    /// The position, in physical coordinates, in the order of the names.
     pub theta: Vec<f64>,
     /// Spottedness of the reconstruction at the position.
     pub spottedness: f64,

@@ -33,7 +33,7 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
     }
     text += &derived(summary, truth);
     text += &format!(
-        "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} passes each, best log_prob {:.3}\n",
+        "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} model applications each, best log_prob {:.3}\n",
         summary.steps,
         summary.discarded_steps,
         summary.acceptance_fraction,
@@ -82,7 +82,7 @@ fn moves(summary: &Summary) -> String {
         format!("{name} {:.2} (worth {worth}) of {}", m.acceptance_fraction, m.proposals)
     };
     let each: Vec<String> = summary.moves.iter().map(one).collect();
-    format!("{} effective samples an evaluation; accepted: {}\n", share(summary.ess_per_evaluation), each.join(", "))
+    format!("{} effective samples per evaluation; accepted: {}\n", share(summary.ess_per_evaluation), each.join(", "))
 }
 
 fn convergence(summary: &Summary) -> String {

@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// One walker: where it stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Walker {
-    /// Position in written coordinates.
+    /// Position in physical coordinates.
     pub theta: Vec<f64>,
     /// Its evaluation (`passes` is not kept through a resume and plays no role).
     pub evaluation: Evaluation,
@@ -88,10 +88,10 @@ impl<'a> Sampler<'a> {
         Sampler { mix, ..self }
     }
 
-    /// Step 0: evaluates the start, positions `[ensemble][walker]` in written coordinates.
+    /// Step 0: evaluates the start, positions `[ensemble][walker]` in physical coordinates.
     ///
     /// # Errors
-    /// [`EnsembleError`] when the start has the wrong shape, is degenerate in internal coordinates (naming the parameter),
+    /// [`EnsembleError`] when the start has the wrong shape, is degenerate in sampling coordinates (naming the parameter),
     /// a walker has no finite log-probability, or the evaluator stopped.
     pub fn start(&self, positions: &[Vec<Vec<f64>>]) -> Result<(State, Vec<Record>), EnsembleError> {
         start::check_shape(positions, [self.ensembles, self.walkers, self.density.names().len()])?;
@@ -183,7 +183,7 @@ impl<'a> Sampler<'a> {
     fn propose(&self, state: &State, splits: &[Vec<usize>], half: usize) -> Vec<Trial> {
         let mut trials = Vec::with_capacity(self.ensembles * self.walkers / 2);
         for (ensemble, (walkers, split)) in state.ensembles.iter().zip(splits).enumerate() {
-            let internal = |&walker: &usize| self.density.to_internal(&walkers[walker].theta);
+            let internal = |&walker: &usize| self.density.to_sampling(&walkers[walker].theta);
             let (first, second) = split.split_at(self.walkers / 2);
             let (moved, others) = if half == 0 { (first, second) } else { (second, first) };
             let complement: Vec<Vec<f64>> = others.iter().map(internal).collect();
@@ -191,7 +191,7 @@ impl<'a> Sampler<'a> {
                 let mut rng = random_numbers(self.seed, stream(Purpose::Walker, ensemble, walker), state.step);
                 let here = internal(&walker);
                 let proposal = self.mix.propose(&here, &complement, &mut rng);
-                let theta = self.density.to_written(&proposal.position);
+                let theta = self.density.to_physical(&proposal.position);
                 let refused = match proposal.position == here {
                     // nothing new to look at
                     true => Some(Status::OutsidePrior),
@@ -215,7 +215,7 @@ impl<'a> Sampler<'a> {
         }
         // Rounding is some 1e-16 of the largest coordinate; a wrap is by a period.
         let largest = position.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-        let back = self.density.to_internal(theta);
+        let back = self.density.to_sampling(theta);
         let wrapped = position.iter().zip(&back).any(|(x, y)| (x - y).abs() > 1e-6 * largest);
         wrapped.then_some(Status::OutsidePrior)
     }
@@ -235,7 +235,7 @@ impl<'a> Sampler<'a> {
         Outcome { accepted, proposed, passes, by: Some(by) }
     }
 
-    /// ln of the density in internal coordinates, up to a constant.
+    /// ln of the density in sampling coordinates, up to a constant.
     fn target(&self, walker: &Walker) -> f64 {
         if walker.evaluation.log_prob == f64::NEG_INFINITY {
             return f64::NEG_INFINITY;

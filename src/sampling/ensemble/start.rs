@@ -15,15 +15,15 @@ use rand_distr::StandardNormal;
 /// Draws tried for a walker before giving up.
 const TRIES: usize = 2000;
 
-/// Positions of walkers in written coordinates, `[ensemble][walker][parameter]`.
+/// Positions of walkers in physical coordinates, `[ensemble][walker][parameter]`.
 pub type Positions = Vec<Vec<Vec<f64>>>;
 
 /// What a start is drawn from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartDraw<'a> {
-    /// The centre, in written coordinates.
+    /// The centre, in physical coordinates.
     pub centre: &'a [f64],
-    /// Covariance in internal coordinates.
+    /// Covariance in sampling coordinates.
     pub covariance: &'a DMatrix<f64>,
     /// Factor on the standard deviations; 1.5 or so makes the start over-dispersed.
     pub scale: f64,
@@ -40,9 +40,9 @@ pub fn start_numbers(seed: u64, ensemble: usize, walker: usize) -> ChaCha8Rng {
     random_numbers(seed, stream(Purpose::Start, ensemble, walker), 0)
 }
 
-/// Draws start positions, `[ensemble][walker]`, in written coordinates.
+/// Draws start positions, `[ensemble][walker]`, in physical coordinates.
 ///
-/// Gaussian in internal coordinates; a position for which `allowed` (a finite log-prior, say) is false is drawn again. The
+/// Gaussian in sampling coordinates; a position for which `allowed` (a finite log-prior, say) is false is drawn again. The
 /// same arguments give the same positions.
 ///
 /// # Errors
@@ -63,12 +63,12 @@ pub fn draw_start(
         .flatten()
         .ok_or(EnsembleError::StartCovariance { dimension })?
         .unpack();
-    let centre = DVector::from_vec(density.to_internal(draw.centre));
+    let centre = DVector::from_vec(density.to_sampling(draw.centre));
     let walker = |ensemble: usize, walker: usize| {
         let mut rng = start_numbers(draw.seed, ensemble, walker);
         let mut position = || {
             let normal = DVector::from_fn(dimension, |_, _| rng.sample::<f64, _>(StandardNormal));
-            density.to_written((&centre + &factor * normal).as_slice())
+            density.to_physical((&centre + &factor * normal).as_slice())
         };
         (0..TRIES).map(|_| position()).find(|theta| theta.iter().all(|x| x.is_finite()) && allowed(theta)).ok_or_else(
             || EnsembleError::StartOutside {
@@ -104,7 +104,7 @@ pub(super) fn check_spread(density: &dyn LogDensity, positions: &[Vec<Vec<f64>>]
     for (ensemble, walkers) in positions.iter().enumerate() {
         let mut columns = vec![Vec::with_capacity(walkers.len()); names.len()];
         for (walker, theta) in walkers.iter().enumerate() {
-            let internal = density.to_internal(theta);
+            let internal = density.to_sampling(theta);
             if let Some(i) = (0..names.len()).find(|&i| !(theta[i].is_finite() && internal[i].is_finite())) {
                 let (name, value) = (names[i].clone(), theta[i]);
                 return Err(EnsembleError::StartNotFinite { ensemble, walker, name, value });

@@ -118,8 +118,8 @@ pub(super) struct SearchRecord {
 #[derive(Serialize)]
 pub(super) struct ExpansionRecord {
     pub marginalised: Vec<&'static str>,
-    /// How many times larger than the entropy expects spots left over are, in variance: without a planet, at the best orbit.
-    pub spots_left: [f64; 2],
+    /// How many times larger than the entropy expects unresolved spots are, in variance: without a planet, at the best orbit.
+    pub unresolved_spots: [f64; 2],
     /// Delta ln L of the best orbit with spots as the entropy sees them.
     pub regularised_delta_ln_l: f64,
     pub rounds: usize,
@@ -166,7 +166,7 @@ impl PeriodogramResult<'_> {
             },
             expansion: ExpansionRecord {
                 marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name()).collect(),
-                spots_left: [found.planet_free.spots_left, found.last().spots_left],
+                unresolved_spots: [found.planet_free.unresolved_spots, found.last().unresolved_spots],
                 regularised_delta_ln_l: found.regularised_delta_ln_l(),
                 rounds: found.rounds,
                 closed: found.closed,

@@ -1,6 +1,6 @@
 //! Moves: how a walker is proposed a new place, given the walkers of the other half. One file a move.
 //!
-//! Moves see internal coordinates only. A new move is one file, one field of [`MoveWeights`] and one line of
+//! Moves see sampling coordinates only. A new move is one file, one field of [`MoveWeights`] and one line of
 //! [`MoveWeights::mix`]; a move that needs data of its own is added with [`Mix::with`]. The tests of every move call
 //! `harness::check`. Left out: acceptance (`sampler`).
 
@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// A place to go to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proposal {
-    /// The new position, in internal coordinates.
+    /// The new position, in sampling coordinates.
     pub position: Vec<f64>,
     /// ln of the Hastings factor: ln q(current | proposed) - ln q(proposed | current), with any Jacobian of the move.
     pub log_factor: f64,
@@ -36,7 +36,7 @@ pub struct Proposal {
 /// A way of proposing a new position.
 pub trait Move: Send + Sync {
     /// Proposes a place for a walker at `current`, given the positions `complement` of the other half of its ensemble
-    /// (at least two), all in internal coordinates. May draw up to 2^15 words of random numbers.
+    /// (at least two), all in sampling coordinates. May draw up to 2^15 words of random numbers.
     fn propose(&self, current: &[f64], complement: &[Vec<f64>], rng: &mut dyn RngCore) -> Proposal;
 }
 

@@ -1,7 +1,7 @@
-//! Footholds: images that evaluations nearby start from, each with its preconditioner and what a prediction needs.
+//! Warm starts: images that evaluations nearby start from, each with its preconditioner and what a prediction needs.
 //!
 //! The reference is one. Far from it a Newton system is no longer close to the one that its preconditioner inverts, and an
-//! evaluation takes hundreds of passes instead of tens; another foothold there brings it down again, for the passes of about
+//! evaluation takes hundreds of passes instead of tens; another warm start there brings it down again, for the passes of about
 //! five such evaluations. What an evaluation ends at does not depend on where it started beyond the solver's tolerance. Left out:
 //! where a chain, a grid or a search will go, and how an image is made.
 
@@ -15,8 +15,8 @@ use std::sync::Arc;
 
 /// An image, and what evaluations nearby need of it.
 #[derive(Clone, Debug)]
-pub struct Foothold {
-    /// Where it is (written coordinates).
+pub struct WarmStart {
+    /// Where it is (physical coordinates).
     pub theta: Vec<f64>,
     /// The same as [`place`] has it.
     pub place: Vec<f64>,
@@ -28,7 +28,7 @@ pub struct Foothold {
     pub prediction: Prediction,
 }
 
-impl Foothold {
+impl WarmStart {
     /// Bytes that it takes in memory, all but a few.
     fn bytes(&self) -> usize {
         let start = size_of_val(&self.start.image.coordinates[..]) + size_of_val(&self.start.path[..]);
@@ -51,32 +51,32 @@ pub fn place(imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> Vec<f64>
     place
 }
 
-/// The foothold nearest to `theta`, the first of equals; one that stands alone is not looked for.
-pub fn nearest<'a>(footholds: &'a [Foothold], imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> &'a Foothold {
-    if let [only] = footholds {
+/// The warm start nearest to `theta`, the first of equals; one that stands alone is not looked for.
+pub fn nearest<'a>(warm_starts: &'a [WarmStart], imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> &'a WarmStart {
+    if let [only] = warm_starts {
         return only;
     }
     let here = place(imager, space, theta);
-    let to = |foothold: &&Foothold| distance(&foothold.place, &here);
-    footholds.iter().min_by(|a, b| to(a).total_cmp(&to(b))).expect("the reference is one")
+    let to = |warm_start: &&WarmStart| distance(&warm_start.place, &here);
+    warm_starts.iter().min_by(|a, b| to(a).total_cmp(&to(b))).expect("the reference is one")
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Passes of an evaluation that starts so far from where it ends: about what the paper's setup takes in the mean.
+/// Model applications per evaluation that starts so far from where it ends: about what the paper's setup takes in the mean.
 fn passes(distance: f64) -> f64 {
     (15.0 + 6.0 * distance.powf(3.5)).min(500.0)
 }
 
-/// Passes that a foothold takes to be made.
+/// Passes that a warm start takes to be made.
 const PASSES: f64 = 2000.0;
 
-/// Bytes that all footholds together may take.
+/// Bytes that all warm starts together may take.
 const MEMORY: usize = 1 << 29;
 
-/// Most places that are considered for a foothold, and most that it is judged by; the others are like them.
+/// Most places that are considered for a warm start, and most that it is judged by; the others are like them.
 const CONSIDERED: usize = 400;
 const JUDGED: usize = 2000;
 
@@ -87,9 +87,9 @@ pub fn sampled(thetas: &[Vec<f64>]) -> Vec<&Vec<f64>> {
     chosen.into_iter().map(|i| &thetas[i]).collect()
 }
 
-/// At which of `places` footholds save more passes than they take, if so many `evaluations` are spread like the places and there is
+/// At which of `places` warm starts save more passes than they take, if so many `evaluations` are spread like the places and there is
 /// the `reference` already: the one that saves most, then the next. The places are in no particular order.
-pub fn worthwhile(reference: &Foothold, places: &[Vec<f64>], evaluations: usize) -> Vec<usize> {
+pub fn worthwhile(reference: &WarmStart, places: &[Vec<f64>], evaluations: usize) -> Vec<usize> {
     let each = evaluations as f64 / places.len() as f64;
     let mut now: Vec<f64> = places.iter().map(|place| passes(distance(&reference.place, place))).collect();
     // what evaluations at all places would take from each candidate

@@ -53,7 +53,7 @@ pub(super) struct Point {
 }
 
 /// What the gradient at a point says.
-pub(super) struct Standing {
+pub(super) struct Convergence {
     /// Scale of the entropy's metric.
     pub scale: Vec<f32>,
     /// Gradient of chi2 / 2, in the metric.
@@ -84,7 +84,7 @@ pub(super) struct Guide<'a> {
     pub adjoint: &'a [f32],
 }
 
-impl Standing {
+impl Convergence {
     /// Takes the gradient at a point (one pass) and judges it by the guide. `gradient` is memory for it.
     pub fn of(
         problem: &mut impl Problem,
@@ -109,7 +109,7 @@ impl Standing {
         });
         let (chi2_path, spottedness_path, spottedness_left) = (0.0, 0.0, 0.0);
         let (move_lambda, known_error, merit_errors, at_bound) = (0.0, 0.0, [1.0; 2], false);
-        let mut standing = Standing {
+        let mut convergence = Convergence {
             scale,
             chi2_gradient,
             right,
@@ -125,12 +125,12 @@ impl Standing {
             Goal::Lambda(_) => {}
             Goal::Chi2 { .. } if guide.path.len() == n => {
                 let weights = entropy.spottedness_gradient(&at.s, problem.area());
-                standing.forecast(&weights, at, goal, guide);
+                convergence.forecast(&weights, at, goal, guide);
             }
             // without a path there is no telling how far chi2 is from its target
-            Goal::Chi2 { .. } => standing.known_error = f64::INFINITY,
+            Goal::Chi2 { .. } => convergence.known_error = f64::INFINITY,
         }
-        standing
+        convergence
     }
 
     /// `weights` is the gradient of spottedness with respect to the image.
