@@ -1,6 +1,4 @@
 //! How a pass and an evaluation grow with pixels, profiles and velocity bins.
-//!
-//! Left out: what they cost at the usual sizes beside a yardstick (`passes`, `evaluations`).
 
 mod common;
 
@@ -28,8 +26,8 @@ const PASSES: u32 = 10;
 /// Parameter vectors evaluated at each size.
 const POINTS: usize = 24;
 
-/// How far chi2 is brought below that of the true map. A fixed chi2 per datum would ask for another fit at every size, down to
-/// impossible ones: noise moves chi2 by the square root of twice the number of data.
+/// How far chi2 is brought below that of the true map. A fixed chi2 per datum would ask for another fit at every size,
+/// down to impossible ones: noise moves chi2 by the square root of twice the number of data.
 const FIT: f64 = 100.0;
 
 /// Standard deviations of K, period and phase in the paper's setup.
@@ -50,8 +48,10 @@ fn main() {
     let finer = |bins| Size { step_kms: 1.8 * 56.0 / (bins - 1) as f64, ..Size::pixels(PIXELS) };
     family("bins", &bins, finer, &mut table);
     table.print(&format!(
-        "One thread; the fastest of several rounds in which all sizes of a family take turns. 50 profiles, 57 bins and {} pixels where they \
-         are not what grows. 3-D, objective spottedness, {POINTS} points as far apart as the posterior is wide, chi2 {FIT} below \
+        "One thread; the fastest of several rounds in which all sizes of a family take turns. 50 profiles, 57 bins \
+        and {} pixels where they \
+         are not what grows. 3-D, objective spottedness, {POINTS} points as far apart as the posterior is wide, chi2 \
+         {FIT} below \
          that of the true map. Exponents by least squares in the logarithms.",
         thousands(PIXELS)
     ));

@@ -1,7 +1,8 @@
-//! Ranks of a cluster against one thread: what the queue between them costs, how two workers share a batch, and the numbers that
-//! `examples/scaling.py` makes a cluster of: seconds of evaluations, of messages, and of the work that only rank 0 does.
+//! Ranks of a cluster against one thread: what the queue between them costs, how two workers share a batch, and the
+//! numbers that `examples/scaling.py` makes a cluster of: seconds of evaluations, of messages, and of the work that
+//! only rank 0 does.
 //!
-//! Starts itself anew by `mpirun`. Left out: threads (`threads`).
+//! Starts itself anew by `mpirun`.
 
 mod common;
 
@@ -185,7 +186,8 @@ fn workers(queue: &Queue) {
         ]);
     }
     table.print(&format!(
-        "Batches of {BATCH} points from the bulk of the posterior, the same bytes by all; rank 0 only hands them out. The fastest of \
+        "Batches of {BATCH} points from the bulk of the posterior, the same bytes by all; rank 0 only hands them out. \
+        The fastest of \
          {BATCHES} rounds in which all take turns."
     ));
 }
@@ -216,7 +218,8 @@ fn ingredients(queue: &Queue) {
     let many: Vec<f64> =
         (0..5).map(|_| seconds(|| queue.answers(b"echo", &questions, &AtomicBool::new(false)))).collect();
     println!(
-        "A question and its answer, nothing to think about: {:.0} us alone, {:.1} us each in a row of {ECHOES} (medians).\n",
+        "A question and its answer, nothing to think about: {:.0} us alone, {:.1} us each in a row of {ECHOES} \
+        (medians).\n",
         1e6 * quantile(&alone, 0.5),
         1e6 * quantile(&many, 0.5) / ECHOES as f64
     );

@@ -1,6 +1,4 @@
 //! Two threads against one: a batch of evaluations through pools of either size, in turn.
-//!
-//! Left out: what an evaluation costs (`evaluations`).
 
 mod common;
 
@@ -40,6 +38,7 @@ fn main() {
         ]);
     }
     table.print(&format!(
-        "Batches of {BATCH} points from the bulk of the posterior; the fastest of {ROUNDS} rounds in which both take turns."
+        "Batches of {BATCH} points from the bulk of the posterior; the fastest of {ROUNDS} rounds in which both take \
+        turns."
     ));
 }

@@ -2,7 +2,8 @@
 //!
 //!     cargo run --release --example moves
 //!
-//! prints the table of `results/moves.md`. Every case is `configs/demo.json` with another planet (on 5,000 pixels where there is one), or `configs/paper_7d.json`; a part of a name after `--` runs that case alone.
+//! prints the table of `results/moves.md`. Every case is `configs/demo.json` with another planet (on 5,000 pixels where
+//! there is one), or `configs/paper_7d.json`; a part of a name after `--` runs that case alone.
 
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::data::search::{SearchSettings, find};

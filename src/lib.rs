@@ -1,9 +1,9 @@
 //! Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
 //!
 //! The idea is that of Petit et al. 2015 (*A maximum entropy approach to detect close-in giant planets around active
-//! stars*, A&A 584, A84): a wrong orbit shifts the line profiles against each other, and the map that fits them needs more
-//! spots. Here the spots are marginalised and the orbit is sampled, instead of being read off a grid. All formulas are in
-//! `docs/method.md`.
+//! stars*, A&A 584, A84): a wrong orbit shifts the line profiles against each other, and the map that fits them needs
+//! more spots. Here the spots are marginalised and the orbit is sampled, instead of being read off a grid. All formulas
+//! are in `docs/method.md`.
 //!
 //! # The rooms
 //!

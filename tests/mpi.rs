@@ -1,8 +1,8 @@
-//! Several ranks by MPI, with `mpirun` on this machine: the same bytes as by threads, whatever happens on the way, and no job that
-//! hangs.
+//! Several ranks by MPI, with `mpirun` on this machine: the same bytes as by threads, whatever happens on the way, and
+//! no job that hangs.
 //!
-//! Without a test harness: `mpirun` starts this very program too, as ranks of jobs that go wrong on purpose (`ranks`). Without
-//! `mpirun` it says `skipped`, and fails where `CI` is set.
+//! Without a test harness: `mpirun` starts this very program too, as ranks of jobs that go wrong on purpose (`ranks`).
+//! Without `mpirun` it says `skipped`, and fails where `CI` is set.
 
 #[path = "common/desk.rs"]
 #[allow(unused)]

@@ -1,7 +1,5 @@
 //! The paper's setup (Petit et al. 2015, section 2) at any size: a spotted star with a planet, 50 profiles over three
 //! rotations in 57 bins; three or seven free parameters.
-//!
-//! Left out: anything that takes a reconstruction but for [`Bulk`].
 
 use dimcmc::internals::data::config::{self, ObservationSource};
 use dimcmc::internals::data::scene::Scene;

@@ -1,4 +1,5 @@
-//! The place of this process among the ranks of a cluster: the first one does what is asked for, the others evaluate for it.
+//! The place of this process among the ranks of a cluster: the first one does what is asked for, the others evaluate
+//! for it.
 //!
 //! Without the feature `mpi`, or without a launcher, it is alone.
 

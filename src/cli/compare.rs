@@ -12,9 +12,9 @@ use std::path::PathBuf;
 
 /// Compare a chain with a landscape of the same data
 ///
-/// Parameter by parameter: the chain's median and 68 % interval; vertex and error bar of the paraboloid; median and 68 %
-/// interval of the whole landscape under the chain's prior; how far they are apart, and what each took. The two must be of the
-/// same data, star, image and objective. Writes comparison.json.
+/// Parameter by parameter: the chain's median and 68 % interval; vertex and error bar of the paraboloid; median and 68
+/// % interval of the whole landscape under the chain's prior; how far they are apart, and what each took. The two must
+/// be of the same data, star, image and objective. Writes comparison.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc compare runs/demo runs/demo_grid --out runs/demo_comparison")]
 pub struct Args {

@@ -1,5 +1,6 @@
-//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 75 where a scheduler stopped what can go on, 1
-//! for anything else. Which error of the system is the input's fault is said in one place, [`Failure::of`].
+//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 75 where a scheduler stopped what
+//! can go on, 1 for anything else. Which error of the system is the input's fault is said in one place,
+//! [`Failure::of`].
 
 use crate::data::config::ConfigError;
 use crate::data::init::ProposalError;
@@ -96,7 +97,9 @@ impl Failure {
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
             RunError::Merged(_) => Failure::of(error),
-            RunError::PriorStart | RunError::UnresolvedSpots(_) => Failure::input(format!("{}: {error}", path.display())),
+            RunError::PriorStart | RunError::UnresolvedSpots(_) => {
+                Failure::input(format!("{}: {error}", path.display()))
+            }
             RunError::Journal(error) => error.into(),
             RunError::Interrupted => Failure::failed(error),
         }

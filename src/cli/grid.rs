@@ -8,7 +8,7 @@ use crate::data::io::effort::{EFFORT, Effort};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::scene::Scene;
 use crate::numerics::text::shown;
-use crate::runs::grid_scan::{HEADER, NODES, PARABOLOID, GridScan};
+use crate::runs::grid_scan::{GridScan, HEADER, NODES, PARABOLOID};
 use crate::sampling::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -16,12 +16,13 @@ use std::time::{Duration, Instant};
 
 /// Compute the landscape: a reconstruction at every node of a grid
 ///
-/// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values. ln L is
-/// the log-probability of `sample` without the prior, relative to the same reference: the best parameters along the axes,
-/// which are searched for first. Around the highest node a paraboloid is fitted to chi2 = -2 ln L: its vertex is the estimate,
-/// and the projection of its surface one above the minimum the error bar. Writes landscape.json (what it was begun with),
-/// landscape.jsonl (a line per node) and paraboloid.json. A landscape that was stopped, by whatever, goes on with --resume and
-/// comes to the same bytes as one that was not; a finished one gets its paraboloid anew.
+/// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values.
+/// ln L is the log-probability of `sample` without the prior, relative to the same reference: the best parameters along
+/// the axes, which are searched for first. Around the highest node a paraboloid is fitted to chi2 = -2 ln L: its vertex
+/// is the estimate, and the projection of its surface one above the minimum the error bar. Writes landscape.json (what
+/// it was begun with), landscape.jsonl (a line per node) and paraboloid.json. A landscape that was stopped, by
+/// whatever, goes on with --resume and comes to the same bytes as one that was not; a finished one gets its paraboloid
+/// anew.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc grid configs/demo.json --out runs/demo_grid\n  \
                         dimcmc grid configs/demo.json --out runs/demo_grid --resume")]
@@ -33,7 +34,8 @@ pub struct Args {
     /// Go on with the landscape in the folder
     #[arg(long)]
     resume: bool,
-    /// Fit the paraboloid to the N highest nodes; by default to all up to 4 above the lowest chi2, or as many as it takes
+    /// Fit the paraboloid to the N highest nodes; by default to all up to 4 above the lowest chi2, or as many as it
+    /// takes
     #[arg(long, value_name = "N")]
     fit_nodes: Option<NonZeroUsize>,
     /// Fit it to nodes no farther than N from the highest one along any axis

@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 
 /// Write a config from ZDIpy's input files
 ///
-/// Reads inzdi.dat, model-voigt-line.dat beside it, and the profiles that it lists. Writes the config and the list of profiles
-/// beside it (star.json, star_observations.txt). Epoch, angles, signs and units are the same in both programs. What has no
-/// counterpart is listed; what ZDIpy does not know, the priors among it, is found as by `init`.
+/// Reads inzdi.dat, model-voigt-line.dat beside it, and the profiles that it lists. Writes the config and the list of
+/// profiles beside it (star.json, star_observations.txt). Epoch, angles, signs and units are the same in both programs.
+/// What has no counterpart is listed; what ZDIpy does not know, the priors among it, is found as by `init`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc import inzdi.dat --out star.json")]
 pub struct Args {

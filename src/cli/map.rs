@@ -13,8 +13,9 @@ use std::path::{Path, PathBuf};
 
 /// Reconstruct the spots at the config's parameter values
 ///
-/// The map of greatest entropy whose chi2 is `imaging.chi2_target`. Writes map.json (the map), profiles.csv (observed and model
-/// profiles), rv.csv (radial velocities before and after the model is taken out of them) and fit.json (how good the fit is).
+/// The map of greatest entropy whose chi2 is `imaging.chi2_target`. Writes map.json (the map), profiles.csv (observed
+/// and model profiles), rv.csv (radial velocities before and after the model is taken out of them) and fit.json (how
+/// good the fit is).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
 pub struct Args {

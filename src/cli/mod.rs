@@ -1,7 +1,8 @@
 //! The commands, one file each: what is asked, which parts of the library answer, what is printed. No formulas.
 //!
-//! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`, one line
-//! each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias = "analyze")]`.
+//! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`,
+//! one line each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias =
+//! "analyze")]`.
 
 mod analyse;
 mod batch;
@@ -55,7 +56,8 @@ struct Cli {
 /// Options of every command.
 #[derive(Debug, clap::Args)]
 pub struct Global {
-    /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do not depend on it
+    /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do
+    /// not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// No progress bar
@@ -111,7 +113,8 @@ pub fn main() -> std::process::ExitCode {
     console::end(run(&parse()))
 }
 
-/// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to do.
+/// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to
+/// do.
 fn parse() -> Cli {
     Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|e| e.exit())
 }

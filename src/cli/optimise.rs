@@ -13,8 +13,8 @@ const OPTIMUM: &str = "optimum.json";
 
 /// Find the best parameters and their error bars
 ///
-/// Climbs from the config's values and from other orbits of the prior, with the gradient of the log-probability; the error
-/// bars are those of its curvature. Writes optimum.json.
+/// Climbs from the config's values and from other orbits of the prior, with the gradient of the log-probability; the
+/// error bars are those of its curvature. Writes optimum.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc optimise configs/demo.json --out runs/demo_optimum")]
 pub struct Args {

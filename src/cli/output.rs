@@ -1,7 +1,7 @@
 //! Where results go: a folder of their own that is absent or empty, unless the user insists.
 //!
-//! It is checked before anything is computed and created once there is something to write, so that bad input leaves nothing
-//! behind.
+//! It is checked before anything is computed and created once there is something to write, so that bad input leaves
+//! nothing behind.
 
 use super::{Failure, console};
 use crate::data::scene::Scene;

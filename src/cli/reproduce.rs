@@ -12,8 +12,9 @@ use std::time::Instant;
 
 /// Repeat the experiments of Petit et al. (2015), and a few beyond them
 ///
-/// Every row of experiments gets a folder with table.csv, summary.json and figures. A row that is there already is left alone; one that
-/// was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an hour on two cores.
+/// Every row of experiments gets a folder with table.csv, summary.json and figures. A row that is there already is left
+/// alone; one that was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an
+/// hour on two cores.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc reproduce R2 --quick --out runs/reproduced --work runs/reproduce_raw\n  \
                         dimcmc reproduce --list")]

@@ -1,9 +1,10 @@
 //! Why no map fits: one thing at a time is changed, and what helps most is the likely reason.
 //!
-//! Tried are vsini, width, wings and strength of the local line, the continuum, the velocity range, the rotation period and faculae,
-//! each on coarse maps at the errors with which the config's own map fits. Of what helps most the best value is looked for, and the
-//! smallest chi2 that a map then comes down to. Where nothing helps the errors are left: they are too small, or the profiles hold
-//! something that the model of the star does not know. Two things wrong at once show as the one that helps more.
+//! Tried are vsini, width, wings and strength of the local line, the continuum, the velocity range, the rotation period
+//! and faculae, each on coarse maps at the errors with which the config's own map fits. Of what helps most the best
+//! value is looked for, and the smallest chi2 that a map then comes down to. Where nothing helps the errors are left:
+//! they are too small, or the profiles hold something that the model of the star does not know. Two things wrong at
+//! once show as the one that helps more.
 
 mod change;
 
@@ -17,7 +18,8 @@ use serde::Serialize;
 /// Pixels of the maps: enough to see whether a change helps.
 const PIXELS: usize = 500;
 
-/// A change is a reason when chi2 falls to less than this share of what it was, and what it has above its target likewise.
+/// A change is a reason when chi2 falls to less than this share of what it was, and what it has above its target
+/// likewise.
 const HELPS: f64 = 0.8;
 const HELPS_EXCESS: f64 = 0.6;
 
@@ -55,7 +57,8 @@ pub struct Diagnosis {
     pub reason: Reason,
     /// It in words, with what helps.
     pub text: String,
-    /// chi2 per independent datum that a map comes down to as it is, with errors as the continuum has them, or as given.
+    /// chi2 per independent datum that a map comes down to as it is, with errors as the continuum has them, or as
+    /// given.
     pub chi2_per_datum: f64,
     /// The same with the change that helps most.
     pub chi2_per_datum_changed: f64,
@@ -73,8 +76,8 @@ pub struct Tried {
 }
 
 impl Diagnosis {
-    /// Of a scene that no map fits as well as its errors promise, by trying; `whole` are its profiles in their whole width, in units
-    /// of their continuum, if they are at hand. `None` where there is no map at all.
+    /// Of a scene that no map fits as well as its errors promise, by trying; `whole` are its profiles in their whole
+    /// width, in units of their continuum, if they are at hand. `None` where there is no map at all.
     pub fn of(scene: &Scene, whole: Option<&Observations>) -> Option<Self> {
         let patient = patient(scene, whole);
         let unchanged = factor(&patient, 1.0)?;
@@ -105,8 +108,10 @@ impl Diagnosis {
                 chi2(unchanged)
             ),
             None => format!(
-                "the errors are the likely reason, or something that the model does not know: a map comes down to chi2 = {:.3} per \
-                 datum, and other values of vsini, line, continuum, velocity range and rotation period, one at a time, do not help; \
+                "the errors are the likely reason, or something that the model does not know: a map comes down to \
+                chi2 = {:.3} per \
+                 datum, and other values of vsini, line, continuum, velocity range and rotation period, one at a \
+                 time, do not help; \
                  errors {unchanged:.2} times as large would do",
                 chi2(unchanged)
             ),

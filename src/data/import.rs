@@ -1,5 +1,5 @@
-//! From another program's input files to a proposal: ZDIpy's star, line and list of profiles in this program's terms, and a list
-//! of what has no counterpart here.
+//! From another program's input files to a proposal: ZDIpy's star, line and list of profiles in this program's terms,
+//! and a list of what has no counterpart here.
 //!
 //! Angles, signs, epoch, units and the Voigt profile of the local line are the same in both (`io::zdipy`). A target
 //! chi2 far from 1 says that the errors are wrong: they are measured here, with what noise neighbouring bins share.
@@ -29,7 +29,8 @@ pub struct Import {
 /// Why there is none.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "{place}: profile {file}: the list of profiles cannot hold a path with a blank or a # in it: write the config elsewhere"
+    "{place}: profile {file}: the list of profiles cannot hold a path with a blank or a # in it: write the config \
+    elsewhere"
 )]
 pub struct ImportError {
     place: String,
@@ -37,8 +38,8 @@ pub struct ImportError {
 }
 
 impl Import {
-    /// Of ZDIpy's `inzdi.dat` and, if there is one, its model of the local line. `folder` is that of the input as seen from the
-    /// list of profiles.
+    /// Of ZDIpy's `inzdi.dat` and, if there is one, its model of the local line. `folder` is that of the input as seen
+    /// from the list of profiles.
     ///
     /// # Errors
     /// A path that the list cannot hold.

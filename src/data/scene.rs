@@ -1,6 +1,5 @@
-//! What every command begins with: a config file, the observations it names or simulates, and what they are imaged with.
-//!
-//! Left out: anything that takes a reconstruction.
+//! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
+//! with.
 
 use crate::data::config::{self, Automatic, ConfigError, ObservationSource, Settings, VelocityJitter};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
@@ -104,8 +103,8 @@ impl Scene {
         Ok(Scene { data_sha256, truth, ..scene })
     }
 
-    /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left to them
-    /// is chosen.
+    /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left
+    /// to them is chosen.
     ///
     /// # Errors
     /// Settings that make no sense with these observations.
@@ -113,8 +112,8 @@ impl Scene {
         Scene::with_noise(settings, observations, None)
     }
 
-    /// The same of profiles in their `whole` width and `cut` to the config's velocity range, both in units of their continuum and with
-    /// errors as quoted. Errors that `settings` leave to them are measured.
+    /// The same of profiles in their `whole` width and `cut` to the config's velocity range, both in units of their
+    /// continuum and with errors as quoted. Errors that `settings` leave to them are measured.
     ///
     /// # Errors
     /// Settings that make no sense with these observations, and errors that cannot be measured.
@@ -163,7 +162,8 @@ impl Scene {
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
     }
 
-    /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected into.
+    /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected
+    /// into.
     ///
     /// # Errors
     /// Files that are no longer what they were.
@@ -189,12 +189,14 @@ impl Scene {
         files
     }
 
-    /// The profiles in their whole width and in units of their continuum, errors as quoted; `None` if they are no longer there.
+    /// The profiles in their whole width and in units of their continuum, errors as quoted; `None` if they are no
+    /// longer there.
     pub fn whole_over_continuum(&self) -> Option<Observations> {
         self.whole().ok().map(|(whole, _)| whole.over_continuum(self.continuum_level()))
     }
 
-    /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors stay.
+    /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors
+    /// stay.
     ///
     /// # Errors
     /// Profiles that no longer make sense.
@@ -364,8 +366,8 @@ fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> Parame
     ParameterSpace::new(free.to_vec(), settings.values, mid, base, imager.star.rotation_period_d)
 }
 
-/// SHA-256 (hex) of the numbers of `observations`, little-endian: the step, then for each profile time, number of bins, and
-/// velocity, intensity and sigma of each bin.
+/// SHA-256 (hex) of the numbers of `observations`, little-endian: the step, then for each profile time, number of bins,
+/// and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
     let step = observations.step_kms;
     let mut hash = Sha256::new();

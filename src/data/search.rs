@@ -1,10 +1,10 @@
-//! The way to the reference: from the config's values, and from the peaks of the likelihood over all periods, to the best
-//! parameters and to the maximum-entropy image there (method section 3, step 1).
+//! The way to the reference: from the config's values, and from the peaks of the likelihood over all periods, to the
+//! best parameters and to the maximum-entropy image there (method section 3, step 1).
 //!
-//! The peaks are those of the quadratic around the first climb's end (method section 4), brought into the priors where they lie
-//! outside; where there is no quadratic (K or phi fixed), orbits drawn from the prior take their place. The search itself runs
-//! on the regularised likelihood, which needs no target and is smooth everywhere; a last climb is on the objective asked for.
-//! Left out: the maximum-entropy solver, argmin.
+//! The peaks are those of the quadratic around the first climb's end (method section 4), brought into the priors where
+//! they lie outside; where there is no quadratic (K or phi fixed), orbits drawn from the prior take their place. The
+//! search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last climb is on
+//! the objective asked for.
 
 use crate::data::config::{ImagingSettings, Settings};
 use crate::posterior::imaging::Imager;
@@ -230,8 +230,8 @@ impl Found {
     }
 }
 
-/// `theta` with an orbit drawn from the prior: it is in the orbit that the landscape has several maxima, one for every alias
-/// of the sampling; the star's own parameters have one, which the climb from the config's values has found.
+/// `theta` with an orbit drawn from the prior: it is in the orbit that the landscape has several maxima, one for every
+/// alias of the sampling; the star's own parameters have one, which the climb from the config's values has found.
 fn with_other_orbit(space: &ParameterSpace, theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
     let draw = space.sample_prior(rng);
     let choose = |((f, drawn), kept): ((&FreeParameter, f64), &f64)| {

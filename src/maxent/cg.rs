@@ -13,8 +13,8 @@ pub(super) struct CgLimits {
     pub iterations: usize,
 }
 
-/// Solves `A z = b` from the start `z`; returns the number of iterations. Once the residual is small enough one more step is taken,
-/// which costs no application of A, because its length is not computed but guessed.
+/// Solves `A z = b` from the start `z`; returns the number of iterations. Once the residual is small enough one more
+/// step is taken, which costs no application of A, because its length is not computed but guessed.
 ///
 /// The residual is measured against `b A^-1 b`: about `b z` where the start is good, about `b P b` where there is none.
 pub(super) fn solve<N: Number>(

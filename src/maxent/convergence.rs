@@ -1,10 +1,10 @@
 //! Where an image stands: what its gradient tells of the way that is left to the goal, without a Newton step.
 //!
-//! With H the Newton system, g the gradient of chi2/2 and r minus the gradient of the merit, the path of solutions obeys
-//! `H path = -lambda g`, so that a step `H step = r` changes chi2 by `-2 path r / lambda`; and the adjoint of spottedness at
-//! fixed chi2 says that the step changes that by `adjoint r`. Path and adjoint of a solution near by serve as well, to first
-//! order in the distance. Where data say little, an adjoint is in proportion to the scale of the metric, and is kept relative
-//! to it: a pixel that has become spotted since then weighs what it weighs now. Left out: the steps (`solver`).
+//! With H the Newton system, g the gradient of chi2/2 and r minus the gradient of the merit, the path of solutions
+//! obeys `H path = -lambda g`, so that a step `H step = r` changes chi2 by `-2 path r / lambda`; and the adjoint of
+//! spottedness at fixed chi2 says that the step changes that by `adjoint r`. Path and adjoint of a solution near by
+//! serve as well, to first order in the distance. Where data say little, an adjoint is in proportion to the scale of
+//! the metric, and is kept relative to it: a pixel that has become spotted since then weighs what it weighs now.
 
 use super::entropy::Entropy;
 use super::preconditioner::Preconditioner;
@@ -22,8 +22,8 @@ pub(super) const SMALLEST_LAMBDA: f64 = 1e-12;
 /// A lambda this close to its bound, in logarithm, is there.
 const AT_BOUND: f64 = 1e-12;
 
-/// Error of a first-order forecast of what spottedness has left to change, over the forecast: of a good one. Those of small
-/// changes are often worse, which is why errors come out several times the tolerance.
+/// Error of a first-order forecast of what spottedness has left to change, over the forecast: of a good one. Those of
+/// small changes are often worse, which is why errors come out several times the tolerance.
 const FORECAST_ERROR: f64 = 0.03;
 
 /// Error of what a step along the path of a solution near by makes of chi2/2, over what that lacks.
@@ -32,12 +32,12 @@ const PATH_ERROR: f64 = 0.01;
 /// Error left at the bound of lambda, over the forecast of what chi2/2 has left to change, which is not applied there.
 const BOUND_ERROR: f64 = 0.3;
 
-/// Error of the forecast of spottedness, which is of second order in a step, over the merit of what the preconditioner's eigenvectors
-/// span of the step, ...
+/// Error of the forecast of spottedness, which is of second order in a step, over the merit of what the
+/// preconditioner's eigenvectors span of the step, ...
 const SPANNED_ERROR: f64 = 8.0;
 
-/// ... and over that of the rest: pixels that become spotted, where spottedness is far from linear. Like the constants above they
-/// were measured against exact solutions on the paper's setup, in three and seven dimensions.
+/// ... and over that of the rest: pixels that become spotted, where spottedness is far from linear. Like the constants
+/// above they were measured against exact solutions on the paper's setup, in three and seven dimensions.
 const REST_ERROR: f64 = 40.0;
 
 /// An image with what has been computed there.
@@ -181,8 +181,8 @@ impl Convergence {
         combined(&self.right, &self.chi2_gradient, |right, g| right - change * g)
     }
 
-    /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be below
-    /// `tolerance`.
+    /// Whether the error left, in `S/lambda - chi2/2` or in the chi2/2 that spottedness is worth, is estimated to be
+    /// below `tolerance`.
     pub fn is_within(
         &self,
         tolerance: f64,
@@ -208,8 +208,8 @@ impl Convergence {
         self.known_error + 0.5 * (of_spanned * (spanned + faint) + of_rest * rest) / at.lambda < tolerance
     }
 
-    /// What the squared norm of `left` lacks of twice the merit to be gained by pixels that are to come back to the default. The metric
-    /// knows changes of second order: next to nothing where a pixel has been pushed into the dark.
+    /// What the squared norm of `left` lacks of twice the merit to be gained by pixels that are to come back to the
+    /// default. The metric knows changes of second order: next to nothing where a pixel has been pushed into the dark.
     fn faint(&self, left: &[f32], at: &Point, entropy: Entropy, area: &[f64]) -> f64 {
         let (mut lacking, default) = (0.0, entropy.default_coordinate());
         for (((left, scale), area), u) in left.iter().zip(&self.scale).zip(area).zip(&at.u) {

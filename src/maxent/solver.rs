@@ -1,18 +1,18 @@
 //! Newton's method with preconditioned conjugate gradients for `max S subject to chi2 = target`, or at a given lambda
 //! (method section 2).
 //!
-//! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: the linearised constraint says how
-//! far lambda is to go, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to there. The path takes
-//! a solve of its own unless a solution near by has one. The steps end where a first-order forecast of what they would still
-//! change (`convergence`) is good enough. Every call starts from the image it is given and from nothing else, so the answer is a
-//! function of problem and start. Left out: what the image shows.
+//! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: the linearised constraint
+//! says how far lambda is to go, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to
+//! there. The path takes a solve of its own unless a solution near by has one. The steps end where a first-order
+//! forecast of what they would still change (`convergence`) is good enough. Every call starts from the image it is
+//! given and from nothing else, so the answer is a function of problem and start.
 
 use super::cg::{self, CgLimits};
+use super::convergence::{Convergence, Guide, Point, SMALLEST_LAMBDA};
 use super::entropy::{Entropy, MetricStep, Worth};
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
-use super::convergence::{Guide, Point, SMALLEST_LAMBDA, Convergence};
 use crate::numerics::vector::Number;
 use crate::numerics::vector::linear::{combine, combine_two, dot, norm, rounded, scale_by, widened};
 
@@ -91,8 +91,9 @@ impl Solver<'_> {
             if newton_steps == self.settings.newton_steps {
                 return self.finish(at, Some(convergence), path, Termination::StepLimit, newton_steps);
             }
-            // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be; and that of a
-            // solution near by serves: lambda goes wrong by as much as the path, and the next step sees it
+            // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be;
+            // and that of a solution near by serves: lambda goes wrong by as much as the path, and the next step sees
+            // it
             let near_by = !adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && convergence.chi2_path < 0.0;
             let mut move_lambda = convergence.move_lambda;
             if matches!(goal, Goal::Chi2 { .. }) && !convergence.at_bound && !near_by {
@@ -123,8 +124,8 @@ impl Solver<'_> {
         scaled
     }
 
-    /// The path along lambda from a solution, and the slopes along it: at the bound of lambda, where the solver needs none, or as
-    /// precise as this solver's systems are.
+    /// The path along lambda from a solution, and the slopes along it: at the bound of lambda, where the solver needs
+    /// none, or as precise as this solver's systems are.
     pub fn find_path(&self, problem: &mut impl Problem, solution: &mut Solution) {
         let s = self.entropy.image(&solution.image.coordinates);
         let scale = self.entropy.metric(&s, problem.area());
@@ -202,9 +203,9 @@ impl Solver<'_> {
         Newton { decrement: (norm * dot(&step, &right)).max(0.0), step, move_lambda }
     }
 
-    /// Solves a system from the start `z`. The right-hand side is scaled to unit length, so that nothing is too small or too large for
-    /// single precision; returns how long it was. In double precision where it is to be precise, but right-hand side and solution are in
-    /// single precision even then, and the steps make up for it.
+    /// Solves a system from the start `z`. The right-hand side is scaled to unit length, so that nothing is too small
+    /// or too large for single precision; returns how long it was. In double precision where it is to be precise, but
+    /// right-hand side and solution are in single precision even then, and the steps make up for it.
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &mut [f32], z: &mut [f32]) -> f64 {
         let (norm, per_norm) = norm_of(right);
         scale_by(per_norm, right);

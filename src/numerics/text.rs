@@ -1,4 +1,4 @@
-//! Tables as text, and text of others in a line of one's own. Left out: what stands in them.
+//! Tables as text, and text of others in a line of one's own.
 
 use std::borrow::Cow;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Constants and conversions between the units at the program's boundaries (degrees, km/s, nm) and those inside (radians).
+//! Constants and conversions between the units at the program's boundaries (degrees, km/s, nm) and those inside
+//! (radians).
 
 /// Speed of light (km/s).
 pub const SPEED_OF_LIGHT_KMS: f64 = 299_792.458;

@@ -1,8 +1,8 @@
 //! What is said of a planet: every threshold, and the one sentence that heads every result.
 //!
-//! One number is compared with the thresholds: the probability that a star without a planet shows a peak as high anywhere in the
-//! blind search. A detection also needs that nothing speaks against it; otherwise it is a candidate, and the sentence names the
-//! reasons. Whether a chain has converged is another question, and is not part of it.
+//! One number is compared with the thresholds: the probability that a star without a planet shows a peak as high
+//! anywhere in the blind search. A detection also needs that nothing speaks against it; otherwise it is a candidate,
+//! and the sentence names the reasons. Whether a chain has converged is another question, and is not part of it.
 
 use serde::{Deserialize, Serialize};
 
@@ -181,7 +181,8 @@ mod tests {
         assert_eq!(doubted.finding, Finding::Candidate);
         assert_eq!(
             doubted.sentence,
-            "Candidate, not a detection: 5.0692 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. Against it: the \
+            "Candidate, not a detection: 5.0692 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. Against \
+            it: the \
              period is close to 2 Prot."
         );
         assert_eq!(

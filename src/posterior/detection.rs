@@ -1,10 +1,10 @@
-//! The blind search for a planet: from the image of the star without one to the periodogram, and from its best orbit to the
-//! orbit that stays the best when the star is imaged with it.
+//! The blind search for a planet: from the image of the star without one to the periodogram, and from its best orbit to
+//! the orbit that stays the best when the star is imaged with it.
 //!
-//! The periodogram and its false-alarm probability belong to the expansion around the planet-free image: a statistic that knows
-//! nothing of the planet. That expansion is exact for small velocities only, so the best orbit is found again in an expansion
-//! around the image that it implies, and so on until K stays. A second planet is searched for in the last expansion, where the
-//! first is small. Left out: what is written (`io::periodogram`).
+//! The periodogram and its false-alarm probability belong to the expansion around the planet-free image: a statistic
+//! that knows nothing of the planet. That expansion is exact for small velocities only, so the best orbit is found
+//! again in an expansion around the image that it implies, and so on until K stays. A second planet is searched for in
+//! the last expansion, where the first is small.
 
 mod remarks;
 mod robustness;
@@ -57,8 +57,8 @@ pub struct View {
     pub reference: Reference,
     /// ln L around it.
     pub expansion: Expansion,
-    /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over count as
-    /// noise.
+    /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over
+    /// count as noise.
     pub quadratic: VelocityQuadratic,
     /// The same with spots as the entropy sees them: the regularised likelihood itself.
     pub regularised: VelocityQuadratic,
@@ -84,8 +84,8 @@ pub struct Detection {
     pub frequencies: Frequencies,
     /// Without a planet; its quadratic is the one that `search` is of.
     pub planet_free: View,
-    /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots, which
-    /// makes the false-alarm probability a cautious one.
+    /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots,
+    /// which makes the false-alarm probability a cautious one.
     pub blind: Search,
     /// At the best orbit; `None` if it was not imaged, because its period lies on the edge of the search.
     pub at_best: Option<View>,
@@ -138,8 +138,8 @@ impl DetectionSettings {
 }
 
 impl View {
-    /// The star imaged at `values`. Where the target chi2 takes more than three times the entropy's weight over the number of data, the
-    /// image stops short of it: beyond, noise is turned into spots.
+    /// The star imaged at `values`. Where the target chi2 takes more than three times the entropy's weight over the
+    /// number of data, the image stops short of it: beyond, noise is turned into spots.
     ///
     /// # Errors
     /// [`DetectionError`].

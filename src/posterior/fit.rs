@@ -1,7 +1,5 @@
-//! One reconstruction held against the data: its map and model profiles, first-moment velocities before and after the model is
-//! taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is judged.
-//!
-//! Left out: how the reconstruction came about (`objective::reference`), and files (`io::map`).
+//! One reconstruction held against the data: its map and model profiles, first-moment velocities before and after the
+//! model is taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is judged.
 
 mod checks;
 
@@ -22,7 +20,8 @@ use serde::Serialize;
 pub struct Fit {
     /// What the map holds: spot filling factor or brightness of every pixel.
     pub map: Vec<f64>,
-    /// Model intensity of every bin, one vector a profile, in units of the continuum; with its nuisances, where there are any.
+    /// Model intensity of every bin, one vector a profile, in units of the continuum; with its nuisances, where there
+    /// are any.
     pub model: Vec<Vec<f64>>,
     /// Posterior mean of the nuisances of each profile, given the map; empty where none are integrated out.
     pub nuisances: Vec<LineAndContinuum>,

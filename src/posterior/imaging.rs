@@ -1,8 +1,8 @@
 //! Star and maximum entropy meet: the misfit of a map to observed profiles, and the Doppler image.
 //!
-//! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is
-//! `D = line(B) / continuum(B)` (method section 1), whose second derivative is kept, so that the solver's Newton steps are exact.
-//! Left out: which parameters are tried, and why.
+//! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is `D =
+//! line(B) / continuum(B)` (method section 1), whose second derivative is kept, so that the solver's Newton steps are
+//! exact.
 
 mod data;
 mod profile;
@@ -45,7 +45,8 @@ impl Imager {
         }
     }
 
-    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard deviations.
+    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard
+    /// deviations.
     pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
         self.data.nuisances = Nuisances::new(priors, observations);
         self
@@ -151,12 +152,14 @@ pub struct ImagingProblem<'a> {
 }
 
 impl<'a> ImagingProblem<'a> {
-    /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness `contrast`.
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness
+    /// `contrast`.
     pub fn new(area: &'a [f64], data: &'a Data, response: Response, contrast: f64) -> Self {
         ImagingProblem::of_brightness(area, data, response, Brightness::of_spots(contrast))
     }
 
-    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the `brightness`.
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the
+    /// `brightness`.
     fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Brightness) -> Self {
         let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
         ImagingProblem {

@@ -1,15 +1,16 @@
-//! How large the errors of observed profiles are, from the profiles themselves: by how much the continuum beside the line
-//! scatters, and by how much a map leaves the line unfitted.
+//! How large the errors of observed profiles are, from the profiles themselves: by how much the continuum beside the
+//! line scatters, and by how much a map leaves the line unfitted.
 //!
-//! The continuum alone may promise too much, for in the core of the line LSD profiles are noisier and the model of the star is not
-//! perfect; what a map leaves over alone may be spots that it lacks. So the larger of the two counts, and both are written down. Of
-//! a map it is the smallest factor on the quoted errors with which it comes down to 0.97 per datum, as one of right errors does,
-//! before noise is turned into spots. Level and slope of the continuum do not count.
+//! The continuum alone may promise too much, for in the core of the line LSD profiles are noisier and the model of the
+//! star is not perfect; what a map leaves over alone may be spots that it lacks. So the larger of the two counts, and
+//! both are written down. Of a map it is the smallest factor on the quoted errors with which it comes down to 0.97 per
+//! datum, as one of right errors does, before noise is turned into spots. Level and slope of the continuum do not
+//! count.
 //!
-//! Noise that goes together over n bins, as that of LSD profiles may, counts for one: errors are larger by the root of n, and a
-//! target chi2 is meant per independent datum, so that the map stays what it was and errors of orbits become what they are. What
-//! counts is noise that looks like the local line, for nothing in a profile is narrower; where features are broader and the noise goes
-//! together farther, errors are still a little too small. Left out: which profiles, and files.
+//! Noise that goes together over n bins, as that of LSD profiles may, counts for one: errors are larger by the root of
+//! n, and a target chi2 is meant per independent datum, so that the map stays what it was and errors of orbits become
+//! what they are. What counts is noise that looks like the local line, for nothing in a profile is narrower; where
+//! features are broader and the noise goes together farther, errors are still a little too small.
 
 use crate::posterior::first_look::Scatter;
 use crate::posterior::imaging::Imager;
@@ -50,8 +51,8 @@ pub struct ErrorSettings {
 /// What they said.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredErrors {
-    /// Factor on the quoted errors, where it was measured: the larger of the two below times the root of the bins that go
-    /// together.
+    /// Factor on the quoted errors, where it was measured: the larger of the two below times the root of the bins that
+    /// go together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_scale: Option<f64>,
     /// Scatter of the continuum over quoted errors; null where there is too little of it.
@@ -100,7 +101,8 @@ impl NoiseError {
     }
 }
 
-/// Fewest degrees of freedom of the continuum, in all profiles together and in one of them: errors are good to 13 and 22 %.
+/// Fewest degrees of freedom of the continuum, in all profiles together and in one of them: errors are good to 13 and
+/// 22 %.
 const FEWEST: (usize, usize) = (30, 10);
 
 /// chi2 per datum of a map of profiles whose errors are right, at the lambda beyond which noise is turned into spots.
@@ -124,8 +126,8 @@ const MISFIT_OF_QUOTED: f64 = 2.0;
 /// Beyond this many local line widths from the limb there is continuum.
 const BEYOND: f64 = 3.0;
 
-/// The errors of `observations`, cut as they are used, by their continuum: that of `whole`, the same profiles in their whole width,
-/// beside the line of `star` at `values`. The factor is that of the continuum for now.
+/// The errors of `observations`, cut as they are used, by their continuum: that of `whole`, the same profiles in their
+/// whole width, beside the line of `star` at `values`. The factor is that of the continuum for now.
 ///
 /// # Errors
 /// [`NoiseError::NoContinuum`].
@@ -150,8 +152,9 @@ pub fn by_continuum(
     Ok(MeasuredErrors { sigma_scale, continuum, residual: None, correlated_bins, profiles })
 }
 
-/// The scatter of each profile over that of them all, as far as the continuum knows it: the logarithms of equal profiles scatter by
-/// `1 / (2 freedom)` in variance, and are drawn together by the share that this has in the scatter there is. Mean weights stay.
+/// The scatter of each profile over that of them all, as far as the continuum knows it: the logarithms of equal
+/// profiles scatter by `1 / (2 freedom)` in variance, and are drawn together by the share that this has in the scatter
+/// there is. Mean weights stay.
 fn relative(scatter: &[Scatter]) -> Result<Vec<f64>, NoiseError> {
     let ratio = |(k, s): (usize, &Scatter)| {
         let missing = NoiseError::NoContinuum { profile: k + 1, freedom: s.freedom, least: FEWEST.1 };
@@ -170,8 +173,8 @@ fn relative(scatter: &[Scatter]) -> Result<Vec<f64>, NoiseError> {
 }
 
 impl MeasuredErrors {
-    /// Takes the residuals of a map into account. `imager` is of the profiles with errors scaled by what was measured so far, times a
-    /// factor.
+    /// Takes the residuals of a map into account. `imager` is of the profiles with errors scaled by what was measured
+    /// so far, times a factor.
     ///
     /// # Errors
     /// The outer ones are those of `imager`, the inner ones say that there is no map.
@@ -246,8 +249,8 @@ impl MeasuredErrors {
     }
 }
 
-/// The smallest factor on the errors with which a map comes down to 0.97 per independent datum before noise is turned into spots.
-/// `imager` is of the profiles with errors times a factor.
+/// The smallest factor on the errors with which a map comes down to 0.97 per independent datum before noise is turned
+/// into spots. `imager` is of the profiles with errors times a factor.
 ///
 /// # Errors
 /// The outer ones are those of `imager`, the inner ones say that there is no map.

@@ -8,9 +8,6 @@
 //! term `+ z D'` with D' the derivative of the depths with velocity, which is the star's and comes from outside. With
 //! the whitened templates `sigma^-1 T P^(1/2) = Q s V^t` the inverse is `sigma^-1 (1 - Q s^2/(1+s^2) Q^t) sigma^-1`:
 //! one product of two vectors a template.
-//!
-//! Left out: that the line's own depth is the model's and not M (second order: equivalent width times what spots make of the line),
-//! and numbers that all profiles share (the equivalent width of the star's line may be a free parameter).
 
 use crate::numerics::vector::Instructions;
 use crate::numerics::vector::linear::short_dot;
@@ -62,7 +59,8 @@ pub struct Estimate {
 /// Place of the zero point among the templates, behind those of line and continuum.
 const ZERO_POINT: usize = 3;
 
-/// The nuisances of a set of profiles; none by default. Vectors are as long as the data, all profiles one after the other.
+/// The nuisances of a set of profiles; none by default. Vectors are as long as the data, all profiles one after the
+/// other.
 #[derive(Clone, Debug, Default)]
 pub struct Nuisances {
     priors: LineAndContinuum,
@@ -158,8 +156,8 @@ impl Nuisances {
         }
     }
 
-    /// The posterior mean of the nuisances of the profile with these `bins`, given the weighted residual `W (model - data)`; the
-    /// change of its depths that they make is added to `depth`.
+    /// The posterior mean of the nuisances of the profile with these `bins`, given the weighted residual `W (model -
+    /// data)`; the change of its depths that they make is added to `depth`.
     pub fn estimate(&self, bins: Range<usize>, weighted_residual: &[f64], depth: &mut [f64]) -> Estimate {
         let mut numbers = [0.0; ZERO_POINT + 1];
         let [offset, slope, width] = self.priors.numbers();
@@ -194,7 +192,8 @@ fn templates_of(profile: &Profile, observations: &Observations) -> Vec<[f64; 3]>
     (0..bins).map(|j| templates(j, bins, mean(j))).collect()
 }
 
-/// Appends what the `templates` (columns, in standard deviations of the prior) of a profile with these errors make of its weights.
+/// Appends what the `templates` (columns, in standard deviations of the prior) of a profile with these errors make of
+/// its weights.
 fn correct(templates: &DMatrix<f64>, sigma: &[f64], corrections: &mut [Correction]) {
     if corrections.is_empty() {
         return;

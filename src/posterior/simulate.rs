@@ -1,10 +1,10 @@
-//! Synthetic observations: a spotted star with its planet through the forward model, and photon noise (Petit et al. 2015,
-//! section 2).
+//! Synthetic observations: a spotted star with its planet through the forward model, and photon noise (Petit et al.
+//! 2015, section 2).
 //!
-//! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of filling
-//! factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the largest s and the
-//! largest excess e of the discs that overlap. The same simulation gives
-//! the same numbers on every machine and with any number of threads. Left out: where the settings come from (`config`).
+//! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of
+//! filling factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the
+//! largest s and the largest excess e of the discs that overlap. The same simulation gives the same numbers on every
+//! machine and with any number of threads.
 
 use crate::posterior::nuisances::{LineAndContinuum, templates};
 use crate::posterior::objective::ParameterValues;
@@ -94,7 +94,8 @@ impl Simulation {
         Observations { step_kms: self.step_kms, profiles }
     }
 
-    /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own filling.
+    /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own
+    /// filling.
     pub fn spot_filling(&self, grid: &SurfaceGrid) -> Vec<f64> {
         grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
     }

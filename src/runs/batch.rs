@@ -1,7 +1,6 @@
 //! Many stars: the chain of every config of a list, each in a folder of its own, several at once.
 //!
-//! A star that is done is left alone, one that was stopped goes on, and one that fails stops no other. Left out: the chain itself
-//! (`run`), and who works (`pool`).
+//! A star that is done is left alone, one that was stopped goes on, and one that fails stops no other.
 
 use crate::data::io::atomic::write_json;
 use crate::data::scene::Scene;
@@ -96,8 +95,8 @@ pub fn read_list(path: &Path, out: &Path) -> Result<Vec<Star>, ListError> {
     if stars.is_empty() { Err(ListError::Empty(path.into())) } else { Ok(stars) }
 }
 
-/// Samples all stars, as many at once as the pool is large; `done` is told of each that ends on this machine. What came of them, in
-/// order; of those that were not begun when the pool was told to stop, that they were interrupted.
+/// Samples all stars, as many at once as the pool is large; `done` is told of each that ends on this machine. What came
+/// of them, in order; of those that were not begun when the pool was told to stop, that they were interrupted.
 pub fn sample_all(stars: &[Star], pool: &Pool, done: &(dyn Fn() + Sync)) -> Vec<End> {
     let stop = pool.shared_stop();
     let here = |star: &Star| {

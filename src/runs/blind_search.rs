@@ -1,8 +1,8 @@
-//! The blind search that every statement on a planet rests on: what `periodogram` does without options, for the commands that go on
-//! from there (`optimise`, `sample`, `batch`).
+//! The blind search that every statement on a planet rests on: what `periodogram` does without options, for the
+//! commands that go on from there (`optimise`, `sample`, `batch`).
 //!
-//! An optimum or a chain takes a planet for granted and says which one; whether there is one is told by how often stars without a
-//! planet show as much. So their results hold the search beside them, and its verdict heads them.
+//! An optimum or a chain takes a planet for granted and says which one; whether there is one is told by how often stars
+//! without a planet show as much. So their results hold the search beside them, and its verdict heads them.
 
 use crate::data::scene::Scene;
 use crate::planets::periodogram::{
@@ -38,8 +38,8 @@ enum SearchError {
 }
 
 impl BlindSearch {
-    /// Searches the star of `scene`, what its config leaves free integrated out. `None` where no orbit is asked for, K being fixed.
-    /// Where the search fails the verdict says why.
+    /// Searches the star of `scene`, what its config leaves free integrated out. `None` where no orbit is asked for, K
+    /// being fixed. Where the search fails the verdict says why.
     pub fn of(scene: &Scene) -> Option<Self> {
         let asked = scene.settings.free.iter().any(|f| f.parameter == Parameter::K);
         asked.then(|| BlindSearch::tried(scene).unwrap_or_else(|error| BlindSearch::failed(&error)))
@@ -67,7 +67,8 @@ impl BlindSearch {
             remarks.push(Remark::against(
                 "the highest peak lies at a period that the config does not allow",
                 format!(
-                    "the highest peak of the blind search, {:.4} d, lies at a period that the config does not allow: it may look \
+                    "the highest peak of the blind search, {:.4} d, lies at a period that the config does not allow: \
+                    it may look \
                      like an orbit of another one",
                     rotation_period_d * found.best.porb_over_prot
                 ),
@@ -118,8 +119,8 @@ impl Periods {
     }
 }
 
-/// The verdict where the best period is not allowed: that of the highest peak, or else place, that is, by the chance of one as high
-/// at any period.
+/// The verdict where the best period is not allowed: that of the highest peak, or else place, that is, by the chance of
+/// one as high at any period.
 fn within(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict {
     let rotation_period_d = found.frequencies.rotation_period_d;
     let peak = found.blind.peaks.iter().find(|peak| periods.contain(peak.porb_over_prot));
@@ -153,7 +154,8 @@ impl BlindSearch {
         self
     }
 
-    /// What speaks against a planet where the orbit that was found, of this `Porb/Prot`, is not the one that the verdict is on.
+    /// What speaks against a planet where the orbit that was found, of this `Porb/Prot`, is not the one that the
+    /// verdict is on.
     pub fn of_another_orbit(&self, porb_over_prot: f64, rotation_period_d: f64) -> Option<Remark> {
         let (signal, rotation) = (self.verdict.signal?, self.rotation.as_ref()?);
         let judged = signal.period_d / rotation_period_d;

@@ -1,8 +1,8 @@
 //! A landscape on disk: begun afresh, or gone on with to the same bytes (method section 6).
 //!
-//! The reference is that of `sample`: the best parameters by `search` over the axes. Nodes are reconstructed in batches, in the
-//! order of the grid, so that the file does not depend on the number of threads, and a kill loses the batch under way. Left out:
-//! how progress is shown, and what is read off a landscape (`landscape`).
+//! The reference is that of `sample`: the best parameters by `search` over the axes. Nodes are reconstructed in
+//! batches, in the order of the grid, so that the file does not depend on the number of threads, and a kill loses the
+//! batch under way.
 
 use crate::data::config::{GridSettings, MOST_NODES};
 use crate::data::io::atomic::{WriteError, write_json};
@@ -101,8 +101,8 @@ pub enum GridScanError {
 }
 
 impl GridScan {
-    /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes `found`.
-    /// A landscape that is there already is replaced if `replace`, and refused otherwise.
+    /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes
+    /// `found`. A landscape that is there already is replaced if `replace`, and refused otherwise.
     ///
     /// # Errors
     /// [`GridScanError`]: files that are there already, or cannot be written.
@@ -159,8 +159,8 @@ impl GridScan {
         self.posterior.warm_starts().count()
     }
 
-    /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one, and of the
-    /// last what was finished in time. Returns whether the landscape is whole.
+    /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one,
+    /// and of the last what was finished in time. Returns whether the landscape is whole.
     ///
     /// # Errors
     /// Nodes that cannot be written.

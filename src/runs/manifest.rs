@@ -1,7 +1,7 @@
 //! What a run was begun with: `manifest.json`, beside the chain it belongs to.
 //!
-//! Written before the first step; afterwards only length and goals of the run change (`--extend`, or `steps`, `rhat` and `ess`
-//! of the config). Everything that a chain is a function of is in it or checked against it. Left out: the chain itself (`io::journal`).
+//! Written before the first step; afterwards only length and goals of the run change (`--extend`, or `steps`, `rhat`
+//! and `ess` of the config). Everything that a chain is a function of is in it or checked against it.
 
 mod conclusions;
 
@@ -22,7 +22,8 @@ use std::path::Path;
 /// Name of the file in a run's folder.
 pub const FILE: &str = "manifest.json";
 
-/// Share of the rotation period, or of a fraction of it, within which spots imitate an orbit (`results/calibration.md`).
+/// Share of the rotation period, or of a fraction of it, within which spots imitate an orbit
+/// (`results/calibration.md`).
 const NEAR_ROTATION: f64 = 0.15;
 
 /// The content of `manifest.json`.
@@ -67,8 +68,8 @@ impl Manifest {
         self.origin.rivals.iter().map(line).chain(self.origin.reference.warning()).chain(measured).collect()
     }
 
-    /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an orbit
-    /// there, and the posterior does not know of them.
+    /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an
+    /// orbit there, and the posterior does not know of them.
     pub fn co_rotation(&self, summary: &Summary) -> Option<String> {
         let counted = self.origin.config.pointer("/imaging/unresolved_spots").is_some_and(|value| value != "entropy");
         let period = summary.parameters.get(Parameter::PorbOverProt.name()).filter(|_| !counted)?;
@@ -83,7 +84,8 @@ impl Manifest {
         })?;
         let rotation = if fraction == 1 { "Prot".to_owned() } else { format!("Prot/{fraction}") };
         Some(format!(
-            "the period is within {:.0} % of {rotation}, where spots imitate an orbit: K is less certain than its interval \
+            "the period is within {:.0} % of {rotation}, where spots imitate an orbit: K is less certain than its \
+            interval \
              says; see what `dimcmc periodogram` or imaging.unresolved_spots \"fitted\" makes of it",
             100.0 * NEAR_ROTATION
         ))
@@ -94,7 +96,8 @@ impl Manifest {
         OrbitQuantities::new(&settings.star, settings.mass_msun, self.origin.time_span_d)
     }
 
-    /// The summary of the run's chain with its verdict, and with what is usually quoted of the orbit, draw by draw, also apart.
+    /// The summary of the run's chain with its verdict, and with what is usually quoted of the orbit, draw by draw,
+    /// also apart.
     ///
     /// # Errors
     /// A chain without a step.
@@ -117,7 +120,8 @@ impl Manifest {
         Ok((summary, settled))
     }
 
-    /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was injected.
+    /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was
+    /// injected.
     pub fn true_quantity(&self, settings: &Settings, name: &str, estimate: f64) -> Option<f64> {
         let truth = self.origin.truth.as_ref()?;
         let value = |p: Parameter| truth.get(p.name()).copied();
@@ -129,7 +133,8 @@ impl Manifest {
         self.orbit_quantities(settings).value(OrbitQuantity::from_name(name)?, &orbit, Some(estimate))
     }
 
-    /// Injected values of the parameters and of what `summary` derives from them, for its table; `None` for observed data.
+    /// Injected values of the parameters and of what `summary` derives from them, for its table; `None` for observed
+    /// data.
     pub fn truth(&self, settings: &Settings, summary: &Summary) -> Option<BTreeMap<String, f64>> {
         let mut truth = self.origin.truth.clone()?;
         for (name, one) in &summary.derived {
@@ -183,8 +188,8 @@ impl Manifest {
         write_json(&folder.join(FILE), self)
     }
 
-    /// Takes over settings that may change between the parts of a run (its length and goals), and the step that it goes on
-    /// to in any case. A new step limit ends an extension. Returns whether anything changed.
+    /// Takes over settings that may change between the parts of a run (its length and goals), and the step that it goes
+    /// on to in any case. A new step limit ends an extension. Returns whether anything changed.
     pub fn update(&mut self, settings: &Settings, extend_to: Option<usize>) -> bool {
         let before = (self.extend_to, self.origin.config.clone());
         let steps = |config: &serde_json::Value| config.pointer("/sampler/steps").cloned();

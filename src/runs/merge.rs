@@ -1,8 +1,8 @@
 //! Runs of independent ensembles joined into one: what an array of jobs has sampled, as if it were one chain.
 //!
-//! Runs belong together if they are of the same program, config and data, start every evaluation from the same reference, and
-//! have different seeds. What is beyond the shortest of them is left out, for a step is one of all ensembles. Left out: whether
-//! they agree, which the analysis tells (`chain`).
+//! Runs belong together if they are of the same program, config and data, start every evaluation from the same
+//! reference, and have different seeds. What is beyond the shortest of them is left out, for a step is one of all
+//! ensembles.
 
 use crate::data::config::{self, ConfigError};
 use crate::data::io::atomic::WriteError;
@@ -50,7 +50,8 @@ pub enum MergeError {
     #[error("{}: no complete step to join", .0.display())]
     Empty(PathBuf),
     /// Two runs are the same chain.
-    #[error("{} and {}: both have the seed {seed} (sampler.seed): they are the same chain", first.display(), second.display())]
+    #[error("{} and {}: both have the seed {seed} (sampler.seed): they are the same \
+    chain", first.display(), second.display())]
     Same {
         /// One folder.
         first: PathBuf,
@@ -106,7 +107,8 @@ pub fn merge(folders: &[PathBuf]) -> Result<Merged, MergeError> {
 }
 
 impl Merged {
-    /// Writes it as a run into `folder`, which is there; one that is there already is replaced if `replace`, and refused otherwise.
+    /// Writes it as a run into `folder`, which is there; one that is there already is replaced if `replace`, and
+    /// refused otherwise.
     ///
     /// # Errors
     /// [`MergeError`].
@@ -140,7 +142,8 @@ fn difference(first: &Manifest, second: &Manifest) -> Option<String> {
         _ if a.data_sha256 != b.data_sha256 => "the observations are not the same".to_owned(),
         _ if a.version != b.version => format!("they are of versions {} and {} of the program", a.version, b.version),
         _ if a.reference != b.reference => format!(
-            "the reference images are not the same (lambda {:e} and {:e}): the search found another maximum, or the processors \
+            "the reference images are not the same (lambda {:e} and {:e}): the search found another maximum, or the \
+            processors \
              are of another kind",
             a.reference.lambda, b.reference.lambda
         ),

@@ -29,8 +29,8 @@ pub struct OptimumFile {
     pub converged: bool,
     /// Covariance of the parameters from the curvature.
     pub covariance: Vec<Vec<f64>>,
-    /// Minus the Hessian of the log-probability in sampling coordinates, where K and phi (if both are free) are K cos and
-    /// K sin of the orbital phase at mid-time.
+    /// Minus the Hessian of the log-probability in sampling coordinates, where K and phi (if both are free) are K cos
+    /// and K sin of the orbital phase at mid-time.
     pub internal_curvature: Vec<Vec<f64>>,
     /// The blind search that the verdict rests on; absent where no orbit was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,7 +1,7 @@
 //! What a long computation was begun with: config, data, program and the reference that every evaluation starts from.
 //!
-//! It is written beside the results, and whoever goes on with them checks it: nothing is continued with another config or
-//! other data, and the reference is rebuilt to the same bits. Left out: the results (`run`, `survey`).
+//! It is written beside the results, and whoever goes on with them checks it: nothing is continued with another config
+//! or other data, and the reference is rebuilt to the same bits.
 
 use crate::data::config::{self, ConfigError};
 use crate::data::io::provenance::{Measured, Provenance};
@@ -125,7 +125,8 @@ pub enum OriginError {
         what: String,
     },
     /// The reference comes out differently: another version of the program, or another kind of processor.
-    #[error("{}: the reference image comes out differently here (lambda {now:e} instead of {then:e}): resume with the version and on the kind of machine it was begun with", folder.display())]
+    #[error("{}: the reference image comes out differently here (lambda {now:e} instead of {then:e}): resume with the \
+    version and on the kind of machine it was begun with", folder.display())]
     Irreproducible {
         /// The folder.
         folder: PathBuf,
@@ -268,7 +269,8 @@ impl ReferenceRecord {
         (self.chi2_target - self.chi2_reach < noise).then(|| {
             let per_datum = |chi2: f64| chi2 / self.data as f64;
             format!(
-                "the target chi2 of {:.3} per datum is close to the floor (three times its lambda comes down to {:.3}): see \
+                "the target chi2 of {:.3} per datum is close to the floor (three times its lambda comes down to \
+                {:.3}): see \
                  whether the answer stays when imaging.chi2_target is raised by {:.3}",
                 per_datum(self.chi2_target),
                 per_datum(self.chi2_reach),

@@ -1,8 +1,8 @@
-//! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few derived numbers out.
+//! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few derived numbers
+//! out.
 //!
 //! The ensemble, the optimiser and the landscape know only this file; the objective implements it. Batches go through
 //! [`Evaluator`], behind which are the threads of one machine or the ranks of a cluster.
-//! Left out: what the parameters mean, and how a log-probability comes about.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -57,8 +57,8 @@ impl Evaluation {
 pub struct Likelihood {
     /// ln(likelihood); only differences mean something.
     pub log_likelihood: f64,
-    /// Spottedness of the image, such as its fractional spot coverage; where the target chi2 is reached, what a first-order forecast says that it
-    /// is at the target, of which the log-likelihood is made.
+    /// Spottedness of the image, such as its fractional spot coverage; where the target chi2 is reached, what a
+    /// first-order forecast says that it is at the target, of which the log-likelihood is made.
     pub spottedness: f64,
     /// Entropy of the image at which the solver stopped.
     pub entropy: f64,
@@ -95,7 +95,8 @@ pub trait LogDensity: Sync {
     /// Names of the parameters, in the order of every vector.
     fn names(&self) -> &[String];
 
-    /// The log-posterior at `theta`. A pure function: the same bytes for the same `theta`, whatever was evaluated before.
+    /// The log-posterior at `theta`. A pure function: the same bytes for the same `theta`, whatever was evaluated
+    /// before.
     fn evaluate(&self, theta: &[f64]) -> Evaluation;
 
     /// Internal coordinates of `theta`.
@@ -108,7 +109,8 @@ pub trait LogDensity: Sync {
         internal.to_vec()
     }
 
-    /// ln |d(written) / d(internal)| at `theta`: what turns a density in physical coordinates into one in internal ones.
+    /// ln |d(written) / d(internal)| at `theta`: what turns a density in physical coordinates into one in internal
+    /// ones.
     fn log_jacobian(&self, _theta: &[f64]) -> f64 {
         0.0
     }

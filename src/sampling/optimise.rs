@@ -1,7 +1,7 @@
-//! The maximum of a log-density and its curvature: a trust-region Newton method (argmin; Nocedal & Wright 2006, chapter 4) in
-//! scaled sampling coordinates, with Hessians from differences of gradients.
+//! The maximum of a log-density and its curvature: a trust-region Newton method (argmin; Nocedal & Wright 2006, chapter
+//! 4) in scaled sampling coordinates, with Hessians from differences of gradients.
 //!
-//! Knows densities through [`Gradient`] alone. Left out: where to start, and what the parameters mean.
+//! Knows densities through [`Gradient`] alone.
 
 use crate::sampling::log_density::{Evaluation, Gradient};
 use argmin::core::{
@@ -25,7 +25,8 @@ pub struct Optimum {
     pub evaluation: Evaluation,
     /// Minus the Hessian of the log-probability in sampling coordinates.
     pub curvature: Matrix,
-    /// Inverse of the curvature. Directions that the data leave open (curvature not positive) get a large variance instead.
+    /// Inverse of the curvature. Directions that the data leave open (curvature not positive) get a large variance
+    /// instead.
     pub covariance: Matrix,
     /// The covariance in physical coordinates, to first order.
     pub written_covariance: Matrix,
@@ -59,7 +60,8 @@ const GAIN: f64 = 2e-3;
 /// Differences of gradients step by this share of a coordinate's natural scale.
 const HESSIAN_STEP: f64 = 0.25;
 
-/// Directions in which the curvature is less than this, in units of 1 / (natural scale)^2, count as left open by the data.
+/// Directions in which the curvature is less than this, in units of 1 / (natural scale)^2, count as left open by the
+/// data.
 const OPEN_CURVATURE: f64 = 1e-3;
 
 /// Climbs from `start` (physical coordinates) to a local maximum of `density`; `tick` is called at every evaluation.
@@ -299,8 +301,8 @@ mod tests {
         let optimum = climb(&density, &[-1.2, 1.0], &|| ()).unwrap();
         assert!(optimum.converged && optimum.well_defined);
         assert!((optimum.theta[0] - 1.0).abs() < 0.07 && (optimum.theta[1] - 1.0).abs() < 0.14, "{optimum:?}");
-        // curvature at (1, 1) is [[17, -8], [-8, 4]]: variances 1 and 4.25; the search may end 0.06 sigma away, in a curved
-        // valley
+        // curvature at (1, 1) is [[17, -8], [-8, 4]]: variances 1 and 4.25; the search may end 0.06 sigma away, in a
+        // curved valley
         assert!((optimum.covariance[(0, 0)] - 1.0).abs() < 0.4, "{}", optimum.covariance);
         assert!((optimum.covariance[(1, 1)] - 4.25).abs() < 1.0);
     }

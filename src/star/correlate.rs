@@ -1,6 +1,4 @@
 //! Short filters along a row of numbers, a chunk of results at a time in registers.
-//!
-//! Left out: what is filtered; the caller sees to it that rows reach far enough.
 
 use crate::numerics::vector::Instructions;
 

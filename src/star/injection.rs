@@ -1,11 +1,12 @@
-//! Observed profiles with the orbit of a planet put into them: each is shifted by the orbit's velocity at its time and resampled on
-//! the velocity axis that it had. Relabelling the axis instead would leave the noise where it was in the bins.
+//! Observed profiles with the orbit of a planet put into them: each is shifted by the orbit's velocity at its time and
+//! resampled on the velocity axis that it had. Relabelling the axis instead would leave the noise where it was in the
+//! bins.
 //!
-//! The interpolation is band-limited: a sinc in a Kaiser window (Kaiser & Schafer 1980) of 16 bins to either side. Of a line as
-//! broad as the spectrograph makes it, 3 km/s in bins of 1.8, it loses 1e-5 of the depth. White noise stays nearly white: half way between
-//! two bins, the worst case, its variance is 0.93 of what it was and neighbours correlate by 0.07 (a cubic spline: 0.76 and 0.26).
-//! Beyond the ends of a profile the continuum goes on flat, as the mean of its last bins. Errors travel along, unsmoothed.
-//! Left out: files, and what becomes of the profiles.
+//! The interpolation is band-limited: a sinc in a Kaiser window (Kaiser & Schafer 1980) of 16 bins to either side. Of a
+//! line as broad as the spectrograph makes it, 3 km/s in bins of 1.8, it loses 1e-5 of the depth. White noise stays
+//! nearly white: half way between two bins, the worst case, its variance is 0.93 of what it was and neighbours
+//! correlate by 0.07 (a cubic spline: 0.76 and 0.26). Beyond the ends of a profile the continuum goes on flat, as the
+//! mean of its last bins. Errors travel along, unsmoothed.
 
 use crate::star::observation::{Observations, Profile};
 use crate::star::{Orbit, StarSettings};

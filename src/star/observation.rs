@@ -1,7 +1,6 @@
 //! Observed (or simulated) line profiles: times, velocity bins, intensities and their errors.
 //!
-//! Also what they measure by themselves: areas and first-moment velocities. Left out: where they came from (see `io::lsd` and
-//! `simulate`), and what they are compared with.
+//! Also what they measure by themselves: areas and first-moment velocities.
 
 /// One line profile on a uniform velocity axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,8 +80,8 @@ impl Observations {
         self
     }
 
-    /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that the velocity
-    /// range holds whole, whatever the spots, because every pixel's line has the same one (method section 1).
+    /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that the
+    /// velocity range holds whole, whatever the spots, because every pixel's line has the same one (method section 1).
     pub fn mean_equivalent_width_kms(&self) -> f64 {
         let area = |p: &Profile| p.intensity.iter().map(|i| 1.0 - i).sum::<f64>() * self.step_kms;
         self.profiles.iter().map(area).sum::<f64>() / self.profiles.len() as f64

@@ -1,5 +1,5 @@
-//! `grid` as users run it: values that are those of the posterior, the same bytes whatever happens on the way, and refusals
-//! that write nothing.
+//! `grid` as users run it: values that are those of the posterior, the same bytes whatever happens on the way, and
+//! refusals that write nothing.
 
 #[cfg(unix)]
 use crate::desk::interrupt;
@@ -19,8 +19,8 @@ const NODES: &str = "landscape.jsonl";
 
 const PARABOLOID: &str = "paraboloid.json";
 
-/// The injected orbit (0.2, 1.7, 0.5) is nearest to value 2 of K, 1 of the period and 0 of the phase. The last K is outside its
-/// prior.
+/// The injected orbit (0.2, 1.7, 0.5) is nearest to value 2 of K, 1 of the period and 0 of the phase. The last K is
+/// outside its prior.
 const AXES: &str = r#"{ "k_kms": [0.11, 0.26, 4], "porb_over_prot": [1.62, 1.92, 4], "phi": [0.49, 0.55, 3] }"#;
 
 const COUNT: usize = 48;
@@ -305,8 +305,8 @@ fn a_phase_axis_may_wrap_or_go_once_around() {
     }
 }
 
-/// The paraboloid beside the landscape: its error bar is that of the curvature at the best parameters, for which the search has
-/// derivatives; and the user may say which nodes.
+/// The paraboloid beside the landscape: its error bar is that of the curvature at the best parameters, for which the
+/// search has derivatives; and the user may say which nodes.
 #[test]
 fn the_paraboloid_is_the_curvature() {
     let mut config = config();

@@ -5,8 +5,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The rooms of `src/`, lowest first; the modules of each, lowest first, where there is an order to keep; and what it may see
-/// elsewhere: whole rooms or modules of them.
+/// The rooms of `src/`, lowest first; the modules of each, lowest first, where there is an order to keep; and what it
+/// may see elsewhere: whole rooms or modules of them.
 const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("numerics", &[], &[]),
     ("star", &[], &["numerics"]),

@@ -1,4 +1,5 @@
-//! Configs: those that ship resolve, their resolved form is stable, and every mistake gets one line that names file and key.
+//! Configs: those that ship resolve, their resolved form is stable, and every mistake gets one line that names file and
+//! key.
 
 use dimcmc::internals::data::config::{self, EquivalentWidth, ObservationSource, Settings};
 use dimcmc::internals::posterior::objective::{Parameter, Prior};

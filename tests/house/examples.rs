@@ -1,7 +1,7 @@
 //! Every example in the program's own help, run as it stands; and what shells, editors and `man` read.
 //!
-//! Commands and examples are taken from `--help`, so that a new command is covered without a line here, but for its place in
-//! [`ORDER`].
+//! Commands and examples are taken from `--help`, so that a new command is covered without a line here, but for its
+//! place in [`ORDER`].
 
 use crate::desk::{Desk, dimcmc, says, text};
 use serde_json::{Value, json};
@@ -144,7 +144,8 @@ fn every_example_works() {
     let placeless: Vec<&String> = commands.iter().filter(|command| place(command).is_none()).collect();
     assert!(
         placeless.is_empty(),
-        "{placeless:?}: no place in ORDER of tests/examples.rs: put the command after those whose results its example reads"
+        "{placeless:?}: no place in ORDER of tests/examples.rs: put the command after those whose results its example \
+        reads"
     );
     commands.sort_by_key(place);
     let desk = desk();

@@ -14,8 +14,8 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// An orbit's (K, phi, v): K and phi move as (x, y). Gaussian in K around 0.1, von Mises in phi around 0.97, so that the
-/// posterior lies across the wrap; uniform prior in K from 0 to 0.3. Some places fail, in every way there is.
+/// An orbit's (K, phi, v): K and phi move as (x, y). Gaussian in K around 0.1, von Mises in phi around 0.97, so that
+/// the posterior lies across the wrap; uniform prior in K from 0 to 0.3. Some places fail, in every way there is.
 struct Orbit {
     names: Vec<String>,
     /// Whether some evaluations fail.
@@ -187,7 +187,8 @@ fn an_orbit_is_recovered_and_failures_are_counted() {
     assert_eq!(reason, StopReason::Converged);
     let summary = summarise(&chain, &KINDS, &policy.goals).unwrap();
     assert!(summary.converged);
-    // Mean and variance of the Gaussian of K, cut at 0 and 0.3, i.e. -2 and +4 sigma: mean from the densities at the walls.
+    // Mean and variance of the Gaussian of K, cut at 0 and 0.3, i.e. -2 and +4 sigma: mean from the densities at the
+    // walls.
     let (lower, mass) = ((-2.0f64).powi(2), 0.977250 - 3.17e-5);
     let density_at = |square: f64| (-0.5 * square).exp() / TAU.sqrt();
     let mean = 0.1 + 0.05 * (density_at(lower) - density_at(16.0)) / mass;

@@ -88,7 +88,8 @@ fn orbits(oracle: &Oracle, imager: &Imager) {
         let [k, period, phi] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi].map(|p| orbit[p]);
         println!("K {k:.3} P {period:.3} phi {phi:.3}: {full:9.3}, quadratic {quadratic:9.3}");
         let difference = (full - quadratic).abs();
-        // near co-rotation the spots answer by moving, which the entropy of dark and bright pixels makes less than linear
+        // near co-rotation the spots answer by moving, which the entropy of dark and bright pixels makes less than
+        // linear
         let worst = if (period - 1.0).abs() < 0.3 { &mut worst_near } else { &mut worst };
         *worst = worst.max(difference);
     }
@@ -231,9 +232,9 @@ fn co_rotation_hides_a_planet() {
     assert!(eigen.min() > -1e-2 * quadratic.information.diagonal().max());
 }
 
-/// Unresolved spots counted in the posterior: the same at the reference; near it ln of the density of the gradient, its size
-/// integrated over by a sum of its own; everywhere a fall, not faster than without them, and one that goes on where the
-/// quadratics would have turned the sum of exact ln L and their difference upwards.
+/// Unresolved spots counted in the posterior: the same at the reference; near it ln of the density of the gradient, its
+/// size integrated over by a sum of its own; everywhere a fall, not faster than without them, and one that goes on
+/// where the quadratics would have turned the sum of exact ln L and their difference upwards.
 #[test]
 fn a_posterior_that_counts_unresolved_spots() {
     let oracle = oracle();
@@ -292,8 +293,8 @@ fn a_posterior_that_counts_unresolved_spots() {
     }
 }
 
-/// What ln L has beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the reference, as it is
-/// next to one that is not its maximum, and the density of the gradient below it.
+/// What ln L has beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the reference,
+/// as it is next to one that is not its maximum, and the density of the gradient below it.
 #[test]
 fn unresolved_spots_magnify_nothing() {
     let oracle = oracle();

@@ -189,7 +189,8 @@ fn an_orbit_is_found_under_wandering_continua() {
     let reference = Reference::build(&scene.imager, scene.settings.values, 0.97).unwrap();
     let fit = Fit::new(&scene.imager, &scene.observations, &reference);
     assert!(fit.summary.residual_rms < 1.05e-3, "{}", fit.summary.residual_rms);
-    // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth of the prior
+    // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth
+    // of the prior
     let config::ObservationSource::Simulate(simulation) = &scene.settings.source else { panic!() };
     for i in 0..3 {
         let (found, injected): (Vec<f64>, Vec<f64>) =

@@ -13,7 +13,8 @@ use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 const KINDS: [ObjectiveKind; 3] =
     [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];
 
-/// All eight parameters free, with the reference near the optimum of the oracle's data; maps of spots, or of the given entropy.
+/// All eight parameters free, with the reference near the optimum of the oracle's data; maps of spots, or of the given
+/// entropy.
 fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
     let oracle = oracle();
     let imager = Imager {
@@ -146,8 +147,8 @@ fn agree_and_are_precise(posteriors: &[Posterior]) {
     }
 }
 
-/// Errors of predictions at `theta`: of the map, in its metric at the start, and of ln(lambda). A solver that takes whatever it starts
-/// from leaves the prediction as it is.
+/// Errors of predictions at `theta`: of the map, in its metric at the start, and of ln(lambda). A solver that takes
+/// whatever it starts from leaves the prediction as it is.
 fn prediction_errors(posterior: &Posterior, theta: &[f64]) -> [f64; 2] {
     let careless = SolverSettings { tolerance: f64::INFINITY, ..SolverSettings::default() };
     let predicted = posterior.clone().with_settings(careless);
@@ -176,7 +177,8 @@ fn predictions_are_right_to_first_order() {
                 prediction_errors(&posterior, &theta)
             });
             println!("{j}: {errors:?}");
-            // twice the step, four times the error: an error of first order would double, those of third order are smaller
+            // twice the step, four times the error: an error of first order would double, those of third order are
+            // smaller
             assert!((0..2).all(|i| (errors[1][i] / errors[0][i] - 4.0).abs() < 0.6), "{j}: {errors:?}");
         }
     }
@@ -276,7 +278,10 @@ fn warm_starts_save_passes_and_change_nothing_else() {
         println!("{:?}: {with} passes instead of {without}", posterior.kind());
         assert!(3 * with < 2 * without, "{:?}: {with} passes instead of {without}", posterior.kind());
         // as many as they are worth, and none where nothing is far
-        assert_eq!(posterior.clone().with_warm_starts_for(std::slice::from_ref(&start), 10_000).warm_starts().count(), 0);
+        assert_eq!(
+            posterior.clone().with_warm_starts_for(std::slice::from_ref(&start), 10_000).warm_starts().count(),
+            0
+        );
         let few = posterior.clone().with_warm_starts_for(&thetas, 1).warm_starts().count();
         let many = posterior.with_warm_starts_for(&thetas, 100_000).warm_starts().count();
         assert!(few == 0 && many > 0, "{few} {many}");

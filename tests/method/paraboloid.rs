@@ -79,7 +79,8 @@ fn refusal(landscape: &Landscape) -> String {
     text.strip_prefix("no well-defined minimum: ").unwrap().to_owned()
 }
 
-/// One to three axes of quite different scales, correlated, phi across 0: nothing that comes out could be taken for another.
+/// One to three axes of quite different scales, correlated, phi across 0: nothing that comes out could be taken for
+/// another.
 fn examples() -> Vec<Gaussian> {
     let k = axis("k_kms", 0.0, 0.2, 15);
     let period = axis("porb_over_prot", 1.2, 2.2, 15);

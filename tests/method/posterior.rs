@@ -1,9 +1,9 @@
-//! Whole chains against the posterior of an independent implementation (`posterior.json`: emcee on the regularised likelihood
-//! at lambda = 1e-3 on the oracle's pixel table), on the oracle's data.
+//! Whole chains against the posterior of an independent implementation (`posterior.json`: emcee on the regularised
+//! likelihood at lambda = 1e-3 on the oracle's pixel table), on the oracle's data.
 //!
-//! Tolerances: the reference chain and ours have effective sizes of 600 and of 3000 on the same pixels, 1500 on others, so that
-//! medians agree to 0.056 sigma (`1.25 (1/600 + 1/3000)^1/2`) and widths to 4 % by chance alone; what is asked for is three times
-//! that on the same pixels, and twice as much again on another grid of pixels.
+//! Tolerances: the reference chain and ours have effective sizes of 600 and of 3000 on the same pixels, 1500 on others,
+//! so that medians agree to 0.056 sigma (`1.25 (1/600 + 1/3000)^1/2`) and widths to 4 % by chance alone; what is asked
+//! for is three times that on the same pixels, and twice as much again on another grid of pixels.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth};
 use dimcmc::internals::posterior::objective::{

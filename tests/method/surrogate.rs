@@ -180,7 +180,8 @@ fn a_wide_prior_of_the_period_is_covered_whole() {
     ] {
         let (surrogate, space) = surrogate_with(0.1, period);
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let mut periods: Vec<f64> = (0..200).map(|_| space.to_physical(&surrogate.draw(&mut rng).unwrap())[1]).collect();
+        let mut periods: Vec<f64> =
+            (0..200).map(|_| space.to_physical(&surrogate.draw(&mut rng).unwrap())[1]).collect();
         periods.sort_by(f64::total_cmp);
         assert!((periods[100] - 1.75).abs() < 0.1, "{period:?}: {}", periods[100]);
     }

@@ -1,7 +1,5 @@
-//! A config to be written: the keys that a first config of an observed star has, in the order and layout in which people read
-//! them. Defaults that nobody asked about are left to the program.
-//!
-//! Left out: where the values come from (`proposal`).
+//! A config to be written: the keys that a first config of an observed star has, in the order and layout in which
+//! people read them. Defaults that nobody asked about are left to the program.
 
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Planet, Star};
 use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};

@@ -1,4 +1,5 @@
-//! What can be wrong with a config: one line each, naming the file and the key. Serde's words are turned into the user's here.
+//! What can be wrong with a config: one line each, naming the file and the key. Serde's words are turned into the
+//! user's here.
 
 use super::suggest::nearest;
 use crate::numerics::text::escaped;

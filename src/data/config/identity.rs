@@ -1,4 +1,5 @@
-//! The fingerprint of a config: what must be the same for a chain to be resumed; and what two configs that belong together share.
+//! The fingerprint of a config: what must be the same for a chain to be resumed; and what two configs that belong
+//! together share.
 
 use crate::posterior::objective::Parameter;
 use serde_json::Value;
@@ -29,8 +30,8 @@ pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
     Some(format!("{key} ({first} then, {second} now)"))
 }
 
-/// The first key in which two resolved configs do not ask for the same model: star, instrument and image, whatever the values
-/// of the parameters that may be free.
+/// The first key in which two resolved configs do not ask for the same model: star, instrument and image, whatever the
+/// values of the parameters that may be free.
 pub fn model_difference(first: &Value, second: &Value) -> Option<Difference> {
     ["star", "instrument", "imaging"].iter().find_map(|name| section_difference(name, first, second))
 }

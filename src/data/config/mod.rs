@@ -1,7 +1,7 @@
 //! The config file: JSON as users write it -> checked, resolved [`Settings`]; and its JSON Schema.
 //!
-//! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for), and every
-//! error names the file and the key. Left out: reading the observations (`io::lsd`), and anything done with the settings.
+//! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for),
+//! and every error names the file and the key.
 
 mod automatic;
 mod domain;

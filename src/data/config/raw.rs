@@ -1,6 +1,6 @@
 //! The config as users write it: names, units and defaults. Doc comments here are the descriptions of the JSON Schema.
 //!
-//! Left out: whether the values make sense (`resolve`). Fields of `PerParameter` and the observations are in `raw_parts`.
+//! Fields of `PerParameter` and the observations are in `raw_parts`.
 
 use super::EquivalentWidth;
 use super::raw_parts::{Grid, ObservationsSection, PerParameter, PriorSection};
@@ -62,8 +62,8 @@ pub(super) struct Star {
     /// Differential rotation: angular velocity of the equator minus that of the pole (rad/d).
     #[serde(default)]
     pub domega_rad_d: f64,
-    /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It decides nothing
-    /// else, and may be added to a run that is there.
+    /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It
+    /// decides nothing else, and may be added to a run that is there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass_msun: Option<f64>,
     /// Limb darkening; linear with coefficient 0.65 if not given.
@@ -101,7 +101,8 @@ pub(super) struct Line {
     /// Of a Voigt profile: half width at half depth (km/s) of the Lorentzian, above 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gamma_kms: Option<f64>,
-    /// Equivalent width (km/s), wings and all, above 0, or "auto": the mean area of the observed profiles, for observations from files.
+    /// Equivalent width (km/s), wings and all, above 0, or "auto": the mean area of the observed profiles, for
+    /// observations from files.
     pub equivalent_width_kms: EquivalentWidth,
 }
 
@@ -146,8 +147,8 @@ pub(super) enum LimbLaw {
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Instrument {
-    /// Resolving power, above 0: the instrumental profile is a Gaussian of full width c/R at half maximum. Without it, no
-    /// instrumental broadening.
+    /// Resolving power, above 0: the instrumental profile is a Gaussian of full width c/R at half maximum. Without it,
+    /// no instrumental broadening.
     #[serde(default)]
     pub resolving_power: Option<f64>,
 }
@@ -160,8 +161,8 @@ pub(super) struct Planet {
     pub k_kms: f64,
     /// Orbital period over the rotation period, above 0.
     pub porb_over_prot: f64,
-    /// Orbital phase (cycles, 0 to 1): the part of an orbit from `star.epoch_d` (rotation cycle 0) to the next maximum of the star's
-    /// radial velocity. `phi` = 0 is a maximum at `star.epoch_d`.
+    /// Orbital phase (cycles, 0 to 1): the part of an orbit from `star.epoch_d` (rotation cycle 0) to the next maximum
+    /// of the star's radial velocity. `phi` = 0 is a maximum at `star.epoch_d`.
     pub phi: f64,
 }
 

@@ -19,7 +19,8 @@ pub(super) struct PerParameter<T> {
     /// Orbital period over the rotation period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub porb_over_prot: Option<T>,
-    /// Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's radial velocity.
+    /// Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's radial
+    /// velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phi: Option<T>,
     /// Angular velocity of the equator (rad/d).
@@ -43,12 +44,12 @@ pub(super) struct PerParameter<T> {
     /// Standard deviation of the local line (km/s), before the spectrograph.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_sigma_kms: Option<T>,
-    /// Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a nuisance of each profile's
-    /// own by the priors alone.
+    /// Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a nuisance of
+    /// each profile's own by the priors alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equivalent_width_kms: Option<T>,
-    /// Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter than some value: the
-    /// darker they are, the fewer a map needs, so that a flat prior ends at 0.
+    /// Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter than some
+    /// value: the darker they are, the fewer a map needs, so that a flat prior ends at 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contrast: Option<T>,
 }
@@ -149,12 +150,12 @@ pub(super) struct ObservationsSection {
     /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_range_kms: Option<[f64; 2]>,
-    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given. "auto": the larger of what the
-    /// scatter of the continuum says and what a map at the config's values leaves over.
+    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given. "auto": the larger of what
+    /// the scatter of the continuum says and what a map at the config's values leaves over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_scale: Option<Automatic>,
-    /// With `path`: level of the continuum in the files, from 0.5 to 2; 1 if not given. Intensities and standard errors are divided
-    /// by it as they are read.
+    /// With `path`: level of the continuum in the files, from 0.5 to 2; 1 if not given. Intensities and standard errors
+    /// are divided by it as they are read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub continuum_level: Option<f64>,
     /// With `path`: how the profiles are weighted against each other.
@@ -174,13 +175,13 @@ pub(super) struct ObservationsSection {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SimulateSection {
-    /// Hard-edged circular spots `[longitude, latitude, radius, filling]`: degrees, and the filling factor from 0 to 1. The
-    /// larger filling counts where they overlap.
+    /// Hard-edged circular spots `[longitude, latitude, radius, filling]`: degrees, and the filling factor from 0 to 1.
+    /// The larger filling counts where they overlap.
     #[serde(default)]
     pub spots: Vec<[f64; 4]>,
-    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter than the
-    /// photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of filling s overlaps,
-    /// the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
+    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter
+    /// than the photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of
+    /// filling s overlaps, the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faculae: Vec<[f64; 4]>,
     /// Rotation cycles of the profiles, counted from `epoch_d`.
@@ -261,13 +262,13 @@ pub(super) struct VelocitySection {
     pub step: f64,
 }
 
-/// The landscape that `dimcmc grid` computes: ln L of the reconstructions, without priors. All parameters without an axis are
-/// fixed at their values under `star` and `planet`, those with a prior too.
+/// The landscape that `dimcmc grid` computes: ln L of the reconstructions, without priors. All parameters without an
+/// axis are fixed at their values under `star` and `planet`, those with a prior too.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Grid {
-    /// One to three axes `[min, max, n]`: n nodes (2 or more) from min to max, both included, 1,000,000 nodes in all at most.
-    /// An axis of `phi` may wrap around 0 or 1 (nodes are written in [0, 1)); where it spans a whole period, as [0, 1, n],
-    /// max is the same place as min and is left out.
+    /// One to three axes `[min, max, n]`: n nodes (2 or more) from min to max, both included, 1,000,000 nodes in all at
+    /// most. An axis of `phi` may wrap around 0 or 1 (nodes are written in [0, 1)); where it spans a whole period, as
+    /// [0, 1, n], max is the same place as min and is left out.
     pub axes: PerParameter<(f64, f64, usize)>,
 }

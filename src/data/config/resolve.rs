@@ -1,7 +1,4 @@
 //! From the config as written to [`Settings`]: checks, defaults that depend on other keys, units.
-//!
-//! Left out: the star (`resolve_star`), observations (`resolve_observations`), the landscape (`resolve_grid`), and what each
-//! prior may be (`domain`).
 
 use super::domain::{check_value, key, resolve_prior};
 use super::error::Fault;
@@ -90,7 +87,8 @@ fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, 
     Ok(values)
 }
 
-/// Priors of the free parameters, with their defaults filled into `raw`, and their starts checked (and wrapped) in `values`.
+/// Priors of the free parameters, with their defaults filled into `raw`, and their starts checked (and wrapped) in
+/// `values`.
 fn resolve_free(raw: &mut Config, values: &mut ParameterValues) -> Result<Vec<FreeParameter>, Fault> {
     let phi_free = raw.parameters.phi.is_some();
     let mut free = Vec::new();

@@ -64,8 +64,8 @@ fn check_axis(parameter: Parameter, axis: &Axis) -> Result<(), Fault> {
     Err(Fault::new(key, problem))
 }
 
-/// Where the search looks for the best value of a parameter that has an axis and no prior: along the axis, and as far as the
-/// value of the config, from which it starts.
+/// Where the search looks for the best value of a parameter that has an axis and no prior: along the axis, and as far
+/// as the value of the config, from which it starts.
 fn along_the_axis(parameter: Parameter, axis: &Axis, values: &ParameterValues) -> FreeParameter {
     let start = values[parameter];
     let prior = match axis.periodic {

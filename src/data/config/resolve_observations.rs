@@ -17,7 +17,8 @@ use std::path::Path;
 /// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
 const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start from.
+/// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start
+/// from.
 pub(super) fn resolve_observations(
     raw: &mut Config,
     star: &StarSettings,

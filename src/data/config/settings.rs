@@ -20,7 +20,8 @@ use std::path::PathBuf;
 pub struct Settings {
     /// The config file.
     pub path: PathBuf,
-    /// The star. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through [`Settings::star_for`].
+    /// The star. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through
+    /// [`Settings::star_for`].
     pub star: StarSettings,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
@@ -74,18 +75,19 @@ pub struct ImagingSettings {
     /// What the pixels of the image hold.
     #[serde(skip_serializing_if = "BrightnessModel::is_default")]
     pub brightness: BrightnessModel,
-    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5; an image of bright and dark pixels
-    /// has no use for it.
+    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5; an image of bright and
+    /// dark pixels has no use for it.
     pub default_spot: f64,
-    /// Target chi2 per datum, above 0. "auto": the highest value below which the radial velocities that are left over, observed
-    /// minus modelled, stop shrinking, at the config's values.
+    /// Target chi2 per datum, above 0. "auto": the highest value below which the radial velocities that are left over,
+    /// observed minus modelled, stop shrinking, at the config's values.
     pub chi2_target: Automatic,
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
-    /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has them.
+    /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has
+    /// them.
     pub unresolved_spots: UnresolvedSpots,
-    /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors around 0, from
-    /// 0 (no nuisance) to 10.
+    /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors
+    /// around 0, from 0 (no nuisance) to 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nuisances: Option<LineAndContinuum>,
 }
@@ -120,8 +122,8 @@ pub struct GridSettings {
     /// Its nodes, the axes in the order of [`Parameter::ALL`].
     pub grid: Grid,
     /// The parameters on its axes, in the same order, with the priors of the search for the reference: those under
-    /// `parameters`, or uniform along the axis. All other parameters are fixed at their values in the config. The priors do
-    /// not enter the landscape.
+    /// `parameters`, or uniform along the axis. All other parameters are fixed at their values in the config. The
+    /// priors do not enter the landscape.
     pub free: Vec<FreeParameter>,
 }
 
@@ -170,8 +172,9 @@ impl Settings {
         Ok(star)
     }
 
-    /// Equivalent width (km/s) of the line below the continuum that each profile has beside it, wherever that is; `None` where the
-    /// profiles do not reach into it. What an unspotted star loses by the same measure, wings under the continuum, is allowed for.
+    /// Equivalent width (km/s) of the line below the continuum that each profile has beside it, wherever that is;
+    /// `None` where the profiles do not reach into it. What an unspotted star loses by the same measure, wings under
+    /// the continuum, is allowed for.
     fn above_its_continuum(&self, star: &StarSettings, observations: &Observations) -> Option<f64> {
         let reach_kms = self.values[Parameter::Vsini] + BESIDE * star.line.sigma_kms;
         let mut unit = star.clone();
@@ -211,7 +214,8 @@ impl Settings {
         if nodes.is_nan() || nodes > MOST_NODES {
             let vsini = values[Parameter::Vsini];
             let problem = format!(
-                "{vsini} km/s, at the pole or the equator, takes {nodes:.1e} steps of a fraction of the line's width, over \
+                "{vsini} km/s, at the pole or the equator, takes {nodes:.1e} steps of a fraction of the line's width, \
+                over \
                  {MOST_NODES}: see star.domega_rad_d, star.line.sigma_kms and the velocity bins too"
             );
             return Err(self.fault("star.vsini_kms", &problem));
@@ -219,7 +223,8 @@ impl Settings {
         Ok(())
     }
 
-    /// The config with other observations in place of its own, those of a list at `path`; cut and errors of observed ones stay.
+    /// The config with other observations in place of its own, those of a list at `path`; cut and errors of observed
+    /// ones stay.
     pub fn with_observations(&self, path: &str) -> serde_json::Value {
         let mut config = self.resolved.clone();
         if let Some(top) = config.as_object_mut() {
@@ -245,7 +250,8 @@ impl Settings {
     }
 }
 
-/// Bins farther than this many local line widths beyond vsini are taken for continuum, and so many of them on a side will do.
+/// Bins farther than this many local line widths beyond vsini are taken for continuum, and so many of them on a side
+/// will do.
 const BESIDE: f64 = 2.0;
 const FEWEST_BESIDE: usize = 2;
 

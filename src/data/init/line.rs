@@ -1,5 +1,5 @@
-//! What a first look says of line and continuum, as values of a config: where the continuum is, how wide the local line is, and which
-//! velocities hold it with some continuum on both sides.
+//! What a first look says of line and continuum, as values of a config: where the continuum is, how wide the local line
+//! is, and which velocities hold it with some continuum on both sides.
 
 use super::Known;
 use super::digits::rounded;
@@ -7,8 +7,8 @@ use super::ledger::{Ledger, Source};
 use super::values::origin;
 use crate::posterior::first_look::{FirstLook, LineModel};
 
-/// The velocity range reaches so many bins, and so many widths of the line as the spectrograph shows it, into the continuum on
-/// either side.
+/// The velocity range reaches so many bins, and so many widths of the line as the spectrograph shows it, into the
+/// continuum on either side.
 const CONTINUUM: (f64, f64) = (6.0, 2.0);
 
 /// A line width is poorly determined where its error is more than this share of it.

@@ -1,9 +1,9 @@
-//! A first config for observed profiles: what they say themselves, what is given, and what has to be assumed; each value with
-//! where it came from.
+//! A first config for observed profiles: what they say themselves, what is given, and what has to be assumed; each
+//! value with where it came from.
 //!
-//! It is a config that `map`, `periodogram` and `sample` take as it is, and that is tried out. Where the model does not fit as well as
-//! the errors of the continuum promise, what is likely to be wrong is found by trying (`diagnosis`), and put right where it was
-//! measured. Left out: who gives values (`import`, the command line), and writing it down.
+//! It is a config that `map`, `periodogram` and `sample` take as it is, and that is tried out. Where the model does not
+//! fit as well as the errors of the continuum promise, what is likely to be wrong is found by trying (`diagnosis`), and
+//! put right where it was measured.
 
 mod digits;
 mod ledger;
@@ -134,8 +134,8 @@ pub enum ProposalError {
     },
 }
 
-/// The proposal for the profiles of a list, of a star of which something is known. What looks wrong is said at once by `say`, before
-/// anything is tried out.
+/// The proposal for the profiles of a list, of a star of which something is known. What looks wrong is said at once by
+/// `say`, before anything is tried out.
 ///
 /// # Errors
 /// Profiles that cannot be read or show no line, given values that make no sense or are far from what the profiles say.

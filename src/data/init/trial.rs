@@ -1,5 +1,5 @@
-//! Tries a draft out: whether a map reaches its target chi2 with errors as the continuum has them, without a planet or with the best
-//! orbit that a search finds, and what is likely to be wrong if none does.
+//! Tries a draft out: whether a map reaches its target chi2 with errors as the continuum has them, without a planet or
+//! with the best orbit that a search finds, and what is likely to be wrong if none does.
 
 use super::digits::rounded;
 use super::values::Values;
@@ -20,8 +20,8 @@ const STAND_IN_D: f64 = 1.0;
 /// Errors that a map needs may be larger by this than those that it is hoped to do with.
 const AS_GOOD: f64 = 0.8;
 
-/// Where errors have to be larger than those of the continuum by more than this, and nothing that is tried helps, they are not at
-/// fault: the model is.
+/// Where errors have to be larger than those of the continuum by more than this, and nothing that is tried helps, they
+/// are not at fault: the model is.
 const MOST_MISFIT: f64 = 5.0;
 
 /// More of a star is hardly ever spotted in a maximum-entropy map.
@@ -72,14 +72,15 @@ struct Attempt {
     /// The draft with its profiles; `None` where their errors cannot be measured.
     scene: Option<Scene>,
     reached: Result<f64, String>,
-    /// Whether errors are larger than those of the continuum, or than those given would have to be, because no map fits.
+    /// Whether errors are larger than those of the continuum, or than those given would have to be, because no map
+    /// fits.
     misfits: bool,
     /// By how much; 1 where they do not.
     misfit: f64,
 }
 
-/// Tries `draft` on its profiles. Changes the draft's start where only an orbit makes a map fit, and vsini where the given one is far
-/// from that of the profiles and no map fits with it. No orbit is searched for with such a vsini.
+/// Tries `draft` on its profiles. Changes the draft's start where only an orbit makes a map fit, and vsini where the
+/// given one is far from that of the profiles and no map fits with it. No orbit is searched for with such a vsini.
 ///
 /// # Errors
 /// Given values that make no sense; a model so far from the profiles that nothing helps.
@@ -177,8 +178,8 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attemp
     })
 }
 
-/// Puts the best orbit and systemic velocity into the draft, searched for with errors as the continuum has them; whether there
-/// are any.
+/// Puts the best orbit and systemic velocity into the draft, searched for with errors as the continuum has them;
+/// whether there are any.
 fn search(draft: &mut Draft, config: &Path, profiles: Profiles, tried: Option<&Scene>) -> Result<bool, ProposalError> {
     let measured = tried.and_then(|scene| scene.measured.errors.as_ref());
     let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
@@ -209,7 +210,8 @@ impl Trial {
     pub fn notes(&self, draft: &Draft) -> Vec<String> {
         let vsini = self.measured_vsini.then(|| {
             format!(
-                "no map fits with the given vsini, and one does much better with that of the mean profile, which is written: {} km/s",
+                "no map fits with the given vsini, and one does much better with that of the mean profile, which is \
+                written: {} km/s",
                 draft.vsini_kms
             )
         });

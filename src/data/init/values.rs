@@ -60,8 +60,8 @@ pub(super) struct Values {
 }
 
 impl Values {
-    /// A look at all that was observed, and where the line is in it. Profiles whose continuum is elsewhere than at 1 are divided by
-    /// its level.
+    /// A look at all that was observed, and where the line is in it. Profiles whose continuum is elsewhere than at 1
+    /// are divided by its level.
     pub fn measure(whole: &mut Observations, known: &Known, ledger: &mut Ledger) -> Result<Self, LookError> {
         let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
         let resolving_power = ledger.settle(
@@ -258,7 +258,8 @@ impl Values {
         let (first, last) = self.look.span_d;
         let bins = whole.len() / whole.profiles.len().max(1);
         format!(
-            "{} profiles of {bins} bins of {:.3} km/s, from {first:.3} to {last:.3} ({:.3} d); S/N {:.0} a bin by their errors",
+            "{} profiles of {bins} bins of {:.3} km/s, from {first:.3} to {last:.3} ({:.3} d); S/N {:.0} a bin by \
+            their errors",
             whole.profiles.len(),
             whole.step_kms,
             last - first,
@@ -289,14 +290,16 @@ impl Values {
         let rigid = known.domega_rad_d.is_none() && shear > SHEAR_RAD;
         let domega = rigid.then(|| {
             format!(
-                "in {days:.1} d the equator of a star like the Sun gains {:.0} degrees on its poles: give --domega, or a prior of \
+                "in {days:.1} d the equator of a star like the Sun gains {:.0} degrees on its poles: give --domega, \
+                or a prior of \
                  domega_rad_d",
                 shear.to_degrees()
             )
         });
         let few = (self.profiles < FEWEST_FOR_AN_ORBIT).then(|| {
             format!(
-                "{} profiles make a map, and show no orbit: `periodogram` and `sample` take {FEWEST_FOR_AN_ORBIT} or more",
+                "{} profiles make a map, and show no orbit: `periodogram` and `sample` take {FEWEST_FOR_AN_ORBIT} or \
+                more",
                 self.profiles
             )
         });
@@ -344,7 +347,8 @@ fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
     imaging
 }
 
-/// Upper bound of K: as far as the lines are seen to move from peak to peak, twice of what moves them if that is a planet.
+/// Upper bound of K: as far as the lines are seen to move from peak to peak, twice of what moves them if that is a
+/// planet.
 fn k_max(cut: &Observations, ledger: &mut Ledger) -> f64 {
     const PHOTON_ERRORS: f64 = 5.0;
     let moments = cut.first_moments();

@@ -31,8 +31,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     })
 }
 
-/// Writes a folder: `fill` makes it, under the name it is given. A folder that is at `path` already is replaced, whatever is in
-/// it; between two renames it is missing.
+/// Writes a folder: `fill` makes it, under the name it is given. A folder that is at `path` already is replaced,
+/// whatever is in it; between two renames it is missing.
 ///
 /// # Errors
 /// Those of `fill`, and as [`write()`].

@@ -1,7 +1,6 @@
 //! How long a run or a landscape took: `effort.json`, beside results whose bytes do not depend on it.
 //!
-//! Sessions of a computation that was stopped and gone on with add up; one that was killed is missing. Left out: how many
-//! reconstructions there were, which the results themselves tell.
+//! Sessions of a computation that was stopped and gone on with add up; one that was killed is missing.
 
 use super::atomic::{WriteError, write_json};
 use serde::{Deserialize, Serialize};

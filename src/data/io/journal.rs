@@ -1,6 +1,4 @@
 //! The journal: `chain.jsonl`, one line per step, ensemble and walker, appended by whole steps.
-//!
-//! Left out: what a crash leaves of a file (`lines`), and what the numbers mean.
 
 use super::lines::{self, LineFile, Refusal};
 use crate::sampling::chain::{Chain, ChainError, MoveKind, Record, Shape};

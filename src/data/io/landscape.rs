@@ -1,7 +1,7 @@
 //! A landscape as text: `landscape.jsonl`, one line per node, in the order of the grid.
 //!
 //! `{"index":0,"k_kms":0.0,...,"log_likelihood":-38.2,"spottedness":0.06,"entropy":-0.2,"chi2":2764.5,"lambda":0.001,
-//! "passes":24,"status":"converged"}`. Left out: what a crash leaves of a file (`lines`).
+//! "passes":24,"status":"converged"}`.
 
 use super::lines::{self, JournalError, LineFile, Refusal};
 use crate::sampling::landscape::{Grid, Landscape, Node};

@@ -1,9 +1,9 @@
 //! Files of JSON lines that grow by whole blocks while something long is computed, and are gone on with after whatever
 //! stopped it.
 //!
-//! What a crash can leave is recovered: a torn last line and an incomplete last block are dropped. Anything else that is
-//! wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn tail.
-//! While a process writes such a file it holds a lock on it. Left out: what is in a line (`journal`, `landscape`).
+//! What a crash can leave is recovered: a torn last line and an incomplete last block are dropped. Anything else that
+//! is wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn
+//! tail. While a process writes such a file it holds a lock on it.
 
 use super::atomic;
 use serde::Serialize;
@@ -125,8 +125,8 @@ impl LineFile {
         Ok(LineFile { writer: BufWriter::new(file), path: path.to_owned() })
     }
 
-    /// Opens a file to go on with it: hands its lines to `take`, and cuts it after the last whole block. It is only cut when
-    /// it can be read without error.
+    /// Opens a file to go on with it: hands its lines to `take`, and cuts it after the last whole block. It is only cut
+    /// when it can be read without error.
     pub(super) fn recover(path: &Path, take: TakeLine) -> Result<Self, JournalError> {
         let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(at(path))?;
         lock(&file, path)?;

@@ -1,5 +1,5 @@
-//! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment), and the LSD
-//! profiles it names, relative to its folder (`layout` has their formats).
+//! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment), and
+//! the LSD profiles it names, relative to its folder (`layout` has their formats).
 //!
 //! Times are days of one count (`times`). VRAD is subtracted from the velocity axis first; the velocity range is cut in
 //! that frame. Stokes V and nulls are not used.

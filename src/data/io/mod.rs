@@ -1,4 +1,5 @@
-//! Files in and out: LSD profiles, the journals of chains and landscapes, maps, tables, Zarr stores. No decisions are taken here.
+//! Files in and out: LSD profiles, the journals of chains and landscapes, maps, tables, Zarr stores. No decisions are
+//! taken here.
 
 pub mod atomic;
 pub mod csv;

@@ -1,10 +1,10 @@
-//! Zarr version 3 stores in folders, as far as tables of draws need them: groups, and arrays of numbers with named dimensions.
+//! Zarr version 3 stores in folders, as far as tables of draws need them: groups, and arrays of numbers with named
+//! dimensions.
 //!
-//! Format: the Zarr core specification, version 3 (<https://zarr-specs.readthedocs.io/en/latest/v3/core/>). A group is a folder
-//! with `zarr.json`; an array is one with `zarr.json` and its values in a single chunk, little-endian and in C order, in `c/0`,
-//! `c/0/0`, ... The root repeats the nodes of all the others (`consolidated_metadata`): that is zarr-python's addition to the
-//! specification, which other readers may pass over, and without which xarray complains. Left out: compression, arrays of several
-//! chunks, text, and reading.
+//! Format: the Zarr core specification, version 3 (<https://zarr-specs.readthedocs.io/en/latest/v3/core/>). A group is
+//! a folder with `zarr.json`; an array is one with `zarr.json` and its values in a single chunk, little-endian and in C
+//! order, in `c/0`, `c/0/0`, ... The root repeats the nodes of all the others (`consolidated_metadata`): that is
+//! zarr-python's addition to the specification, which other readers may pass over, and without which xarray complains.
 
 use super::atomic::{WriteError, write_folder};
 use serde::{Serialize, Serializer};

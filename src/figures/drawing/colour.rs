@@ -1,5 +1,5 @@
-//! Colours that survive colour blindness (Okabe & Ito 2008) and colour maps of steadily rising or falling lightness, which
-//! survive grey print too.
+//! Colours that survive colour blindness (Okabe & Ito 2008) and colour maps of steadily rising or falling lightness,
+//! which survive grey print too.
 
 /// A colour: red, green, blue, and opacity in 255ths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

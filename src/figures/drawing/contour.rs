@@ -1,5 +1,5 @@
-//! Lines of equal value of a function on a rectangular grid, by marching squares: linear along the sides of a square, the
-//! value in its middle deciding where two lines could run either way.
+//! Lines of equal value of a function on a rectangular grid, by marching squares: linear along the sides of a square,
+//! the value in its middle deciding where two lines could run either way.
 
 use std::collections::HashMap;
 
@@ -14,8 +14,8 @@ struct Side {
     right: bool,
 }
 
-/// The lines where `value(i, j)`, at node i of `x` and j of `y` (both rising), is `level`. Squares with a value that is not
-/// finite are left out.
+/// The lines where `value(i, j)`, at node i of `x` and j of `y` (both rising), is `level`. Squares with a value that is
+/// not finite are left out.
 pub fn contour(x: &[f64], y: &[f64], value: impl Fn(usize, usize) -> f64, level: f64) -> Vec<Line> {
     let mut pieces = Vec::new();
     for j in 0..y.len().saturating_sub(1) {

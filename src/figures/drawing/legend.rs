@@ -65,7 +65,8 @@ impl Legend {
         CORNERS.into_iter().min_by_key(covered).unwrap_or_default()
     }
 
-    /// Draws it in a corner of `frame`, or in the middle of a side: `corner` is 0, 0.5 or 1 from the left and from above.
+    /// Draws it in a corner of `frame`, or in the middle of a side: `corner` is 0, 0.5 or 1 from the left and from
+    /// above.
     pub fn draw(&self, figure: &mut Figure, frame: Rect, corner: Point) {
         if self.entries.is_empty() {
             return;

@@ -1,10 +1,10 @@
-//! Figures for papers: one description, two files. A [`Figure`] is a list of shapes and texts on a page; it is written as SVG
-//! ([`Figure::svg`]) and as PNG ([`Figure::png`]) alike, the same bytes every time.
+//! Figures for papers: one description, two files. A [`Figure`] is a list of shapes and texts on a page; it is written
+//! as SVG ([`Figure::svg`]) and as PNG ([`Figure::png`]) alike, the same bytes every time.
 //!
-//! On top of it: a [`Panel`] with axes turns data into shapes, [`scatter()`] makes whole figures of tables (points with error
-//! bars, lines, a reference line), [`contour`] follows levels. Colours survive colour blindness and grey print, the font comes
-//! with the program, and a figure is as wide as a column ([`COLUMN_MM`]) or a page ([`PAGE_MM`]) of a journal. Lengths on the
-//! page are points (1/72 inch) from its upper left corner. Left out: files, and what the numbers mean.
+//! On top of it: a [`Panel`] with axes turns data into shapes, [`scatter()`] makes whole figures of tables (points with
+//! error bars, lines, a reference line), [`contour`] follows levels. Colours survive colour blindness and grey print,
+//! the font comes with the program, and a figure is as wide as a column ([`COLUMN_MM`]) or a page ([`PAGE_MM`]) of a
+//! journal. Lengths on the page are points (1/72 inch) from its upper left corner.
 //!
 //! Recovered against injected K, with error bars and the line where they agree:
 //!
@@ -236,7 +236,8 @@ impl Figure {
         self.path(class, ellipse(centre, radii), paint);
     }
 
-    /// Writes a text: `*italic*`, `_{subscript}`, `^{superscript}`. `at` is on the baseline, `turn` in degrees, anticlockwise.
+    /// Writes a text: `*italic*`, `_{subscript}`, `^{superscript}`. `at` is on the baseline, `turn` in degrees,
+    /// anticlockwise.
     pub fn text(&mut self, text: &str, at: Point, font: Font, align: Align, turn: f64) {
         let glyphs = text::lay_out(text, at, font.size, align, turn);
         self.items.push(Item::Text { text: plain(text), glyphs, colour: font.colour });

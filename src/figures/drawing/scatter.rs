@@ -103,8 +103,8 @@ pub struct ScatterPanel {
 /// Margins of a panel: left, right, above, below (pt).
 const MARGINS: [f64; 4] = [38.0, 8.0, 16.0, 26.0];
 
-/// A figure of such panels, in rows of `columns`: a column of a journal wide if that is 1, a page wide otherwise. A legend that the
-/// first of several panels has for all stands above them.
+/// A figure of such panels, in rows of `columns`: a column of a journal wide if that is 1, a page wide otherwise. A
+/// legend that the first of several panels has for all stands above them.
 pub fn scatter(name: &str, panels: &[ScatterPanel], columns: usize) -> Figure {
     let columns = columns.max(1);
     let rows = panels.len().div_ceil(columns).max(1);

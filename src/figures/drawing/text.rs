@@ -1,7 +1,7 @@
-//! Text as outlines of glyphs, so that a figure looks the same wherever it is shown: Open Sans, which comes with the program
-//! (Apache 2.0; reduced to Latin, Greek and some mathematics).
+//! Text as outlines of glyphs, so that a figure looks the same wherever it is shown: Open Sans, which comes with the
+//! program (Apache 2.0; reduced to Latin, Greek and some mathematics).
 //!
-//! Markup: `*italic*`, `_{subscript}`, `^{superscript}`. Left out: kerning, and scripts other than these.
+//! Markup: `*italic*`, `_{subscript}`, `^{superscript}`.
 
 use super::colour::{BLACK, Colour};
 use super::{LABEL_PT, Point, SMALL_PT, Segment};

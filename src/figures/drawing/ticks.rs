@@ -103,8 +103,8 @@ fn logarithmic(low: f64, high: f64, most: usize) -> Ticks {
     Ticks { major: major.into_iter().map(|value| (value, text(value))).collect(), silent: Vec::new(), minor }
 }
 
-/// A range that holds all finite `values` with a margin of `share` of their extent to either side; of positive values only for
-/// a logarithmic scale, where the margin is of the logarithm.
+/// A range that holds all finite `values` with a margin of `share` of their extent to either side; of positive values
+/// only for a logarithmic scale, where the margin is of the logarithm.
 pub fn range_of(values: impl Iterator<Item = f64>, scale: Scale, share: f64) -> [f64; 2] {
     let log = scale == Scale::Log;
     let values = values.filter(|x| x.is_finite() && (!log || *x > 0.0)).map(|x| if log { x.ln() } else { x });

@@ -1,4 +1,4 @@
-//! What a map of the star shows, and what that means for its colours, discs and words. Left out: painting (`surface`).
+//! What a map of the star shows, and what that means for its colours, discs and words.
 
 use super::injected::Injected;
 use super::surface::Scale;
@@ -26,8 +26,8 @@ impl Content {
         )
     }
 
-    /// Discs with what the map holds inside them, those that cover others last: of spots the fuller ones, of faculae the brighter
-    /// ones, and spots whatever faculae they cover.
+    /// Discs with what the map holds inside them, those that cover others last: of spots the fuller ones, of faculae
+    /// the brighter ones, and spots whatever faculae they cover.
     pub fn discs(self, injected: &Injected) -> Vec<(Disc, f64)> {
         let mut spots: Vec<(Disc, f64)> = injected.spots.iter().map(|spot| (spot.disc(), spot.filling)).collect();
         spots.sort_by(|a, b| a.1.total_cmp(&b.1));

@@ -1,5 +1,6 @@
-//! Corner plots: every parameter by itself and against every other. Of a chain: histograms, and contours of 68 and 95 % of the
-//! draws; a periodic parameter is unwrapped around its mode, and one with a log-uniform prior has a logarithmic axis.
+//! Corner plots: every parameter by itself and against every other. Of a chain: histograms, and contours of 68 and 95 %
+//! of the draws; a periodic parameter is unwrapped around its mode, and one with a log-uniform prior has a logarithmic
+//! axis.
 
 use super::density::Density;
 use super::symbols::{Title, decimals, label, short_label};
@@ -175,7 +176,8 @@ pub(super) fn figure(sampled: &Sampled) -> Figure {
     let mut figure = corner.draw("corner", diagonal, pair, &legend);
     let injected = if corner.truth.iter().any(Option::is_some) { "; dashed: injected values" } else { "" };
     figure.caption = format!(
-        "Posterior of the sampled parameters after the burn-in: histograms with the 68 % interval shaded, numbers are median and \
+        "Posterior of the sampled parameters after the burn-in: histograms with the 68 % interval shaded, numbers are \
+        median and \
          68 % interval (\"unconstrained\": the data hardly say more than the prior); contours hold 68 and 95 % of the \
          draws{injected}."
     );

@@ -1,9 +1,10 @@
 //! The density of draws in two dimensions, and the contours that hold given shares of it.
 //!
-//! A histogram under a Gaussian of the draws' own correlation, narrowed by the number of effective draws (0.9 of Scott's rule), and
-//! divided by the part of the kernel that is inside: a posterior that ends at the edge of a prior keeps its height there. Along each
-//! axis it is as wide as the densest part of the draws asks for, not their tails or the distance between their modes. A contour
-//! holds its share of the draws themselves, for the density is wider than they are.
+//! A histogram under a Gaussian of the draws' own correlation, narrowed by the number of effective draws (0.9 of
+//! Scott's rule), and divided by the part of the kernel that is inside: a posterior that ends at the edge of a prior
+//! keeps its height there. Along each axis it is as wide as the densest part of the draws asks for, not their tails or
+//! the distance between their modes. A contour holds its share of the draws themselves, for the density is wider than
+//! they are.
 
 use crate::figures::drawing::contour::{Line, contour};
 
@@ -34,8 +35,8 @@ fn moments(draws: &[[f64; 2]]) -> ([f64; 2], [[f64; 2]; 2]) {
     (mean, [[product(0, 0), product(0, 1)], [product(0, 1), product(1, 1)]])
 }
 
-/// Scale of the draws along an axis, a standard deviation for a Gaussian: the smallest of `sd`, what the quartiles say (tails), and
-/// what the shortest interval with a quarter of the draws says (several modes).
+/// Scale of the draws along an axis, a standard deviation for a Gaussian: the smallest of `sd`, what the quartiles say
+/// (tails), and what the shortest interval with a quarter of the draws says (several modes).
 fn robust_scale(mut values: Vec<f64>, sd: f64) -> f64 {
     // of a Gaussian of sd 1: distance between the quartiles, and twice the quantile of 0.625
     const QUARTILES: f64 = 1.349;
@@ -49,8 +50,8 @@ fn robust_scale(mut values: Vec<f64>, sd: f64) -> f64 {
 }
 
 impl Density {
-    /// The density of `draws`, of which `effective` are independent, in the rectangle `range` (from, to; along x and y).
-    /// `None` where they do not spread along both axes or the rectangle is empty.
+    /// The density of `draws`, of which `effective` are independent, in the rectangle `range` (from, to; along x and
+    /// y). `None` where they do not spread along both axes or the rectangle is empty.
     pub fn of(draws: &[[f64; 2]], effective: f64, range: [[f64; 2]; 2]) -> Option<Self> {
         let (_, covariance) = moments(draws);
         let step = range.map(|[low, high]| (high - low) / CELLS as f64);
@@ -97,7 +98,8 @@ impl Density {
         contour(&self.x, &self.y, |i, j| self.share[j * self.x.len() + i], self.level(share))
     }
 
-    /// The same as closed lines: around the rectangle the density is taken for zero, so that a line goes along its border.
+    /// The same as closed lines: around the rectangle the density is taken for zero, so that a line goes along its
+    /// border.
     pub fn outlines(&self, share: f64) -> Vec<Line> {
         let framed = |centres: &[f64]| {
             let half = 0.5 * (centres[1] - centres[0]);
@@ -209,7 +211,8 @@ mod tests {
         sides.filter(crosses).count() % 2 == 1
     }
 
-    /// Two narrow modes, and a mode with tails ten times as wide: the contours hold what they say, and are no wider than the modes.
+    /// Two narrow modes, and a mode with tails ten times as wide: the contours hold what they say, and are no wider
+    /// than the modes.
     #[test]
     fn contours_of_several_modes_and_of_tails_hold_their_share() {
         let two = |k: usize, [x, y]: [f64; 2]| if k.is_multiple_of(2) { [x, y] } else { [x + 20.0, y + 10.0] };

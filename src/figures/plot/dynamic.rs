@@ -1,4 +1,5 @@
-//! The dynamic spectrum: what changes in the profiles with rotation phase, observed and modelled, and what is left over.
+//! The dynamic spectrum: what changes in the profiles with rotation phase, observed and modelled, and what is left
+//! over.
 
 use super::profiles::{Line, extent};
 use crate::figures::drawing::colour::{ColourMap, GREY};
@@ -14,8 +15,10 @@ const RESIDUAL: f64 = 4.0;
 /// The figure of profiles with a model, which are in the order of their phase.
 pub(super) fn figure(lines: &[Line]) -> Figure {
     let mut figure = Figure::new("residuals", PAGE_MM, 92.0);
-    figure.caption = "Dynamic spectra: observed and modelled profiles minus the mean observed profile, and observed minus \
-                      modelled in units of the standard error. Rows are profiles, at their rotation phases; phases that were \
+    figure.caption = "Dynamic spectra: observed and modelled profiles minus the mean observed profile, and observed \
+    minus \
+                      modelled in units of the standard error. Rows are profiles, at their rotation phases; phases \
+                      that were \
                       not observed are grey."
         .into();
     let mean = mean(lines);
@@ -87,7 +90,8 @@ fn edges(centres: &[f64]) -> Vec<f64> {
     first.into_iter().chain(centres.iter().map(|v| v + 0.5 * step)).collect()
 }
 
-/// From which phase to which each profile is drawn: half way to its neighbours, [`HALF_ROW`] at most; in two parts around 0.
+/// From which phase to which each profile is drawn: half way to its neighbours, [`HALF_ROW`] at most; in two parts
+/// around 0.
 fn rows(lines: &[Line]) -> Vec<Vec<[f64; 2]>> {
     let phases: Vec<f64> = lines.iter().map(Line::phase).collect();
     let n = phases.len();

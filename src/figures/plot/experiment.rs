@@ -1,6 +1,4 @@
 //! The figure of an experiment: columns of its table against each other, as its summary says.
-//!
-//! Left out: what the columns mean (`experiments`).
 
 use super::PlotError;
 use super::symbols::label;

@@ -1,5 +1,5 @@
-//! A landscape: slices through its highest node and the lowest chi2 over the axis that is not shown, with the paraboloid and,
-//! where a run is given, the contours of its chain.
+//! A landscape: slices through its highest node and the lowest chi2 over the axis that is not shown, with the
+//! paraboloid and, where a run is given, the contours of its chain.
 
 use super::density::Density;
 use super::paraboloid::{self, Paraboloid, ParaboloidFile};
@@ -269,7 +269,8 @@ impl Scene {
     fn caption(&self, three: bool) -> String {
         let rows = match three {
             true => {
-                " Above: slices through the lowest node, with the section of the paraboloid through its vertex. Below: the lowest \
+                " Above: slices through the lowest node, with the section of the paraboloid through its vertex. \
+                Below: the lowest \
                  chi2 over the third axis, with the projection of the paraboloid."
             }
             false => "",
@@ -280,8 +281,10 @@ impl Scene {
         };
         let chain = if self.chain.is_some() { " Dashed: 68 and 95 % of the chain." } else { "" };
         format!(
-            "Landscape: the root of chi2 = -2 ln L minus its lowest value, {DARKEST} and more in the darkest colour, nodes \
-             without a reconstruction white.{rows} Contours of landscape and paraboloid are at Delta chi2 = 2.30 and 5.99, 68 and \
+            "Landscape: the root of chi2 = -2 ln L minus its lowest value, {DARKEST} and more in the darkest colour, \
+            nodes \
+             without a reconstruction white.{rows} Contours of landscape and paraboloid are at Delta chi2 = 2.30 and \
+             5.99, 68 and \
              95 % of two Gaussian parameters.{paraboloid}{chain}"
         )
     }

@@ -120,7 +120,10 @@ fn above(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NEG_INFINITY, f64::max) * half_step(values)
 }
 
-const CAPTION: &str = "Detection map. Orbits of each period and semi-amplitude K were put into the profiles; colour: the share of \
-                       their phases at which the blind search finds a planet, false-alarm probability below 1 %, of that period. \
-                       Lines: K recovered at 50 and 95 % of the phases. Points: orbits that went the whole way, with resampled \
+const CAPTION: &str = "Detection map. Orbits of each period and semi-amplitude K were put into the profiles; colour: \
+the share of \
+                       their phases at which the blind search finds a planet, false-alarm probability below 1 %, of \
+                       that period. \
+                       Lines: K recovered at 50 and 95 % of the phases. Points: orbits that went the whole way, with \
+                       resampled \
                        profiles. Dotted: the rotation period and its fractions.";

@@ -1,7 +1,7 @@
 //! Figures of what a folder holds, from its files alone; nothing is computed anew.
 //!
-//! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`, `optimise`, `grid`, `sample`,
-//! `compare` and `reproduce`. Left out: how a figure is drawn (`figure`).
+//! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`,
+//! `optimise`, `grid`, `sample`, `compare` and `reproduce`.
 
 mod comparison;
 mod content;

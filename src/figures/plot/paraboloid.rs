@@ -48,8 +48,8 @@ impl Paraboloid {
         })
     }
 
-    /// The ellipses so far (Delta chi2) above the minimum: projected onto the plane, with error bars (Delta chi2 = 1) as a cross
-    /// at the vertex, or cut by the plane through the vertex.
+    /// The ellipses so far (Delta chi2) above the minimum: projected onto the plane, with error bars (Delta chi2 = 1)
+    /// as a cross at the vertex, or cut by the plane through the vertex.
     pub fn draw(&self, figure: &mut Figure, panel: &Panel, [i, j]: [usize; 2], levels: &[f64], projected: bool) {
         let centre = [self.vertex[i], self.vertex[j]];
         let square = |m: &DMatrix<f64>| [[m[(i, i)], m[(i, j)]], [m[(j, i)], m[(j, j)]]];

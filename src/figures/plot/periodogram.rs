@@ -1,5 +1,5 @@
-//! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of observation
-//! alone do, and how well K is known.
+//! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of
+//! observation alone do, and how well K is known.
 
 use super::symbols::PERIOD_DIGITS;
 use super::{POSITIVE, PlotError, velocities};
@@ -260,7 +260,10 @@ fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitFile) {
     figure.text(&text, [left, y - 3.5], Font::SMALL.coloured(BLUE), Align::Left, 0.0);
 }
 
-const CAPTION: &str = "Periodogram. Above: gain in ln L by an orbit of each period, spots marginalised out; dashed: what chance \
-                       exceeds in so many searches of stars without a planet. Middle: window function of the times. Below: best \
-                       K, its standard error and its upper limit. Dotted lines: the rotation period and its fractions, and one \
+const CAPTION: &str = "Periodogram. Above: gain in ln L by an orbit of each period, spots marginalised out; dashed: \
+what chance \
+                       exceeds in so many searches of stars without a planet. Middle: window function of the times. \
+                       Below: best \
+                       K, its standard error and its upper limit. Dotted lines: the rotation period and its \
+                       fractions, and one \
                        day.";

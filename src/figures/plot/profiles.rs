@@ -112,7 +112,8 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     let modelled = lines.iter().any(|line| !line.model.is_empty());
     let what = if modelled { "Observed (black) and modelled (orange) line profiles" } else { "Line profiles" };
     figure.caption = format!(
-        "{what} below each other in the order of their rotation phase; numbers are rotation cycles, whole turns + phase. Bars \
+        "{what} below each other in the order of their rotation phase; numbers are rotation cycles, whole turns + \
+        phase. Bars \
          beside the profiles are plus and minus one standard error."
     );
     let [low, high] = extent(lines, |line| &line.observed);

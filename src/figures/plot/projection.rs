@@ -1,9 +1,10 @@
-//! Projections of the stellar surface: flattened polar (equidistant: colatitude is the distance from the pole, as in most
-//! published Doppler images) and Mollweide (equal areas).
+//! Projections of the stellar surface: flattened polar (equidistant: colatitude is the distance from the pole, as in
+//! most published Doppler images) and Mollweide (equal areas).
 //!
-//! Both show the star as seen from its upper side. In the polar one the observer of cycle 0 is below the picture: longitude 0
-//! is at the bottom and longitudes grow anticlockwise, the way the star turns; the phase at which a longitude faces the
-//! observer grows clockwise. In Mollweide's, longitudes grow to the right, 180 degrees in the middle.
+//! Both show the star as seen from its upper side. In the polar one the observer of cycle 0 is below the picture:
+//! longitude 0 is at the bottom and longitudes grow anticlockwise, the way the star turns; the phase at which a
+//! longitude faces the observer grows clockwise. In Mollweide's, longitudes grow to the right, 180 degrees in the
+//! middle.
 
 use crate::figures::drawing::Point;
 use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};

@@ -103,8 +103,10 @@ pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
 }
 
 /// How phases and longitudes are to be read.
-const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above the visible pole: parallels at +60, +30, 0 \
-                           (bold) and -30 degrees, the star turns anticlockwise, numbers outside are the rotation phases at which \
+const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above the visible pole: parallels at +60, \
++30, 0 \
+                           (bold) and -30 degrees, the star turns anticlockwise, numbers outside are the rotation \
+                           phases at which \
                            a meridian faces the observer, ticks the observed phases. Ellipses: Mollweide projection; \
                            longitude = 360 (1 - phase) degrees.";
 

@@ -180,8 +180,10 @@ const INJECTED: Stroke = Stroke::new(BLACK, 1.0).dashed();
 pub(super) fn autocorrelation(sampled: &Sampled) -> Figure {
     let mut figure = Figure::new("autocorrelation", PAGE_MM, 70.0);
     figure.caption = format!(
-        "Left: autocorrelation of the walkers around the mean of their ensemble, after the burn-in. Right: the integrated \
-         autocorrelation time as the chain grows. Convergence is judged between independent ensembles, not by the number of \
+        "Left: autocorrelation of the walkers around the mean of their ensemble, after the burn-in. Right: the \
+        integrated \
+         autocorrelation time as the chain grows. Convergence is judged between independent ensembles, not by the \
+         number of \
          autocorrelation times. {}",
         criterion(sampled)
     );

@@ -1,5 +1,5 @@
-//! Radial velocities: first moments with the spots in them, and what is left when these are taken out; over time and folded
-//! with the orbit.
+//! Radial velocities: first moments with the spots in them, and what is left when these are taken out; over time and
+//! folded with the orbit.
 
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
@@ -74,8 +74,10 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         orbital: 1,
     };
     let mut figure = curves.draw();
-    figure.caption = "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: the model's \
-                      spots taken out, with the assumed orbit. Below: the model taken out. To the right: the middle folded with \
+    figure.caption = "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: the \
+    model's \
+                      spots taken out, with the assumed orbit. Below: the model taken out. To the right: the middle \
+                      folded with \
                       the orbital period; phase 0 is the largest velocity."
         .into();
     Ok(figure)

@@ -202,7 +202,8 @@ fn landscape(header: &Value, paraboloid: &Value) -> Chapter {
             Some(name) => (
                 Tone::Doubt,
                 format!(
-                    "A paraboloid fits around the highest node, but the error bar of {} is more than half its axis: the nodes \
+                    "A paraboloid fits around the highest node, but the error bar of {} is more than half its axis: \
+                    the nodes \
                      do not bound it.",
                     label(&name)
                 ),

@@ -1,7 +1,6 @@
 //! One page of what a folder holds: star and data, the verdict in plain words and what speaks against it, tables,
-//! figures, the config and how to cite. A single HTML file that needs nothing else: no network, no script, figures as SVG within it.
-//!
-//! Left out: figures (`plot`), and how the page looks (`html`).
+//! figures, the config and how to cite. A single HTML file that needs nothing else: no network, no script, figures as
+//! SVG within it.
 
 mod chapters;
 mod citation;

@@ -146,7 +146,8 @@ fn convergence(summary: &Summary) -> (Tone, String) {
     let least = all().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
     let remark = if summary.advice.is_empty() { String::new() } else { format!(" But {}.", summary.advice.join("; ")) };
     let sentence = format!(
-        "The chain has converged: independent ensembles agree on every parameter (R-hat at most {worst:.3}), and its draws are \
+        "The chain has converged: independent ensembles agree on every parameter (R-hat at most {worst:.3}), and its \
+        draws are \
          worth {least:.0} independent ones or more.{remark}"
     );
     (if summary.advice.is_empty() { Tone::Good } else { Tone::Neutral }, sentence)

@@ -1,8 +1,8 @@
-//! Exponential, logarithm, sine and cosine for loops that are compiled into vector instructions: without branches, to two units
-//! in the last place where nothing else is said; and rounding.
+//! Exponential, logarithm, sine and cosine for loops that are compiled into vector instructions: without branches, to
+//! two units in the last place where nothing else is said; and rounding.
 //!
-//! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for sine, cosine and the logarithm in single precision, and the
-//! series to r^13 over |r| < ln(2)/2 for the exponential. Left out: infinities, and results that are not normal numbers.
+//! Reduction and polynomials are those of fdlibm (Sun Microsystems 1993) for sine, cosine and the logarithm in single
+//! precision, and the series to r^13 over |r| < ln(2)/2 for the exponential.
 
 use super::Instructions;
 
@@ -50,8 +50,8 @@ const COSINE: [f64; 6] = [
     -1.135_964_755_778_819_5e-11,
 ];
 
-/// Coefficients of `(ln((1 + s) / (1 - s)) / (2 s) - 1) / s^2` in s^2, over 0 < s < 1/3: the interpolation at Chebyshev's points, which is
-/// off by 5e-17.
+/// Coefficients of `(ln((1 + s) / (1 - s)) / (2 s) - 1) / s^2` in s^2, over 0 < s < 1/3: the interpolation at
+/// Chebyshev's points, which is off by 5e-17.
 const LOGARITHM: [f64; 10] = [
     0.333_333_333_333_333_3,
     0.200_000_000_000_072_92,

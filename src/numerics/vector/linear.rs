@@ -1,6 +1,4 @@
 //! Sums and combinations of rows of numbers, as long as a map.
-//!
-//! Left out: matrices.
 
 use super::{Instructions, Number, Task};
 

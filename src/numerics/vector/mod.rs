@@ -1,10 +1,11 @@
-//! Vector instructions: hot loops are compiled for AVX2 with fused multiply-add and for AVX-512 as well, and chosen at run time.
+//! Vector instructions: hot loops are compiled for AVX2 with fused multiply-add and for AVX-512 as well, and chosen at
+//! run time.
 //!
-//! A hot loop is a [`Task`]: written once, inlined into an entry compiled for each set of instructions. The compiler makes vectors of
-//! most loops by itself; where it does not, they are written in registers. Products are fused with sums in two of the
-//! sets, so that results differ in the last digits between processors with and without AVX2, never between runs on one; how
-//! wide the registers are does not change the order of a sum. Closures that take instructions are to be kept out of hot
-//! loops: where one is not inlined, it is compiled for every processor. Left out: what the loops are.
+//! A hot loop is a [`Task`]: written once, inlined into an entry compiled for each set of instructions. The compiler
+//! makes vectors of most loops by itself; where it does not, they are written in registers. Products are fused with
+//! sums in two of the sets, so that results differ in the last digits between processors with and without AVX2, never
+//! between runs on one; how wide the registers are does not change the order of a sum. Closures that take instructions
+//! are to be kept out of hot loops: where one is not inlined, it is compiled for every processor.
 
 pub mod elementary;
 pub mod linear;
@@ -21,7 +22,8 @@ pub trait Task {
     fn run<I: Instructions>(self, instructions: I) -> Self::Output;
 }
 
-/// A set of instructions; having one at hand proves that the processor has them. There are no others than those of this module.
+/// A set of instructions; having one at hand proves that the processor has them. There are no others than those of this
+/// module.
 pub trait Instructions: Copy + sealed::Sealed {
     /// Its registers for numbers in double precision.
     type Doubles: Scattered<Number = f64>;
@@ -97,7 +99,8 @@ pub fn run<T: Task>(task: T) -> T::Output {
     task.run(Portable)
 }
 
-/// Asks memory for the entry `distance` entries on, which need not be there: what is read in a row from far away comes sooner.
+/// Asks memory for the entry `distance` entries on, which need not be there: what is read in a row from far away comes
+/// sooner.
 #[inline(always)]
 pub fn fetch_ahead<T>(entry: &T, distance: usize) {
     #[cfg(target_arch = "x86_64")]

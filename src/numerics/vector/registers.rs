@@ -1,6 +1,6 @@
 //! Numbers side by side, in the registers of each set of instructions, in double or single precision.
 //!
-//! Here are those that every processor has. Left out: how a processor's set is found out (`vector`).
+//! Here are those that every processor has.
 
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -73,7 +73,8 @@ pub trait Scattered: Registers {
     #[allow(unsafe_code)]
     unsafe fn pick(self, from: &[Self::Number], places: &[u32], first: usize) -> Self::Lanes;
 
-    /// Puts numbers where [`Scattered::pick`] takes them from, the first lane last: where two have one place, the first is it.
+    /// Puts numbers where [`Scattered::pick`] takes them from, the first lane last: where two have one place, the first
+    /// is it.
     ///
     /// # Safety
     /// The places lie within `to`.

@@ -1,9 +1,9 @@
 //! What a periodogram looks like without a planet: the highest peak of many draws of the gradient.
 //!
-//! Without a planet the gradient has mean 0 and the information as covariance: noise, and spots that the map leaves over.
-//! `Delta ln L(P) = |L^-1 X' gradient|^2 / 2` with `A = L L'` at every trial period. The whitened rows of all periods are one
-//! matrix, times a square root of the information, times the deviates. Each block of draws has its own stream of random
-//! numbers, so that the number of threads does not matter.
+//! Without a planet the gradient has mean 0 and the information as covariance: noise, and spots that the map leaves
+//! over. `Delta ln L(P) = |L^-1 X' gradient|^2 / 2` with `A = L L'` at every trial period. The whitened rows of all
+//! periods are one matrix, times a square root of the information, times the deviates. Each block of draws has its own
+//! stream of random numbers, so that the number of threads does not matter.
 
 use super::orbits::{Trial, design};
 use crate::planets::velocities::VelocityQuadratic;
@@ -59,7 +59,8 @@ fn whitened(quadratic: &VelocityQuadratic, trials: &[Trial]) -> DMatrix<f64> {
     columns.transpose()
 }
 
-/// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do draws.
+/// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do
+/// draws.
 fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let mut eigen = covariance.clone().symmetric_eigen();
     let still = STILL * eigen.eigenvalues.max();

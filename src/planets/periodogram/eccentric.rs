@@ -1,8 +1,9 @@
 //! The best Keplerian orbit around a peak.
 //!
-//! Given period, eccentricity and time of periastron, the velocities are linear in `K cos(omega)` and `K sin(omega)`; the best of
-//! a grid of the other two at the peak's period starts a climb in all five. There the coordinates are those of the circle, (a, b,
-//! frequency), which give the mean longitude, and `(e cos omega, e sin omega)`: at e = 0 nothing is singular.
+//! Given period, eccentricity and time of periastron, the velocities are linear in `K cos(omega)` and `K sin(omega)`;
+//! the best of a grid of the other two at the peak's period starts a climb in all five. There the coordinates are those
+//! of the circle, (a, b, frequency), which give the mean longitude, and `(e cos omega, e sin omega)`: at e = 0 nothing
+//! is singular.
 
 use super::frequencies::Frequencies;
 use super::kepler::{mean_anomaly, true_anomaly};

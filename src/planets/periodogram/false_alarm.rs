@@ -1,8 +1,8 @@
 //! How often stars without a planet show a peak as high: by draws, and beyond their reach by extreme-value theory.
 //!
-//! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z) exp(-z)`, hence `FAP = 1 - exp(-tau)`
-//! (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). W comes from the upper tail of the draws
-//! by maximum likelihood, those below the tail counting as such.
+//! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z) exp(-z)`, hence `FAP = 1 -
+//! exp(-tau)` (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). W comes from the
+//! upper tail of the draws by maximum likelihood, those below the tail counting as such.
 
 use super::draws::maxima;
 use super::orbits::Trial;
@@ -133,7 +133,8 @@ mod tests {
         (quadratic, trials)
     }
 
-    /// Kolmogorov-Smirnov: gradients of the null model itself, drawn another way, have uniform false-alarm probabilities.
+    /// Kolmogorov-Smirnov: gradients of the null model itself, drawn another way, have uniform false-alarm
+    /// probabilities.
     #[test]
     fn the_probability_is_uniform_under_its_own_null() {
         let (quadratic, trials) = star();

@@ -1,12 +1,10 @@
 //! The trial periods of a blind search: uniform in frequency, several to a peak.
 //!
-//! A peak is about `1/T` wide, T the time base; ten frequencies to each of these lose less than 1 % of its height. The longest
-//! period is 2 T, of which the data show half an orbit. Unevenly spaced data have no Nyquist frequency, but one searches no
-//! further than some multiple of its average `N / (2 T)`: 5 of them, the custom of Lomb-Scargle codes (VanderPlas 2018, ApJS
-//! 236, 16, section 7.1). Where the profiles stand at about even distances the periods shorter than twice the median spacing
-//! are mere reflections, and the search ends there.
-//!
-//! Left out: what is searched for (`orbits`).
+//! A peak is about `1/T` wide, T the time base; ten frequencies to each of these lose less than 1 % of its height. The
+//! longest period is 2 T, of which the data show half an orbit. Unevenly spaced data have no Nyquist frequency, but one
+//! searches no further than some multiple of its average `N / (2 T)`: 5 of them, the custom of Lomb-Scargle codes
+//! (VanderPlas 2018, ApJS 236, 16, section 7.1). Where the profiles stand at about even distances the periods shorter
+//! than twice the median spacing are mere reflections, and the search ends there.
 
 use serde::{Deserialize, Serialize};
 
@@ -165,7 +163,8 @@ mod tests {
         assert!(found.per_cycle.windows(2).all(|f| (f[1] - f[0] - found.step()).abs() < 1e-12));
     }
 
-    /// Nights of many profiles each: the spacing within a night does not set the shortest period, the number of profiles does.
+    /// Nights of many profiles each: the spacing within a night does not set the shortest period, the number of
+    /// profiles does.
     #[test]
     fn clumps_are_searched_to_some_average_nyquist_frequencies() {
         let cycles: Vec<f64> = (0..60).map(|k| (k / 10) as f64 + 0.01 * (k % 10) as f64).collect();

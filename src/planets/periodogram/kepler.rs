@@ -1,7 +1,6 @@
 //! Kepler's equation, and the velocity of an eccentric orbit.
 //!
-//! `V = K (cos(nu + omega) + e cos omega)`, nu the true anomaly; with e = 0 it is the circular orbit. Left out: fits
-//! (`eccentric`).
+//! `V = K (cos(nu + omega) + e cos omega)`, nu the true anomaly; with e = 0 it is the circular orbit.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,7 +10,8 @@ const STEPS: usize = 50;
 /// The eccentric anomaly E of a mean anomaly (radians), `E - e sin E = M`, for `0 <= e < 1`; in the same turn as M.
 pub fn eccentric_anomaly(mean_anomaly: f64, e: f64) -> f64 {
     let m = (mean_anomaly + PI).rem_euclid(TAU) - PI;
-    // beyond the root on the side where the function is convex: Newton's steps fall towards it and never leave the half turn
+    // beyond the root on the side where the function is convex: Newton's steps fall towards it and never leave the half
+    // turn
     let mut anomaly = if m >= 0.0 { (m + e).min(PI) } else { (m - e).max(-PI) };
     for _ in 0..STEPS {
         let step = (anomaly - e * anomaly.sin() - m) / (1.0 - e * anomaly.cos());

@@ -1,11 +1,11 @@
 //! What K can be at one period: the 95 % upper limit of the data at hand, and the K that a search would find.
 //!
 //! Upper limit: the posterior flat in K >= 0 and in phase is, along the direction u of phase in (a, b), the Gaussian
-//! `exp(b u K - u A u K^2 / 2)`. Its integral over K is an error function; that over phase is a sum over even steps, which for a
-//! periodic function is exact as soon as they resolve it. Detection limit: with an orbit of that K in the data, the whitened
-//! amplitude `w = L^-1 X' gradient` (`A = L L'`) is a normal deviate in the plane about `L' u K`; the chance that its length
-//! exceeds `sqrt(2 level)` is taken along its mean direction, with what scatter across adds to the length on average. Left out:
-//! that another period might do still better, which makes the limit a little too high.
+//! `exp(b u K - u A u K^2 / 2)`. Its integral over K is an error function; that over phase is a sum over even steps,
+//! which for a periodic function is exact as soon as they resolve it. Detection limit: with an orbit of that K in the
+//! data, the whitened amplitude `w = L^-1 X' gradient` (`A = L L'`) is a normal deviate in the plane about `L' u K`;
+//! the chance that its length exceeds `sqrt(2 level)` is taken along its mean direction, with what scatter across adds
+//! to the length on average.
 
 use super::normal::{cumulative, erfc};
 use super::orbits::{Trial, eigenvalues};
@@ -64,7 +64,8 @@ pub fn upper_limit_kms(trial: &Trial, credence: f64) -> Option<f64> {
     Some(rising(credence * below(high), high, below))
 }
 
-/// The semi-amplitude (km/s) with which a planet at the period of `trial` lifts ln L above `level` with that probability.
+/// The semi-amplitude (km/s) with which a planet at the period of `trial` lifts ln L above `level` with that
+/// probability.
 pub fn detection_limit_kms(trial: &Trial, level: f64, probability: f64) -> Option<f64> {
     trial.orbit?;
     let factor = trial.information.cholesky()?.l();

@@ -1,9 +1,8 @@
-//! The Doppler-imaging periodogram: orbits blindly searched in the velocities of the profiles, spots marginalised out (method
-//! section 4).
+//! The Doppler-imaging periodogram: orbits blindly searched in the velocities of the profiles, spots marginalised out
+//! (method section 4).
 //!
-//! All of it follows from one quadratic in the velocities. Periods are in rotation cycles, `Porb/Prot`; days only where the
-//! user states what to search (`frequencies`). Left out: where the quadratic comes from (`expansion`), and files
-//! (`io::periodogram`).
+//! All of it follows from one quadratic in the velocities. Periods are in rotation cycles, `Porb/Prot`; days only where
+//! the user states what to search (`frequencies`).
 
 mod draws;
 pub mod eccentric;
@@ -125,8 +124,8 @@ impl Search {
     }
 }
 
-/// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is bounded where the star's
-/// spots imitate one. `None` where the data bound none there.
+/// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is bounded where
+/// the star's spots imitate one. `None` where the data bound none there.
 pub fn co_rotation_penalty(quadratic: &VelocityQuadratic, frequencies: &Frequencies, rows: &[Row]) -> Option<f64> {
     let here = orbits::at(quadratic, 1.0).orbit?.sigma_k_kms;
     let away = |row: &&Row| (row.trial.frequency - 1.0).abs() * frequencies.time_base_cycles > 1.0;

@@ -1,7 +1,7 @@
 //! Whether the systemic velocity is right: how much ln L gains when a constant velocity is free beside the orbit.
 //!
-//! A wrong one does not stay in the mean: an orbit of another period takes it up. So the best orbit is searched for once more
-//! with the constant left free at every trial period. Left out: what to do about it.
+//! A wrong one does not stay in the mean: an orbit of another period takes it up. So the best orbit is searched for
+//! once more with the constant left free at every trial period.
 
 use super::orbits::scan;
 use super::two_planets::{eliminated, without};
@@ -20,8 +20,8 @@ pub struct Offset {
     pub gain: f64,
 }
 
-/// The constant beside an orbit of one of the `frequencies`; `best` is Delta ln L of the best orbit without it. `None` where
-/// no constant is bounded.
+/// The constant beside an orbit of one of the `frequencies`; `best` is Delta ln L of the best orbit without it. `None`
+/// where no constant is bounded.
 pub fn offset(quadratic: &VelocityQuadratic, frequencies: &[f64], best: f64) -> Option<Offset> {
     let (slope, curvature) = (quadratic.gradient.sum(), quadratic.information.sum());
     let free = eliminated(quadratic, &DMatrix::from_element(quadratic.len(), 1, 1.0))?;

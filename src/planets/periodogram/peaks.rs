@@ -1,7 +1,7 @@
 //! The peaks of the periodogram, each refined between the trial periods, with errors that count the period's own.
 //!
-//! At a peak ln L is expanded in (a, b, frequency) of the circular orbit; the inverse of that curvature gives the errors of
-//! K, period and phase together.
+//! At a peak ln L is expanded in (a, b, frequency) of the circular orbit; the inverse of that curvature gives the
+//! errors of K, period and phase together.
 
 use super::frequencies::Frequencies;
 use super::orbits::{CircularOrbit, SIGMA_OF_UNKNOWN_PHASE, Trial, amplitudes, mid_cycle, phi, velocities};

@@ -1,7 +1,8 @@
-//! The highest ln L of velocities that depend on a few parameters: Gauss-Newton steps, damped (Levenberg 1944, Marquardt 1963).
+//! The highest ln L of velocities that depend on a few parameters: Gauss-Newton steps, damped (Levenberg 1944,
+//! Marquardt 1963).
 //!
-//! ln L is a quadratic in the velocities, so its gradient is `J' (g - I V)`, J the derivative of the velocities by differences.
-//! Left out: where to start.
+//! ln L is a quadratic in the velocities, so its gradient is `J' (g - I V)`, J the derivative of the velocities by
+//! differences.
 
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};

@@ -1,9 +1,10 @@
-//! Periods at which spots imitate orbits: the rotation period, its multiples and fractions, and their aliases by the sampling and by
-//! the day.
+//! Periods at which spots imitate orbits: the rotation period, its multiples and fractions, and their aliases by the
+//! sampling and by the day.
 //!
-//! Spots return with the rotation and distort each line several times on their way across the disc, which gives signals at `Prot/n`;
-//! where they change, or the sampling sees every other rotation, at multiples, too. Profiles taken from one place come once a day,
-//! so that each of these has reflections at one and two a day (Dawson & Fabrycky 2010), however weak the window function is there.
+//! Spots return with the rotation and distort each line several times on their way across the disc, which gives signals
+//! at `Prot/n`; where they change, or the sampling sees every other rotation, at multiples, too. Profiles taken from
+//! one place come once a day, so that each of these has reflections at one and two a day (Dawson & Fabrycky 2010),
+//! however weak the window function is there.
 
 use super::window::{Alias, SAME, WindowPeak, alias, window};
 use serde::{Deserialize, Serialize};
@@ -12,8 +13,9 @@ use serde::{Deserialize, Serialize};
 const FRACTIONS: u32 = 4;
 const MULTIPLES: u32 = 4;
 
-/// A period is told from another if its frequency differs by more than so many standard errors, but for the second number (in
-/// inverse time bases) within which it never is: spots that change or rotate differentially do not keep their period.
+/// A period is told from another if its frequency differs by more than so many standard errors, but for the second
+/// number (in inverse time bases) within which it never is: spots that change or rotate differentially do not keep
+/// their period.
 const TOLD_APART: (f64, f64) = (3.0, 0.2);
 
 /// The sampling sees the day where its window function is at least this high at one or two a day.
@@ -41,8 +43,8 @@ impl Imitation {
         }
     }
 
-    /// Whether spots are likely to make a signal there: at the rotation period, its fractions and multiples, and at aliases of the first
-    /// two, where most of their power is. Aliases of all others fill a large part of all periods.
+    /// Whether spots are likely to make a signal there: at the rotation period, its fractions and multiples, and at
+    /// aliases of the first two, where most of their power is. Aliases of all others fill a large part of all periods.
     pub fn is_likely(&self) -> bool {
         self.alias.is_none() || self.numerator == 1 && self.denominator <= 2
     }
@@ -82,8 +84,8 @@ impl RotationPeriods {
         RotationPeriods { window: all, time_base_cycles }
     }
 
-    /// The star's period that `porb_over_prot`, known to `sigma`, is not told from, if there is one: itself rather than an alias, and
-    /// fractions rather than multiples.
+    /// The star's period that `porb_over_prot`, known to `sigma`, is not told from, if there is one: itself rather than
+    /// an alias, and fractions rather than multiples.
     pub fn imitated(&self, porb_over_prot: f64, sigma: Option<f64>) -> Option<Imitation> {
         let frequency = 1.0 / porb_over_prot;
         let sigma = sigma.filter(|s| s.is_finite()).unwrap_or(f64::INFINITY) * frequency * frequency;
@@ -110,7 +112,8 @@ impl RotationPeriods {
 mod tests {
     use super::*;
 
-    /// LO Peg's rotation, nights and the peaks that its spots make: 1.985 rotations, and 0.7308 d, which is 2.363/d less 1/d.
+    /// LO Peg's rotation, nights and the peaks that its spots make: 1.985 rotations, and 0.7308 d, which is 2.363/d
+    /// less 1/d.
     #[test]
     fn multiples_and_daily_aliases_are_named() {
         let rotation_period_d = 0.4232;

@@ -1,8 +1,10 @@
-//! A second planet: the gain in ln L of two circular orbits over one, the period of the first kept, then both refined together.
+//! A second planet: the gain in ln L of two circular orbits over one, the period of the first kept, then both refined
+//! together.
 //!
-//! At each period the 4 x 4 system in both (a, b) is solved by blocks: with the first orbit's pair eliminated, what is left is a
-//! quadratic in the velocities again, of gradient `Q g` and information `Q I`, `Q = 1 - I X A^-1 X'` (Schur complement). The
-//! periodogram of that is the gain, and gradients without a second planet scatter with its own information.
+//! At each period the 4 x 4 system in both (a, b) is solved by blocks: with the first orbit's pair eliminated, what is
+//! left is a quadratic in the velocities again, of gradient `Q g` and information `Q I`, `Q = 1 - I X A^-1 X'` (Schur
+//! complement). The periodogram of that is the gain, and gradients without a second planet scatter with its own
+//! information.
 
 use super::frequencies::Frequencies;
 use super::orbits::{design, velocities};
@@ -38,7 +40,8 @@ pub(super) fn eliminated(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> Opt
     })
 }
 
-/// Both orbits refined together, from the `first` and from the `second` found beside it. `None` where they have no maximum.
+/// Both orbits refined together, from the `first` and from the `second` found beside it. `None` where they have no
+/// maximum.
 pub fn both(
     quadratic: &VelocityQuadratic,
     frequencies: &Frequencies,

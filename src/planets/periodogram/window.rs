@@ -1,7 +1,8 @@
 //! The window function of the sampling, and peaks that are aliases of the highest by it.
 //!
-//! `W(f) = |sum_k exp(2 pi i f E_k)|^2 / N^2` is 1 where the profiles always catch an orbit of that frequency at the same phase.
-//! A strong peak of it at F makes orbits of frequency f and of `F - f`, `F + f` or `f - F` look alike (Dawson & Fabrycky 2010).
+//! `W(f) = |sum_k exp(2 pi i f E_k)|^2 / N^2` is 1 where the profiles always catch an orbit of that frequency at the
+//! same phase. A strong peak of it at F makes orbits of frequency f and of `F - f`, `F + f` or `f - F` look alike
+//! (Dawson & Fabrycky 2010).
 
 use super::frequencies::Frequencies;
 use rayon::prelude::*;
@@ -42,8 +43,8 @@ pub fn window(cycles: &[f64], frequency: f64) -> f64 {
     (sin * sin + cos * cos) / (cycles.len() as f64).powi(2)
 }
 
-/// Strong peaks of the window function up to the sum of any two of the `frequencies`, but for those so low that they join
-/// what is the same anyway.
+/// Strong peaks of the window function up to the sum of any two of the `frequencies`, but for those so low that they
+/// join what is the same anyway.
 pub fn window_peaks(cycles: &[f64], frequencies: &Frequencies) -> Vec<WindowPeak> {
     let base = frequencies.time_base_cycles;
     let last = 2.0 * frequencies.range().1 + SAME / base;

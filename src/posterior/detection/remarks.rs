@@ -1,4 +1,5 @@
-//! What is to be said of a blind search in words: what speaks against a planet, what else has to be known, and the verdict.
+//! What is to be said of a blind search in words: what speaks against a planet, what else has to be known, and the
+//! verdict.
 
 use super::{Detection, DetectionSettings, Robustness};
 use crate::planets::periodogram::Peak;
@@ -82,7 +83,8 @@ impl Detection {
         let shortest = self.frequencies.rotation_period_d / self.frequencies.range().1;
         if shortest > self.frequencies.rotation_period_d {
             remarks.push(Remark::note(format!(
-                "the search begins at {shortest:.3} d, above the rotation period of {:.3} d: signals of the spots at Prot and its \
+                "the search begins at {shortest:.3} d, above the rotation period of {:.3} d: signals of the spots at \
+                Prot and its \
                  fractions can only appear as their aliases; --min-period-d searches further",
                 self.frequencies.rotation_period_d
             )));
@@ -108,7 +110,8 @@ impl Detection {
             remarks.push(Remark::against(
                 "no map fits to the target chi2",
                 format!(
-                    "no map reaches the target chi2 of {target:.3} per datum without turning noise into spots ({chi2:.3} was \
+                    "no map reaches the target chi2 of {target:.3} per datum without turning noise into spots \
+                    ({chi2:.3} was \
                      reached): the target may be too low, or the model of the star wrong"
                 ),
             ));
@@ -116,7 +119,8 @@ impl Detection {
             remarks.push(Remark::against(
                 "chi2 is far from 1",
                 format!(
-                    "chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles or the model \
+                    "chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles or \
+                    the model \
                      of the star may be wrong, and all errors here with them"
                 ),
             ));
@@ -128,7 +132,8 @@ impl Detection {
             remarks.push(Remark::against(
                 "the systemic velocity may be wrong",
                 format!(
-                    "with a constant velocity of {velocity_kms:+.3} +- {sigma_kms:.3} km/s beside an orbit ln L is {gain:.0} \
+                    "with a constant velocity of {velocity_kms:+.3} +- {sigma_kms:.3} km/s beside an orbit ln L is \
+                    {gain:.0} \
                      higher: star.vsys_kms may be wrong, which makes false peaks; make it free under parameters"
                 ),
             ));
@@ -138,7 +143,8 @@ impl Detection {
             remarks.push(Remark::against(
                 "there are few profiles",
                 format!(
-                    "{profiles} profiles hardly tell how large the spots are that the map does not resolve: planets are missed, \
+                    "{profiles} profiles hardly tell how large the spots are that the map does not resolve: planets \
+                    are missed, \
                      and errors are rough"
                 ),
             ));
@@ -146,7 +152,8 @@ impl Detection {
         if view.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
             remarks.push(Remark::against(
                 "the model of the star is wrong",
-                "the profiles have nothing to do with the model of the star: what the map leaves over is without bounds",
+                "the profiles have nothing to do with the model of the star: what the map leaves over is without \
+                bounds",
             ));
         }
         remarks

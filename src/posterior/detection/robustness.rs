@@ -1,7 +1,8 @@
-//! Whether the best orbit hangs on a choice: K at a target chi2 3 % lower and higher, and without the profiles of each night.
+//! Whether the best orbit hangs on a choice: K at a target chi2 3 % lower and higher, and without the profiles of each
+//! night.
 //!
-//! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other target, or of
-//! the profiles that remain. Left out: whether another period would then be the best.
+//! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other
+//! target, or of the profiles that remain.
 
 use super::{DetectionError, DetectionSettings, View};
 use crate::planets::periodogram::{CircularOrbit, Peak, orbits};
@@ -110,8 +111,8 @@ impl Robustness {
         (largest > MOVES).then_some(largest)
     }
 
-    /// Nights that make the result: without them ln L of the orbit falls below `level`, where it was above, or K moves by more than
-    /// the profiles left out explain.
+    /// Nights that make the result: without them ln L of the orbit falls below `level`, where it was above, or K moves
+    /// by more than the profiles left out explain.
     pub fn decisive_nights(&self, level: f64) -> Vec<&WithoutNight> {
         let Some(all) = self.targets[1].orbit else { return Vec::new() };
         let decides = |night: &&WithoutNight| {

@@ -1,18 +1,17 @@
 //! What a posterior becomes where the spots that the map leaves over are counted as noise, their size unknown.
 //!
-//! With x the coordinates of an expansion relative to its centre, its gradient g there scatters around `I x` with the covariance
-//! `S = noise + f (I - noise)`, f the size of unresolved spots in variance (`spots`). Close to the rotation period, an orbit can
-//! stand for unresolved spots and they for an orbit: which of them it is is not settled by the size that is most probable with
-//! one or the other, so that the size is integrated over, uniform in its logarithm:
+//! With x the coordinates of an expansion relative to its centre, its gradient g there scatters around `I x` with the
+//! covariance `S = noise + f (I - noise)`, f the size of unresolved spots in variance (`spots`). Close to the rotation
+//! period, an orbit can stand for unresolved spots and they for an orbit: which of them it is is not settled by the
+//! size that is most probable with one or the other, so that the size is integrated over, uniform in its logarithm:
 //! `p(x) = sum_f |S_f|^-1/2 exp(-(g - I x) S_f^-1 (g - I x) / 2)`.
 //!
-//! ln L as the objective has it is more than the quadratic q, the more so the farther from the reference. A map answers a large
-//! change of the velocities as q says that it would a smaller one in the same direction (or a larger one): in place of x stands
-//! `c x` with `q(c x) = ln L`, on the same side of the highest q in that direction. Next to that height, where c would jump, it is
-//! softened, and of the rest every term has the share `rho_f = x I S_f^-1 I x / x I x`, at most 1, that unresolved spots leave of what q
-//! does along x. So nothing is better than what explains all velocities but for the rest, and with spots of the entropy's
-//! own size ln L comes back as it is.
-//! Left out: where the reference is.
+//! ln L as the objective has it is more than the quadratic q, the more so the farther from the reference. A map answers
+//! a large change of the velocities as q says that it would a smaller one in the same direction (or a larger one): in
+//! place of x stands `c x` with `q(c x) = ln L`, on the same side of the highest q in that direction. Next to that
+//! height, where c would jump, it is softened, and of the rest every term has the share `rho_f = x I S_f^-1 I x / x I
+//! x`, at most 1, that unresolved spots leave of what q does along x. So nothing is better than what explains all
+//! velocities but for the rest, and with spots of the entropy's own size ln L comes back as it is.
 
 use super::spots::UNRESOLVED_SPOTS;
 use super::{Expansion, free_stellar, nuisances};
@@ -37,7 +36,8 @@ pub struct SpotsCounted {
     sizes: Vec<Size>,
 }
 
-/// The density of the gradient for one size of the unresolved spots: with `S = L L^t`, `L^-1 I`, `L^-1 g` and `ln |S|^-1/2`.
+/// The density of the gradient for one size of the unresolved spots: with `S = L L^t`, `L^-1 I`, `L^-1 g` and `ln
+/// |S|^-1/2`.
 #[derive(Clone, Debug)]
 struct Size {
     information: DMatrix<f64>,
@@ -74,8 +74,8 @@ impl SpotsCounted {
         SpotsCounted { density_at_reference: counted.ln_density(&nowhere, 1.0, 0.0), ..counted }
     }
 
-    /// ln L at the reference to second order, with unresolved spots of the larger of the sizes that are most probable with the
-    /// reference's orbit and without a planet: what a surrogate is made of.
+    /// ln L at the reference to second order, with unresolved spots of the larger of the sizes that are most probable
+    /// with the reference's orbit and without a planet: what a surrogate is made of.
     pub fn expansion(&self) -> &Expansion {
         &self.cautious
     }
@@ -127,7 +127,8 @@ impl SpotsCounted {
 }
 
 impl Size {
-    /// Of unresolved spots `factor` times as large in variance as the entropy expects; `None` where that is no covariance.
+    /// Of unresolved spots `factor` times as large in variance as the entropy expects; `None` where that is no
+    /// covariance.
     fn new(expansion: &Expansion, factor: f64) -> Option<Self> {
         let lower = expansion.covariance_with_unresolved_spots(factor).cholesky()?.unpack();
         Some(Size {
@@ -206,8 +207,8 @@ mod tests {
         assert!(compared > 500, "{compared}");
     }
 
-    /// ln L that falls no further than to 50 below the reference: no orbit, however large, is better than one that explains all
-    /// velocities.
+    /// ln L that falls no further than to 50 below the reference: no orbit, however large, is better than one that
+    /// explains all velocities.
     #[test]
     fn a_map_that_answers_little_is_no_better_than_a_perfect_fit() {
         let counted = spotted();
@@ -220,7 +221,8 @@ mod tests {
         }
     }
 
-    /// Where ln L is a little off the quadratic, that changes it little: also where the quadratic is highest along the step.
+    /// Where ln L is a little off the quadratic, that changes it little: also where the quadratic is highest along the
+    /// step.
     #[test]
     fn nothing_is_magnified() {
         let counted = spotted();

@@ -1,7 +1,5 @@
-//! What is left of an expansion for the orbit's velocities when systemic velocity and stellar parameters are integrated out
-//! within their priors, each taken as a Gaussian of the same mean and variance.
-//!
-//! Left out: orbits (`periodogram`).
+//! What is left of an expansion for the orbit's velocities when systemic velocity and stellar parameters are integrated
+//! out within their priors, each taken as a Gaussian of the same mean and variance.
 
 use super::{Expansion, STELLAR};
 use crate::planets::velocities::VelocityQuadratic;

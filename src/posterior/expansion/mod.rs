@@ -1,9 +1,9 @@
-//! The regularised likelihood to second order around a reference, in the velocities of the profiles and in the star's own
-//! parameters (method section 4).
+//! The regularised likelihood to second order around a reference, in the velocities of the profiles and in the star's
+//! own parameters (method section 4).
 //!
-//! `ln L(x) = max_s [alpha S(s) - chi2(s, x)/2]` at the alpha of the reference is very nearly a quadratic in the velocity of
-//! every profile: it holds where the map that fits best answers the change of a velocity linearly. Its gradient and
-//! curvature take one preconditioned solve a profile. Left out: orbits (`periodogram`), proposals (`surrogate`).
+//! `ln L(x) = max_s [alpha S(s) - chi2(s, x)/2]` at the alpha of the reference is very nearly a quadratic in the
+//! velocity of every profile: it holds where the map that fits best answers the change of a velocity linearly. Its
+//! gradient and curvature take one preconditioned solve a profile.
 
 mod counted;
 mod marginal;
@@ -39,8 +39,8 @@ pub fn free_stellar(free: &[FreeParameter]) -> Vec<Parameter> {
     STELLAR.into_iter().filter(|p| free.iter().any(|f| f.parameter == *p)).collect()
 }
 
-/// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic velocity
-/// together), then the stellar parameters in the units of their names.
+/// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic
+/// velocity together), then the stellar parameters in the units of their names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expansion {
     /// The parameters that it was made at.
@@ -57,8 +57,8 @@ pub struct Expansion {
     pub gradient: DVector<f64>,
     /// Minus the second derivative.
     pub information: DMatrix<f64>,
-    /// Covariance of the gradient that photon noise makes, and unresolved spots where they are counted as noise. Otherwise it is
-    /// smaller than the information, which counts spots that might be there as well.
+    /// Covariance of the gradient that photon noise makes, and unresolved spots where they are counted as noise.
+    /// Otherwise it is smaller than the information, which counts spots that might be there as well.
     pub noise: DMatrix<f64>,
 }
 
@@ -68,9 +68,10 @@ const CG_TOLERANCE: f64 = 1e-4;
 impl Expansion {
     /// Around `reference`, in the velocities of all profiles and the given `stellar` parameters.
     ///
-    /// With the data weights W, the residual r, `D_x = dD/dx`, `C_x = d/dx` of the gradient of chi2/2 with respect to the map
-    /// and `M = alpha Hess(-S) + Hess(chi2/2)`: `g_x = -r W D_x` and `I_xy = D_x W D_y + r W D_xy - C_x M^-1 C_y`. Noise n in
-    /// the data changes the gradient by `(D_x - J M^-1 C_x) W n`, J the derivative of the model with respect to the map.
+    /// With the data weights W, the residual r, `D_x = dD/dx`, `C_x = d/dx` of the gradient of chi2/2 with respect to
+    /// the map and `M = alpha Hess(-S) + Hess(chi2/2)`: `g_x = -r W D_x` and `I_xy = D_x W D_y + r W D_xy - C_x M^-1
+    /// C_y`. Noise n in the data changes the gradient by `(D_x - J M^-1 C_x) W n`, J the derivative of the model with
+    /// respect to the map.
     pub fn of(imager: &Imager, reference: &Reference, stellar: &[Parameter]) -> Self {
         let model = DisplacedModel::new(imager, reference, stellar);
         let lambda = reference.solution.image.lambda;

@@ -1,7 +1,6 @@
 //! The forward model at a fixed map, displaced in one or two coordinates: its derivatives by central differences.
 //!
 //! A shift of all profiles at once gives every profile's own derivative, because no profile sees another's velocity.
-//! Left out: how the map answers (`expansion`).
 
 use crate::maxent::Problem;
 use crate::numerics::vector::Portable;

@@ -1,12 +1,11 @@
 //! Spots that the map leaves over, counted as noise.
 //!
-//! The information counts spots as the entropy sees them: many small and independent ones. Real spots have edges, and what a
-//! map of the highest entropy misses of them is larger (25 times in variance for discs at a signal-to-noise ratio of 1000) and
-//! goes with the star: most of it looks like an orbit at the rotation period or its fractions. Its covariance has the shape of
-//! what spots add to noise, `information - noise`; its size is fitted, one number, as that of a jitter would be, to the
-//! gradient itself. Without it, half of all stars without a planet show one (`results/calibration.md`).
-//!
-//! Left out: that the size is known no better than the gradient tells, and that the shape is the entropy's.
+//! The information counts spots as the entropy sees them: many small and independent ones. Real spots have edges, and
+//! what a map of the highest entropy misses of them is larger (25 times in variance for discs at a signal-to-noise
+//! ratio of 1000) and goes with the star: most of it looks like an orbit at the rotation period or its fractions. Its
+//! covariance has the shape of what spots add to noise, `information - noise`; its size is fitted, one number, as that
+//! of a jitter would be, to the gradient itself. Without it, half of all stars without a planet show one
+//! (`results/calibration.md`).
 
 use super::{Expansion, Nuisance};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -15,8 +14,9 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 pub const UNRESOLVED_SPOTS: (f64, f64) = (1.0, 1e6);
 
 impl Expansion {
-    /// How many times larger than the entropy expects the unresolved spots are, in variance: the factor with which the gradient
-    /// at the centre is most probable, the `nuisances` being anywhere within their priors. `None` where none is possible.
+    /// How many times larger than the entropy expects the unresolved spots are, in variance: the factor with which the
+    /// gradient at the centre is most probable, the `nuisances` being anywhere within their priors. `None` where none
+    /// is possible.
     pub fn unresolved_spots(&self, nuisances: &[Nuisance]) -> Option<f64> {
         let moved = &self.information * self.columns(nuisances);
         let (sd, offset) = self.priors(nuisances);
@@ -36,11 +36,12 @@ impl Expansion {
         misfit(best).is_finite().then(|| best.exp())
     }
 
-    /// The same expansion with unresolved spots, `factor` times as large as the entropy expects in variance, counted as noise.
-    /// `None` where the information is singular.
+    /// The same expansion with unresolved spots, `factor` times as large as the entropy expects in variance, counted as
+    /// noise. `None` where the information is singular.
     ///
-    /// With `S = noise + factor (information - noise)` the covariance of the gradient, the best coordinates `centre + I^-1 g`
-    /// stay, and their covariance is `I^-1 S I^-1`: the new information is `I S^-1 I`, the new gradient `I S^-1 g`.
+    /// With `S = noise + factor (information - noise)` the covariance of the gradient, the best coordinates `centre +
+    /// I^-1 g` stay, and their covariance is `I^-1 S I^-1`: the new information is `I S^-1 I`, the new gradient `I S^-1
+    /// g`.
     pub fn with_unresolved_spots(&self, factor: f64) -> Option<Self> {
         let answer = self.covariance_with_unresolved_spots(factor).cholesky()?.solve(&self.information);
         let information = symmetric(self.information.tr_mul(&answer));
@@ -60,8 +61,8 @@ impl Expansion {
         Some(symmetric(&inverse * self.covariance_with_unresolved_spots(factor) * &inverse))
     }
 
-    /// What spots add to the covariance of the gradient, as the entropy has it: positive, whatever rounding and the curvature of
-    /// the model make of the difference.
+    /// What spots add to the covariance of the gradient, as the entropy has it: positive, whatever rounding and the
+    /// curvature of the model make of the difference.
     fn spots(&self) -> DMatrix<f64> {
         let scale = self.information.diagonal().map(|i| i.max(f64::MIN_POSITIVE).sqrt());
         let (scale, back) = (DMatrix::from_diagonal(&scale), DMatrix::from_diagonal(&scale.map(f64::recip)));
@@ -70,8 +71,8 @@ impl Expansion {
         symmetric(&scale * eigen.recompose() * &scale)
     }
 
-    /// Standard deviations of the nuisances' priors, and how far their means are from the centre. A prior wider than a thousand
-    /// standard errors is as good as flat.
+    /// Standard deviations of the nuisances' priors, and how far their means are from the centre. A prior wider than a
+    /// thousand standard errors is as good as flat.
     pub(super) fn priors(&self, nuisances: &[Nuisance]) -> (DVector<f64>, DVector<f64>) {
         const FLAT: f64 = 1e3;
         let columns = self.columns(nuisances);
@@ -108,8 +109,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_distr::StandardNormal;
 
-    /// Gradients drawn with spots 30 times what the information says, and a systemic velocity within its prior: the factor
-    /// comes back, the velocities stay, their covariance is the one that they have, and the prior is left alone.
+    /// Gradients drawn with spots 30 times what the information says, and a systemic velocity within its prior: the
+    /// factor comes back, the velocities stay, their covariance is the one that they have, and the prior is left alone.
     #[test]
     fn the_size_of_unresolved_spots_is_found() {
         let n = 60;

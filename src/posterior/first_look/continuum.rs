@@ -1,5 +1,5 @@
-//! Where the continuum beside the line is, on average and in each profile: profiles whose continuum is not at 1, or wanders from one to
-//! the next, are fitted by no map.
+//! Where the continuum beside the line is, on average and in each profile: profiles whose continuum is not at 1, or
+//! wanders from one to the next, are fitted by no map.
 
 use super::noise::Scatter;
 use crate::star::observation::{Observations, Profile};
@@ -23,8 +23,8 @@ pub struct Continuum {
     pub level: f64,
     /// Standard error of that, by the scatter of the profiles' own levels and of their bins.
     pub level_error: f64,
-    /// Standard deviation of the levels of single profiles about the mean, what their noise explains taken off; `None` where the noise
-    /// explains it all.
+    /// Standard deviation of the levels of single profiles about the mean, what their noise explains taken off; `None`
+    /// where the noise explains it all.
     pub wandering: Option<f64>,
     /// The same of half the difference of the two sides: the slope of profiles.
     pub tilting: Option<f64>,
@@ -37,7 +37,8 @@ struct Sides {
 }
 
 impl Continuum {
-    /// Of profiles whose line reaches `reach_kms` to either side of `centre_kms`; `None` where hardly any continuum is beside it.
+    /// Of profiles whose line reaches `reach_kms` to either side of `centre_kms`; `None` where hardly any continuum is
+    /// beside it.
     pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Option<Self> {
         let step_kms = observations.step_kms;
         let scatter: Scatter =

@@ -1,7 +1,7 @@
 //! The mean of all profiles, and where its line is.
 //!
-//! Profiles that stand between each other's bins, because their VRAD differ, are interpolated linearly; that is good enough for
-//! a first look and used for nothing else. Left out: what the line says of the star.
+//! Profiles that stand between each other's bins, because their VRAD differ, are interpolated linearly; that is good
+//! enough for a first look and used for nothing else.
 
 use super::LookError;
 use crate::star::observation::{Observations, Profile};

@@ -1,8 +1,7 @@
-//! A first look at observations, before there is a config: where the line is, how broad and how noisy, what that says of vsini
-//! and systemic velocity, and how much the line moves.
+//! A first look at observations, before there is a config: where the line is, how broad and how noisy, what that says
+//! of vsini and systemic velocity, and how much the line moves.
 //!
-//! Every number is a start for what the program does afterwards, and says how far it can be trusted. Left out: spots, orbits,
-//! and what to make of the numbers (`proposal`).
+//! Every number is a start for what the program does afterwards, and says how far it can be trusted.
 
 mod continuum;
 mod mean;
@@ -24,7 +23,8 @@ const SPOTS: (f64, f64) = (0.01, 0.3);
 /// What the centre owes to spots, as a share of vsini.
 const CENTRE: f64 = 0.004;
 
-/// How far limb darkening (its linear coefficient) and the width of a local line that is given (a share of it) may be wrong.
+/// How far limb darkening (its linear coefficient) and the width of a local line that is given (a share of it) may be
+/// wrong.
 const DOUBT: (f64, f64) = (0.15, 0.2);
 
 /// The local line as far as it is assumed.
@@ -93,7 +93,8 @@ pub enum LookError {
     },
     /// The line that is assumed is out of all proportion to the data.
     #[error(
-        "a local line of a standard deviation of {sigma_kms} km/s (with the instrument) is too narrow or too broad for bins of \
+        "a local line of a standard deviation of {sigma_kms} km/s (with the instrument) is too narrow or too broad \
+        for bins of \
          {step_kms:.3} km/s from {from_kms:.1} to {to_kms:.1}"
     )]
     LineModel {

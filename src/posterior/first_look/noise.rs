@@ -10,8 +10,8 @@ const FEWEST_BINS: usize = 30;
 /// Fewest bins of continuum of a profile that is counted.
 const FEWEST_IN_PROFILE: usize = 4;
 
-/// Only continuum nearer to the centre than this is asked, in units of the distance at which the line ends: farther out LSD
-/// profiles ripple.
+/// Only continuum nearer to the centre than this is asked, in units of the distance at which the line ends: farther out
+/// LSD profiles ripple.
 const OUTER: f64 = 2.0;
 
 /// Errors of a bin in units of the continuum.
@@ -51,8 +51,8 @@ impl std::iter::Sum for Scatter {
 }
 
 impl Scatter {
-    /// The continuum of `profile` beside a line that reaches `reach_kms` to either side of `centre_kms`, as far again, about a
-    /// straight line on each side: neither level nor slope counts.
+    /// The continuum of `profile` beside a line that reaches `reach_kms` to either side of `centre_kms`, as far again,
+    /// about a straight line on each side: neither level nor slope counts.
     pub fn of(profile: &Profile, step_kms: f64, centre_kms: f64, reach_kms: f64) -> Self {
         let side = |sign: f64| {
             let distance = move |j: usize| sign * (profile.velocity_kms(j, step_kms) - centre_kms);
@@ -63,9 +63,9 @@ impl Scatter {
         [side(-1.0), side(1.0)].into_iter().sum()
     }
 
-    /// Over how many bins noise goes together for features of a width (standard deviation) of `sigma_bins`: `1 + 2 sum rho a`, rho the
-    /// correlation of bins so far apart, as long as it is larger than white noise shows by chance, and `a` that of the features. What a
-    /// profile says of them has an error that is larger by the root of it.
+    /// Over how many bins noise goes together for features of a width (standard deviation) of `sigma_bins`: `1 + 2 sum
+    /// rho a`, rho the correlation of bins so far apart, as long as it is larger than white noise shows by chance, and
+    /// `a` that of the features. What a profile says of them has an error that is larger by the root of it.
     pub fn correlated_bins(&self, sigma_bins: f64) -> f64 {
         let overlap = |lag: usize| (-0.25 * (lag as f64 / sigma_bins).powi(2)).exp();
         const CHANCE: f64 = 2.5;
@@ -78,8 +78,8 @@ impl Scatter {
         bins
     }
 
-    /// Correlations of bins 1, ..., `lags` apart, none beyond. The lines take up some of what goes together; what the products of
-    /// their residuals are on average is linear in the covariances, and is solved for these.
+    /// Correlations of bins 1, ..., `lags` apart, none beyond. The lines take up some of what goes together; what the
+    /// products of their residuals are on average is linear in the covariances, and is solved for these.
     fn correlation(&self, lags: usize) -> Option<Vec<f64>> {
         let mut lengths = self.lengths.clone();
         lengths.sort_unstable();
@@ -113,8 +113,8 @@ fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatte
     Scatter { chi2: products(0), freedom: count - 2, products: std::array::from_fn(products), lengths: vec![count] }
 }
 
-/// Mean of the sum of products of residuals that are so many bins apart (row) from a straight line through `bins`, for noise that has
-/// a covariance of 1 at one distance (column).
+/// Mean of the sum of products of residuals that are so many bins apart (row) from a straight line through `bins`, for
+/// noise that has a covariance of 1 at one distance (column).
 fn mean_products(bins: usize, lags: usize) -> DMatrix<f64> {
     let line = DMatrix::from_fn(bins, 2, |j, power| (j as f64 - 0.5 * (bins - 1) as f64).powi(power as i32));
     let unit = DMatrix::from_fn(bins, 2, |j, k| line[(j, k)] / line.column(k).norm());
@@ -166,7 +166,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Level and slope leave no trace, and of points about a line the scatter is that of a fit by hand: y = 1, 0, 1 about 2/3.
+    /// Level and slope leave no trace, and of points about a line the scatter is that of a fit by hand: y = 1, 0, 1
+    /// about 2/3.
     #[test]
     fn slopes_do_not_count() {
         let line = |j: usize| 1.3 - 0.01 * j as f64;

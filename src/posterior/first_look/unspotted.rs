@@ -1,11 +1,11 @@
-//! The unspotted star whose profile is most like the mean one: vsini, centre, strength, level of the continuum and, where nobody
-//! gives it, width of the local line, by least squares (Levenberg-Marquardt) through the forward model.
+//! The unspotted star whose profile is most like the mean one: vsini, centre, strength, level of the continuum and,
+//! where nobody gives it, width of the local line, by least squares (Levenberg-Marquardt) through the forward model.
 //!
-//! Spots that are dark at all phases, polar ones above all, fill the core of the mean profile and leave its flanks alone; so
-//! only the flanks and the continuum beside them are fitted. What remains is good to 1 % and 0.3 km/s of vsini, and to 0.4 % of
-//! vsini for the centre (`tests/first_look.rs`), where the width of the local line is known. Where it is not, it has a weak prior,
-//! and the error of vsini holds what it leaves open: the flanks of a slow rotator show it, those of a fast one hardly.
-//! Limb darkening is given.
+//! Spots that are dark at all phases, polar ones above all, fill the core of the mean profile and leave its flanks
+//! alone; so only the flanks and the continuum beside them are fitted. What remains is good to 1 % and 0.3 km/s of
+//! vsini, and to 0.4 % of vsini for the centre (`tests/first_look.rs`), where the width of the local line is known.
+//! Where it is not, it has a weak prior, and the error of vsini holds what it leaves open: the flanks of a slow rotator
+//! show it, those of a fast one hardly. Limb darkening is given.
 
 use super::mean::{HalfDepth, MeanProfile};
 use super::{LineModel, LookError};
@@ -31,8 +31,8 @@ const CONTINUUM_BINS: usize = 6;
 /// Passes of choosing the bins and fitting them.
 const PASSES: usize = 4;
 
-/// Standard deviation of the prior of the logarithm of the width of the local line: thermal motion and turbulence of a cool dwarf,
-/// blends of LSD lines.
+/// Standard deviation of the prior of the logarithm of the width of the local line: thermal motion and turbulence of a
+/// cool dwarf, blends of LSD lines.
 const LINE_PRIOR: f64 = 0.5;
 
 /// The local line is within these widths (standard deviations in km/s, before the spectrograph).
@@ -66,7 +66,8 @@ pub struct Unspotted {
     pub vsini_kms: f64,
     /// Velocity of the centre (km/s).
     pub centre_kms: f64,
-    /// Equivalent width (km/s) that the flanks would have without spots; larger than the line's own where there are polar ones.
+    /// Equivalent width (km/s) that the flanks would have without spots; larger than the line's own where there are
+    /// polar ones.
     pub equivalent_width_kms: f64,
     /// Depth of what is beyond the line: 0 where the continuum is at 1.
     pub offset: f64,
@@ -92,7 +93,8 @@ impl Unspotted {
         Ok(found.0)
     }
 
-    /// Distance (km/s) from the centre at which a line has ended that the spectrograph broadens by `instrumental_sigma_kms`.
+    /// Distance (km/s) from the centre at which a line has ended that the spectrograph broadens by
+    /// `instrumental_sigma_kms`.
     pub fn reach_kms(&self, instrumental_sigma_kms: f64) -> f64 {
         self.vsini_kms + REACH_SIGMAS * self.line_sigma_kms.hypot(instrumental_sigma_kms)
     }
@@ -150,8 +152,8 @@ impl Model {
         self.line.sigma_kms * log_width.exp()
     }
 
-    /// Depths, for an equivalent width of 1, in the bins of `profile`. A star that rotates as a solid body and has no spots looks
-    /// the same from everywhere.
+    /// Depths, for an equivalent width of 1, in the bins of `profile`. A star that rotates as a solid body and has no
+    /// spots looks the same from everywhere.
     fn depths(&self, shape: Shape, profile: &MeanProfile) -> Vec<f64> {
         let state = StarState {
             rotation: Rotation { omega_eq_rad_d: TAU, domega_rad_d: 0.0 },
@@ -169,7 +171,8 @@ impl Model {
     }
 }
 
-/// A fit of vsini, centre, equivalent width, offset and log width of the line (in this order) to bins that stay the same.
+/// A fit of vsini, centre, equivalent width, offset and log width of the line (in this order) to bins that stay the
+/// same.
 struct Fit<'a> {
     model: &'a Model,
     mean: &'a MeanProfile,
@@ -282,8 +285,8 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Variance of a bin in the flanks that is not explained. What spots leave there goes together over the width of the local line,
-    /// and so many bins count for one.
+    /// Variance of a bin in the flanks that is not explained. What spots leave there goes together over the width of
+    /// the local line, and so many bins count for one.
     fn unexplained(&self, here: &Point) -> f64 {
         let fitted = self.weights.iter().sum::<f64>();
         let total_kms = self.model.line_sigma_kms(here.p[4]).hypot(self.model.line.instrumental_sigma_kms);

@@ -1,9 +1,11 @@
-//! Whether what a map leaves over looks like noise: replicated data, the model with noise of the errors given, against the data.
+//! Whether what a map leaves over looks like noise: replicated data, the model with noise of the errors given, against
+//! the data.
 //!
-//! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the profiles,
-//! between the core of the line and what lies outside, and whether neighbouring bins go together. In replicated data every
-//! profile has the same chi2 per datum, but for the scatter of a chi2 distribution, and neighbours have nothing to do with each
-//! other; noise of which several bins go together counts as so many fewer. What the map itself takes up is spread evenly here. Left out: what is wrong where it does not.
+//! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the
+//! profiles, between the core of the line and what lies outside, and whether neighbouring bins go together. In
+//! replicated data every profile has the same chi2 per datum, but for the scatter of a chi2 distribution, and
+//! neighbours have nothing to do with each other; noise of which several bins go together counts as so many fewer. What
+//! the map itself takes up is spread evenly here.
 
 use super::Residual;
 use crate::planets::periodogram::normal::cumulative;
@@ -96,7 +98,8 @@ impl Checks {
         }
         if self.core_excess_sigma.abs() > FAR {
             doubts.push(format!(
-                "chi2 is {:.2} per datum in the core of the line and {:.2} outside: errors, local line or continuum are not right \
+                "chi2 is {:.2} per datum in the core of the line and {:.2} outside: errors, local line or continuum \
+                are not right \
                  everywhere",
                 self.chi2_per_datum_core, self.chi2_per_datum_outside
             ));
@@ -118,7 +121,8 @@ fn mean(x: impl Iterator<Item = f64>) -> f64 {
     sum / n
 }
 
-/// Probability that chi2 of that many degrees of freedom is larger: its cube root is nearly normal (Wilson & Hilferty 1931).
+/// Probability that chi2 of that many degrees of freedom is larger: its cube root is nearly normal (Wilson & Hilferty
+/// 1931).
 fn chi2_exceeds(chi2: f64, freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     cumulative((1.0 - spread - (chi2 / freedom).cbrt()) / spread.sqrt())

@@ -1,6 +1,4 @@
 //! The observed depths and the weights of their bins, which is all that the misfit needs of the observations.
-//!
-//! Left out: the model that they are compared with.
 
 use crate::numerics::vector::Instructions;
 use crate::posterior::nuisances::Nuisances;
@@ -41,7 +39,8 @@ impl Data {
         Data { depth: of(&self.depth), inverse_variance, correlated_bins: self.correlated_bins, nuisances }
     }
 
-    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see another's bins.
+    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see
+    /// another's bins.
     #[inline(always)]
     pub fn weigh(&self, i: impl Instructions, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
         let weights = x[bins.clone()].iter().zip(&self.inverse_variance[bins.clone()]);

@@ -1,7 +1,7 @@
-//! One observed profile, once the response has made a line and a continuum of a map: its misfit, and what goes back through the
-//! response for gradient and curvature of chi2 / 2.
+//! One observed profile, once the response has made a line and a continuum of a map: its misfit, and what goes back
+//! through the response for gradient and curvature of chi2 / 2.
 //!
-//! Vectors are as long as the data, of which a profile has some bins. Left out: the response.
+//! Vectors are as long as the data, of which a profile has some bins.
 
 use super::data::Data;
 use crate::numerics::vector::linear::short_dot;
@@ -55,8 +55,9 @@ impl Task for Pull<'_> {
     }
 }
 
-/// What the transpose makes the curvature of, `J^T W J v` plus that of the model: with `dD = (line(dB) - D dC) / C`, the second
-/// derivative of `D = N/C` in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`. The continuum comes out.
+/// What the transpose makes the curvature of, `J^T W J v` plus that of the model: with `dD = (line(dB) - D dC) / C`,
+/// the second derivative of `D = N/C` in directions v and x is `-(dD[v] dC[x] + dD[x] dC[v]) / C`. The continuum comes
+/// out.
 pub struct Bend<'a> {
     pub data: &'a Data,
     pub bins: Range<usize>,

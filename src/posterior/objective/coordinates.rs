@@ -1,7 +1,7 @@
 //! Free parameters, their joint prior, and the sampling coordinates that samplers and optimisers move in.
 //!
-//! Where K and phi are both free they become `(K cos, K sin)` of the orbital phase at mid-time (method section 5): K near 0
-//! and the wrap of phi are then no special case, and phi no longer hangs on the period. Left out: the likelihood.
+//! Where K and phi are both free they become `(K cos, K sin)` of the orbital phase at mid-time (method section 5): K
+//! near 0 and the wrap of phi are then no special case, and phi no longer hangs on the period.
 
 use super::parameters::{Parameter, ParameterValues};
 use super::prior::Prior;
@@ -139,8 +139,8 @@ impl ParameterSpace {
         self.polar.map_or(0.0, |(k, _)| -(TAU * theta[k].max(SMALLEST_K_KMS)).ln())
     }
 
-    /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what numerical
-    /// derivatives and a first trust region are scaled with.
+    /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what
+    /// numerical derivatives and a first trust region are scaled with.
     pub fn scales(&self) -> Vec<f64> {
         // a change of angular velocity that turns the star by this angle (rad) in half the time base
         let turn = 0.01;

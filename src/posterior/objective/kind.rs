@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ObjectiveKind {
-    /// Spottedness at the target chi2 (coverage by spots; rms of brightness minus 1 of bright and dark images), turned into a log-probability by the trade-off curve.
+    /// Spottedness at the target chi2 (coverage by spots; rms of brightness minus 1 of bright and dark images), turned
+    /// into a log-probability by the trade-off curve.
     #[default]
     Spottedness,
     /// Entropy at the target chi2, turned into a log-probability in the same way.
@@ -32,8 +33,8 @@ impl ObjectiveKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum UnresolvedSpots {
-    /// As the entropy has them (the paper's method): small and independent. Intervals are too narrow where spots have edges, above
-    /// all near Porb = Prot.
+    /// As the entropy has them (the paper's method): small and independent. Intervals are too narrow where spots have
+    /// edges, above all near Porb = Prot.
     Entropy,
     /// The chain counts them as noise, of a size that the data tell, as a jitter's, and that is integrated over.
     #[default]

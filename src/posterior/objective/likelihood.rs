@@ -1,7 +1,6 @@
 //! What a reconstruction is worth: ln L by the three objectives (method section 3, step 3), whatever the prior says.
 //!
-//! In the posterior it is joined by the prior; alone it is what a landscape shows. Left out: the reconstruction itself
-//! (`posterior`).
+//! In the posterior it is joined by the prior; alone it is what a landscape shows.
 
 use super::kind::ObjectiveKind;
 use super::posterior::Posterior;
@@ -13,7 +12,8 @@ use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
 const FAR: f64 = 1.05;
 
 impl Posterior {
-    /// The likelihood at `theta` (physical coordinates). The log-probability there is its logarithm plus that of the prior.
+    /// The likelihood at `theta` (physical coordinates). The log-probability there is its logarithm plus that of the
+    /// prior.
     pub fn likelihood(&self, theta: &[f64]) -> Reconstruction {
         if !self.is_physical(theta) {
             return Reconstruction { likelihood: None, passes: 0, status: Status::NonFinite };
@@ -55,8 +55,8 @@ impl Posterior {
         (-0.5 * (target - on_curve + misfit), slope)
     }
 
-    /// Spottedness of a reconstruction; at the target chi2 what a first-order forecast says that the solver's next steps would
-    /// make of it (along the path alone where spottedness is not the objective).
+    /// Spottedness of a reconstruction; at the target chi2 what a first-order forecast says that the solver's next
+    /// steps would make of it (along the path alone where spottedness is not the objective).
     pub(super) fn spottedness(&self, solution: &Solution) -> f64 {
         match (self.goal(), solution.termination) {
             (Goal::Chi2 { target, .. }, Termination::Converged) => {

@@ -1,7 +1,6 @@
 //! What a point of parameter space is worth: parameters, priors, trade-off curve, objectives (method section 3).
 
 pub mod coordinates;
-mod warm_start;
 pub mod kind;
 mod likelihood;
 pub mod orbital;
@@ -12,6 +11,7 @@ pub mod prior;
 pub mod reference;
 pub mod target;
 pub mod tradeoff;
+mod warm_start;
 
 pub use coordinates::{FreeParameter, ParameterSpace};
 pub use kind::{ObjectiveKind, UnresolvedSpots};

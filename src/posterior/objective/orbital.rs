@@ -1,5 +1,5 @@
-//! What is usually quoted of an orbit, from the parameters sampled: period in days, time of the largest radial velocity and of inferior
-//! conjunction, minimum mass; for single orbits with their errors, and for each draw of a chain.
+//! What is usually quoted of an orbit, from the parameters sampled: period in days, time of the largest radial velocity
+//! and of inferior conjunction, minimum mass; for single orbits with their errors, and for each draw of a chain.
 //!
 //! Formulas are in `star::planet`, statistics of draws in `chain::derived`.
 
@@ -18,7 +18,8 @@ const UNKNOWN_PHASE: f64 = 0.288_675_134_594_812_9;
 const SMALL_MJUP: f64 = 0.1;
 
 /// What phi is, in a line.
-pub const PHI: &str = "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity; 0: a maximum at star.epoch_d";
+pub const PHI: &str = "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity; 0: a \
+maximum at star.epoch_d";
 
 /// A quantity of an orbit. The order is that of tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,7 +137,8 @@ impl OrbitQuantities {
         self.epoch_d + period * (turns + phase)
     }
 
-    /// The value for one orbit; an event nearest to `near`, or else to the middle of the data. `None` where it cannot be had.
+    /// The value for one orbit; an event nearest to `near`, or else to the middle of the data. `None` where it cannot
+    /// be had.
     pub fn value(&self, quantity: OrbitQuantity, orbit: &Orbit, near: Option<f64>) -> Option<f64> {
         let period = self.period_d(orbit);
         let value = match quantity {
@@ -149,8 +151,8 @@ impl OrbitQuantities {
         value.filter(|value| value.is_finite())
     }
 
-    /// The value with its error to first order, for errors of K, period over rotation period and phi of that covariance. The error of
-    /// an event is at most that of one of which nothing but the period is known.
+    /// The value with its error to first order, for errors of K, period over rotation period and phi of that
+    /// covariance. The error of an event is at most that of one of which nothing but the period is known.
     pub fn estimate(&self, quantity: OrbitQuantity, orbit: &Orbit, covariance: &[[f64; 3]; 3]) -> Option<Estimate> {
         let value = self.value(quantity, orbit, None)?;
         let (prot, period) = (self.rotation_period_d, self.period_d(orbit));

@@ -1,6 +1,4 @@
 //! The parameters that may be sampled: their names, units, and values at one point of parameter space.
-//!
-//! Left out: priors (`prior`) and what a point is worth (`objective`).
 
 use crate::star::{Orbit, Rotation, StarState, Surface};
 use serde::{Deserialize, Serialize, Serializer};
@@ -120,8 +118,8 @@ impl Parameter {
     }
 }
 
-/// Values of all parameters in the units of their names, free or not; index by [`Parameter`]. Those of the surface are NaN where
-/// they are not given: they are those of the star's settings then.
+/// Values of all parameters in the units of their names, free or not; index by [`Parameter`]. Those of the surface are
+/// NaN where they are not given: they are those of the star's settings then.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterValues(pub [f64; 12]);
 

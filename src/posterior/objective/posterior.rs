@@ -1,14 +1,12 @@
-//! The log-probability of a parameter vector: one maximum-entropy reconstruction, judged by one of three objectives (method
-//! section 3), times the prior; and its gradient.
-//!
-//! Left out: what a reconstruction is worth (`likelihood`), how the reference was found, and who explores the posterior.
+//! The log-probability of a parameter vector: one maximum-entropy reconstruction, judged by one of three objectives
+//! (method section 3), times the prior; and its gradient.
 
 use super::coordinates::ParameterSpace;
-use super::warm_start::{WarmStart, nearest, place, sampled, worthwhile};
 use super::kind::ObjectiveKind;
 use super::parameters::Parameter;
 use super::prediction::{Prediction, Solved};
 use super::reference::{Reference, precondition, start};
+use super::warm_start::{WarmStart, nearest, place, sampled, worthwhile};
 use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
 use crate::posterior::imaging::{Imager, ImagingProblem};
 use crate::sampling::log_density::{Evaluation, Gradient, LogDensity, Status};
@@ -27,8 +25,8 @@ pub struct Posterior {
     settings: SolverSettings,
     /// Where evaluations start: the reference, and others.
     warm_starts: Vec<WarmStart>,
-    /// What responses of stars close to the reference have in common; nothing where only orbit and systemic velocity are free, so that
-    /// pixels are looked at once for all evaluations.
+    /// What responses of stars close to the reference have in common; nothing where only orbit and systemic velocity
+    /// are free, so that pixels are looked at once for all evaluations.
     nearby: Option<Arc<Nearby>>,
 }
 
@@ -66,8 +64,8 @@ impl Posterior {
         posterior
     }
 
-    /// The same posterior with warm starts at `thetas` (physical coordinates) besides the reference, and no others: evaluations start
-    /// from the nearest. Places without an image get none.
+    /// The same posterior with warm starts at `thetas` (physical coordinates) besides the reference, and no others:
+    /// evaluations start from the nearest. Places without an image get none.
     pub fn with_warm_starts(mut self, thetas: &[Vec<f64>]) -> Self {
         self.warm_starts.truncate(1);
         let more = thetas.par_iter().with_max_len(1).filter_map(|theta| self.another_warm_start(theta));
@@ -134,14 +132,15 @@ impl Posterior {
         WarmStart { place: place(imager, space, &theta), theta, start, preconditioner, prediction }
     }
 
-    /// A warm start's prediction to second order. For orbits around the reference it is worth its passes (those of an evaluation become a
-    /// quarter fewer). Rotation, inclination and vsini change maps too much within their errors: in 7-D it saves none; nor does it
-    /// at a fixed lambda, where the first order leaves little.
+    /// A warm start's prediction to second order. For orbits around the reference it is worth its passes (those of an
+    /// evaluation become a quarter fewer). Rotation, inclination and vsini change maps too much within their errors: in
+    /// 7-D it saves none; nor does it at a fixed lambda, where the first order leaves little.
     fn second_order(&self, warm_start: &WarmStart) -> Prediction {
         let settings = SolverSettings { tolerance: BEND_TOLERANCE, leniency: 0.0, ..SolverSettings::patient() };
         let solve = |x: &[f64]| {
             let theta = Some(self.space.to_physical(x)).filter(|theta| self.is_physical(theta))?;
-            let solution = self.solve_near(warm_start, &theta, settings, &mut self.imager.problem(self.response(&theta)));
+            let solution =
+                self.solve_near(warm_start, &theta, settings, &mut self.imager.problem(self.response(&theta)));
             (solution.termination == Termination::Converged).then_some(solution.image)
         };
         warm_start.prediction.clone().with_second_order(&self.imager, &warm_start.start, solve)
@@ -262,10 +261,10 @@ impl Posterior {
 
     /// What changes of the forward model at a fixed map do to ln L: `weight_chi2 * chi2 + slope along direction`.
     ///
-    /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem). Spottedness
-    /// is not: with `A'` the gradient of spottedness and the constraint chi2 = target, the adjoint system `H y = A' - 2 mu g`, `g y = 0` (g the
-    /// gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`.
-    /// The solution's path is found again: the solver is content with that of a solution near by.
+    /// Regularised likelihood and entropy are extrema over maps, so that chi2 alone counts (envelope theorem).
+    /// Spottedness is not: with `A'` the gradient of spottedness and the constraint chi2 = target, the adjoint system
+    /// `H y = A' - 2 mu g`, `g y = 0` (g the gradient of chi2/2) gives `dA = -lambda d(g y) - mu d(chi2)`. The
+    /// solution's path is found again: the solver is content with that of a solution near by.
     fn sensitivity(
         &self,
         theta: &[f64],

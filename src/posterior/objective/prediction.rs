@@ -1,10 +1,10 @@
-//! A prediction of image and lambda from a known solution: how both change with each parameter (method section 2), to first or to
-//! second order.
+//! A prediction of image and lambda from a known solution: how both change with each parameter (method section 2), to
+//! first or to second order.
 //!
-//! The solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term
-//! set so that chi2 stays at the target (or left out at a fixed lambda). What that leaves over is taken from solutions near by. It is
-//! where an evaluation starts, and saves it a Newton step or two; what it ends at does not depend on it beyond the solver's tolerance.
-//! Left out: the solver.
+//! The solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term set so that
+//! chi2 stays at the target (or left out at a fixed lambda). What that leaves over is taken from solutions near by. It
+//! is where an evaluation starts, and saves it a Newton step or two; what it ends at does not depend on it beyond the
+//! solver's tolerance.
 
 use super::coordinates::ParameterSpace;
 use super::kind::ObjectiveKind;
@@ -49,7 +49,8 @@ const REACH: f64 = 3.0;
 /// Solutions for the second order are so many natural scales away.
 const BEND_STEP: f64 = 0.4;
 
-/// The second order is followed no farther than this many natural scales: beyond, it takes passes instead of saving them.
+/// The second order is followed no farther than this many natural scales: beyond, it takes passes instead of saving
+/// them.
 const BEND_REACH: f64 = 1.5;
 
 /// Largest change of a coordinate of the image by either order.
@@ -140,8 +141,8 @@ impl Prediction {
         Prediction { origin, map, scales, image, ln_lambda, adjoint, bends: Vec::new() }
     }
 
-    /// The same to second order, with `solve` giving the images at sampling coordinates around that of the solution and `known` as in
-    /// [`Prediction::start`]; to first order where an image is missing.
+    /// The same to second order, with `solve` giving the images at sampling coordinates around that of the solution and
+    /// `known` as in [`Prediction::start`]; to first order where an image is missing.
     pub fn with_second_order(self, imager: &Imager, known: &Start, solve: impl Fn(&[f64]) -> Option<Image>) -> Self {
         let is_finite = |bend: &Bend| bend.change.iter().all(|x| x.is_finite());
         let found = self.find_bends(imager, known, solve);

@@ -1,6 +1,6 @@
 //! Priors of single parameters: densities, bounds and draws, in the units of the parameter's name.
 //!
-//! Every density is normalised over its own bounds. Left out: which prior suits which parameter (`config`), and joint priors.
+//! Every density is normalised over its own bounds.
 
 use rand::Rng;
 use serde::Serialize;
@@ -152,8 +152,8 @@ impl Truncated {
         (-0.5 * (z - self.peak) * (z + self.peak)).exp()
     }
 
-    /// Logarithm of the integral of `exp(-z^2/2)` between the bounds: three-point Gauss-Legendre on 400 panels, none wider
-    /// than 0.05, which leaves errors of 1e-12.
+    /// Logarithm of the integral of `exp(-z^2/2)` between the bounds: three-point Gauss-Legendre on 400 panels, none
+    /// wider than 0.05, which leaves errors of 1e-12.
     fn log_integral(&self) -> f64 {
         const PANELS: usize = 400;
         let half = 0.5 * (self.hi - self.lo) / PANELS as f64;

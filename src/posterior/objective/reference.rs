@@ -1,7 +1,7 @@
 //! The reference: the Doppler image at one point of parameter space that every evaluation starts from, with the
 //! preconditioner and the trade-off curve that belong to it (method sections 2 and 3).
 //!
-//! Built once, deterministically, before a chain begins; never changed by it. Left out: how the point was found.
+//! Built once, deterministically, before a chain begins; never changed by it.
 
 use super::kind::ObjectiveKind;
 use super::parameters::ParameterValues;
@@ -22,14 +22,15 @@ const SMALLEST_CURVATURE: f64 = 0.2;
 /// Step in ln(lambda) between nodes of the trade-off curve.
 const CURVE_STEP: f64 = 0.25;
 
-/// Residual of the Newton systems on the way to a node: more steps, and fewer passes. Slopes are of one system solved well.
+/// Residual of the Newton systems on the way to a node: more steps, and fewer passes. Slopes are of one system solved
+/// well.
 const CURVE_CG_TOLERANCE: f64 = 0.05;
 
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
 const CURVE_REACH: (f64, f64) = (1.1, 0.8);
 
-/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many chi2. This
-/// and the lambdas below are in the entropy's unit.
+/// Data begin to matter at lambda = this over their number: there the entropy of a spotted star is worth that many
+/// chi2. This and the lambdas below are in the entropy's unit.
 const BLANK_LAMBDA: f64 = 3e-3;
 
 /// A first preconditioner is built at this many times the target chi2, where images are cheap.
@@ -38,7 +39,8 @@ const FIRST_CHI2: f64 = 1.5;
 /// chi2 per datum, all of them independent, that a map fits to: the paper's.
 const USUAL_CHI2: f64 = 0.97;
 
-/// Error allowed to the image of a provisional reference: a worse one costs every evaluation that starts from it passes.
+/// Error allowed to the image of a provisional reference: a worse one costs every evaluation that starts from it
+/// passes.
 const PROVISIONAL_TOLERANCE: f64 = 1e-7;
 
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
@@ -50,7 +52,8 @@ const OUT_OF_REACH: f64 = 1e-6;
 /// A chi2 within this factor of the target is not the floor, wherever the solver stopped.
 const ABOVE_TARGET: f64 = 1.001;
 
-/// A provisional reference takes what it gets at lambda = this over the number of data: beyond, noise is turned into spots.
+/// A provisional reference takes what it gets at lambda = this over the number of data: beyond, noise is turned into
+/// spots.
 pub const PROVISIONAL_LAMBDA: f64 = 3.0;
 
 /// The reference image and what belongs to it.
@@ -79,7 +82,8 @@ pub struct Reference {
 pub enum ReferenceError {
     /// No map fits the data that well.
     #[error(
-        "the target chi2 of {target:.4} per datum is below the reachable floor: at these parameters the fit comes down to \
+        "the target chi2 of {target:.4} per datum is below the reachable floor: at these parameters the fit comes \
+        down to \
          {floor:.5} per datum and no further"
     )]
     TargetBelowFloor {
@@ -90,7 +94,8 @@ pub enum ReferenceError {
     },
     /// The blank star already fits better than the target: data or errors cannot be right.
     #[error(
-        "a star without spots already fits with chi2 = {blank:.4} per datum, below the target of {target:.4}: the errors \
+        "a star without spots already fits with chi2 = {blank:.4} per datum, below the target of {target:.4}: the \
+        errors \
          are too large (see observations.sigma_scale) or the target is too high"
     )]
     NothingToFit {
@@ -123,7 +128,8 @@ impl Reference {
             Termination::Converged => {}
             // out of steps on the doorstep: the exact solution is a few more away
             Termination::StepLimit if reference.solution.chi2 <= ABOVE_TARGET * reference.chi2_target => {}
-            // a search for the floor that runs out of steps far from the target has found it to within what a message needs
+            // a search for the floor that runs out of steps far from the target has found it to within what a message
+            // needs
             Termination::Unreachable | Termination::StepLimit
                 if reference.solution.chi2 > ABOVE_TARGET * reference.chi2_target =>
             {
@@ -152,8 +158,8 @@ impl Reference {
         Ok(reference)
     }
 
-    /// A reference to begin a search with: without a trade-off curve (the regularised likelihood needs none), and with the
-    /// lambda it got where the target cannot be reached.
+    /// A reference to begin a search with: without a trade-off curve (the regularised likelihood needs none), and with
+    /// the lambda it got where the target cannot be reached.
     ///
     /// # Errors
     /// If a blank star is below the target already, or the solver fails.

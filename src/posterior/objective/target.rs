@@ -1,10 +1,11 @@
-//! The target chi2 that the profiles themselves ask for: the highest below which the radial velocities that the image leaves over
-//! stop shrinking (Petit et al. 2015, section 3; method section 3).
+//! The target chi2 that the profiles themselves ask for: the highest below which the radial velocities that the image
+//! leaves over stop shrinking (Petit et al. 2015, section 3; method section 3).
 //!
-//! Above it spots are still missing in the image; below, noise is turned into spots. Along the path of images the rms of the
-//! filtered velocities, observed minus modelled first moments, falls with lambda and then no more: the target is the chi2 at
-//! which a doubling of lambda is worth less than 3 %: the paper's 0.97 on its setup. Where the rms still shrinks at the lambda
-//! beyond which noise is turned into spots, which with the right model and errors it does not, that lambda is the end.
+//! Above it spots are still missing in the image; below, noise is turned into spots. Along the path of images the rms
+//! of the filtered velocities, observed minus modelled first moments, falls with lambda and then no more: the target is
+//! the chi2 at which a doubling of lambda is worth less than 3 %: the paper's 0.97 on its setup. Where the rms still
+//! shrinks at the lambda beyond which noise is turned into spots, which with the right model and errors it does not,
+//! that lambda is the end.
 
 use super::parameters::ParameterValues;
 use super::reference::{PROVISIONAL_LAMBDA, Reference, ReferenceError};
@@ -49,7 +50,8 @@ impl ChosenTarget {
             (false, false) => "",
         };
         format!(
-            "{value} per datum; velocities left over {filtered_rv_rms_kms:.4} km/s rms, {left:.0} % less with twice the weight of \
+            "{value} per datum; velocities left over {filtered_rv_rms_kms:.4} km/s rms, {left:.0} % less with twice \
+            the weight of \
              the data{still}"
         )
     }
@@ -62,7 +64,8 @@ struct Place {
     rms_kms: f64,
 }
 
-/// The target at `values`, for data of which noise correlated over `correlated_bins`: per datum, not per independent one.
+/// The target at `values`, for data of which noise correlated over `correlated_bins`: per datum, not per independent
+/// one.
 ///
 /// # Errors
 /// If the solver fails.

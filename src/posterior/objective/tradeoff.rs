@@ -1,8 +1,9 @@
-//! The trade-off curve of the reference: how much chi2 a given spottedness (or entropy) is worth (method section 3, step 2).
+//! The trade-off curve of the reference: how much chi2 a given spottedness (or entropy) is worth (method section 3,
+//! step 2).
 //!
-//! Nodes along the path of maximum-entropy images, from the reference to larger and smaller lambda; between them chi2 is a
-//! cubic in spottedness with the exact slopes of the path. Beyond its ends the curve goes on along its tangent, so that it
-//! stays monotone everywhere. Left out: what is done with a difference of chi2.
+//! Nodes along the path of maximum-entropy images, from the reference to larger and smaller lambda; between them chi2
+//! is a cubic in spottedness with the exact slopes of the path. Beyond its ends the curve goes on along its tangent, so
+//! that it stays monotone everywhere.
 
 /// One image on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,8 +37,8 @@ pub struct TradeOff {
 }
 
 impl TradeOff {
-    /// From nodes of falling chi2. Only the stretch around node `reference` along which spottedness grows is kept: beyond,
-    /// it says nothing about chi2.
+    /// From nodes of falling chi2. Only the stretch around node `reference` along which spottedness grows is kept:
+    /// beyond, it says nothing about chi2.
     pub fn new(nodes: Vec<Node>, reference: usize) -> Self {
         let good = |a: &Node, b: &Node| {
             a.spottedness < b.spottedness && a.entropy > b.entropy && b.chi2 < a.chi2 && b.chi2_per_spottedness < 0.0

@@ -1,9 +1,9 @@
 //! Warm starts: images that evaluations nearby start from, each with its preconditioner and what a prediction needs.
 //!
-//! The reference is one. Far from it a Newton system is no longer close to the one that its preconditioner inverts, and an
-//! evaluation takes hundreds of passes instead of tens; another warm start there brings it down again, for the passes of about
-//! five such evaluations. What an evaluation ends at does not depend on where it started beyond the solver's tolerance. Left out:
-//! where a chain, a grid or a search will go, and how an image is made.
+//! The reference is one. Far from it a Newton system is no longer close to the one that its preconditioner inverts, and
+//! an evaluation takes hundreds of passes instead of tens; another warm start there brings it down again, for the
+//! passes of about five such evaluations. What an evaluation ends at does not depend on where it started beyond the
+//! solver's tolerance.
 
 use super::coordinates::ParameterSpace;
 use super::prediction::Prediction;
@@ -39,8 +39,8 @@ impl WarmStart {
 /// Velocities that differ by this (km/s, in the root mean square over the profiles) are one unit apart in [`place`].
 const VELOCITY_KMS: f64 = 0.02;
 
-/// Where `theta` is as profiles have it: the velocities of all of them and the star's own free parameters, each in a unit that
-/// changes profiles as much, so that distances say how different the profiles are.
+/// Where `theta` is as profiles have it: the velocities of all of them and the star's own free parameters, each in a
+/// unit that changes profiles as much, so that distances say how different the profiles are.
 pub fn place(imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> Vec<f64> {
     let state = space.values_at(theta).state();
     let cycles = imager.cycles();
@@ -52,7 +52,12 @@ pub fn place(imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> Vec<f64>
 }
 
 /// The warm start nearest to `theta`, the first of equals; one that stands alone is not looked for.
-pub fn nearest<'a>(warm_starts: &'a [WarmStart], imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> &'a WarmStart {
+pub fn nearest<'a>(
+    warm_starts: &'a [WarmStart],
+    imager: &Imager,
+    space: &ParameterSpace,
+    theta: &[f64],
+) -> &'a WarmStart {
     if let [only] = warm_starts {
         return only;
     }
@@ -65,7 +70,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Model applications per evaluation that starts so far from where it ends: about what the paper's setup takes in the mean.
+/// Model applications per evaluation that starts so far from where it ends: about what the paper's setup takes in the
+/// mean.
 fn passes(distance: f64) -> f64 {
     (15.0 + 6.0 * distance.powf(3.5)).min(500.0)
 }
@@ -87,8 +93,9 @@ pub fn sampled(thetas: &[Vec<f64>]) -> Vec<&Vec<f64>> {
     chosen.into_iter().map(|i| &thetas[i]).collect()
 }
 
-/// At which of `places` warm starts save more passes than they take, if so many `evaluations` are spread like the places and there is
-/// the `reference` already: the one that saves most, then the next. The places are in no particular order.
+/// At which of `places` warm starts save more passes than they take, if so many `evaluations` are spread like the
+/// places and there is the `reference` already: the one that saves most, then the next. The places are in no particular
+/// order.
 pub fn worthwhile(reference: &WarmStart, places: &[Vec<f64>], evaluations: usize) -> Vec<usize> {
     let each = evaluations as f64 / places.len() as f64;
     let mut now: Vec<f64> = places.iter().map(|place| passes(distance(&reference.place, place))).collect();

@@ -1,7 +1,7 @@
 //! The quadratic at one period: a Gaussian in all other coordinates.
 //!
-//! With `x = T y + o` the coordinates of the expansion, y the linear ones (K cos, K sin, systemic velocity, stellar parameters)
-//! and T's first two columns the cosine and sine of the orbit's angle: `ln L = c + b y - y A y / 2`.
+//! With `x = T y + o` the coordinates of the expansion, y the linear ones (K cos, K sin, systemic velocity, stellar
+//! parameters) and T's first two columns the cosine and sine of the orbit's angle: `ln L = c + b y - y A y / 2`.
 
 use crate::posterior::expansion::Expansion;
 use crate::posterior::objective::{Parameter, ParameterSpace, Prior};
@@ -36,7 +36,8 @@ pub(super) struct LinearModel {
     prior_pull: DVector<f64>,
 }
 
-/// What is added to ln L at every period: `constant + gradient (y - centre) - (y - centre) information (y - centre) / 2`.
+/// What is added to ln L at every period: `constant + gradient (y - centre) - (y - centre) information (y - centre) /
+/// 2`.
 #[derive(Clone, Debug)]
 pub(super) struct Correction {
     pub centre: DVector<f64>,

@@ -1,8 +1,8 @@
-//! The surrogate brought closer to the posterior that is sampled: a quadratic in the linear coordinates, fitted to what a few
-//! hundred reconstructions say beyond it.
+//! The surrogate brought closer to the posterior that is sampled: a quadratic in the linear coordinates, fitted to what
+//! a few hundred reconstructions say beyond it.
 //!
-//! The expansion is that of the regularised likelihood. Spottedness, which is no extremum over maps, falls faster in the star's
-//! own parameters (by a fifth of their errors on the paper's setup). Left out: how a reconstruction is judged.
+//! The expansion is that of the regularised likelihood. Spottedness, which is no extremum over maps, falls faster in
+//! the star's own parameters (by a fifth of their errors on the paper's setup).
 
 use super::Surrogate;
 use super::conditional::Correction;
@@ -27,7 +27,8 @@ const ENOUGH: f64 = 3.0;
 const TRIALS: usize = 64;
 
 impl Surrogate {
-    /// The surrogate fitted to `density`, if that is better than as it was, and the share of its proposals that are accepted.
+    /// The surrogate fitted to `density`, if that is better than as it was, and the share of its proposals that are
+    /// accepted.
     pub fn fitted(self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> (Self, f64) {
         let own = (self.acceptance(density, evaluator), self);
         let fitted = own.1.corrected(density, evaluator).map(|fitted| (fitted.acceptance(density, evaluator), fitted));
@@ -35,8 +36,8 @@ impl Surrogate {
         (best, acceptance)
     }
 
-    /// The surrogate with what `density` says beyond it, by least squares over draws of the surrogate itself, which depend on
-    /// nothing but it. `None` where too few draws say anything, or no maximum is left.
+    /// The surrogate with what `density` says beyond it, by least squares over draws of the surrogate itself, which
+    /// depend on nothing but it. `None` where too few draws say anything, or no maximum is left.
     fn corrected(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> Option<Self> {
         let count = self.model.linear_count();
         let terms = 1 + count + count * (count + 1) / 2;
@@ -59,9 +60,9 @@ impl Surrogate {
         Surrogate::of(model, self.space.clone(), self.time_base_cycles, self.temperature)
     }
 
-    /// Share of the surrogate's proposals that `density` accepts from where a chain is: its draws, each with the weight that
-    /// `density` has over the surrogate there. Without the weights the few draws where the surrogate is far too low, and a
-    /// chain stays for long, would hardly count.
+    /// Share of the surrogate's proposals that `density` accepts from where a chain is: its draws, each with the weight
+    /// that `density` has over the surrogate there. Without the weights the few draws where the surrogate is far too
+    /// low, and a chain stays for long, would hardly count.
     fn acceptance(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> f64 {
         let draws = self.evaluated(TRIALS, density, evaluator);
         let beyond: Vec<f64> = draws

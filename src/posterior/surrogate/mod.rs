@@ -1,9 +1,9 @@
-//! A stand-in for the posterior that costs microseconds: the quadratic of [`crate::posterior::expansion`] with the priors, frozen before a
-//! chain begins (method section 5, surrogate move).
+//! A stand-in for the posterior that costs microseconds: the quadratic of [`crate::posterior::expansion`] with the
+//! priors, frozen before a chain begins (method section 5, surrogate move).
 //!
-//! Given the period, the quadratic is a Gaussian in K cos, K sin, the systemic velocity and the stellar parameters; over the
-//! periods it is tabulated. Its tails are those of a t distribution, so that nothing it calls improbable is out of reach.
-//! Left out: the exact posterior, which decides what is accepted (`ensemble`).
+//! Given the period, the quadratic is a Gaussian in K cos, K sin, the systemic velocity and the stellar parameters;
+//! over the periods it is tabulated. Its tails are those of a t distribution, so that nothing it calls improbable is
+//! out of reach.
 
 mod conditional;
 mod correction;
@@ -58,8 +58,8 @@ struct Place {
 }
 
 impl Surrogate {
-    /// Around `reference`; `None` where the space is not one that it is made for (K or phi fixed), or the likelihood has no
-    /// maximum to second order.
+    /// Around `reference`; `None` where the space is not one that it is made for (K or phi fixed), or the likelihood
+    /// has no maximum to second order.
     pub fn new(imager: &Imager, space: &ParameterSpace, reference: &Reference) -> Option<Self> {
         if !is_orbit_free(space) {
             return None;
@@ -67,8 +67,8 @@ impl Surrogate {
         Surrogate::of_expansion(&Expansion::of(imager, reference, &free_stellar(space.free())), space, imager)
     }
 
-    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where K or phi is fixed, or the
-    /// likelihood has no maximum.
+    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where K or phi is fixed, or
+    /// the likelihood has no maximum.
     pub fn of_expansion(expansion: &Expansion, space: &ParameterSpace, imager: &Imager) -> Option<Self> {
         if !is_orbit_free(space) {
             return None;
@@ -131,8 +131,8 @@ impl Surrogate {
         Some(Place { position: position.to_vec(), log_density: self.density(&conditional, position), log_proposal })
     }
 
-    /// The end of a walk of independent proposals on the surrogate that begins at `place`: reversible with respect to it, and
-    /// after so many steps all but a draw of it.
+    /// The end of a walk of independent proposals on the surrogate that begins at `place`: reversible with respect to
+    /// it, and after so many steps all but a draw of it.
     fn walk(&self, mut place: Place, rng: &mut dyn RngCore) -> Place {
         for _ in 0..WALK {
             let log_uniform = rng.random::<f64>().ln();

@@ -1,8 +1,9 @@
 //! The surrogate as a move of the ensemble: the end of a walk on it, accepted by what the exact posterior says.
 //!
-//! The walk is reversible with respect to the surrogate density q, so that the Hastings factor is `q(current) / q(proposed)`
-//! whatever q is (Liu 2001, *Monte Carlo Strategies in Scientific Computing*, section 9.4.3: surrogate transition). Where q is
-//! the posterior up to a constant, every proposal is accepted, and the next state hardly depends on the last.
+//! The walk is reversible with respect to the surrogate density q, so that the Hastings factor is `q(current) /
+//! q(proposed)` whatever q is (Liu 2001, *Monte Carlo Strategies in Scientific Computing*, section 9.4.3: surrogate
+//! transition). Where q is the posterior up to a constant, every proposal is accepted, and the next state hardly
+//! depends on the last.
 
 use super::Surrogate;
 use crate::sampling::chain::MoveKind;

@@ -1,10 +1,10 @@
-//! Who is asked next: whoever has least to do; and where more questions are left than all can take at once, some have questions ahead,
-//! so that nobody waits for the next one.
+//! Who is asked next: whoever has least to do; and where more questions are left than all can take at once, some have
+//! questions ahead, so that nobody waits for the next one.
 //!
-//! A question and its answer take a quarter of a millisecond on the way, and several where rank 0 has to wait for a processor, while an
-//! evaluation may take one (`results/scaling.md`). Fewer are ahead the longer they take, and the fewer are left (guided
-//! self-scheduling, Polychronopoulos & Kuck 1987): at the end of a batch nothing waits behind another question while somebody is idle.
-//! Left out: messages.
+//! A question and its answer take a quarter of a millisecond on the way, and several where rank 0 has to wait for a
+//! processor, while an evaluation may take one (`results/scaling.md`). Fewer are ahead the longer they take, and the
+//! fewer are left (guided self-scheduling, Polychronopoulos & Kuck 1987): at the end of a batch nothing waits behind
+//! another question while somebody is idle.
 
 use mpi::Rank;
 use std::collections::BTreeSet;

@@ -1,6 +1,4 @@
 //! What is sent between ranks: a tag, and bytes.
-//!
-//! Left out: when (`queue`, `worker`).
 
 use mpi::Tag;
 
@@ -13,8 +11,8 @@ pub(super) const ORDER: Tag = 2;
 /// From a worker: an answer.
 pub(super) const ANSWER: Tag = 3;
 
-/// To a worker: a question about the brief of that number. Each has a tag of its own, so that threads that do not know yet that the one
-/// before is over leave them alone.
+/// To a worker: a question about the brief of that number. Each has a tag of its own, so that threads that do not know
+/// yet that the one before is over leave them alone.
 pub(super) fn question(brief: usize) -> Tag {
     const FIRST: usize = 4;
     const TAGS: usize = 1000;

@@ -1,8 +1,8 @@
-//! Ranks of MPI: rank 0 asks, the others answer, in bytes. One queue: every question goes to whoever is free, and the answers come
-//! in the order of the questions.
+//! Ranks of MPI: rank 0 asks, the others answer, in bytes. One queue: every question goes to whoever is free, and the
+//! answers come in the order of the questions.
 //!
-//! A panic on any rank, on any thread, ends them all: without that the others would wait for it forever. Nobody burns a processor
-//! while waiting (`nap`). Left out: what is asked (`pool`), and what a failure looks like to the user.
+//! A panic on any rank, on any thread, ends them all: without that the others would wait for it forever. Nobody burns a
+//! processor while waiting (`nap`).
 
 mod hands;
 mod message;
@@ -45,8 +45,8 @@ pub enum ClusterError {
     Threads,
 }
 
-/// Joins the ranks that a launcher has started, this one answering so many questions at once if it is not the first; without a
-/// launcher there is nobody to join, and MPI is left alone.
+/// Joins the ranks that a launcher has started, this one answering so many questions at once if it is not the first;
+/// without a launcher there is nobody to join, and MPI is left alone.
 ///
 /// # Errors
 /// [`ClusterError`].

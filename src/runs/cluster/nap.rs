@@ -1,6 +1,6 @@
 //! Waiting without burning a processor: naps that grow with the wait.
 //!
-//! MPI's own blocking calls spin. Left out: what is waited for.
+//! MPI's own blocking calls spin.
 
 use std::time::{Duration, Instant};
 
@@ -10,8 +10,8 @@ const SHARE: u32 = 20;
 /// The shortest nap; the kernel adds some 50 us.
 const SHORTEST: Duration = Duration::from_micros(10);
 
-/// The longest of who has nothing to do: so long does it take at most to hear that it is wanted. A look costs some 10 us, 3 % of its
-/// processor.
+/// The longest of who has nothing to do: so long does it take at most to hear that it is wanted. A look costs some 10
+/// us, 3 % of its processor.
 pub(super) const WHILE_IDLE: Duration = Duration::from_micros(250);
 
 /// The longest of rank 0 while all have something to do: so long does it take to see that the job is to stop.

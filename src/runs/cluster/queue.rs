@@ -1,6 +1,4 @@
 //! Rank 0: questions out to whoever is free, answers back in order.
-//!
-//! Left out: the other side (`worker`), and who is next (`hands`).
 
 use super::Ranks;
 use super::hands::Hands;
@@ -42,8 +40,8 @@ impl Queue {
         self.at_once.iter().map(|(_, at_once)| at_once).sum()
     }
 
-    /// The answers to the first of the `questions` about `brief`: to all, unless `stop` is set meanwhile, after which none is
-    /// asked any more and those that were are waited for.
+    /// The answers to the first of the `questions` about `brief`: to all, unless `stop` is set meanwhile, after which
+    /// none is asked any more and those that were are waited for.
     pub fn answers(&self, brief: &[u8], questions: &[Vec<u8>], stop: &AtomicBool) -> Vec<Vec<u8>> {
         let tag = question(self.tell(brief));
         let mut hands = Hands::new(&self.at_once);

@@ -1,7 +1,7 @@
 //! The other ranks: told what questions are about, they answer until they are dismissed.
 //!
-//! Every thread takes its questions from MPI and sends its answers itself, so that nothing has to wake up for either while all are
-//! busy; the main thread hears orders. Left out: the other side (`queue`).
+//! Every thread takes its questions from MPI and sends its answers itself, so that nothing has to wake up for either
+//! while all are busy; the main thread hears orders.
 
 use super::message::{ANSWER, HELLO, ORDER, Order, number, numbered, question, split};
 use super::nap::{WHILE_IDLE, Wait, nap};

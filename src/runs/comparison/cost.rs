@@ -1,6 +1,4 @@
 //! What chain and landscape took: reconstructions, and passes, which hardly depend on the machine.
-//!
-//! Left out: the reconstructions of the search for the reference before them.
 
 use super::{Compared, Pair};
 use crate::sampling::chain::Summary;
@@ -85,8 +83,8 @@ impl Cost {
     }
 }
 
-/// Nodes of a grid that also has the axes that are missing: as many to an error bar as there are on the others in the geometric
-/// mean, out to [`REACH`] error bars. `None` if none is missing.
+/// Nodes of a grid that also has the axes that are missing: as many to an error bar as there are on the others in the
+/// geometric mean, out to [`REACH`] error bars. `None` if none is missing.
 pub(super) fn nodes_needed(pair: &Pair, parameters: &BTreeMap<String, Compared>) -> Option<f64> {
     let spacings: Vec<f64> = parameters.values().filter_map(|one| one.spacing).collect();
     let missing = parameters.len() - spacings.len();

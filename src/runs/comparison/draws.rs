@@ -1,4 +1,5 @@
-//! The chain's draws on the axes of a landscape: how many are outside, and how far the others are from the landscape's distribution.
+//! The chain's draws on the axes of a landscape: how many are outside, and how far the others are from the landscape's
+//! distribution.
 
 use super::Pair;
 use crate::sampling::chain::{ParameterSummary, Summary};

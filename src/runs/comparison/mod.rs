@@ -1,9 +1,9 @@
-//! A chain against a landscape of the same data: the same posterior by two routes, and the paper's paraboloid beside them
-//! (method section 6).
+//! A chain against a landscape of the same data: the same posterior by two routes, and the paper's paraboloid beside
+//! them (method section 6).
 //!
-//! The landscape has no prior: it gets the run's before it is integrated. Differences are in units of the chain's error bar, half
-//! its 68 % interval. A sampled parameter without an axis is fixed in the landscape, which is then conditional. Left
-//! out: how either was made.
+//! The landscape has no prior: it gets the run's before it is integrated. Differences are in units of the chain's error
+//! bar, half its 68 % interval. A sampled parameter without an axis is fixed in the landscape, which is then
+//! conditional.
 
 mod cost;
 mod draws;
@@ -35,8 +35,8 @@ pub struct Comparison {
     pub parameters: BTreeMap<String, Compared>,
     /// Sampled parameters that are fixed in the landscape: it is conditional on them, the chain marginal.
     pub fixed_in_landscape: Vec<String>,
-    /// Nodes that a grid over all sampled parameters would have needed, at the same spacing for each error bar and out to three
-    /// of them along the axes that are missing; null if none is.
+    /// Nodes that a grid over all sampled parameters would have needed, at the same spacing for each error bar and out
+    /// to three of them along the axes that are missing; null if none is.
     pub nodes_needed: Option<f64>,
     /// Share of the chain's draws outside the grid.
     pub outside: f64,

@@ -22,7 +22,8 @@ pub(super) fn notes(comparison: &Comparison, summary: &Summary) -> Vec<String> {
     if !comparison.fixed_in_landscape.is_empty() {
         let missing = comparison.fixed_in_landscape.join(", ");
         notes.push(format!(
-            "{missing} fixed in the landscape and sampled in the chain: a conditional against a marginal posterior, whose \
+            "{missing} fixed in the landscape and sampled in the chain: a conditional against a marginal posterior, \
+            whose \
              intervals are wider and may lie elsewhere"
         ));
     }
@@ -30,7 +31,8 @@ pub(super) fn notes(comparison: &Comparison, summary: &Summary) -> Vec<String> {
         let percent = |name: &str, share: f64| format!("{name} {:.1} %", 100.0 * share);
         let axes = named(&|one| Some(one.outside).filter(|share| *share > 0.0), &percent).join(", ");
         notes.push(format!(
-            "the grid does not hold the posterior: {:.1} % of the draws are outside ({axes}), and the landscape's intervals \
+            "the grid does not hold the posterior: {:.1} % of the draws are outside ({axes}), and the landscape's \
+            intervals \
              are of what is inside",
             100.0 * comparison.outside
         ));

@@ -1,6 +1,5 @@
-//! A run and a landscape that belong together: the same data, star, image and objective, and axes that the chain samples.
-//!
-//! Left out: what they say (`comparison`).
+//! A run and a landscape that belong together: the same data, star, image and objective, and axes that the chain
+//! samples.
 
 use crate::data::config::{self, Difference, Settings};
 use crate::data::io::effort::Effort;

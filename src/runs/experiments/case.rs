@@ -1,7 +1,8 @@
-//! One simulated star, and the three routes to its planet's orbit: grid and paraboloid (the paper's), chain, periodogram.
+//! One simulated star, and the three routes to its planet's orbit: grid and paraboloid (the paper's), chain,
+//! periodogram.
 //!
-//! Grid and chain share the search for the reference. Where the star is modelled wrongly the target chi2 may be out of reach;
-//! then it is raised to what is in reach, as an observer would, and the outcome says so. Left out: which stars (`orbits`).
+//! Grid and chain share the search for the reference. Where the star is modelled wrongly the target chi2 may be out of
+//! reach; then it is raised to what is in reach, as an observer would, and the outcome says so.
 
 use super::laboratory::ExperimentError;
 use super::outcome::{Estimate, Outcome, Route};
@@ -15,7 +16,7 @@ use crate::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings
 use crate::posterior::detection::{Detection, DetectionSettings};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::objective::{Parameter, Reference, ReferenceError};
-use crate::runs::grid_scan::{PARABOLOID, GridScan, GridScanError};
+use crate::runs::grid_scan::{GridScan, GridScanError, PARABOLOID};
 use crate::runs::origin::by_name;
 use crate::runs::pool::Pool;
 use crate::runs::run::{CHAIN, Run, RunError, StartFrom};
@@ -34,8 +35,8 @@ const REACH: f64 = 3.0;
 /// Shortest period on a grid, over the rotation period.
 const SHORTEST: f64 = 0.3;
 
-/// A target out of reach is set above what a provisional reference reaches, by the first of these factors at which there is an
-/// image at the best orbit.
+/// A target out of reach is set above what a provisional reference reaches, by the first of these factors at which
+/// there is an image at the best orbit.
 const ABOVE_REACHED: [f64; 5] = [1.05, 1.08, 1.12, 1.2, 1.5];
 
 /// Where the nodes of a grid over K, Porb/Prot and phi are.

@@ -1,8 +1,7 @@
-//! Whether intervals are what they say: the share of injected values inside the chain's 68 and 95 % intervals, over spot maps and
-//! noise seeds, for each way to judge a reconstruction.
+//! Whether intervals are what they say: the share of injected values inside the chain's 68 and 95 % intervals, over
+//! spot maps and noise seeds, for each way to judge a reconstruction.
 //!
-//! Orbits are drawn from the very prior that the chain has, so that an exact posterior covers just as often as it says. Left out:
-//! the periodogram's intervals (`examples/calibration.rs`).
+//! Orbits are drawn from the very prior that the chain has, so that an exact posterior covers just as often as it says.
 
 use super::case::Case;
 use super::laboratory::{ExperimentError, Laboratory};
@@ -59,7 +58,10 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
             name: format!("{}_map_{map}_seed_{seed}", judge.name),
             config: with(
                 config.clone(),
-                &[("/imaging/objective", json!(judge.objective)), ("/imaging/unresolved_spots", json!(judge.unresolved_spots))],
+                &[
+                    ("/imaging/objective", json!(judge.objective)),
+                    ("/imaging/unresolved_spots", json!(judge.unresolved_spots)),
+                ],
             ),
             grid: None,
             chain: true,
@@ -109,7 +111,8 @@ fn injected(outcome: &Outcome, name: &str) -> f64 {
     outcome.config["planet"][name].as_f64().unwrap_or(f64::NAN)
 }
 
-/// Shares of the stars inside the intervals, with their binomial errors, for all periods, away from co-rotation and near it.
+/// Shares of the stars inside the intervals, with their binomial errors, for all periods, away from co-rotation and
+/// near it.
 fn shares(outcomes: &[Outcome]) -> Value {
     let is_near = |outcome: &&Outcome| (injected(outcome, "porb_over_prot") - 1.0).abs() < NEAR;
     let (near, away): (Vec<&Outcome>, Vec<&Outcome>) = outcomes.iter().partition(is_near);
@@ -163,8 +166,9 @@ fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, Experimen
 /// lambda of the image that has the target chi2, over the number of data; the paper's star at 0.97 has 1.6.
 const LAMBDA: f64 = 3.0;
 
-/// `config` with a target chi2 that its image attains: that of the image where lambda is [`LAMBDA`] over the number of data. How far down a noise realisation lets chi2 come is up to it, and a target near the floor would
-/// make noise of the spots.
+/// `config` with a target chi2 that its image attains: that of the image where lambda is [`LAMBDA`] over the number of
+/// data. How far down a noise realisation lets chi2 come is up to it, and a target near the floor would make noise of
+/// the spots.
 pub(super) fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, ExperimentError> {
     let scene = Scene::of_config(&config, &laboratory.folder.join("config.json"))?;
     let image = Reference::at_lambda(&scene.imager, scene.settings.values, LAMBDA)?;

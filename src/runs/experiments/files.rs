@@ -1,6 +1,4 @@
 //! The results of a row as files: `table.csv` and `summary.json` in a folder of its name.
-//!
-//! Left out: figures, which are drawn from these files.
 
 use super::report::Panel;
 use super::{Report, Row};

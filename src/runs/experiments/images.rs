@@ -1,6 +1,4 @@
 //! R1 and R2: the radial velocities of a spotted star, and what is left of them once the image is taken out.
-//!
-//! Left out: orbits that are looked for.
 
 use super::laboratory::{ExperimentError, Laboratory};
 use super::report::{Panel, Report, Series};
@@ -79,7 +77,8 @@ pub(super) fn profiles(laboratory: &Laboratory) -> Result<Report, ExperimentErro
     Ok(report)
 }
 
-/// R2: observed minus modelled first moments, without a planet; with one that the image knows, and one that it does not.
+/// R2: observed minus modelled first moments, without a planet; with one that the image knows, and one that it does
+/// not.
 pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let injected = |k: f64| ("/observations/simulate/truth/k_kms", json!(k));
     let assumed = |k: f64| ("/planet/k_kms", json!(k));
@@ -96,7 +95,8 @@ pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         let scene = scene(laboratory, &changes)?;
         let settings = &scene.settings;
         let target = settings.imaging.chi2_target.value();
-        // without its planet a star may not be fitted that well: then as well as it can be without turning noise into spots
+        // without its planet a star may not be fitted that well: then as well as it can be without turning noise into
+        // spots
         let reference = Reference::build(&scene.imager, settings.values, target)
             .or_else(|_| Reference::provisional(&scene.imager, settings.values, target))?;
         let fit = Fit::new(&scene.imager, &scene.observations, &reference);

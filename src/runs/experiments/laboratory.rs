@@ -1,7 +1,7 @@
 //! Where experiments are run: with what effort, in which folder; and what is done already.
 //!
-//! Every case is a file of its own once it is done, with the config that it was run with. A laboratory that was stopped goes on
-//! with the first case that is not there, or was run with another config or version. Left out: what a case is (`case`).
+//! Every case is a file of its own once it is done, with the config that it was run with. A laboratory that was stopped
+//! goes on with the first case that is not there, or was run with another config or version.
 
 use super::{Case, Outcome};
 use crate::data::config::ConfigError;
@@ -83,7 +83,10 @@ impl ExperimentError {
     /// Whether it lies in the star: one that cannot be imaged, or has no best orbit, is a result of an experiment.
     pub(super) fn is_of_the_star(&self) -> bool {
         use ExperimentError::{Detection, Reference, Run, Search};
-        matches!(self, Search(_) | Reference(_) | Detection(_) | Run(RunError::UnresolvedSpots(_) | RunError::PriorStart))
+        matches!(
+            self,
+            Search(_) | Reference(_) | Detection(_) | Run(RunError::UnresolvedSpots(_) | RunError::PriorStart)
+        )
     }
 }
 

@@ -1,6 +1,4 @@
 //! R3: the landscape in three dimensions and in slices, and the chain of the same data beside it.
-//!
-//! Left out: the comparison itself (`comparison`).
 
 use super::case;
 use super::laboratory::{ExperimentError, Laboratory};
@@ -44,7 +42,8 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         let Some(likelihood) = node.reconstruction.likelihood else { continue };
         report.row([&node.theta[..], &[likelihood.spottedness, likelihood.chi2, likelihood.log_likelihood]].concat());
     }
-    let highest = |survey: &crate::runs::grid_scan::GridScan| survey.landscape.best().map(|(node, _)| node.theta.clone());
+    let highest =
+        |survey: &crate::runs::grid_scan::GridScan| survey.landscape.best().map(|(node, _)| node.theta.clone());
     report.number("highest_node", json!(highest(&survey)));
     let mut slices = 0;
     for (k, &(fixed, ..)) in AXES.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! The experiments of Petit et al. (2015), row by row, and a few beyond them: each from simulated stars to a table.
 //!
-//! A [`Row`] is data: its stars (`star` is the paper's, changed key by key), and which of the three routes to an orbit each of
-//! them takes (`case`): grid and paraboloid, chain, periodogram. A [`Laboratory`] runs them and keeps what is done. Left out:
-//! files of results and figures (`reproduction`), and what the numbers mean, which `results/README.md` says.
+//! A [`Row`] is data: its stars (`star` is the paper's, changed key by key), and which of the three routes to an orbit
+//! each of them takes (`case`): grid and paraboloid, chain, periodogram. A [`Laboratory`] runs them and keeps what is
+//! done.
 
 pub mod case;
 mod coverage;
@@ -78,7 +78,8 @@ pub const ROWS: &[Row] = &[
     Row {
         name: "R5",
         title: "K from 10 to 200 m/s at P = 1.7, phi = 0.5 (K = 0 is R4)",
-        paper: "K within 10 % for K > 20 m/s, error bars < 20 m/s (35 at 60 m/s); P within 2 %; sigma_P 0.05 at 200 m/s, \
+        paper: "K within 10 % for K > 20 m/s, error bars < 20 m/s (35 at 60 m/s); P within 2 %; sigma_P 0.05 at 200 \
+        m/s, \
                 0.6 at 30 m/s",
         run: orbits::amplitudes,
     },
@@ -98,7 +99,8 @@ pub const ROWS: &[Row] = &[
     Row {
         name: "R9",
         title: "inclination assumed wrong",
-        paper: "at 33 or 43 deg instead of 38: large biases, best chi2 more than doubled, error bars up to ten times wider",
+        paper: "at 33 or 43 deg instead of 38: large biases, best chi2 more than doubled, error bars up to ten times \
+        wider",
         run: orbits::inclinations,
     },
     Row {

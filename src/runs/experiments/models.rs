@@ -1,8 +1,8 @@
-//! Stars that are more than spots on a quiet photosphere: faculae, a line with wings, a continuum that wanders; each analysed with
-//! the model that it was made by and with the plain one.
+//! Stars that are more than spots on a quiet photosphere: faculae, a line with wings, a continuum that wanders; each
+//! analysed with the model that it was made by and with the plain one.
 //!
-//! What a wrong model costs: bias of K and coverage of its intervals. Every noise seed has a spot map and a phase of its own.
-//! Left out: real stars, which are all of this and more (`results/lopeg.md`).
+//! What a wrong model costs: bias of K and coverage of its intervals. Every noise seed has a spot map and a phase of
+//! its own.
 
 use super::case::Case;
 use super::coverage::{attainable, random_spots};

@@ -1,7 +1,7 @@
 //! R4 to R11, and co-rotation: the orbit of one planet under changing circumstances, each star by three routes.
 //!
-//! The orbit is looked for at periods within a factor of 1.4 of the injected one, as the paper's grids did (1.2 to 2.2 for 1.7);
-//! the periodogram searches all periods, and so do all routes where there is no planet, and in a part of R9. Left out: other parameters (`stellar`).
+//! The orbit is looked for at periods within a factor of 1.4 of the injected one, as the paper's grids did (1.2 to 2.2
+//! for 1.7); the periodogram searches all periods, and so do all routes where there is no planet, and in a part of R9.
 
 use super::case::{Case, Nodes, search};
 use super::laboratory::{ExperimentError, Laboratory};
@@ -95,7 +95,10 @@ type Way = ((&'static str, f64), Option<(&'static str, Value)>);
 
 /// Both ways of taking what maps leave over of spots.
 fn ways_with_unresolved_spots() -> [Way; 2] {
-    [((UNRESOLVED_SPOTS_FITTED, 0.0), None), ((UNRESOLVED_SPOTS_FITTED, 1.0), Some(("/imaging/unresolved_spots", json!("fitted"))))]
+    [
+        ((UNRESOLVED_SPOTS_FITTED, 0.0), None),
+        ((UNRESOLVED_SPOTS_FITTED, 1.0), Some(("/imaging/unresolved_spots", json!("fitted")))),
+    ]
 }
 
 const ROUTES: [&str; 3] = ["grid", "chain", "periodogram"];
@@ -159,8 +162,8 @@ fn rounded(x: f64, digits: usize) -> f64 {
 /// A periodogram whose highest peak is a false alarm with a larger probability has found nothing.
 const FOUND: f64 = 0.01;
 
-/// For each route: how far its estimates are from the truth, and what it took in the mean. Most rows have one map and one noise
-/// seed, so that these are no statistics of a route but of what it made of those data.
+/// For each route: how far its estimates are from the truth, and what it took in the mean. Most rows have one map and
+/// one noise seed, so that these are no statistics of a route but of what it made of those data.
 fn sum_up(report: &mut Report, outcomes: &[Outcome]) {
     for name in ROUTES {
         let routes: Vec<(&Outcome, &Route)> =
@@ -280,8 +283,8 @@ pub(super) fn targets(laboratory: &Laboratory) -> Result<Report, ExperimentError
     tabulated(laboratory, "R8", &["chi2_target", "seed"], all.map(star).collect())
 }
 
-/// R9. Once with the projected velocity as it is, as a line's width gives it, and once with the equatorial velocity kept, so that
-/// vsini goes with the inclination; the latter also with all periods allowed.
+/// R9. Once with the projected velocity as it is, as a line's width gives it, and once with the equatorial velocity
+/// kept, so that vsini goes with the inclination; the latter also with all periods allowed.
 pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     const TRUE_DEG: f64 = 38.0;
     const VSINI_KMS: f64 = 40.0;
@@ -327,8 +330,8 @@ pub(super) fn shear_modelled(laboratory: &Laboratory) -> Result<Report, Experime
     tabulated(laboratory, "R10", &["gamma"], stars.collect())
 }
 
-/// R11. Once with the rotation of the equator, and once with the solid rotation that fits the profiles best, as an observer would
-/// take it who knows of no shear.
+/// R11. Once with the rotation of the equator, and once with the solid rotation that fits the profiles best, as an
+/// observer would take it who knows of no shear.
 pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     let mut stars = Vec::new();
     for gamma in (0..=6).map(|k| f64::from(4 * k) / 1000.0) {
@@ -352,7 +355,8 @@ pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Experimen
     tabulated(laboratory, "R11", &["gamma", "rotation_fitted"], stars)
 }
 
-/// K = 100 m/s at the rotation period, the same number of profiles over more and more rotations, for several noise seeds.
+/// K = 100 m/s at the rotation period, the same number of profiles over more and more rotations, for several noise
+/// seeds.
 pub(super) fn co_rotation(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
     const PROFILES: u32 = 50;
     let mut stars = Vec::new();

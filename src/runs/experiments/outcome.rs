@@ -1,6 +1,4 @@
 //! What a case came to: three estimates of the same orbit, and what each of them took.
-//!
-//! Left out: how they were made (`case`).
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -41,7 +39,8 @@ pub struct Outcome {
     pub failed: Option<String>,
     /// What was injected, all parameters by name.
     pub truth: BTreeMap<String, f64>,
-    /// Target chi2 per datum (null, as the next two, where there is no result); above the config's where that could not be reached.
+    /// Target chi2 per datum (null, as the next two, where there is no result); above the config's where that could not
+    /// be reached.
     #[serde(deserialize_with = "number_or_null")]
     pub chi2_target: f64,
     /// Multiplier of chi2 / 2 in the image at the best orbit, times the number of data.
@@ -71,7 +70,8 @@ fn number_or_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
-/// Share of `of` and its binomial error: that of the share with one more of either kind, which is not nothing where all are alike.
+/// Share of `of` and its binomial error: that of the share with one more of either kind, which is not nothing where all
+/// are alike.
 pub fn share(count: usize, of: usize) -> [f64; 2] {
     let n = of.max(1) as f64;
     let p = (count as f64 + 1.0) / (n + 2.0);
@@ -98,8 +98,8 @@ impl Outcome {
         all.into_iter().filter_map(|(name, route)| Some((name, route.as_ref()?)))
     }
 
-    /// Whether the injected value is inside the chain's interval of 68 (level 0) or 95 % (1); a phase in any turn. A star without
-    /// a result counts as one that is missed.
+    /// Whether the injected value is inside the chain's interval of 68 (level 0) or 95 % (1); a phase in any turn. A
+    /// star without a result counts as one that is missed.
     pub fn is_covered(&self, name: &str, level: usize) -> bool {
         let estimate = self.chain.as_ref().and_then(|chain| chain.parameters.get(name));
         let (Some(one), Some(truth)) = (estimate, self.truth.get(name)) else { return false };

@@ -1,6 +1,4 @@
 //! What a row comes to: a table of numbers, and the few that sum it up.
-//!
-//! Left out: files (`files`).
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

@@ -1,6 +1,4 @@
 //! The paper's star as a config, and how an experiment changes it.
-//!
-//! Left out: what a config means (`config`).
 
 use serde_json::Value;
 

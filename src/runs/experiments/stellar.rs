@@ -1,7 +1,7 @@
 //! R12: the paper's outlook, done: differential rotation, inclination and vsini sampled together with the orbit.
 //!
-//! The chain starts three standard deviations off in each of them. A landscape over the orbit alone, all else at its injected
-//! value, says how many nodes a grid over all of them would take. Left out: the periodogram, which integrates them out instead.
+//! The chain starts three standard deviations off in each of them. A landscape over the orbit alone, all else at its
+//! injected value, says how many nodes a grid over all of them would take.
 
 use super::case;
 use super::laboratory::{ExperimentError, Laboratory};
@@ -123,7 +123,8 @@ pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError
     Ok(report)
 }
 
-/// The star with shear, and these of its parameters free; the values of the config off by three standard deviations, or not.
+/// The star with shear, and these of its parameters free; the values of the config off by three standard deviations, or
+/// not.
 fn config(laboratory: &Laboratory, free: &[Stellar], off: bool) -> Value {
     let mut changes = vec![
         ("/imaging/pixels".to_owned(), json!(laboratory.full_or_quick(5000, 1000))),

@@ -1,7 +1,7 @@
 //! Comma-separated text for pandas and everything else: a row for each line of the chain, in the same order.
 //!
-//! `warmup` is true for the steps that `analyse` discards. Values are those of the chain, digit by digit; a periodic parameter is
-//! not unwrapped. `move` is empty at step 0. What follows from the parameters is in the last columns.
+//! `warmup` is true for the steps that `analyse` discards. Values are those of the chain, digit by digit; a periodic
+//! parameter is not unwrapped. `move` is empty at step 0. What follows from the parameters is in the last columns.
 
 use super::place::begins_with;
 use super::{Contents, DerivedQuantity};

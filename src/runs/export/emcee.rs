@@ -1,14 +1,15 @@
-//! An HDF5 file as the backend of emcee 3 writes it (Foreman-Mackey et al. 2013; `emcee.backends.HDFBackend`): group `mcmc` with
-//! `chain [step, walker, parameter]`, `log_prob [step, walker]`, `blobs [step, walker, blob]` and `accepted [walker]`.
+//! An HDF5 file as the backend of emcee 3 writes it (Foreman-Mackey et al. 2013; `emcee.backends.HDFBackend`): group
+//! `mcmc` with `chain [step, walker, parameter]`, `log_prob [step, walker]`, `blobs [step, walker, blob]` and `accepted
+//! [walker]`.
 //!
-//! All walkers of all ensembles are side by side, those of the first ensemble first: emcee's autocorrelation time averages over
-//! walkers, and is right so. It knows of no ensembles; `chain.reshape(steps, ensembles, walkers, parameters)` has them back, and
-//! R-hat between walkers, which ArviZ gives of such a file, is not that between ensembles. The start (step 0) is no step for emcee
-//! and is left out, so that `accepted / iteration` is the acceptance fraction; the warm-up is there, and the attribute `discard`
-//! is what to give to `get_chain(discard=...)`. A periodic parameter is unwrapped around its mode.
+//! All walkers of all ensembles are side by side, those of the first ensemble first: emcee's autocorrelation time
+//! averages over walkers, and is right so. It knows of no ensembles; `chain.reshape(steps, ensembles, walkers,
+//! parameters)` has them back, and R-hat between walkers, which ArviZ gives of such a file, is not that between
+//! ensembles. The start (step 0) is no step for emcee and is left out, so that `accepted / iteration` is the acceptance
+//! fraction; the warm-up is there, and the attribute `discard` is what to give to `get_chain(discard=...)`. A periodic
+//! parameter is unwrapped around its mode.
 //!
-//! Besides emcee's own attributes there are names, units, priors and injected values. Left out: `random_state_N`, for this
-//! program's random numbers have no state that emcee could go on with (its backend then gives None).
+//! Besides emcee's own attributes there are names, units, priors and injected values.
 
 use super::place::begins_with;
 use super::{Contents, DerivedQuantity, ExportError};

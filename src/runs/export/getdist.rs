@@ -1,10 +1,11 @@
-//! Text files of GetDist (Lewis 2019, arXiv:1910.13970): `ROOT_1.txt`, `ROOT_2.txt`, ... with a row a draw, `ROOT.paramnames`,
-//! `ROOT.ranges`.
+//! Text files of GetDist (Lewis 2019, arXiv:1910.13970): `ROOT_1.txt`, `ROOT_2.txt`, ... with a row a draw,
+//! `ROOT.paramnames`, `ROOT.ranges`.
 //!
-//! An ensemble is a file, so that GetDist's R-1 (variance of the files' means over mean of their variances) compares what is
-//! independent. Rows are weight (always 1), -ln P, the parameters, and as derived ones what follows from them, spottedness
-//! and chi2, in the order of `draws`; the warm-up is left out, `ignore_rows` is to stay 0. `.ranges` has the bounds of the priors, `N` where there is none;
-//! a periodic parameter is unwrapped around its mode and its range is one period around that.
+//! An ensemble is a file, so that GetDist's R-1 (variance of the files' means over mean of their variances) compares
+//! what is independent. Rows are weight (always 1), -ln P, the parameters, and as derived ones what follows from them,
+//! spottedness and chi2, in the order of `draws`; the warm-up is left out, `ignore_rows` is to stay 0. `.ranges` has
+//! the bounds of the priors, `N` where there is none; a periodic parameter is unwrapped around its mode and its range
+//! is one period around that.
 
 use super::draws::Draws;
 use super::{Contents, ExportError, Quantity};
@@ -45,8 +46,9 @@ pub fn files(root: &Path, ensembles: usize) -> Vec<PathBuf> {
     chains.chain([".paramnames", ".ranges"].map(|end| ending(root, end))).collect()
 }
 
-/// Whether the file, one of [`files`], may be of an earlier export: `ROOT.paramnames` is one of ours, or the file has nothing but
-/// rows of a chain of so many parameters and quantities that follow from them (an export that was interrupted).
+/// Whether the file, one of [`files`], may be of an earlier export: `ROOT.paramnames` is one of ours, or the file has
+/// nothing but rows of a chain of so many parameters and quantities that follow from them (an export that was
+/// interrupted).
 pub fn is_own(root: &Path, file: &Path, parameters: usize) -> bool {
     let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
     if read(&ending(root, ".paramnames")).ends_with(DERIVED) {

@@ -7,10 +7,10 @@
 //! | [`getdist`] | GetDist | left out | an ensemble is a file |
 //! | [`csv`] | pandas and everything else | there, marked | as in the chain, a row a line |
 //!
-//! Ensembles are independent of each other, walkers of one ensemble are not: R-hat compares ensembles. A periodic parameter is
-//! unwrapped around its mode, as in `summary.json`, for means and R-hat take no heed of periods; only csv has it as it stands in
-//! the chain. What follows from the parameters (`chain::derived`: period, times, minimum mass) goes along, draw by draw, with the values
-//! that `summary.json` is of. Left out: what the parameters mean, beyond names, units and priors, and everything that `summary.json` has.
+//! Ensembles are independent of each other, walkers of one ensemble are not: R-hat compares ensembles. A periodic
+//! parameter is unwrapped around its mode, as in `summary.json`, for means and R-hat take no heed of periods; only csv
+//! has it as it stands in the chain. What follows from the parameters (`chain::derived`: period, times, minimum mass)
+//! goes along, draw by draw, with the values that `summary.json` is of.
 
 pub mod contents;
 pub mod csv;
@@ -90,8 +90,9 @@ pub enum ExportError {
     Write(#[from] WriteError),
 }
 
-/// Writes a run's chain to `out` in a format: a folder (zarr), a file (emcee, csv), or files whose names begin so (getdist).
-/// What an earlier export left there is replaced if `replace`, and nothing is written otherwise. Returns what was written.
+/// Writes a run's chain to `out` in a format: a folder (zarr), a file (emcee, csv), or files whose names begin so
+/// (getdist). What an earlier export left there is replaced if `replace`, and nothing is written otherwise. Returns
+/// what was written.
 ///
 /// # Errors
 /// [`ExportError`].

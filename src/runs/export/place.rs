@@ -24,8 +24,8 @@ pub fn check_name(out: &Path) -> Result<(), ExportError> {
     }
 }
 
-/// Whether these files can be written: none is there yet, or each that is there `is_own` and `replace`. Another file is not
-/// replaced, whatever the user says.
+/// Whether these files can be written: none is there yet, or each that is there `is_own` and `replace`. Another file is
+/// not replaced, whatever the user says.
 pub fn check_files(files: &[PathBuf], replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
     for file in files {
         match file.symlink_metadata() {
@@ -39,8 +39,8 @@ pub fn check_files(files: &[PathBuf], replace: bool, is_own: &dyn Fn(&Path) -> b
     Ok(())
 }
 
-/// Whether the folder can be written: it is not there yet, or it `is_own` and `replace`. Another folder is not replaced, whatever
-/// the user says.
+/// Whether the folder can be written: it is not there yet, or it `is_own` and `replace`. Another folder is not
+/// replaced, whatever the user says.
 pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
     match folder.symlink_metadata() {
         Err(_) => Ok(()),

@@ -1,13 +1,14 @@
-//! A Zarr store (version 3) with the groups of ArviZ's InferenceData: `posterior`, `sample_stats`, and the same of the warm-up.
+//! A Zarr store (version 3) with the groups of ArviZ's InferenceData: `posterior`, `sample_stats`, and the same of the
+//! warm-up.
 //!
-//! Dimensions are `chain` and `draw`: an ensemble is a chain, draws are in the order of `draws`, which says why; `step` and
-//! `walker` are coordinates along `draw`, so that the ensemble can be had back. `sample_stats` has what belongs to a draw and is
-//! no parameter: `lp` (ln of the posterior density), spottedness, chi2, and how the draw came about, words as codes with CF's
-//! `flag_values` and `flag_meanings`. Attributes are numbers and text, JSON where there is more to say, so that xarray can also
-//! write them to netCDF. A periodic parameter is unwrapped around its mode. What follows from the
-//! parameters is in `posterior` too, with the attribute `derived`.
+//! Dimensions are `chain` and `draw`: an ensemble is a chain, draws are in the order of `draws`, which says why; `step`
+//! and `walker` are coordinates along `draw`, so that the ensemble can be had back. `sample_stats` has what belongs to
+//! a draw and is no parameter: `lp` (ln of the posterior density), spottedness, chi2, and how the draw came about,
+//! words as codes with CF's `flag_values` and `flag_meanings`. Attributes are numbers and text, JSON where there is
+//! more to say, so that xarray can also write them to netCDF. A periodic parameter is unwrapped around its mode. What
+//! follows from the parameters is in `posterior` too, with the attribute `derived`.
 //!
-//! Layout: <https://python.arviz.org/projects/base/en/latest/explanation/schema.html>. Left out: observed data and predictions.
+//! Layout: <https://python.arviz.org/projects/base/en/latest/explanation/schema.html>.
 
 use super::draws::Draws;
 use super::{Contents, DerivedQuantity, Quantity};

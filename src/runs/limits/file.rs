@@ -1,4 +1,5 @@
-//! The files of a survey of limits: `limits.csv`, a line for each period and semi-amplitude, and `limits.json`; and a table.
+//! The files of a survey of limits: `limits.csv`, a line for each period and semi-amplitude, and `limits.json`; and a
+//! table.
 
 use super::full::Agreement;
 use super::{Cell, Comparison, Limit, Orbits, Outcome, Shortcut};
@@ -153,7 +154,8 @@ impl LimitsFile {
         let mut doubts = Vec::new();
         if self.before.false_alarm_probability < CANDIDATE_FAP {
             doubts.push(format!(
-                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: --without-best takes it \
+                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: \
+                --without-best takes it \
                  out first",
                 self.before.period_d
             ));
@@ -165,7 +167,8 @@ impl LimitsFile {
             self.agreement.filter(|a| a.by_shortcut.abs_diff(a.by_full) as f64 > (a.orbits as f64).sqrt())
         {
             doubts.push(format!(
-                "the shortcut recovers {by_shortcut}, the whole way {by_full} of {orbits} orbits ({agree} alike): trust the whole \
+                "the shortcut recovers {by_shortcut}, the whole way {by_full} of {orbits} orbits ({agree} alike): \
+                trust the whole \
                  way"
             ));
         }
@@ -204,7 +207,8 @@ impl LimitsFile {
         );
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) = self.agreement {
             text += &format!(
-                "the whole way: {by_full} of {orbits} orbits near the limit recovered, by the shortcut {by_shortcut}; {agree} alike\n"
+                "the whole way: {by_full} of {orbits} orbits near the limit recovered, by the shortcut {by_shortcut}; \
+                {agree} alike\n"
             );
         }
         for warning in &self.warnings {

@@ -1,10 +1,11 @@
-//! Which planets the profiles would show: orbits of many periods, semi-amplitudes and phases put into them, and whether the blind
-//! search finds them.
+//! Which planets the profiles would show: orbits of many periods, semi-amplitudes and phases put into them, and whether
+//! the blind search finds them.
 //!
-//! An orbit is a shift of the profiles' velocities, in which ln L is known to second order: putting one in changes the gradient by
-//! the information times its velocities, and the search that follows costs milliseconds. What is counted as unresolved spots is
-//! found anew with every orbit, as `periodogram` would; the level of false alarms is that of the star without one. On a few of
-//! them the shortcut is held against the whole way: profiles resampled, imaged and searched. Left out: eccentric orbits.
+//! An orbit is a shift of the profiles' velocities, in which ln L is known to second order: putting one in changes the
+//! gradient by the information times its velocities, and the search that follows costs milliseconds. What is counted as
+//! unresolved spots is found anew with every orbit, as `periodogram` would; the level of false alarms is that of the
+//! star without one. On a few of them the shortcut is held against the whole way: profiles resampled, imaged and
+//! searched.
 
 mod file;
 mod full;

@@ -81,8 +81,9 @@ impl<'a> Shortcut<'a> {
         Ok(Shortcut { settings, view, removed, before, level })
     }
 
-    /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half the time
-    /// at any period to four times the K that is found for certain at nine periods of ten. `None` where nothing is bounded.
+    /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half
+    /// the time at any period to four times the K that is found for certain at nine periods of ten. `None` where
+    /// nothing is bounded.
     pub fn k_range_kms(&self) -> Option<(f64, f64)> {
         let rows = &self.before.rows;
         let lowest = rows.iter().filter_map(|row| row.k_limit50_kms).fold(f64::INFINITY, f64::min);

@@ -1,8 +1,8 @@
-//! What a chain says when its priors and the blind search are known: which parameters it constrains at all, the modes of the period,
-//! and the verdict.
+//! What a chain says when its priors and the blind search are known: which parameters it constrains at all, the modes
+//! of the period, and the verdict.
 //!
-//! The verdict is that of the blind search. A chain takes a planet for granted, so that it can only take something away: where its K
-//! is compatible with zero, or its period is not one, a detection becomes a candidate.
+//! The verdict is that of the blind search. A chain takes a planet for granted, so that it can only take something
+//! away: where its K is compatible with zero, or its period is not one, a detection becomes a candidate.
 
 use super::Manifest;
 use crate::data::config::Settings;
@@ -105,7 +105,8 @@ impl Manifest {
                 "the blind search finds a signal, but K of the chain is compatible with zero",
             )),
             (false, None) => remarks.push(Remark::note(
-                "the chain takes a planet for granted: its K, which is away from zero, means something only if there is one",
+                "the chain takes a planet for granted: its K, which is away from zero, means something only if there \
+                is one",
             )),
             _ => {}
         }
@@ -122,7 +123,8 @@ impl Manifest {
         let period = settings.free.iter().find(|f| f.parameter == Parameter::PorbOverProt);
         if let Some(shortest) = period.map(|f| f.prior.bounds().0).filter(|shortest| *shortest > 1.0) {
             remarks.push(Remark::note(format!(
-                "the prior of the period begins at {shortest:.4} Prot, above the rotation period: signals of the spots at Prot and \
+                "the prior of the period begins at {shortest:.4} Prot, above the rotation period: signals of the \
+                spots at Prot and \
                  its fractions can only appear as their aliases"
             )));
         }

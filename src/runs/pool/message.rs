@@ -1,6 +1,4 @@
 //! Questions and answers as bytes: numbers, little-endian, bit for bit.
-//!
-//! Left out: who sends them.
 
 use crate::runs::limits::Outcome;
 use crate::sampling::log_density::{Evaluation, Likelihood, Reconstruction, Status};

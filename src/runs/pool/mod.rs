@@ -1,8 +1,8 @@
-//! Who reconstructs: the threads of this machine, or the ranks of a cluster. A batch of parameter vectors in, answers out, in
-//! the order of the questions, so that nobody can tell from the results who it was.
+//! Who reconstructs: the threads of this machine, or the ranks of a cluster. A batch of parameter vectors in, answers
+//! out, in the order of the questions, so that nobody can tell from the results who it was.
 //!
-//! `target` is what is evaluated, `task` what another process must know to evaluate the same to the bit, `message` questions and
-//! answers as bytes. Left out: how messages travel (`cluster`), and who asks (`run`, `survey`).
+//! `target` is what is evaluated, `task` what another process must know to evaluate the same to the bit, `message`
+//! questions and answers as bytes.
 
 mod message;
 mod target;
@@ -11,7 +11,7 @@ mod task;
 #[cfg(feature = "mpi")]
 pub use message::orbit_from_bytes;
 pub use message::{Answer, Question};
-pub use target::{UnresolvedSpotsError, Target};
+pub use target::{Target, UnresolvedSpotsError};
 pub use task::{Asked, Brief, Task, TaskError};
 
 #[cfg(feature = "mpi")]
@@ -21,7 +21,8 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
 
-/// Who reconstructs, until they are told to stop: no reconstruction is begun after that, and those under way are finished.
+/// Who reconstructs, until they are told to stop: no reconstruction is begun after that, and those under way are
+/// finished.
 #[derive(Default)]
 pub struct Pool {
     stop: Arc<AtomicBool>,
@@ -74,8 +75,8 @@ impl Pool {
         self.stop.load(Relaxed)
     }
 
-    /// The answers to the first questions: to all, unless told to stop meanwhile. Other processes work by `brief` (a [`Brief`] as
-    /// bytes), this one by `here`, which is the same.
+    /// The answers to the first questions: to all, unless told to stop meanwhile. Other processes work by `brief` (a
+    /// [`Brief`] as bytes), this one by `here`, which is the same.
     pub fn answers<Q: Question, A: Answer>(
         &self,
         brief: &[u8],
@@ -91,8 +92,8 @@ impl Pool {
         })
     }
 
-    /// The same for questions that take batches of their own to answer: one thread each, and no thread that waits for a batch
-    /// takes up another question meanwhile, as rayon's would.
+    /// The same for questions that take batches of their own to answer: one thread each, and no thread that waits for a
+    /// batch takes up another question meanwhile, as rayon's would.
     pub fn answers_apart<Q: Question, A: Answer + Sync>(
         &self,
         brief: &[u8],

@@ -1,6 +1,4 @@
 //! What a run samples: the posterior, with unresolved spots counted as noise or not.
-//!
-//! Left out: what the posterior is worth anywhere (`objective`, `expansion`).
 
 use crate::posterior::expansion::SpotsCounted;
 use crate::posterior::objective::{Posterior, UnresolvedSpots};
@@ -26,13 +24,14 @@ const EVALUATIONS: usize = 3000;
 /// The unresolved spots have no size that fits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "imaging.unresolved_spots: no size of the unresolved spots fits the data; \"entropy\" takes them as the entropy has them"
+    "imaging.unresolved_spots: no size of the unresolved spots fits the data; \"entropy\" takes them as the entropy \
+    has them"
 )]
 pub struct UnresolvedSpotsError;
 
 impl Target {
-    /// Of `posterior`, unresolved spots taken as the config says, with warm starts where the surrogate says that a chain goes: a
-    /// function of posterior and config alone, so that a resumed run, or another process, has the same.
+    /// Of `posterior`, unresolved spots taken as the config says, with warm starts where the surrogate says that a
+    /// chain goes: a function of posterior and config alone, so that a resumed run, or another process, has the same.
     ///
     /// # Errors
     /// [`UnresolvedSpotsError`].
@@ -58,8 +57,8 @@ impl Target {
         &self.posterior
     }
 
-    /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density alone, so that
-    /// a resumed run has the same.
+    /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density
+    /// alone, so that a resumed run has the same.
     pub fn surrogate(&self, evaluator: &dyn Evaluator) -> Option<(Surrogate, f64)> {
         Some(self.surrogate.clone()?.fitted(self, evaluator))
     }

@@ -1,9 +1,9 @@
 //! What another process must know to evaluate the same density to the bit: what the computation was begun with.
 //!
-//! It builds scene, reference and density as a resumed computation does, and with the same checks. Left out: how it comes there.
+//! It builds scene, reference and density as a resumed computation does, and with the same checks.
 
 use super::message::{Answer as _, numbers_from_bytes};
-use super::target::{UnresolvedSpotsError, Target};
+use super::target::{Target, UnresolvedSpotsError};
 use crate::data::scene::{Scene, SceneError};
 use crate::posterior::objective::FreeParameter;
 use crate::runs::limits::{WholeWay, WholeWayError};

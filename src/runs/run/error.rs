@@ -1,6 +1,4 @@
 //! Why a run cannot begin, or go on.
-//!
-//! Left out: what the user is told beside it (`cli`).
 
 use super::start;
 use crate::data::io::atomic::WriteError;

@@ -1,7 +1,6 @@
 //! A sampling run: start, chain on disk; begun afresh or resumed to the same bytes.
 //!
-//! `start` is where the walkers begin. Left out: the search before it (`search`), who reconstructs (`pool`), how progress is shown,
-//! and the analysis of the chain (`chain`).
+//! `start` is where the walkers begin.
 
 mod error;
 mod start;
@@ -37,8 +36,8 @@ pub fn is_false_start(folder: &Path, manifest: bool) -> bool {
 /// Where the walkers start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StartFrom {
-    /// From the quadratic posterior around the optimum, widened: all its peaks get walkers in proportion. Where there is no such
-    /// quadratic, around the maxima that the search found.
+    /// From the quadratic posterior around the optimum, widened: all its peaks get walkers in proportion. Where there
+    /// is no such quadratic, around the maxima that the search found.
     #[default]
     Optimum,
     /// All over the prior.
@@ -66,8 +65,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Begins a run at what a search `found`: draws the start, makes the folder with chain, manifest and step 0. A run that is
-    /// in the folder already is replaced if `replace`, and refused otherwise.
+    /// Begins a run at what a search `found`: draws the start, makes the folder with chain, manifest and step 0. A run
+    /// that is in the folder already is replaced if `replace`, and refused otherwise.
     ///
     /// # Errors
     /// [`RunError`]; nothing is written where there is no start.
@@ -186,7 +185,8 @@ impl Run {
         &self.policy.goals
     }
 
-    /// Steps until the goals are reached, the step limit, or `pool` is told to stop; every step is on disk before the next begins.
+    /// Steps until the goals are reached, the step limit, or `pool` is told to stop; every step is on disk before the
+    /// next begins.
     ///
     /// # Errors
     /// A chain that cannot be written.

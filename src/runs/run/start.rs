@@ -1,6 +1,5 @@
-//! Where the walkers of a run begin: at draws from the surrogate, around the maxima that the search found, or all over the prior.
-//!
-//! Left out: which of them, and evaluating the first step (`run`).
+//! Where the walkers of a run begin: at draws from the surrogate, around the maxima that the search found, or all over
+//! the prior.
 
 use super::RunError;
 use crate::data::scene::Scene;
@@ -21,8 +20,8 @@ const DRAW_TRIES: usize = 3;
 /// Draws from the prior tried for one walker.
 pub(super) const PRIOR_TRIES: usize = 100;
 
-/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these deserve;
-/// `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.
+/// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these
+/// deserve; `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.
 pub(super) fn from_surrogate(
     surrogate: &Surrogate,
     target: &Target,
@@ -34,9 +33,9 @@ pub(super) fn from_surrogate(
     reconstructed(evaluator, scene, DRAW_TRIES, draw)
 }
 
-/// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of them
-/// and half around all in turn, another one for each ensemble: that walkers can hop between them, and that R-hat tells if
-/// they do not.
+/// Walkers around the optimum and its rivals. Where there are several maxima, half of an ensemble starts around one of
+/// them and half around all in turn, another one for each ensemble: that walkers can hop between them, and that R-hat
+/// tells if they do not.
 pub(super) fn around_maxima(
     found: &Found,
     target: &Target,

@@ -13,8 +13,11 @@ const MOST: f64 = 10.0;
 pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<String> {
     let mut advice = Vec::new();
     if chain.shape().ensembles < 2 {
-        advice
-            .push("one ensemble alone cannot be judged, R-hat only compares its two halves: set `sampler.ensembles` to 2 or more".to_owned());
+        advice.push(
+            "one ensemble alone cannot be judged, R-hat only compares its two halves: set `sampler.ensembles` \
+            to 2 or more"
+                .to_owned(),
+        );
     }
     let diagnostics = chain.names().iter().zip(&convergence.diagnostics);
     advice.extend(diagnostics.filter_map(|(name, one)| parameter_advice(name, one, convergence.kept, goals)));
@@ -23,7 +26,8 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
         let which = which.collect::<Vec<_>>().join(", ");
         let count = convergence.stuck.len();
         advice.push(format!(
-            "{count} stuck walker(s), not moved since half of the steps kept: {which}; look at their log_prob, and start anew \
+            "{count} stuck walker(s), not moved since half of the steps kept: {which}; look at their log_prob, and \
+            start anew \
              closer to the optimum if they sit in a minor mode"
         ));
     }
@@ -31,7 +35,8 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
     if failures as f64 > MANY_FAILURES * evaluations as f64 {
         let share = 100.0 * failures as f64 / evaluations as f64;
         advice.push(format!(
-            "{failures} of {evaluations} evaluations failed ({share:.1} %): the posterior may be cut where they did; narrow \
+            "{failures} of {evaluations} evaluations failed ({share:.1} %): the posterior may be cut where they did; \
+            narrow \
              the priors or loosen the chi2 target"
         ));
     }

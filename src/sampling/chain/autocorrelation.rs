@@ -1,10 +1,9 @@
 //! Integrated autocorrelation time, `tau = 1 + 2 sum_l rho(l)`, with Sokal's window.
 //!
-//! Source: Goodman & Weare 2010, section 3 (definition); Foreman-Mackey et al. 2013, section 3 (use with ensembles); the
-//! window is the smallest lag M with M >= c tau(M), c = 5 (Sokal). The autocovariance is that of every walker's series
-//! *around the mean of its ensemble*, averaged over walkers: around its own mean a walker that is stuck has no variance,
-//! and would lower tau where it should raise it.
-//! Sums are direct and stop at the window (n x lag operations). Left out: an FFT, which would not stop.
+//! Source: Goodman & Weare 2010, section 3 (definition); Foreman-Mackey et al. 2013, section 3 (use with ensembles);
+//! the window is the smallest lag M with M >= c tau(M), c = 5 (Sokal). The autocovariance is that of every walker's
+//! series *around the mean of its ensemble*, averaged over walkers: around its own mean a walker that is stuck has no
+//! variance, and would lower tau where it should raise it. Sums are direct and stop at the window (n x lag operations).
 
 use crate::sampling::chain::Series;
 
@@ -38,8 +37,8 @@ fn centred(series: &Series) -> Vec<Vec<f64>> {
     series.iter().flat_map(around).collect()
 }
 
-/// Autocorrelation of a quantity over all walkers at lags from 0 to `lags`, around the mean of each ensemble; 1 at lag 0, empty
-/// when the quantity does not vary.
+/// Autocorrelation of a quantity over all walkers at lags from 0 to `lags`, around the mean of each ensemble; 1 at lag
+/// 0, empty when the quantity does not vary.
 pub fn autocorrelation_function(series: &Series, lags: usize) -> Vec<f64> {
     let centred = centred(series);
     let steps = centred.first().map_or(0, Vec::len);

@@ -1,17 +1,15 @@
 //! Convergence of a chain: R-hat and effective sample size between independent ensembles, and the burn-in.
 //!
-//! - **R-hat** (Gelman & Rubin 1992; Vehtari et al. 2021): each ensemble is cut into an early and a late half, each half
-//!   being one group with all its walkers pooled. Values are replaced by the normal scores of their ranks, and
-//!   `R-hat = sqrt(((N - 1)/N W + B) / W)` with N draws a group, W the mean variance within groups and B the variance of
-//!   the group means. The larger of the values' own and that of their distances from the median (folded) is taken.
+//! - **R-hat** (Gelman & Rubin 1992; Vehtari et al. 2021): each ensemble is cut into an early and a late half, each
+//! half being one group with all its walkers pooled. Values are replaced by the normal scores of their ranks, and
+//! `R-hat = sqrt(((N - 1)/N W + B) / W)` with N draws a group, W the mean variance within groups and B the variance of
+//! the group means. The larger of the values' own and that of their distances from the median (folded) is taken.
 //! - **ESS** = V / Var(grand mean), V the variance of all draws pooled. Walkers of one ensemble are not independent, so
-//!   Var(grand mean) comes from the series of ensemble means: `C(0) tau / (E n)`, C the autocovariance *around the grand
-//!   mean* averaged over ensembles, tau its integrated time (at least 1). It is not let below what the scatter between
-//!   ensemble means supports: `B_E / (E q)`, with q such that chance alone exceeds it once in a hundred times.
+//! Var(grand mean) comes from the series of ensemble means: `C(0) tau / (E n)`, C the autocovariance *around the grand
+//! mean* averaged over ensembles, tau its integrated time (at least 1). It is not let below what the scatter between
+//! ensemble means supports: `B_E / (E q)`, with q such that chance alone exceeds it once in a hundred times.
 //! - **Periodic** parameters are judged by cosine and sine, and the worse of the two counts.
 //! - **Burn-in**: the smaller of half the chain and 5 times the largest autocorrelation time of its second half.
-//!
-//! Left out: the ESS of quantiles.
 
 use crate::sampling::chain::autocorrelation::{autocorrelation_time, integrated_time, mean};
 use crate::sampling::chain::{Chain, ChainError, Series};
@@ -116,8 +114,8 @@ impl Convergence {
         longest.map_or(0.0, |tau| self.kept as f64 / tau.max(1.0))
     }
 
-    /// Whether every parameter has reached the goals and no walker is stuck. One ensemble alone never has: there is nothing
-    /// independent to compare it with.
+    /// Whether every parameter has reached the goals and no walker is stuck. One ensemble alone never has: there is
+    /// nothing independent to compare it with.
     pub fn reached(&self, goals: &Goals) -> bool {
         self.ensembles > 1 && self.stuck.is_empty() && self.diagnostics.iter().all(|one| one.reached(goals))
     }
@@ -149,7 +147,8 @@ fn worst(mut values: impl Iterator<Item = Option<f64>>, worse: fn(f64, f64) -> f
     values.try_fold(first, |so_far, value| Some(worse(so_far, value?)))
 }
 
-/// Rank-normalised split R-hat between ensembles, the larger of plain and folded. `None` under 4 steps or without spread.
+/// Rank-normalised split R-hat between ensembles, the larger of plain and folded. `None` under 4 steps or without
+/// spread.
 pub fn rhat(series: &Series) -> Option<f64> {
     let steps = series.first()?.first()?.len();
     if steps < 4 {
@@ -293,7 +292,8 @@ mod tests {
 
     #[test]
     fn a_small_displacement_costs_what_the_scatter_says() {
-        // Too small for the window to see; Var(grand mean) >= B_E / (E q) = (0.13^2 / 4) / (4 x 3.8), so ESS <= 3600 or so.
+        // Too small for the window to see; Var(grand mean) >= B_E / (E q) = (0.13^2 / 4) / (4 x 3.8), so ESS <= 3600 or
+        // so.
         let mut series = ar1(0.0, [4, 16, 1000], 17);
         series[3].iter_mut().flatten().for_each(|x| *x += 0.13);
         let found = effective_sample_size(&series).unwrap();

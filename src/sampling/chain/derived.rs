@@ -1,8 +1,8 @@
 //! Quantities that follow from the parameters of a draw: computed for each draw, summarised like parameters.
 //!
-//! An event that comes back with a period, of which the draws say time and period, is counted from a given time t0: the phase
-//! `(T - t0) / P` is unwrapped around its mode, as a periodic parameter is, and the turn is that whose median is nearest to t0. Where
-//! period or phase are hardly known the intervals are as wide as that. Left out: the formulas.
+//! An event that comes back with a period, of which the draws say time and period, is counted from a given time t0: the
+//! phase `(T - t0) / P` is unwrapped around its mode, as a periodic parameter is, and the turn is that whose median is
+//! nearest to t0. Where period or phase are hardly known the intervals are as wide as that.
 
 use super::convergence::{Diagnostic, ParameterKind};
 use super::statistics::{periodic_mode, quantile, unwrap_around};
@@ -59,7 +59,8 @@ impl std::fmt::Debug for Settled {
 }
 
 impl Settled {
-    /// Summarises `quantity` over the steps of `chain` from `discarded` on; `has_limit` says which parameters touch zero.
+    /// Summarises `quantity` over the steps of `chain` from `discarded` on; `has_limit` says which parameters touch
+    /// zero.
     pub(super) fn of(chain: &Chain, discarded: usize, quantity: Derived, has_limit: &dyn Fn(&str) -> bool) -> Self {
         let series = |formula: &dyn Fn(&[f64]) -> f64| chain.series_of(discarded, |record| formula(&record.theta));
         match &quantity.rule {

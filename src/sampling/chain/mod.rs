@@ -1,9 +1,8 @@
 //! Chains: what was sampled, how far it can be trusted, and what it says.
 //!
-//! [`Record`] is one line, [`Chain`] holds whole steps; `autocorrelation` and `convergence` say how many independent draws
-//! that amounts to, `summary` and `table` say what came out, `derived` of what
-//! follows from the parameters too. All of it is a function of the chain's content alone.
-//! Left out: who sampled (`ensemble`), and files (`io::journal`).
+//! [`Record`] is one line, [`Chain`] holds whole steps; `autocorrelation` and `convergence` say how many independent
+//! draws that amounts to, `summary` and `table` say what came out, `derived` of what follows from the parameters too.
+//! All of it is a function of the chain's content alone.
 
 pub mod advice;
 pub mod autocorrelation;

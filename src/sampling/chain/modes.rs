@@ -1,7 +1,8 @@
 //! The modes of a chain in the period: how many orbits it holds, and how much weight each has.
 //!
-//! A time base T tells frequencies that differ by some 1/T, and a posterior of periods is a few such peaks. Draws are smoothed in
-//! frequency by a part of that width, and the line is cut wherever the density falls below half of the lower peak beside it.
+//! A time base T tells frequencies that differ by some 1/T, and a posterior of periods is a few such peaks. Draws are
+//! smoothed in frequency by a part of that width, and the line is cut wherever the density falls below half of the
+//! lower peak beside it.
 
 use super::statistics::quantile;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,9 @@
-//! What each kind of move is worth: how often it is accepted, and how many effective samples a reconstruction of it brings.
+//! What each kind of move is worth: how often it is accepted, and how many effective samples a reconstruction of it
+//! brings.
 //!
-//! Of a mix, only the correlation over the one step that a move made can be told apart. Moves are judged as if the chain were
-//! of the first order (AR(1)) with that correlation: `rho = 1 - <jump^2> / (2 variance)`, and `(1 - rho) / (1 + rho)` effective
-//! samples a step, for the parameter where that is least. Left out: the ESS of the whole chain (`convergence`).
+//! Of a mix, only the correlation over the one step that a move made can be told apart. Moves are judged as if the
+//! chain were of the first order (AR(1)) with that correlation: `rho = 1 - <jump^2> / (2 variance)`, and `(1 - rho) /
+//! (1 + rho)` effective samples a step, for the parameter where that is least.
 
 use crate::sampling::chain::{Chain, MoveKind, ParameterKind, Record};
 use crate::sampling::log_density::Status;

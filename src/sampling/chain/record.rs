@@ -1,7 +1,6 @@
 //! One line of a chain: where a walker of an ensemble stands at a step, and what became of the proposal made for it.
 //!
 //! The sampler makes these, the journal writes them and the store keeps them; this file belongs to none of the three.
-//! Left out: how lines become text (`io::journal`) and where positions come from (`ensemble`).
 
 use crate::sampling::chain::ChainError;
 use crate::sampling::log_density::Status;

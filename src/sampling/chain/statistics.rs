@@ -1,8 +1,8 @@
 //! Statistics of one parameter's draws: quantiles, shortest intervals, mode, and the unwrapping of a periodic one.
 //!
 //! The mode is that of a kernel density estimate: a histogram smoothed by a Gaussian of Silverman's width for the
-//! *effective* number of draws (equal neighbours, which rejections leave, rule out methods on spacings), mirrored at the
-//! ends so that a density that is cut off (an amplitude at 0) keeps its height there.
+//! *effective* number of draws (equal neighbours, which rejections leave, rule out methods on spacings), mirrored at
+//! the ends so that a density that is cut off (an amplitude at 0) keeps its height there.
 
 use std::f64::consts::TAU;
 

@@ -1,7 +1,7 @@
 //! A chain in memory: every ensemble, step and walker, by whole steps.
 //!
 //! Values lie in the order of the journal (step, ensemble, walker). Step 0 is the start, so a chain of `n` steps holds
-//! steps 0 to n - 1. Left out: files (`io::journal`) and statistics (the other files of this folder).
+//! steps 0 to n - 1.
 
 use crate::sampling::chain::{ChainError, Record, Shape};
 use crate::sampling::log_density::Status;

@@ -33,7 +33,8 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
     }
     text += &derived(summary, truth);
     text += &format!(
-        "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} model applications each, best log_prob {:.3}\n",
+        "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} model applications each, best \
+        log_prob {:.3}\n",
         summary.steps,
         summary.discarded_steps,
         summary.acceptance_fraction,
@@ -132,7 +133,8 @@ fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
         |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
     let median = if one.unconstrained { "any".to_owned() } else { number(one.median, digits) };
     let side = |width: f64| if one.unconstrained { "-".to_owned() } else { number(width, digits) };
-    // Differences from the median as the interval has it: a periodic one may be in another turn than a wrapped estimate.
+    // Differences from the median as the interval has it: a periodic one may be in another turn than a wrapped
+    // estimate.
     vec![
         name.to_owned(),
         median,

@@ -2,7 +2,6 @@
 //!
 //! Source: Goodman & Weare 2010 (stretch move), ter Braak 2006 (differential evolution), Foreman-Mackey et al. 2013
 //! (halves in turn, so that walkers can be evaluated in parallel). Several independent ensembles run side by side.
-//! Left out: what the parameters mean (`objective`), files (`io::journal`) and statistics (`chain`).
 
 pub mod moves;
 pub mod sampler;

@@ -1,10 +1,9 @@
 //! The sampler: independent ensembles, moved half by half, every half of all of them evaluated as one batch.
 //!
-//! Source: Goodman & Weare 2010 (ensemble), Foreman-Mackey et al. 2013, section 2 (halves in turn). The split into halves
-//! is drawn anew each step. Positions are kept in *written* coordinates and a proposal is written -> internal -> move ->
-//! written, so a chain read back from a file goes on to the same bytes. Random numbers are counter-based: the stream is
-//! that of the ensemble and walker, the position in it that of the step; there is no generator state to keep.
-//! Left out: when to stop (`stop`), where to start (`start`), files, and what the parameters mean.
+//! Source: Goodman & Weare 2010 (ensemble), Foreman-Mackey et al. 2013, section 2 (halves in turn). The split into
+//! halves is drawn anew each step. Positions are kept in *written* coordinates and a proposal is written -> internal ->
+//! move -> written, so a chain read back from a file goes on to the same bytes. Random numbers are counter-based: the
+//! stream is that of the ensemble and walker, the position in it that of the step; there is no generator state to keep.
 
 use crate::sampling::chain::{Chain, MoveKind, Record};
 use crate::sampling::ensemble::{EnsembleError, Mix, Move, Proposal, SamplerSettings, describe, start};
@@ -91,8 +90,8 @@ impl<'a> Sampler<'a> {
     /// Step 0: evaluates the start, positions `[ensemble][walker]` in physical coordinates.
     ///
     /// # Errors
-    /// [`EnsembleError`] when the start has the wrong shape, is degenerate in sampling coordinates (naming the parameter),
-    /// a walker has no finite log-probability, or the evaluator stopped.
+    /// [`EnsembleError`] when the start has the wrong shape, is degenerate in sampling coordinates (naming the
+    /// parameter), a walker has no finite log-probability, or the evaluator stopped.
     pub fn start(&self, positions: &[Vec<Vec<f64>>]) -> Result<(State, Vec<Record>), EnsembleError> {
         start::check_shape(positions, [self.ensembles, self.walkers, self.density.names().len()])?;
         start::check_spread(self.density, positions)?;
@@ -150,8 +149,8 @@ impl<'a> Sampler<'a> {
         Ok(State { step: chain.steps() - 1, ensembles })
     }
 
-    /// Moves every walker once. `None`, with the state as it was, when `stop` was set before the last half was begun, or the
-    /// evaluator stopped within a half.
+    /// Moves every walker once. `None`, with the state as it was, when `stop` was set before the last half was begun,
+    /// or the evaluator stopped within a half.
     pub fn step(&self, state: &mut State, stop: &AtomicBool) -> Option<Vec<Record>> {
         let step = state.step + 1;
         let mut next = State { step, ensembles: state.ensembles.clone() };
@@ -243,8 +242,8 @@ impl<'a> Sampler<'a> {
         walker.evaluation.log_prob + self.density.log_jacobian(&walker.theta)
     }
 
-    /// Evaluates a batch; `None` if it was not evaluated to its end. Whatever is not a usable number is turned into a rejection
-    /// here, where it enters the sampler.
+    /// Evaluates a batch; `None` if it was not evaluated to its end. Whatever is not a usable number is turned into a
+    /// rejection here, where it enters the sampler.
     fn evaluate(&self, batch: Vec<Vec<f64>>) -> Option<Vec<Evaluation>> {
         let mut evaluations = if batch.is_empty() { Vec::new() } else { self.evaluator.evaluate(&batch) };
         assert!(evaluations.len() <= batch.len(), "an evaluator answers no more than it is asked");

@@ -1,6 +1,6 @@
 //! Settings of the sampler: the `sampler` section of the config.
 //!
-//! Defaults are written here and nowhere else. Left out: reading files (`config`).
+//! Defaults are written here and nowhere else.
 
 use crate::sampling::ensemble::{EnsembleError, MoveWeights};
 use schemars::JsonSchema;

@@ -2,7 +2,6 @@
 //!
 //! A start in a plane stays there under affine-invariant moves (Goodman & Weare 2010, section 2), hence the checks.
 //! R-hat asks for starts wider than the posterior (Gelman & Rubin 1992), hence the scale.
-//! Left out: where centre and covariance come from (`optimise`, `velocity`).
 
 use crate::sampling::ensemble::sampler::{Purpose, random_numbers, stream};
 use crate::sampling::ensemble::{EnsembleError, describe};
@@ -42,8 +41,8 @@ pub fn start_numbers(seed: u64, ensemble: usize, walker: usize) -> ChaCha8Rng {
 
 /// Draws start positions, `[ensemble][walker]`, in physical coordinates.
 ///
-/// Gaussian in sampling coordinates; a position for which `allowed` (a finite log-prior, say) is false is drawn again. The
-/// same arguments give the same positions.
+/// Gaussian in sampling coordinates; a position for which `allowed` (a finite log-prior, say) is false is drawn again.
+/// The same arguments give the same positions.
 ///
 /// # Errors
 /// [`EnsembleError::StartCovariance`], [`EnsembleError::Shape`] (the centre), or [`EnsembleError::StartOutside`] when a

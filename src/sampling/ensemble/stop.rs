@@ -1,7 +1,7 @@
 //! When a chain ends: goals reached, step limit, or asked to.
 //!
 //! The goals are looked at every so many steps and depend on the chain's content alone, so a chain that was interrupted
-//! and resumed ends at the same step as one that was not. Left out: the diagnostics themselves (`chain::convergence`).
+//! and resumed ends at the same step as one that was not.
 
 use crate::sampling::chain::{Chain, ChainError, Convergence, Goals, ParameterKind, Record};
 use crate::sampling::ensemble::{EnsembleError, Sampler, SamplerSettings, State};
@@ -92,8 +92,8 @@ impl StopPolicy {
 
 /// Steps from the end of `chain` until the policy or `stop` says so.
 ///
-/// `chain` holds step 0 at least ([`Sampler::start`]) or whatever was read back. Each step is handed to `on_step` (which
-/// writes it, and shows progress) together with the diagnostics when they were due, before the next one begins.
+/// `chain` holds step 0 at least ([`Sampler::start`]) or whatever was read back. Each step is handed to `on_step`
+/// (which writes it, and shows progress) together with the diagnostics when they were due, before the next one begins.
 ///
 /// # Errors
 /// [`RunError`]: a chain that does not fit the sampler, or a callback that failed.

@@ -1,6 +1,4 @@
 //! Where the nodes of a landscape are: axes of equally spaced values, and the order of their products.
-//!
-//! Left out: which values make sense (`config`), and what the parameters mean.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,8 +7,8 @@ const PERIOD_ROUNDING: f64 = 1e-9;
 
 /// One axis: `nodes` equally spaced values from `min` to `max`, both included.
 ///
-/// A periodic parameter (period 1) has its values in `[0, 1)`: `min` and `max` may lie outside, so that an axis can wrap
-/// around 0. Where they are a whole period apart they are the same place, and `max` is left out.
+/// A periodic parameter (period 1) has its values in `[0, 1)`: `min` and `max` may lie outside, so that an axis can
+/// wrap around 0. Where they are a whole period apart they are the same place, and `max` is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
     /// Name of the parameter.

@@ -1,8 +1,8 @@
 //! The posterior of one parameter from a landscape: exp(ln L) times the prior, integrated over the other axes.
 //!
-//! Over the others: the trapezoid, and in cells where the prior is cut off L linear between nodes under the prior as it is. Along the axis: ln L is a cubic between nodes, exact for a Gaussian however
-//! wide the spacing. A circle is cut opposite to its highest node. A node without a value counts as impossible. Left out: what
-//! lies beyond the ends of the axes.
+//! Over the others: the trapezoid, and in cells where the prior is cut off L linear between nodes under the prior as it
+//! is. Along the axis: ln L is a cubic between nodes, exact for a Gaussian however wide the spacing. A circle is cut
+//! opposite to its highest node. A node without a value counts as impossible.
 
 use super::{Axis, Landscape};
 
@@ -22,8 +22,8 @@ pub struct Marginal {
 }
 
 impl Marginal {
-    /// That of the parameter on axis number `target`; `prior` is the density of the one on axis `i` at `x`. `None` where it is
-    /// nowhere above zero.
+    /// That of the parameter on axis number `target`; `prior` is the density of the one on axis `i` at `x`. `None`
+    /// where it is nowhere above zero.
     pub fn of(landscape: &Landscape, target: usize, prior: &dyn Fn(usize, f64) -> f64) -> Option<Self> {
         let axis = landscape.grid().axes.get(target)?;
         let mut log_likelihood = integrated(landscape, target, prior);
@@ -109,8 +109,8 @@ fn log_sum(terms: &[f64]) -> f64 {
     largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
 }
 
-/// What each node of an axis counts in the integral over it: by the trapezoid, or with L linear between nodes where the prior is
-/// cut off next to it.
+/// What each node of an axis counts in the integral over it: by the trapezoid, or with L linear between nodes where the
+/// prior is cut off next to it.
 fn weights(axis: &Axis, prior: &dyn Fn(f64) -> f64) -> Vec<f64> {
     let density = |place: f64| prior(wrapped(axis, axis.min + place * axis.spacing()));
     let midpoints = (0..STEPS).map(|step| (step as f64 + 0.5) / STEPS as f64);

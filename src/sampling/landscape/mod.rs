@@ -2,8 +2,8 @@
 //! paper's own way to an orbit.
 //!
 //! [`Grid`] says where the nodes are, [`Landscape`] holds their values in order, `table` says where the highest one is,
-//! `paraboloid` what the nodes around it (`region`) say of the parameters, and `marginal` what all of them do once there is a
-//! prior. Left out: who reconstructs (`survey`), and files (`io::landscape`).
+//! `paraboloid` what the nodes around it (`region`) say of the parameters, and `marginal` what all of them do once
+//! there is a prior.
 
 pub mod grid;
 pub mod marginal;

@@ -1,6 +1,4 @@
 //! The values at the nodes, in the order of the grid.
-//!
-//! Left out: how lines become text (`io::landscape`).
 
 use super::grid::Grid;
 use crate::sampling::log_density::{Likelihood, Reconstruction, Status};

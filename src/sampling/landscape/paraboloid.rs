@@ -1,9 +1,10 @@
-//! The paraboloid: the paper's own estimate of the parameters and of their error bars (Petit et al. 2015; method section 6).
+//! The paraboloid: the paper's own estimate of the parameters and of their error bars (Petit et al. 2015; method
+//! section 6).
 //!
-//! Least squares of a second-order polynomial to chi2 = -2 ln L at the nodes around the highest one (`region`). Its vertex is the
-//! estimate, the inverse of half its Hessian the covariance, and the projection of the surface one above the minimum on an axis
-//! the error bar: the square root of the diagonal. Where there is no minimum to speak of, it says so instead. Left out: priors,
-//! and weights of the nodes.
+//! Least squares of a second-order polynomial to chi2 = -2 ln L at the nodes around the highest one (`region`). Its
+//! vertex is the estimate, the inverse of half its Hessian the covariance, and the projection of the surface one above
+//! the minimum on an axis the error bar: the square root of the diagonal. Where there is no minimum to speak of, it
+//! says so instead.
 
 use super::region::{Member, Rule, region};
 use super::{Axis, Grid, Landscape, Node};
@@ -19,7 +20,8 @@ const LEAST: f64 = 1.5;
 /// Nodes to each coefficient that the region grows to where the user says nothing.
 const ENOUGH: f64 = 2.0;
 
-/// Smallest singular value of the polynomial's terms at the nodes, relative to the largest: below it they are not independent.
+/// Smallest singular value of the polynomial's terms at the nodes, relative to the largest: below it they are not
+/// independent.
 const INDEPENDENT: f64 = 1e-6;
 
 /// chi2 is good to 2e-3: what rises by less towards the ends of the region has no curvature.
@@ -89,7 +91,8 @@ pub enum Undefined {
         found: usize,
     },
     /// A saddle or a plateau.
-    #[error("no well-defined minimum: chi2 {} along {axis}, the form is not positive definite", if *falls { "falls" } else { "stays flat" })]
+    #[error("no well-defined minimum: chi2 {} along {axis}, the form is not positive \
+    definite", if *falls { "falls" } else { "stays flat" })]
     NotPositive {
         /// The axis that the direction of the least curvature is nearest to.
         axis: String,
@@ -174,7 +177,8 @@ pub fn paraboloid(landscape: &Landscape, rule: Rule) -> Result<Paraboloid, Undef
     })
 }
 
-/// The terms of the polynomial at `u`: 1, u_i, u_i^2 / 2 and u_i u_j, so that the coefficients are value, gradient and Hessian.
+/// The terms of the polynomial at `u`: 1, u_i, u_i^2 / 2 and u_i u_j, so that the coefficients are value, gradient and
+/// Hessian.
 fn terms(u: &[f64]) -> Vec<f64> {
     let products =
         (0..u.len()).flat_map(|i| (i..u.len()).map(move |j| if i == j { 0.5 * u[i] * u[i] } else { u[i] * u[j] }));

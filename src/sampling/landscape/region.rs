@@ -1,16 +1,16 @@
 //! Which nodes a paraboloid is fitted to: those around the highest one.
 //!
-//! The region grows from the highest node like water from a spring: of all neighbours of what is in it, the one of the largest
-//! ln L joins next. So it stays in one piece, and another maximum is not in it unless the saddle between them is. Nodes where
-//! the reconstruction failed or could not reach its target have no place in it. Left out: the fit (`paraboloid`).
+//! The region grows from the highest node like water from a spring: of all neighbours of what is in it, the one of the
+//! largest ln L joins next. So it stays in one piece, and another maximum is not in it unless the saddle between them
+//! is. Nodes where the reconstruction failed or could not reach its target have no place in it.
 
 use super::{Axis, Grid, Landscape};
 use crate::sampling::log_density::Status;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// By default all nodes up to this much above the minimum of chi2 are in, twice the error bars from it: near enough for a
-/// paraboloid, far enough that the rounding of ln L (1e-3) is nothing.
+/// By default all nodes up to this much above the minimum of chi2 are in, twice the error bars from it: near enough for
+/// a paraboloid, far enough that the rounding of ln L (1e-3) is nothing.
 pub const DELTA_CHI2: f64 = 4.0;
 
 /// What the user says of the region; by default it reaches to [`DELTA_CHI2`], or as far as a fit needs.
@@ -33,8 +33,8 @@ pub struct Member {
     pub delta_chi2: f64,
 }
 
-/// The region around node `centre`, which must be the highest of those that converged. By default it grows until a fit has
-/// `enough`.
+/// The region around node `centre`, which must be the highest of those that converged. By default it grows until a fit
+/// has `enough`.
 pub fn region(landscape: &Landscape, centre: usize, rule: Rule, enough: impl Fn(&[Member]) -> bool) -> Vec<Member> {
     let grid = landscape.grid();
     let height = |index: usize| {

@@ -10,7 +10,8 @@ pub fn table(landscape: &Landscape, truth: Option<&BTreeMap<String, f64>>) -> St
     let head = best(landscape, truth).unwrap_or_else(|| "no node gave a likelihood\n".into());
     let count = |is: fn(Status) -> bool| landscape.count(is);
     head + &format!(
-        "{} reconstructions ({} beyond the reach of the target chi2, {} failed), {} model applications each in the median\n",
+        "{} reconstructions ({} beyond the reach of the target chi2, {} failed), {} model applications each in the \
+        median\n",
         landscape.nodes().len(),
         count(|status| status == Status::Unreachable),
         count(Status::is_failure),

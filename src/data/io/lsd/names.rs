@@ -76,7 +76,8 @@ pub(super) fn columns(fields: &[&str]) -> Result<Columns, String> {
                 Err(format!("columns {} and {} are both named as the {name}", first + 1, second + 1))
             }
             (None, _) => Err(format!(
-                "names no column as the {name}: velocity (or v, vel), intensity (or I, I/Ic, flux) and sigma (or error, \
+                "names no column as the {name}: velocity (or v, vel), intensity (or I, I/Ic, flux) and sigma (or \
+                error, \
                  err) are due, in any order"
             )),
         }

@@ -130,7 +130,8 @@ fn no_time_twice(entries: &[Entry]) -> Result<(), Fault> {
         // 0 and -0 are one time
         if let Some(Entry { line, file, time_d, .. }) = seen.insert((entry.time_d + 0.0).to_bits(), entry) {
             let problem = format!(
-                "{} has the time {time_d} of {file} in line {line}: is it the same profile? leave one out, or give each \
+                "{} has the time {time_d} of {file} in line {line}: is it the same profile? leave one out, or give \
+                each \
                  its own time",
                 entry.file
             );

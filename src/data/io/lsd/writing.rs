@@ -15,10 +15,11 @@ pub fn is_written(name: &str) -> bool {
     name == LIST || number.is_some_and(|number| number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The list
-/// comes last, so that where it is the profiles are; files of these names are replaced.
+/// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The
+/// list comes last, so that where it is the profiles are; files of these names are replaced.
 ///
-/// Times are exact, intensities good to 5e-13. Profiles that do not share one velocity axis can be written, but not read back.
+/// Times are exact, intensities good to 5e-13. Profiles that do not share one velocity axis can be written, but not
+/// read back.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -34,8 +35,8 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError>
     save(&folder.join(LIST), &list)
 }
 
-/// The same for what became of observed profiles, one of the `labels` each: VRAD stays in the list and in the velocity axis, and
-/// a comment names the file that a profile comes from. `what` says in its title what became of it.
+/// The same for what became of observed profiles, one of the `labels` each: VRAD stays in the list and in the velocity
+/// axis, and a comment names the file that a profile comes from. `what` says in its title what became of it.
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -1,7 +1,5 @@
-//! The files of a blind search: `rv.csv`, `covariance.csv`, `periodogram.csv` (with a second planet `periodogram_2.csv`) and
-//! `periodogram.json`.
-//!
-//! Left out: the numbers themselves (`detection`, `periodogram`).
+//! The files of a blind search: `rv.csv`, `covariance.csv`, `periodogram.csv` (with a second planet
+//! `periodogram_2.csv`) and `periodogram.json`.
 
 mod alarm;
 mod quantities;

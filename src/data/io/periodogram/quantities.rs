@@ -1,5 +1,5 @@
-//! What is usually quoted of an orbit that was found: times of the largest radial velocity and of inferior conjunction nearest to the
-//! middle of the data, and the minimum mass where the star's is known.
+//! What is usually quoted of an orbit that was found: times of the largest radial velocity and of inferior conjunction
+//! nearest to the middle of the data, and the minimum mass where the star's is known.
 //!
 //! Errors are to first order in K, period and phase; where the period has none, at that period.
 

@@ -118,7 +118,8 @@ pub(super) struct SearchRecord {
 #[derive(Serialize)]
 pub(super) struct ExpansionRecord {
     pub marginalised: Vec<&'static str>,
-    /// How many times larger than the entropy expects unresolved spots are, in variance: without a planet, at the best orbit.
+    /// How many times larger than the entropy expects unresolved spots are, in variance: without a planet, at the best
+    /// orbit.
     pub unresolved_spots: [f64; 2],
     /// Delta ln L of the best orbit with spots as the entropy sees them.
     pub regularised_delta_ln_l: f64,

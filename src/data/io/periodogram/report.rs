@@ -1,4 +1,5 @@
-//! The result of a blind search as text: the best orbit, how often chance does as well, the peaks, and what may be wrong.
+//! The result of a blind search as text: the best orbit, how often chance does as well, the peaks, and what may be
+//! wrong.
 
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};

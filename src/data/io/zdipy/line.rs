@@ -1,6 +1,6 @@
-//! ZDIpy's model of the local line, `model-voigt-line.dat`: wavelength (nm), central depth, Gaussian width (km/s, sqrt(2) standard
-//! deviations), Lorentzian half width (over the Gaussian one), Lande factor, limb darkening (linear), and perhaps gravity
-//! darkening. It describes one line; others that follow are not used, there neither.
+//! ZDIpy's model of the local line, `model-voigt-line.dat`: wavelength (nm), central depth, Gaussian width (km/s,
+//! sqrt(2) standard deviations), Lorentzian half width (over the Gaussian one), Lande factor, limb darkening (linear),
+//! and perhaps gravity darkening. It describes one line; others that follow are not used, there neither.
 
 use super::rows::Rows;
 use super::{ZdipyError, read_text};

@@ -1,10 +1,10 @@
-//! Input files of ZDIpy (Folsom et al. 2018, MNRAS 474, 4956; <https://github.com/folsomcp/ZDIpy>): `inzdi.dat`, and the model of
-//! the local line beside it (`line`).
+//! Input files of ZDIpy (Folsom et al. 2018, MNRAS 474, 4956; <https://github.com/folsomcp/ZDIpy>): `inzdi.dat`, and
+//! the model of the local line beside it (`line`).
 //!
-//! Lines that begin with `#` and blank ones are comments; values stand in a fixed order, one group a line, and what follows
-//! them on a line is ignored. Older versions have no line for mass and radius. Units and signs are those of this program:
-//! degrees, km/s, days, rad/d (equator minus pole); velocities are subtracted from the observed axis; longitudes increase in the
-//! sense of rotation, so that those smaller than 0 come into view as cycles grow. Left out: what becomes of it all (`import`).
+//! Lines that begin with `#` and blank ones are comments; values stand in a fixed order, one group a line, and what
+//! follows them on a line is ignored. Older versions have no line for mass and radius. Units and signs are those of
+//! this program: degrees, km/s, days, rad/d (equator minus pole); velocities are subtracted from the observed axis;
+//! longitudes increase in the sense of rotation, so that those smaller than 0 come into view as cycles grow.
 
 mod line;
 mod rows;
@@ -134,7 +134,8 @@ impl Input {
     /// Reads the file at `path`.
     ///
     /// # Errors
-    /// A file that cannot be read or ends too early, or a line that makes no sense or names a profile that is not there.
+    /// A file that cannot be read or ends too early, or a line that makes no sense or names a profile that is not
+    /// there.
     pub fn read(path: &Path) -> Result<Self, ZdipyError> {
         let text = read_text(path)?;
         let mut rows = Rows::new(path, &text);

@@ -1,6 +1,4 @@
 //! The registers of AVX2 and AVX-512.
-//!
-//! Left out: what they are asked for (`registers`), and how a processor's set is found out (`vector`).
 #![allow(unsafe_code)]
 
 use super::{Doubles, Registers, Scattered, Singles};

@@ -1,9 +1,9 @@
 //! Differential evolution: along the difference of two walkers of the other half.
 //!
-//! Source: ter Braak 2006, equation 2: `Y = X + gamma (X_j - X_k) + e`, `gamma = 2.38 / sqrt(2 d)`, and gamma = 1 now and
-//! then, which leads from one mode to another. Symmetric, so the factor is 1. Here gamma carries a small jitter, and the
-//! noise `e` follows the spread of the other half in each coordinate: with it, the move reaches every place even when the
-//! half has no more walkers than dimensions. Left out: the snooker update.
+//! Source: ter Braak 2006, equation 2: `Y = X + gamma (X_j - X_k) + e`, `gamma = 2.38 / sqrt(2 d)`, and gamma = 1 now
+//! and then, which leads from one mode to another. Symmetric, so the factor is 1. Here gamma carries a small jitter,
+//! and the noise `e` follows the spread of the other half in each coordinate: with it, the move reaches every place
+//! even when the half has no more walkers than dimensions.
 
 use crate::sampling::chain::MoveKind;
 use crate::sampling::ensemble::moves::{Move, Proposal};

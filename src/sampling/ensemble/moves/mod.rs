@@ -2,7 +2,7 @@
 //!
 //! Moves see sampling coordinates only. A new move is one file, one field of [`MoveWeights`] and one line of
 //! [`MoveWeights::mix`]; a move that needs data of its own is added with [`Mix::with`]. The tests of every move call
-//! `harness::check`. Left out: acceptance (`sampler`).
+//! `harness::check`.
 
 mod differential_evolution;
 #[cfg(test)]
@@ -48,8 +48,8 @@ pub struct MoveWeights {
     pub stretch: f64,
     /// Weight of differential evolution (ter Braak 2006).
     pub differential_evolution: f64,
-    /// Weight of the surrogate move (proposals from the quadratic posterior around the reference), times the square of the
-    /// share of its proposals that are accepted on trial. 0 turns it off; there is none where K or phi is fixed.
+    /// Weight of the surrogate move (proposals from the quadratic posterior around the reference), times the square of
+    /// the share of its proposals that are accepted on trial. 0 turns it off; there is none where K or phi is fixed.
     pub surrogate: f64,
 }
 
@@ -60,8 +60,8 @@ impl Default for MoveWeights {
 }
 
 impl MoveWeights {
-    /// Checks that the weights are finite, not negative, and those of the affine-invariant moves not all zero: they find what
-    /// the surrogate misses.
+    /// Checks that the weights are finite, not negative, and those of the affine-invariant moves not all zero: they
+    /// find what the surrogate misses.
     ///
     /// # Errors
     /// [`EnsembleError::Setting`].
