@@ -21,9 +21,9 @@ const UNITS: &[(&str, &str)] = &[
 
 const HEAD: &str = "# Every config key
 
-This page is made from the JSON Schema of the config by a test; `dimcmc schema` prints the same for editors. Keys that are
-not here are refused. Under `parameters` stands what is free, each with its prior; all other parameters keep their values
-under `star` and `planet`. [Your first star](../guide/first-star.md) has a config to begin with.
+This page is made from the JSON Schema of the config by a test; `dimcmc schema` prints the same for editors. Keys that
+are not here are refused. Under `parameters` stands what is free, each with its prior; all other parameters keep their
+values under `star` and `planet`. [Your first star](../guide/first-star.md) has a config to begin with.
 ";
 
 /// The page.
@@ -83,7 +83,9 @@ impl<'a> Page<'a> {
             }
         }
         if path == "parameters" {
-            return self.section("parameters.NAME", &section["properties"][keys[0]], false);
+            // one for all of them
+            let prior = self.resolve(&section["properties"][keys[0]]);
+            return self.section("parameters.NAME", prior, false);
         }
         for key in keys {
             let inner = &section["properties"][key];
