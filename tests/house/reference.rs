@@ -52,8 +52,9 @@ impl<'a> Page<'a> {
         if let Some(reference) = part["$ref"].as_str() {
             return &self.schema["$defs"][reference.rsplit('/').next().unwrap()];
         }
-        let choices = part["anyOf"].as_array().map(|all| all.iter().filter(|c| c["type"] != "null").collect());
-        match choices.unwrap_or_else(Vec::new)[..] {
+        let choices: Option<Vec<&Value>> =
+            part["anyOf"].as_array().map(|all| all.iter().filter(|c| c["type"] != "null").collect());
+        match choices.unwrap_or_default()[..] {
             [only] => self.resolve(only),
             _ => part,
         }
