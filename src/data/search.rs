@@ -1,10 +1,10 @@
 //! The way to the reference: from the config's values, and from the peaks of the likelihood over all periods, to the
-//! best parameters and to the maximum-entropy image there (method section 3, step 1).
+//! best parameters and to the maximum-entropy image there (`docs/method.md` section 3, step 1).
 //!
-//! The peaks are those of the quadratic around the first climb's end (method section 4), brought into the priors where
-//! they lie outside; where there is no quadratic (K or phi fixed), orbits drawn from the prior take their place. The
-//! search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last climb is on
-//! the objective asked for.
+//! The peaks are those of the quadratic around the first climb's end (`docs/method.md` section 4), brought into the
+//! priors where they lie outside; where there is no quadratic (K or phi fixed), orbits drawn from the prior take their
+//! place. The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last
+//! climb is on the objective asked for.
 
 use crate::data::config::{ImagingSettings, Settings};
 use crate::posterior::imaging::Imager;

@@ -1,5 +1,5 @@
-//! Maximum-entropy inversion (method section 2; Skilling & Bryan 1984, Gull & Skilling 1999): the image of greatest
-//! entropy at a given chi2, or at a given Lagrange multiplier.
+//! Maximum-entropy inversion (`docs/method.md` section 2; Skilling & Bryan 1984, Gull & Skilling 1999): the image of
+//! greatest entropy at a given chi2, or at a given Lagrange multiplier.
 //!
 //! Knows images, data misfits and their curvature through [`Problem`] alone.
 

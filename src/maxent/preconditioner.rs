@@ -1,5 +1,5 @@
-//! A truncated eigenbasis of the misfit's curvature at a reference image (method section 2): almost the inverse of the
-//! Newton system of every nearby problem.
+//! A truncated eigenbasis of the misfit's curvature at a reference image (`docs/method.md` section 2): almost the
+//! inverse of the Newton system of every nearby problem.
 //!
 //! In the entropy's metric the system is `1 + lambda M`, and M has a few hundred eigenvalues above 0.01 whatever the
 //! number of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and

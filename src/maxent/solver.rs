@@ -1,5 +1,5 @@
 //! Newton's method with preconditioned conjugate gradients for `max S subject to chi2 = target`, or at a given lambda
-//! (method section 2).
+//! (`docs/method.md` section 2).
 //!
 //! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: the linearised constraint
 //! says how far lambda is to go, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to

@@ -1,5 +1,5 @@
 //! The log-likelihood as a quadratic in the radial velocities of the profiles, with the star's own spots marginalised
-//! out (method section 4): `ln L(V) = ln L(0) + g V - V I V / 2`, one velocity V a profile.
+//! out (`docs/method.md` section 4): `ln L(V) = ln L(0) + g V - V I V / 2`, one velocity V a profile.
 //!
 //! Everything linear in the velocities follows in closed form: radial velocities with their covariance here, orbits in
 //! `periodogram`.

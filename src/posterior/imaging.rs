@@ -1,8 +1,8 @@
 //! Star and maximum entropy meet: the misfit of a map to observed profiles, and the Doppler image.
 //!
 //! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is `D =
-//! line(B) / continuum(B)` (method section 1), whose second derivative is kept, so that the solver's Newton steps are
-//! exact.
+//! line(B) / continuum(B)` (`docs/method.md` section 1), whose second derivative is kept, so that the solver's Newton
+//! steps are exact.
 
 mod data;
 mod profile;

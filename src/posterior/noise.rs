@@ -7,10 +7,10 @@
 //! datum, as one of right errors does, before noise is turned into spots. Level and slope of the continuum do not
 //! count.
 //!
-//! Noise that goes together over n bins, as that of LSD profiles may, counts for one: errors are larger by the root of
+//! Noise correlated over n bins, as that of LSD profiles may, counts for one: errors are larger by the root of
 //! n, and a target chi2 is meant per independent datum, so that the map stays what it was and errors of orbits become
 //! what they are. What counts is noise that looks like the local line, for nothing in a profile is narrower; where
-//! features are broader and the noise goes together farther, errors are still a little too small.
+//! features are broader and the noise is correlated farther, errors are still a little too small.
 
 use crate::posterior::first_look::Scatter;
 use crate::posterior::imaging::Imager;
@@ -51,8 +51,8 @@ pub struct ErrorSettings {
 /// What they said.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredErrors {
-    /// Factor on the quoted errors, where it was measured: the larger of the two below times the root of the bins that
-    /// go together.
+    /// Factor on the quoted errors, where it was measured: the larger of the two below times the root of the
+    /// number of bins over which noise is correlated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_scale: Option<f64>,
     /// Scatter of the continuum over quoted errors; null where there is too little of it.
@@ -60,7 +60,7 @@ pub struct MeasuredErrors {
     /// What a map at the config's values leaves over, over quoted errors, where that was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<f64>,
-    /// Over how many bins the noise of the continuum goes together, 1 for white noise.
+    /// Over how many bins the noise of the continuum is correlated, 1 for white noise.
     pub correlated_bins: f64,
     /// Factor on the errors of each profile beside that; empty where they are weighted as quoted.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]

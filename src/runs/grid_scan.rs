@@ -1,4 +1,4 @@
-//! A landscape on disk: begun afresh, or gone on with to the same bytes (method section 6).
+//! A landscape on disk: begun afresh, or gone on with to the same bytes (`docs/method.md` section 6).
 //!
 //! The reference is that of `sample`: the best parameters by `search` over the axes. Nodes are reconstructed in
 //! batches, in the order of the grid, so that the file does not depend on the number of threads, and a kill loses the

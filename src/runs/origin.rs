@@ -263,7 +263,7 @@ impl ReferenceRecord {
     }
 
     /// A target that a noise realisation, which moves the attainable chi2 by sqrt(2/N), may put out of reach: there
-    /// spottedness explodes, and the answer hangs on the target (method section 3).
+    /// spottedness explodes, and the answer hangs on the target (`docs/method.md` section 3).
     pub fn warning(&self) -> Option<String> {
         let noise = (2.0 / self.data as f64).sqrt() * self.chi2_target;
         (self.chi2_target - self.chi2_reach < noise).then(|| {

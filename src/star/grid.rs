@@ -2,7 +2,7 @@
 //!
 //! Rings of constant latitude hold a number of pixels proportional to the cosine of the latitude; the latitudes of
 //! their borders are then set so that every pixel has the same area. A pixel is evaluated at its centre or, to match
-//! moments (method section 1), at 2 x 2 Gauss points in longitude and sin(latitude).
+//! moments (`docs/method.md` section 1), at 2 x 2 Gauss points in longitude and sin(latitude).
 
 use super::moments::CHUNK;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};

@@ -1,6 +1,6 @@
 //! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots and
-//! faculae, and the response that turns a brightness map into line profiles (method section 1; Petit et al. 2015,
-//! section 2).
+//! faculae, and the response that turns a brightness map into line profiles (`docs/method.md` section 1; Petit et al.
+//! 2015, section 2).
 //!
 //! Angles are radians here, velocities km/s, times days.
 

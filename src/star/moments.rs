@@ -1,5 +1,5 @@
 //! What one observation sees of each pixel: its weight `a mu LD(mu)`, its mean velocity, and the variance of the
-//! velocity across it (method section 1, moment matching).
+//! velocity across it (`docs/method.md` section 1, moment matching).
 //!
 //! Pixels of a ring share their evaluation points but for the longitude, so that several of them are computed side by
 //! side, in single precision: weights, and velocities relative to the middle of the velocity grid's cell that they lie

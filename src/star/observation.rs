@@ -81,7 +81,8 @@ impl Observations {
     }
 
     /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that the
-    /// velocity range holds whole, whatever the spots, because every pixel's line has the same one (method section 1).
+    /// velocity range holds whole, whatever the spots, because every pixel's line has the same one (`docs/method.md`
+    /// section 1).
     pub fn mean_equivalent_width_kms(&self) -> f64 {
         let area = |p: &Profile| p.intensity.iter().map(|i| 1.0 - i).sum::<f64>() * self.step_kms;
         self.profiles.iter().map(area).sum::<f64>() / self.profiles.len() as f64

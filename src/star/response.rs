@@ -1,7 +1,7 @@
 //! The linear part of the forward model: a map of the surface to the line depth and continuum of every profile, before
 //! the division of one by the other; and its transpose.
 //!
-//! Method section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile.
+//! `docs/method.md` section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile.
 
 use super::convolution::{Convolutions, Rows, VelocityGrid};
 use super::deposit::{Deposit, Observed};
@@ -156,7 +156,7 @@ impl Response {
         vector::run(ApplyAndBack { response: self, x, out, weigh });
     }
 
-    /// Normalised depth `1 - I` of every bin for a brightness map: the observable of method section 1.
+    /// Normalised depth `1 - I` of every bin for a brightness map: the observable of `docs/method.md` section 1.
     pub fn depths(&self, brightness: &[f64]) -> Vec<f64> {
         let mut depths = vec![0.0; self.data_len()];
         let mut continuum = vec![0.0; self.profiles()];

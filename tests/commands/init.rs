@@ -422,7 +422,7 @@ fn lo_peg_has_a_config() {
     desk.succeed(&["map", "star.json", "--out", "map"]);
     // the errors are several times too large
     let errors = desk.json("map/fit.json")["measured"]["errors"].clone();
-    // where several bins of noise go together, they are larger by the root of that
+    // where noise is correlated over several bins, they are larger by the root of that
     let alone = number(&errors, "/sigma_scale") / number(&errors, "/correlated_bins").sqrt();
     assert!((0.2..0.6).contains(&alone), "{errors}");
 }

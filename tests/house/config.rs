@@ -68,7 +68,7 @@ fn the_seven_dimensional_config_starts_off_the_truth() {
     let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
     let demo = config::load(&shipped("demo.json")).unwrap();
     assert_eq!(simulation.truth, demo.values);
-    // Widths of method section 5; gamma times Omega_eq for the shear.
+    // Widths of `docs/method.md` section 5; gamma times Omega_eq for the shear.
     let sigma = [0.0106, 0.073, 0.041, 0.00038 * 2.0944, 0.00093 * 2.0944, 0.46, 0.022];
     for (k, sigma) in sigma.into_iter().enumerate() {
         let off = (settings.values.0[k] - simulation.truth.0[k]) / sigma;
@@ -426,4 +426,12 @@ fn replace_number(base: &[u8], at: usize, piece: &[u8]) -> Vec<u8> {
     let Some(start) = (at..base.len()).find(starts) else { return base.to_vec() };
     let end = (start + 1..base.len()).find(|k| !part_of_number(&base[*k])).unwrap_or(base.len());
     [&base[..=start], piece, &base[end..]].concat()
+}
+
+/// A key that was renamed is refused with its new name.
+#[test]
+fn an_old_key_names_the_new_one() {
+    let text = std::fs::read_to_string(shipped("demo.json")).unwrap().replace("unresolved_spots", "spots_left");
+    let error = config::from_json(text.as_bytes(), Path::new("old.json")).unwrap_err().to_string();
+    assert_eq!(error, "old.json: unknown key imaging.spots_left: it is now called unresolved_spots");
 }

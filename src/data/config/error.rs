@@ -101,8 +101,14 @@ impl ConfigError {
     }
 }
 
-/// "did you mean X?", or all that is allowed, from the end of a message of serde's.
+/// Keys that had another name: the old one and the new one.
+const RENAMED: [(&str, &str); 1] = [("spots_left", "unresolved_spots")];
+
+/// The new name of an old key, "did you mean X?", or all that is allowed, from the end of a message of serde's.
 fn hint(given: &str, message: &str) -> String {
+    if let Some((_, name)) = RENAMED.iter().find(|(old, _)| *old == given) {
+        return format!("it is now called {name}");
+    }
     let (_, expected) = message.rsplit_once(", expected ").unwrap_or_default();
     let allowed: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
     match nearest(given, &allowed) {

@@ -1,6 +1,6 @@
-//! Entropy of an image of brightnesses above and below that of the photosphere (method section 2, Gull & Skilling
-//! 1999): `S(B) = - sum_p a_p [ B ln(B/m) - B + m ]` with the default m = 1: profiles are divided by their continuum,
-//! and say nothing of the scale of B.
+//! Entropy of an image of brightnesses above and below that of the photosphere (`docs/method.md` section 2, Gull &
+//! Skilling 1999): `S(B) = - sum_p a_p [ B ln(B/m) - B + m ]` with the default m = 1: profiles are divided by their
+//! continuum, and say nothing of the scale of B.
 //!
 //! The coordinate is `u = ln B`, which keeps B above 0. Spottedness is the root mean square of `B - 1` over the
 //! surface. Its mean modulus would be nearer to the coverage of spots, but is traded for chi2 less faithfully: on the

@@ -1,5 +1,5 @@
-//! Entropies of images, by what an image holds (method section 2): filling factors of dark spots (`spots`), or
-//! brightnesses above and below that of the photosphere (`bright_and_dark`).
+//! Entropies of images, by what an image holds (`docs/method.md` section 2): filling factors of dark spots (`spots`),
+//! or brightnesses above and below that of the photosphere (`bright_and_dark`).
 //!
 //! The solver works in a coordinate u of each pixel that keeps the image inside its domain, and measures steps in the
 //! entropy's own metric, in which -S has the unit matrix as its second derivative.

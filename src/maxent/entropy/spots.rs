@@ -1,4 +1,4 @@
-//! Two-component entropy of an image of spot filling factors (method section 2, Collier Cameron 1992):
+//! Two-component entropy of an image of spot filling factors (`docs/method.md` section 2, Collier Cameron 1992):
 //! `S(s) = - sum_p a_p [ s ln(s/m) + (1-s) ln((1-s)/(1-m)) ]` with default filling m.
 //!
 //! The coordinate is `u = logit(s)`, which keeps s inside (0, 1).

@@ -1,5 +1,5 @@
 //! The Doppler-imaging periodogram: orbits blindly searched in the velocities of the profiles, spots marginalised out
-//! (method section 4).
+//! (`docs/method.md` section 4).
 //!
 //! All of it follows from one quadratic in the velocities. Periods are in rotation cycles, `Porb/Prot`; days only where
 //! the user states what to search (`frequencies`).

@@ -1,5 +1,5 @@
 //! The best circular orbit at each trial period: a generalised least-squares sine fit (Zechmeister & Kurster 2009) in
-//! which the weights are the whole information matrix of the velocities (method section 4).
+//! which the weights are the whole information matrix of the velocities (`docs/method.md` section 4).
 //!
 //! With `theta = 2 pi (E - E_mid) / P` the velocities are `V = X (a, b)`, the columns of X being cos and sin of theta.
 //! Then `ln L = b' (a, b) - (a, b) A (a, b) / 2` with `A = X' I X` and `b = X' g`; its maximum is `b' A^-1 b / 2` above

@@ -1,5 +1,5 @@
 //! The regularised likelihood to second order around a reference, in the velocities of the profiles and in the star's
-//! own parameters (method section 4).
+//! own parameters (`docs/method.md` section 4).
 //!
 //! `ln L(x) = max_s [alpha S(s) - chi2(s, x)/2]` at the alpha of the reference is very nearly a quadratic in the
 //! velocity of every profile: it holds where the map that fits best answers the change of a velocity linearly. Its

@@ -43,7 +43,7 @@ impl Continuum {
         let step_kms = observations.step_kms;
         let scatter: Scatter =
             observations.profiles.iter().map(|p| Scatter::of(p, step_kms, centre_kms, reach_kms)).sum();
-        // bins of which several go together are so many fewer, and quoted errors may be wrong
+        // bins of which several are correlated are so many fewer, and quoted errors may be wrong
         let larger = scatter.ratio(1).unwrap_or(1.0).powi(2) * scatter.correlated_bins(f64::INFINITY);
         let sides = |profile| sides(profile, step_kms, centre_kms, reach_kms, larger);
         let sides = observations.profiles.iter().map(sides).collect::<Option<Vec<Sides>>>()?;

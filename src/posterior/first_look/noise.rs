@@ -23,7 +23,7 @@ pub struct Noise {
     pub scatter: Option<f64>,
 }
 
-/// Bins apart, at most, whose noise may go together.
+/// Bins apart, at most, whose noise may be correlated.
 const LAGS: usize = 8;
 
 /// How much the continuum of a profile, or of several, scatters about straight lines.
@@ -63,7 +63,7 @@ impl Scatter {
         [side(-1.0), side(1.0)].into_iter().sum()
     }
 
-    /// Over how many bins noise goes together for features of a width (standard deviation) of `sigma_bins`: `1 + 2 sum
+    /// Over how many bins noise is correlated for features of a width (standard deviation) of `sigma_bins`: `1 + 2 sum
     /// rho a`, rho the correlation of bins so far apart, as long as it is larger than white noise shows by chance, and
     /// `a` that of the features. What a profile says of them has an error that is larger by the root of it.
     pub fn correlated_bins(&self, sigma_bins: f64) -> f64 {
@@ -78,7 +78,7 @@ impl Scatter {
         bins
     }
 
-    /// Correlations of bins 1, ..., `lags` apart, none beyond. The lines take up some of what goes together; what the
+    /// Correlations of bins 1, ..., `lags` apart, none beyond. The lines take up some of what is correlated; what the
     /// products of their residuals are on average is linear in the covariances, and is solved for these.
     fn correlation(&self, lags: usize) -> Option<Vec<f64>> {
         let mut lengths = self.lengths.clone();

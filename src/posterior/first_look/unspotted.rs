@@ -285,7 +285,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Variance of a bin in the flanks that is not explained. What spots leave there goes together over the width of
+    /// Variance of a bin in the flanks that is not explained. What spots leave there is correlated over the width of
     /// the local line, and so many bins count for one.
     fn unexplained(&self, here: &Point) -> f64 {
         let fitted = self.weights.iter().sum::<f64>();

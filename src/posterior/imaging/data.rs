@@ -12,7 +12,7 @@ pub struct Data {
     pub depth: Vec<f64>,
     /// `1 / sigma^2` of every bin.
     pub inverse_variance: Vec<f64>,
-    /// Over how many bins their noise goes together, which the errors allow for; 1 for white noise.
+    /// Over how many bins their noise is correlated, which the errors allow for; 1 for white noise.
     pub correlated_bins: f64,
     /// What may be wrong with each profile by itself, integrated out.
     pub nuisances: Nuisances,

@@ -1,7 +1,7 @@
 //! Free parameters, their joint prior, and the sampling coordinates that samplers and optimisers move in.
 //!
-//! Where K and phi are both free they become `(K cos, K sin)` of the orbital phase at mid-time (method section 5): K
-//! near 0 and the wrap of phi are then no special case, and phi no longer hangs on the period.
+//! Where K and phi are both free they become `(K cos, K sin)` of the orbital phase at mid-time (`docs/method.md`
+//! section 5): K near 0 and the wrap of phi are then no special case, and phi no longer hangs on the period.
 
 use super::parameters::{Parameter, ParameterValues};
 use super::prior::Prior;

@@ -1,4 +1,4 @@
-//! The three objectives by name (method section 3), and what is known of the spots that a map leaves over.
+//! The three objectives by name (`docs/method.md` section 3), and what is known of the spots that a map leaves over.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,5 @@
-//! What a reconstruction is worth: ln L by the three objectives (method section 3, step 3), whatever the prior says.
+//! What a reconstruction is worth: ln L by the three objectives (`docs/method.md` section 3, step 3), whatever the
+//! prior says.
 //!
 //! In the posterior it is joined by the prior; alone it is what a landscape shows.
 

@@ -1,4 +1,5 @@
-//! What a point of parameter space is worth: parameters, priors, trade-off curve, objectives (method section 3).
+//! What a point of parameter space is worth: parameters, priors, trade-off curve, objectives (`docs/method.md` section
+//! 3).
 
 pub mod coordinates;
 pub mod kind;

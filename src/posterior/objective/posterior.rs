@@ -1,5 +1,5 @@
 //! The log-probability of a parameter vector: one maximum-entropy reconstruction, judged by one of three objectives
-//! (method section 3), times the prior; and its gradient.
+//! (`docs/method.md` section 3), times the prior; and its gradient.
 
 use super::coordinates::ParameterSpace;
 use super::kind::ObjectiveKind;

@@ -1,5 +1,5 @@
-//! A prediction of image and lambda from a known solution: how both change with each parameter (method section 2), to
-//! first or to second order.
+//! A prediction of image and lambda from a known solution: how both change with each parameter (`docs/method.md`
+//! section 2), to first or to second order.
 //!
 //! The solution moves with a parameter x as `H dz = -lambda dg/dx - lambda g dlnlambda`, with the last term set so that
 //! chi2 stays at the target (or left out at a fixed lambda). What that leaves over is taken from solutions near by. It

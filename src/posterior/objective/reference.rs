@@ -1,5 +1,5 @@
 //! The reference: the Doppler image at one point of parameter space that every evaluation starts from, with the
-//! preconditioner and the trade-off curve that belong to it (method sections 2 and 3).
+//! preconditioner and the trade-off curve that belong to it (`docs/method.md` sections 2 and 3).
 //!
 //! Built once, deterministically, before a chain begins; never changed by it.
 

@@ -1,5 +1,5 @@
 //! The target chi2 that the profiles themselves ask for: the highest below which the radial velocities that the image
-//! leaves over stop shrinking (Petit et al. 2015, section 3; method section 3).
+//! leaves over stop shrinking (Petit et al. 2015, section 3; `docs/method.md` section 3).
 //!
 //! Above it spots are still missing in the image; below, noise is turned into spots. Along the path of images the rms
 //! of the filtered velocities, observed minus modelled first moments, falls with lambda and then no more: the target is

@@ -1,5 +1,5 @@
-//! The trade-off curve of the reference: how much chi2 a given spottedness (or entropy) is worth (method section 3,
-//! step 2).
+//! The trade-off curve of the reference: how much chi2 a given spottedness (or entropy) is worth (`docs/method.md`
+//! section 3, step 2).
 //!
 //! Nodes along the path of maximum-entropy images, from the reference to larger and smaller lambda; between them chi2
 //! is a cubic in spottedness with the exact slopes of the path. Beyond its ends the curve goes on along its tangent, so

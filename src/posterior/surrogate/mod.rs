@@ -1,5 +1,5 @@
 //! A stand-in for the posterior that costs microseconds: the quadratic of [`crate::posterior::expansion`] with the
-//! priors, frozen before a chain begins (method section 5, surrogate move).
+//! priors, frozen before a chain begins (`docs/method.md` section 5, surrogate move).
 //!
 //! Given the period, the quadratic is a Gaussian in K cos, K sin, the systemic velocity and the stellar parameters;
 //! over the periods it is tabulated. Its tails are those of a t distribution, so that nothing it calls improbable is

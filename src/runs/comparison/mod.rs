@@ -1,5 +1,5 @@
 //! A chain against a landscape of the same data: the same posterior by two routes, and the paper's paraboloid beside
-//! them (method section 6).
+//! them (`docs/method.md` section 6).
 //!
 //! The landscape has no prior: it gets the run's before it is integrated. Differences are in units of the chain's error
 //! bar, half its 68 % interval. A sampled parameter without an axis is fixed in the landscape, which is then

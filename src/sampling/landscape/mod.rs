@@ -1,5 +1,5 @@
-//! The landscape: ln L of the reconstructions on a Cartesian grid over one to three parameters (method section 6), the
-//! paper's own way to an orbit.
+//! The landscape: ln L of the reconstructions on a Cartesian grid over one to three parameters (`docs/method.md`
+//! section 6), the paper's own way to an orbit.
 //!
 //! [`Grid`] says where the nodes are, [`Landscape`] holds their values in order, `table` says where the highest one is,
 //! `paraboloid` what the nodes around it (`region`) say of the parameters, and `marginal` what all of them do once

@@ -1,5 +1,5 @@
-//! The paraboloid: the paper's own estimate of the parameters and of their error bars (Petit et al. 2015; method
-//! section 6).
+//! The paraboloid: the paper's own estimate of the parameters and of their error bars (Petit et al. 2015;
+//! `docs/method.md` section 6).
 //!
 //! Least squares of a second-order polynomial to chi2 = -2 ln L at the nodes around the highest one (`region`). Its
 //! vertex is the estimate, the inverse of half its Hessian the covariance, and the projection of the surface one above
