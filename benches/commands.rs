@@ -1,7 +1,6 @@
 //! Whole commands, as users run them: seconds, processor seconds, peak memory, reconstructions.
 //!
-//! Memory and processor time are read from `/proc` (Linux) while the command runs; elsewhere they are not known. Left out:
-//! what the time goes into.
+//! Memory and processor time are read from `/proc` (Linux) while the command runs; elsewhere they are not known.
 
 mod common;
 
@@ -112,7 +111,8 @@ struct Usage {
 }
 
 impl Usage {
-    /// Looks every few milliseconds until the process is a zombie, whose processor time is final but whose memory is gone.
+    /// Looks every few milliseconds until the process is a zombie, whose processor time is final but whose memory is
+    /// gone.
     fn until_the_end_of(child: &mut Child) -> Self {
         let mut usage = Usage::default();
         let read = |name| std::fs::read_to_string(format!("/proc/{}/{name}", child.id())).ok();

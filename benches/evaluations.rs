@@ -1,15 +1,13 @@
-//! Evaluations of the log-probability over the bulk of the paper's posterior: how many a second, passes each, what they cost beyond
-//! their passes, and how far they are from solutions to rounding error.
-//!
-//! Left out: how evaluations grow with the size of the problem (`growth`), several threads (`threads`).
+//! Evaluations of the log-probability over the bulk of the paper's posterior: how many a second, passes each, what they
+//! cost beyond their passes, and how far they are from solutions to rounding error.
 
 mod common;
 
 use common::paper::{Bulk, Free, Passes, Size, scene};
 use common::stopwatch::{Candidate, by_criterion, criterion, quantile, seconds};
 use common::table::{Table, Target, thousands};
-use dimcmc::log_density::{LogDensity, Status};
-use dimcmc::maxent::SolverSettings;
+use dimcmc::internals::maxent::SolverSettings;
+use dimcmc::internals::sampling::log_density::{LogDensity, Status};
 use std::hint::black_box;
 
 /// An evaluation over its passes.
@@ -21,7 +19,7 @@ const ERROR: Target = Target::AtMost(1.0);
 /// Times that everything is timed; the fastest counts.
 const ROUNDS: usize = 5;
 
-/// Passes of an evaluation: median and 95 %.
+/// Model applications per evaluation: median and 95 %.
 fn most_passes(free: Free) -> [Target; 2] {
     match free {
         Free::Three => [Target::AtMost(30.0), Target::AtMost(80.0)],
@@ -59,11 +57,16 @@ fn main() {
     criterion.final_summary();
     let [three, seven] = [Free::Three, Free::Seven].map(|free| most_passes(free).map(|target| target.to_string()));
     table.print(&format!(
-        "Objective spottedness; points drawn from a Gaussian around the maximum with the covariance found there: 200 of them, 60 on \
-         20,000 pixels; the fastest of {ROUNDS} evaluations each. Targets of passes: {} and {} in 3-D, {} and {} in 7-D. An evaluation \
-         over its passes is the median over points of its time over that of as many passes at the same point: as many in double \
-         precision, forward and transpose in turn, and as many there and back in single precision as it made; then over as \
-         many passes all of which are in double precision. Errors are differences to the log-probability with the solver taken to rounding error.",
+        "Objective spottedness; points drawn from a Gaussian around the maximum with the covariance found there: 200 \
+        of them, 60 on \
+         20,000 pixels; the fastest of {ROUNDS} evaluations each. Targets of passes: {} and {} in 3-D, {} and {} in \
+         7-D. An evaluation \
+         over its passes is the median over points of its time over that of as many passes at the same point: as many \
+         in double \
+         precision, forward and transpose in turn, and as many there and back in single precision as it made; then \
+         over as \
+         many passes all of which are in double precision. Errors are differences to the log-probability with the \
+         solver taken to rounding error.",
         three[0], three[1], seven[0], seven[1]
     ));
 }
@@ -78,7 +81,8 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
         let [mut time, mut double, mut own] = [f64::INFINITY; 3];
         for _ in 0..ROUNDS {
             time = time.min(seconds(|| bulk.target.evaluate(theta)));
-            // a response in the memory that the evaluation had its own in: with two of them one would be in the other's way
+            // a response in the memory that the evaluation had its own in: with two of them one would be in the other's
+            // way
             let problem = bulk.target.posterior().reconstruct(theta).1;
             let (response, single) = (problem.response(), problem.single_passes());
             let mut only_passes = Passes::new(response);

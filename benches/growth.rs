@@ -1,17 +1,15 @@
 //! How a pass and an evaluation grow with pixels, profiles and velocity bins.
-//!
-//! Left out: what they cost at the usual sizes beside a yardstick (`passes`, `evaluations`).
 
 mod common;
 
 use common::paper::{Free, Passes, Size, scene, truth};
 use common::stopwatch::{Candidate, exponent, fastest, in_turn};
 use common::table::{Table, Target, thousands};
-use dimcmc::log_density::{Evaluation, LogDensity, Status};
-use dimcmc::maxent::Problem;
-use dimcmc::objective::{ObjectiveKind, Posterior, Reference};
-use dimcmc::scene::Scene;
-use dimcmc::star::Response;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::maxent::Problem;
+use dimcmc::internals::posterior::objective::{ObjectiveKind, Posterior, Reference};
+use dimcmc::internals::sampling::log_density::{Evaluation, LogDensity, Status};
+use dimcmc::internals::star::Response;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -28,8 +26,8 @@ const PASSES: u32 = 10;
 /// Parameter vectors evaluated at each size.
 const POINTS: usize = 24;
 
-/// How far chi2 is brought below that of the true map. A fixed chi2 per datum would ask for another fit at every size, down to
-/// impossible ones: noise moves chi2 by the square root of twice the number of data.
+/// How far chi2 is brought below that of the true map. A fixed chi2 per datum would ask for another fit at every size,
+/// down to impossible ones: noise moves chi2 by the square root of twice the number of data.
 const FIT: f64 = 100.0;
 
 /// Standard deviations of K, period and phase in the paper's setup.
@@ -40,7 +38,7 @@ fn main() {
         return;
     }
     let (pass, evaluation) = (format!("pass, ms ({EXPONENT})"), format!("evaluation, ms ({EXPONENT})"));
-    let mut table = Table::new("Growth", &["", "size", &pass, &evaluation, "passes each"]);
+    let mut table = Table::new("Growth", &["", "size", &pass, &evaluation, "model applications each"]);
     let pixels = [1250, 5000, 20_000, 80_000];
     family("pixels", &pixels, Size::pixels, &mut table);
     let profiles = [25, 50, 100, 200, 400];
@@ -50,8 +48,10 @@ fn main() {
     let finer = |bins| Size { step_kms: 1.8 * 56.0 / (bins - 1) as f64, ..Size::pixels(PIXELS) };
     family("bins", &bins, finer, &mut table);
     table.print(&format!(
-        "One thread; the fastest of several rounds in which all sizes of a family take turns. 50 profiles, 57 bins and {} pixels where they \
-         are not what grows. 3-D, objective spottedness, {POINTS} points as far apart as the posterior is wide, chi2 {FIT} below \
+        "One thread; the fastest of several rounds in which all sizes of a family take turns. 50 profiles, 57 bins \
+        and {} pixels where they \
+         are not what grows. 3-D, objective spottedness, {POINTS} points as far apart as the posterior is wide, chi2 \
+         {FIT} below \
          that of the true map. Exponents by least squares in the logarithms.",
         thousands(PIXELS)
     ));
@@ -92,7 +92,7 @@ impl Case {
         self.points.iter().map(|x| self.posterior.evaluate(x)).collect()
     }
 
-    /// Passes of an evaluation in the mean, all of which reach their target.
+    /// Model applications per evaluation in the mean, all of which reach their target.
     fn passes(&self) -> f64 {
         let evaluations = self.evaluate();
         assert!(evaluations.iter().all(|evaluation| evaluation.status == Status::Converged), "{evaluations:?}");

@@ -1,6 +1,4 @@
 //! The response: forward, transpose and build, against the obvious loop and against a straight read of as many bytes.
-//!
-//! Left out: what a reconstruction does with it (`evaluations`), other sizes (`growth`).
 
 mod common;
 #[path = "../tests/common/plain_loop.rs"]
@@ -10,8 +8,8 @@ use common::paper::{Free, Passes, Size, scene, truth, uneven_map};
 use common::stopwatch::{Candidate, by_criterion, criterion, fastest, in_turn};
 use common::table::{Table, Target, thousands};
 use criterion::Criterion;
-use dimcmc::scene::Scene;
-use dimcmc::vector::{self, Instructions, Task};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::numerics::vector::{self, Instructions, Task};
 use plain_loop::PlainLoop;
 use std::hint::black_box;
 
@@ -50,11 +48,16 @@ fn main() {
     }
     criterion.final_summary();
     table.print(&format!(
-        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row; of the rows without ratios \
-         {OTHER_ROUNDS} rounds, one run. `read` sums as many bytes as the response stores for its pairs, by the same instructions, \
-         `plain read` by those that the plain loop is compiled for ({} bytes a pair in the plain loop, whose windows have {WINDOW} \
-         bins). `build` is a response for new stellar parameters, `shift` one for a new orbit; there and back are two passes, and \
-         the time is that of one. Ratios are of whole passes: the plain loop looks at the middle of a pixel alone, and has fewer \
+        "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row; of the rows \
+        without ratios \
+         {OTHER_ROUNDS} rounds, one run. `read` sums as many bytes as the response stores for its pairs, by the same \
+         instructions, \
+         `plain read` by those that the plain loop is compiled for ({} bytes a pair in the plain loop, whose windows \
+         have {WINDOW} \
+         bins). `build` is a response for new stellar parameters, `shift` one for a new orbit; there and back are two \
+         passes, and \
+         the time is that of one. Ratios are of whole passes: the plain loop looks at the middle of a pixel alone, \
+         and has fewer \
          pairs.",
         PlainLoop::<WINDOW>::PAIR_BYTES,
     ));

@@ -1,23 +1,24 @@
-//! Ranks of a cluster against one thread: what the queue between them costs, how two workers share a batch, and the numbers that
-//! `examples/scaling.py` makes a cluster of: seconds of evaluations, of messages, and of the work that only rank 0 does.
+//! Ranks of a cluster against one thread: what the queue between them costs, how two workers share a batch, and the
+//! numbers that `examples/scaling.py` makes a cluster of: seconds of evaluations, of messages, and of the work that
+//! only rank 0 does.
 //!
-//! Starts itself anew by `mpirun`. Left out: threads (`threads`).
+//! Starts itself anew by `mpirun`.
 
 mod common;
 
 use common::paper::{Free, Size, scene};
 use common::stopwatch::{Candidate, fastest, in_turn, quantile, seconds};
 use common::table::{Table, Target, thousands};
-use dimcmc::cluster::{Answer, Queue, Rank, join};
-use dimcmc::config::{self, Settings};
-use dimcmc::ensemble::{Sampler, StartDraw, draw_start};
-use dimcmc::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
-use dimcmc::objective::Posterior;
-use dimcmc::origin::Origin;
-use dimcmc::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
-use dimcmc::scene::Scene;
-use dimcmc::search::{self, SearchSettings};
-use dimcmc::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::data::config::{self, Settings};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{self, SearchSettings};
+use dimcmc::internals::posterior::objective::Posterior;
+use dimcmc::internals::posterior::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
+use dimcmc::internals::runs::origin::Origin;
+use dimcmc::internals::runs::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
+use dimcmc::internals::sampling::ensemble::{Sampler, StartDraw, draw_start};
+use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
 use std::convert::Infallible;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
@@ -109,7 +110,7 @@ fn rank() {
                 let echo: Answer = Box::new(|question, _| question.to_vec());
                 match Brief::from_bytes(brief) {
                     None => Ok::<Answer, Infallible>(echo),
-                    Some(_) => Ok(dimcmc::batch::learn(brief).unwrap()),
+                    Some(_) => Ok(dimcmc::internals::runs::batch::learn(brief).unwrap()),
                 }
             };
             let Ok(()) = worker.serve(learn);
@@ -134,7 +135,7 @@ impl Case {
         let settings = SearchSettings { other_starts: 0, ..SearchSettings::new(&scene.settings) };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let task = Task::new(&scene, &Origin::of(&scene, &found), scene.space.names(), Asked::LogProbability);
-        let target = Density::new(found.posterior.clone(), scene.settings.imaging.spots_left).unwrap();
+        let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();
         let (centre, covariance) = (&found.optimum.theta[..], &found.optimum.covariance);
         let draw = StartDraw { centre, covariance, scale: 1.0, ensembles: 1, walkers: BATCH, seed: 1 };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
@@ -185,7 +186,8 @@ fn workers(queue: &Queue) {
         ]);
     }
     table.print(&format!(
-        "Batches of {BATCH} points from the bulk of the posterior, the same bytes by all; rank 0 only hands them out. The fastest of \
+        "Batches of {BATCH} points from the bulk of the posterior, the same bytes by all; rank 0 only hands them out. \
+        The fastest of \
          {BATCHES} rounds in which all take turns."
     ));
 }
@@ -216,7 +218,8 @@ fn ingredients(queue: &Queue) {
     let many: Vec<f64> =
         (0..5).map(|_| seconds(|| queue.answers(b"echo", &questions, &AtomicBool::new(false)))).collect();
     println!(
-        "A question and its answer, nothing to think about: {:.0} us alone, {:.1} us each in a row of {ECHOES} (medians).\n",
+        "A question and its answer, nothing to think about: {:.0} us alone, {:.1} us each in a row of {ECHOES} \
+        (medians).\n",
         1e6 * quantile(&alone, 0.5),
         1e6 * quantile(&many, 0.5) / ECHOES as f64
     );

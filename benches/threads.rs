@@ -1,13 +1,11 @@
 //! Two threads against one: a batch of evaluations through pools of either size, in turn.
-//!
-//! Left out: what an evaluation costs (`evaluations`).
 
 mod common;
 
 use common::paper::{Bulk, Free, Size, scene};
 use common::stopwatch::{Candidate, fastest, in_turn};
 use common::table::{Table, Target, thousands};
-use dimcmc::log_density::{Evaluator, Threads};
+use dimcmc::internals::sampling::log_density::{Evaluator, Threads};
 
 /// Times as many evaluations a second.
 const TWICE: Target = Target::AtLeast(1.8);
@@ -40,6 +38,7 @@ fn main() {
         ]);
     }
     table.print(&format!(
-        "Batches of {BATCH} points from the bulk of the posterior; the fastest of {ROUNDS} rounds in which both take turns."
+        "Batches of {BATCH} points from the bulk of the posterior; the fastest of {ROUNDS} rounds in which both take \
+        turns."
     ));
 }

@@ -5,17 +5,17 @@
 //!
 //! writes null.csv and planet.csv (a line a star) and prints the tables of `results/calibration.md`.
 
-use dimcmc::config;
-use dimcmc::detection::{Detection, DetectionSettings};
-use dimcmc::expansion::Expansion;
-use dimcmc::imaging::Imager;
-use dimcmc::io::csv::Table;
-use dimcmc::objective::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
-use dimcmc::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings};
-use dimcmc::scene::Scene;
-use dimcmc::simulate::Simulation;
-use dimcmc::star::Spot;
-use dimcmc::surrogate::Surrogate;
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::io::csv::Table;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings};
+use dimcmc::internals::posterior::detection::{Detection, DetectionSettings};
+use dimcmc::internals::posterior::expansion::Expansion;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
+use dimcmc::internals::posterior::simulate::Simulation;
+use dimcmc::internals::posterior::surrogate::Surrogate;
+use dimcmc::internals::star::Spot;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -92,7 +92,7 @@ fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Fai
 /// What a star without a planet showed.
 struct NullStar {
     chi2_per_datum: f64,
-    spots_left: f64,
+    unresolved_spots: f64,
     /// Of the highest peak, for each of [`MODELS`].
     delta_ln_l: [f64; 2],
     porb_over_prot: [f64; 2],
@@ -112,7 +112,7 @@ fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Fa
     let height = |search: &Search| search.best().orbit.delta_ln_l;
     Ok(NullStar {
         chi2_per_datum: view.reference.solution.chi2 / imager.data.depth.len() as f64,
-        spots_left: view.spots_left,
+        unresolved_spots: view.unresolved_spots,
         delta_ln_l: both.map(height),
         porb_over_prot: both.map(|search| search.best().porb_over_prot),
         false_alarm: both.map(|search| search.false_alarm.probability(height(search)).value()),
@@ -121,16 +121,16 @@ fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Fa
 
 impl NullStar {
     fn table(stars: &[NullStar], folder: &Path) -> Result<(), Failure> {
-        let columns = "chi2_per_datum,spots_left,delta_ln_l_entropy,porb_over_prot_entropy,false_alarm_entropy,\
+        let columns = "chi2_per_datum,unresolved_spots,delta_ln_l_entropy,porb_over_prot_entropy,false_alarm_entropy,\
                        delta_ln_l,porb_over_prot,false_alarm";
         let mut csv = Table::new(&columns.split(',').collect::<Vec<_>>());
         for star in stars {
             let of = |i: usize| [star.delta_ln_l[i], star.porb_over_prot[i], star.false_alarm[i]];
-            csv.row(&[&[star.chi2_per_datum, star.spots_left][..], &of(0), &of(1)].concat());
+            csv.row(&[&[star.chi2_per_datum, star.unresolved_spots][..], &of(0), &of(1)].concat());
         }
         std::fs::write(folder.join("null.csv"), csv.into_bytes())?;
         println!("{} stars without a planet\n", stars.len());
-        println!("| spots left over | KS distance | p | below 1 % | below 5 % | below 10 % | below 50 % |");
+        println!("| unresolved spots | KS distance | p | below 1 % | below 5 % | below 10 % | below 50 % |");
         println!("|---|---|---|---|---|---|---|");
         for (i, name) in MODELS.into_iter().enumerate() {
             let mut values: Vec<f64> = stars.iter().map(|star| star.false_alarm[i]).collect();
@@ -183,7 +183,7 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
     };
     let ranks = [&expansion, &fitted].map(|expansion| {
         let surrogate = Surrogate::of_expansion(expansion, &space, &imager)?;
-        let draws = (0..DRAWS).filter_map(|_| Some(space.to_written(&surrogate.draw(&mut rng)?)));
+        let draws = (0..DRAWS).filter_map(|_| Some(space.to_physical(&surrogate.draw(&mut rng)?)));
         Some(ranks(&draws.collect::<Vec<_>>(), [truth[Parameter::K], period, phi]))
     });
     let [Some(entropy), Some(fitted)] = ranks else { return Err("the likelihood has no maximum".into()) };
@@ -224,7 +224,7 @@ impl PlanetStar {
         }
         std::fs::write(folder.join("planet.csv"), csv.into_bytes())?;
         println!("{} stars with a planet of {} m/s\n", stars.len(), 1000.0 * K_KMS);
-        println!("| period | stars | spots left over | K 68 % | K 95 % | P 68 % | P 95 % | phi 68 % | phi 95 % |");
+        println!("| period | stars | unresolved spots | K 68 % | K 95 % | P 68 % | P 95 % | phi 68 % | phi 95 % |");
         println!("|---|---|---|---|---|---|---|---|---|");
         let all: Vec<&PlanetStar> = stars.iter().collect();
         let (near, away): (Vec<&PlanetStar>, Vec<&PlanetStar>) = stars.iter().partition(|s| s.near());

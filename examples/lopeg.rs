@@ -1,17 +1,18 @@
-//! A real star: the orbit that each model of it finds in the profiles of LO Peg, where no planet is known, and orbits put into them.
+//! A real star: the orbit that each model of it finds in the profiles of LO Peg, where no planet is known, and orbits
+//! put into them.
 //!
 //!     cargo run --release --example lopeg -- models
 //!     cargo run --release --example lopeg -- injections
 //!
-//! print the tables of `results/lopeg.md`. Chains are kept in `runs/lopeg` and gone on with. The profiles are not part of this
-//! repository: see `configs/lopeg.json` for where they are looked for.
+//! print the tables of `results/lopeg.md`. Chains are kept in `runs/lopeg` and gone on with. The profiles are not part
+//! of this repository: see `configs/lopeg.json` for where they are looked for.
 
-use dimcmc::experiments::{Case, ExperimentError, Laboratory, Outcome, star};
-use dimcmc::injection::inject;
-use dimcmc::io::lsd;
-use dimcmc::pool::Pool;
-use dimcmc::scene::Scene;
-use dimcmc::star::Orbit;
+use dimcmc::internals::data::io::lsd;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::runs::experiments::{Case, ExperimentError, Laboratory, Outcome, star};
+use dimcmc::internals::runs::pool::Pool;
+use dimcmc::internals::star::Orbit;
+use dimcmc::internals::star::injection::inject;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -29,7 +30,7 @@ const NUISANCES: (&str, fn() -> Value) =
     ("/imaging/nuisances", || json!({ "continuum_offset": 5e-4, "continuum_slope": 5e-4, "equivalent_width": 0.02 }));
 const VOIGT: (&str, fn() -> Value) =
     ("/star/line", || json!({ "shape": "voigt", "sigma_kms": 1.7, "gamma_kms": 2.1, "equivalent_width_kms": "auto" }));
-const SPOTS_LEFT: (&str, fn() -> Value) = ("/imaging/spots_left", || json!("fitted"));
+const UNRESOLVED_SPOTS: (&str, fn() -> Value) = ("/imaging/unresolved_spots", || json!("fitted"));
 
 const MODELS: [Model; 10] = [
     ("spots", &[]),
@@ -40,12 +41,13 @@ const MODELS: [Model; 10] = [
     ("bright and dark, nuisances, errors measured", &[BRIGHT, NUISANCES, MEASURED]),
     ("spots, Voigt, errors measured", &[VOIGT, MEASURED]),
     ("bright and dark, Voigt, errors measured", &[BRIGHT, VOIGT, MEASURED]),
-    ("spots, errors measured, spots left over", &[MEASURED, SPOTS_LEFT]),
+    ("spots, errors measured, unresolved spots", &[MEASURED, UNRESOLVED_SPOTS]),
     RECOMMENDED,
 ];
 
 /// The model that is recommended for a real star.
-const RECOMMENDED: Model = ("bright and dark, errors measured, spots left over", &[BRIGHT, MEASURED, SPOTS_LEFT]);
+const RECOMMENDED: Model =
+    ("bright and dark, errors measured, unresolved spots", &[BRIGHT, MEASURED, UNRESOLVED_SPOTS]);
 
 /// Orbits that are put in: K (km/s), Porb/Prot, phases.
 const K_KMS: [f64; 3] = [0.3, 0.6, 1.0];
@@ -76,7 +78,7 @@ fn base() -> Result<Value, Failure> {
         ("/observations/path", json!(list)),
         // white errors and the entropy's spots, until a model says otherwise
         ("/observations/sigma_scale", json!(0.3)),
-        ("/imaging/spots_left", json!("entropy")),
+        ("/imaging/unresolved_spots", json!("entropy")),
         ("/parameters/porb_over_prot", json!({ "prior": "log-uniform", "min": 0.5, "max": 4.0 })),
         ("/planet", json!({ "k_kms": 0.1, "porb_over_prot": 1.7, "phi": 0.5 })),
         ("/sampler/walkers", json!(24)),
@@ -109,7 +111,8 @@ fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
         let blind = outcome.periodogram.as_ref().and_then(|route| route.parameters.get("porb_over_prot"));
         let limit = outcome.k_upper95_kms.map_or_else(String::new, |k| format!(", below {k:.2}"));
         println!(
-            "| {} | {:.3} | {:.3} | {:.2} ({:.2} to {:.2}){limit} | {:.2} to {:.2} | {:.2} ({:.2} to {:.2}) | {:.2} | {:.1e} |",
+            "| {} | {:.3} | {:.3} | {:.2} ({:.2} to {:.2}){limit} | {:.2} to {:.2} | {:.2} ({:.2} to {:.2}) | {:.2} | \
+            {:.1e} |",
             model.0,
             outcome.chi2_target,
             outcome.spottedness,
@@ -128,7 +131,8 @@ fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Orbits put in and found at their periods by the recommended model, against what it finds there in the profiles as they are.
+/// Orbits put in and found at their periods by the recommended model, against what it finds there in the profiles as
+/// they are.
 fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     let (mut near, mut covered, mut all) = (0, 0, 0);
     println!(
@@ -153,7 +157,8 @@ fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
                 let (along, across) = (change[0] * cos + change[1] * sin, change[1] * cos - change[0] * sin);
                 let (off, aside) = ((along - k_kms) / error, across / error);
                 println!(
-                    "| {k_kms} | {period} | {phi} | {:.2} +- {error:.2} | {:.2} to {:.2} | {along:.2} | {off:+.1} | {aside:+.1} |",
+                    "| {k_kms} | {period} | {phi} | {:.2} +- {error:.2} | {:.2} to {:.2} | {along:.2} | {off:+.1} | \
+                    {aside:+.1} |",
                     k.value, k.ci95[0], k.ci95[1]
                 );
                 all += 1;
@@ -163,7 +168,8 @@ fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
         }
     }
     println!(
-        "\nWithin two errors of the orbit put in: {near} of {all}; K put in inside the 95 % interval: {covered} of {all}."
+        "\nWithin two errors of the orbit put in: {near} of {all}; K put in inside the 95 % interval: {covered} of \
+        {all}."
     );
     Ok(())
 }

@@ -2,14 +2,15 @@
 //!
 //!     cargo run --release --example moves
 //!
-//! prints the table of `results/moves.md`. Every case is `configs/demo.json` with another planet (on 5,000 pixels where there is one), or `configs/paper_7d.json`; a part of a name after `--` runs that case alone.
+//! prints the table of `results/moves.md`. Every case is `configs/demo.json` with another planet (on 5,000 pixels where
+//! there is one), or `configs/paper_7d.json`; a part of a name after `--` runs that case alone.
 
-use dimcmc::chain::{MoveKind, Summary, summarise};
-use dimcmc::manifest::kinds_and_goals;
-use dimcmc::pool::Pool;
-use dimcmc::run::{Run, StartFrom};
-use dimcmc::scene::Scene;
-use dimcmc::search::{SearchSettings, find};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{SearchSettings, find};
+use dimcmc::internals::runs::manifest::kinds_and_goals;
+use dimcmc::internals::runs::pool::Pool;
+use dimcmc::internals::runs::run::{Run, StartFrom};
+use dimcmc::internals::sampling::chain::{MoveKind, Summary, summarise};
 use serde_json::{Value, json};
 
 type Failure = Box<dyn std::error::Error>;

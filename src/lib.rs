@@ -1,32 +1,26 @@
 //! Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
 //!
-//! The idea is that of Petit et al. 2015 (*A maximum entropy approach to detect close-in giant planets around active stars*,
-//! A&A 584, A84): a wrong orbit shifts the line profiles against each other, and the map that fits them needs more spots. Here
-//! the spots are marginalised and the orbit is sampled, instead of being read off a grid.
+//! The idea is that of Petit et al. 2015 (*A maximum entropy approach to detect close-in giant planets around active
+//! stars*, A&A 584, A84): a wrong orbit shifts the line profiles against each other, and the map that fits them needs
+//! more spots. Here the spots are marginalised and the orbit is sampled, instead of being read off a grid. All formulas
+//! are in `docs/method.md`.
 //!
-//! # From the paper to the modules
+//! # The rooms
 //!
-//! | in the paper | here |
+//! Each knows those above it only, and `mod.rs` of each says what comes in, what goes out and what happens between.
+//!
+//! | room | holds |
 //! |---|---|
-//! | the stellar model: geometry, limb darkening, local line, spots (section 2) | [`star`]: pixels to line profiles |
-//! | synthetic data (section 2) | [`simulate`] |
-//! | Doppler imaging by maximum entropy (section 3; Skilling & Bryan 1984) | [`maxent`], which knows no stars; [`imaging`] joins the two |
-//! | the map at an assumed orbit, and radial velocities without the spots | [`fit`] |
-//! | "the orbit that needs the fewest spots" (section 3) | [`objective`]: spottedness, entropy or regularised likelihood as a log-probability |
-//! | the landscape of spottedness on a grid of orbits | [`landscape`], computed by [`survey`] |
-//! | orbital parameters and error bars from a grid and a paraboloid | [`landscape::paraboloid()`]; in its place [`search`] and [`optimise`] for the optimum, [`ensemble`] for the posterior, and [`comparison`] of the two |
-//! | beyond the paper: a blind search for orbits, radial velocities free of spots | [`detection`]: [`expansion`] makes a quadratic in the [`velocities`] of the profiles, [`periodogram`] searches it |
-//! | convergence and credible intervals | [`chain`] |
-//!
-//! # Around them
-//!
-//! [`first_look`] measures what profiles say by themselves, [`proposal`] makes a first config of it, also of another program's
-//! files ([`import`]). [`config`] turns a JSON file into settings, [`io`] reads profiles and writes results, [`scene`] is a config with its
-//! observations, [`run`] a chain and [`survey`] a landscape on disk that can be stopped and resumed, [`manifest`] and [`origin`]
-//! what they were begun with; [`merge`] and [`batch`] are runs of one star joined and runs of many; [`export`] writes a chain for other programs. [`plot`] draws what a folder holds, with the means of [`mod@figure`], and [`mod@report`] makes a page
-//! of it.
-//! [`log_density`] is the seam in the middle: the sampler sees parameters go in and log-probabilities come out, and nothing
-//! of the star. [`pool`] is behind it: threads, or the ranks of a cluster (`cluster`, feature `mpi`).
+//! | `numerics` | vector instructions, units |
+//! | `star` | geometry, rotation, local line, spots, orbit, and the response: a brightness map to line profiles |
+//! | `maxent` | entropies and the maximum-entropy solver (Skilling & Bryan 1984) |
+//! | `planets` | periodograms, false alarms, limits, verdicts: planets in the velocities of the profiles |
+//! | `sampling` | log-densities, the affine-invariant ensemble, chains, optimiser, landscapes |
+//! | `posterior` | parameters and priors, images, objectives, fits, what profiles say by themselves |
+//! | `data` | configs, file formats, a config with its observations, a first config |
+//! | `runs` | chains and grids on disk, threads and ranks, merging, batches, exports, the paper's rows |
+//! | `figures` | figures of a folder, a page of them |
+//! | `cli` | the commands |
 //!
 //! # A map in a few lines
 //!
@@ -43,60 +37,56 @@
 //! # }
 //! ```
 
-pub mod batch;
-pub mod blind_search;
-pub mod chain;
-#[cfg(feature = "mpi")]
-pub mod cluster;
-pub mod comparison;
-pub mod config;
-pub mod detection;
-pub mod diagnosis;
-pub mod ensemble;
-pub mod expansion;
-pub mod experiments;
-pub mod export;
-pub mod figure;
-pub mod first_look;
-pub mod fit;
-pub mod imaging;
-pub mod import;
-pub mod injection;
-pub mod io;
-pub mod landscape;
-pub mod limits;
-pub mod log_density;
-pub mod manifest;
-pub mod maxent;
-pub mod merge;
-pub mod noise;
-pub mod nuisances;
-pub mod objective;
-pub mod observation;
-pub mod optimise;
-pub mod optimum;
-pub mod origin;
-pub mod periodogram;
-pub mod plot;
-pub mod pool;
-pub mod proposal;
-pub mod report;
-pub mod run;
-pub mod scene;
-pub mod search;
-pub mod simulate;
-pub mod star;
-pub mod surrogate;
-pub mod survey;
-pub mod text;
-pub mod units;
-pub mod vector;
-pub mod velocities;
-pub mod verdict;
-pub mod zero_points;
+// a stream that is gone makes the macros of the standard library panic: see `cli::console`
+#![deny(clippy::print_stdout, clippy::print_stderr)]
 
-pub use fit::Fit;
-pub use log_density::LogDensity;
-pub use objective::{Posterior, Reference};
-pub use run::Run;
-pub use scene::Scene;
+mod cli;
+mod data;
+mod figures;
+mod maxent;
+mod numerics;
+mod planets;
+mod posterior;
+mod runs;
+mod sampling;
+mod star;
+
+/// All rooms, for tests and benchmarks. Not part of the public interface: anything here may change without notice.
+#[doc(hidden)]
+pub mod internals {
+    #![allow(missing_docs)]
+    pub mod data {
+        pub use crate::data::*;
+    }
+    pub mod figures {
+        pub use crate::figures::*;
+    }
+    pub mod maxent {
+        pub use crate::maxent::*;
+    }
+    pub mod numerics {
+        pub use crate::numerics::*;
+    }
+    pub mod planets {
+        pub use crate::planets::*;
+    }
+    pub mod posterior {
+        pub use crate::posterior::*;
+    }
+    pub mod runs {
+        pub use crate::runs::*;
+    }
+    pub mod sampling {
+        pub use crate::sampling::*;
+    }
+    pub mod star {
+        pub use crate::star::*;
+    }
+}
+
+pub use cli::main as command_line;
+pub use data::scene::Scene;
+pub use posterior::fit::Fit;
+pub use posterior::objective::{Posterior, Reference};
+pub use runs::run::Run;
+pub use sampling::log_density::LogDensity;

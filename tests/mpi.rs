@@ -1,8 +1,8 @@
-//! Several ranks by MPI, with `mpirun` on this machine: the same bytes as by threads, whatever happens on the way, and no job that
-//! hangs.
+//! Several ranks by MPI, with `mpirun` on this machine: the same bytes as by threads, whatever happens on the way, and
+//! no job that hangs.
 //!
-//! Without a test harness: `mpirun` starts this very program too, as ranks of jobs that go wrong on purpose (`ranks`). Without
-//! `mpirun` it says `skipped`, and fails where `CI` is set.
+//! Without a test harness: `mpirun` starts this very program too, as ranks of jobs that go wrong on purpose (`ranks`).
+//! Without `mpirun` it says `skipped`, and fails where `CI` is set.
 
 #[path = "common/desk.rs"]
 #[allow(unused)]
@@ -131,7 +131,7 @@ fn any_number_of_ranks() {
 /// What a rank makes of a config comes from the config alone, whatever it asks for.
 fn other_models() {
     for (pointer, value) in [
-        ("/imaging/spots_left", json!("fitted")),
+        ("/imaging/unresolved_spots", json!("fitted")),
         ("/imaging/brightness", json!("bright-and-dark")),
         ("/imaging/chi2_target", json!("auto")),
         ("/imaging/nuisances", json!({ "equivalent_width": 0.02 })),

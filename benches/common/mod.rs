@@ -1,6 +1,6 @@
 //! What the benches share: the paper's setup, a stopwatch, tables.
 //!
-//! Every bench prints Markdown tables that go into `results/performance.md` as they are. Left out: what is measured.
+//! Every bench prints Markdown tables that go into `results/performance.md` as they are.
 #![allow(dead_code)]
 
 pub mod paper;

@@ -1,15 +1,13 @@
 //! The paper's setup (Petit et al. 2015, section 2) at any size: a spotted star with a planet, 50 profiles over three
 //! rotations in 57 bins; three or seven free parameters.
-//!
-//! Left out: anything that takes a reconstruction but for [`Bulk`].
 
-use dimcmc::config::{self, ObservationSource};
-use dimcmc::ensemble::{StartDraw, draw_start};
-use dimcmc::objective::Posterior;
-use dimcmc::pool::Target as Density;
-use dimcmc::scene::Scene;
-use dimcmc::search::{self, SearchSettings};
-use dimcmc::star::{Response, StarState};
+use dimcmc::internals::data::config::{self, ObservationSource};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{self, SearchSettings};
+use dimcmc::internals::posterior::objective::Posterior;
+use dimcmc::internals::runs::pool::Target as Density;
+use dimcmc::internals::sampling::ensemble::{StartDraw, draw_start};
+use dimcmc::internals::star::{Response, StarState};
 use serde_json::{Value, json};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -124,7 +122,7 @@ impl Passes {
 /// A posterior and points drawn from its bulk: a Gaussian around the maximum, as wide as the curvature there says.
 pub struct Bulk {
     pub posterior: Posterior,
-    /// What a chain samples: the posterior with its footholds.
+    /// What a chain samples: the posterior with its warm starts.
     pub target: Density,
     pub points: Vec<Vec<f64>>,
 }
@@ -144,7 +142,7 @@ impl Bulk {
         };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
         let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
-        let target = Density::new(found.posterior.clone(), scene.settings.imaging.spots_left).unwrap();
+        let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();
         Bulk { posterior: found.posterior, target, points }
     }
 }

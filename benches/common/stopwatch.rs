@@ -1,7 +1,5 @@
-//! Times of things that are compared with each other: in turn within one run, so that whatever else the machine is doing
-//! slows all of them alike.
-//!
-//! Left out: statistics beyond quantiles; criterion has them.
+//! Times of things that are compared with each other: in turn within one run, so that whatever else the machine is
+//! doing slows all of them alike.
 
 use criterion::Criterion;
 use std::hint::black_box;
@@ -26,8 +24,8 @@ pub fn seconds<R>(f: impl FnOnce() -> R) -> f64 {
     began.elapsed().as_secs_f64()
 }
 
-/// Seconds of a run of every candidate, `[candidate][round]`. In a round each runs once untimed and then `runs` times: the
-/// caches then hold what they hold in a sequence of passes.
+/// Seconds of a run of every candidate, `[candidate][round]`. In a round each runs once untimed and then `runs` times:
+/// the caches then hold what they hold in a sequence of passes.
 pub fn in_turn(candidates: &mut [Candidate], rounds: usize, runs: usize) -> Vec<Vec<f64>> {
     let mut times = vec![Vec::with_capacity(rounds); candidates.len()];
     for _ in 0..rounds {

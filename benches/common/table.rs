@@ -1,6 +1,4 @@
 //! Markdown tables, and whether a number meets its target.
-//!
-//! Left out: which numbers and which targets.
 
 /// What a number is held to.
 #[derive(Clone, Copy)]

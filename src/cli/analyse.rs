@@ -1,17 +1,17 @@
 //! `dimcmc analyse`: credible intervals and convergence of a run.
 
 use super::{Failure, Global, console};
-use dimcmc::chain::{Chain, table};
-use dimcmc::io::atomic::write_json;
-use dimcmc::io::journal;
-use dimcmc::manifest::Manifest;
-use dimcmc::run::{CHAIN, SUMMARY};
+use crate::data::io::atomic::write_json;
+use crate::data::io::journal;
+use crate::runs::manifest::Manifest;
+use crate::runs::run::{CHAIN, SUMMARY};
+use crate::sampling::chain::{Chain, table};
 use std::path::{Path, PathBuf};
 
 /// Credible intervals and convergence of a run
 ///
-/// Prints a table (with the injected values where they are known) and writes summary.json into the run's folder, replacing the
-/// one of an earlier look at the same chain.
+/// Prints a table (with the injected values where they are known) and writes summary.json into the run's folder,
+/// replacing the one of an earlier look at the same chain.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc analyse runs/demo")]
 pub struct Args {

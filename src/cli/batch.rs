@@ -3,17 +3,18 @@
 use super::output::Output;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
-use dimcmc::batch::{End, FILE, Row, read_list, rows, sample_all};
-use dimcmc::chain::ParameterSummary;
-use dimcmc::io::atomic::write_json;
-use dimcmc::text::{Align, columns, escaped, shown};
+use crate::data::io::atomic::write_json;
+use crate::numerics::text::{Align, columns, escaped, shown};
+use crate::runs::batch::{End, FILE, Row, read_list, rows, sample_all};
+use crate::sampling::chain::ParameterSummary;
 use std::path::PathBuf;
 
 /// Sample the posteriors of many stars
 ///
-/// The list names a config in each line. Each gets a run as by `sample`, in a folder of its own name below --out, several at once: as
-/// many as there are threads, or ranks of a cluster. Stars that are done are left alone, those that were stopped go on when
-/// the same command is given again, and one that fails stops no other. Writes batch.json, and prints a table.
+/// The list names a config in each line. Each gets a run as by `sample`, in a folder of its own name below --out,
+/// several at once: as many as there are threads, or ranks of a cluster. Stars that are done are left alone, those that
+/// were stopped go on when the same command is given again, and one that fails stops no other. Writes batch.json, and
+/// prints a table.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc batch configs/stars.txt --out runs/stars")]
 pub struct Args {

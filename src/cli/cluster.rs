@@ -1,14 +1,15 @@
-//! The place of this process among the ranks of a cluster: the first one does what is asked for, the others evaluate for it.
+//! The place of this process among the ranks of a cluster: the first one does what is asked for, the others evaluate
+//! for it.
 //!
 //! Without the feature `mpi`, or without a launcher, it is alone.
 
 use super::signals::Signals;
 use super::{Failure, Global};
-use dimcmc::pool::Pool;
+use crate::runs::pool::Pool;
 
 /// The other ranks, until a command takes them.
 #[cfg(feature = "mpi")]
-pub type Ranks = std::cell::RefCell<Option<dimcmc::cluster::Queue>>;
+pub type Ranks = std::cell::RefCell<Option<crate::runs::cluster::Queue>>;
 
 /// What is left to do after joining the others.
 #[derive(PartialEq, Eq)]
@@ -47,7 +48,7 @@ pub fn join(global: &Global) -> Result<Done, Failure> {
 /// Joins the other ranks, if there are any.
 #[cfg(feature = "mpi")]
 pub fn join(global: &Global) -> Result<Done, Failure> {
-    use dimcmc::cluster::{self, Rank};
+    use crate::runs::cluster::{self, Rank};
     let given = global.threads.map(usize::from);
     match cluster::join(given.unwrap_or(1)).map_err(Failure::failed)? {
         Rank::Only => threads(given)?,
@@ -59,7 +60,7 @@ pub fn join(global: &Global) -> Result<Done, Failure> {
             threads(given.or(Some(1)))?;
             // the first rank decides when to stop; what comes to all is not to kill the others
             let _signals = Signals::ignore()?;
-            if let Err(error) = worker.serve(dimcmc::batch::learn) {
+            if let Err(error) = worker.serve(crate::runs::batch::learn) {
                 super::console::error(format_args!("rank {}: {error}", worker.rank()));
                 cluster::abort(2);
             }

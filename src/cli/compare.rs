@@ -2,19 +2,19 @@
 
 use super::output::Output;
 use super::{Failure, Global, console};
-use dimcmc::comparison::{Comparison, FILE, Pair};
-use dimcmc::io::atomic::write_json;
-use dimcmc::io::paraboloid;
-use dimcmc::run::CHAIN;
-use dimcmc::survey::PARABOLOID;
-use dimcmc::text::shown;
+use crate::data::io::atomic::write_json;
+use crate::data::io::paraboloid;
+use crate::numerics::text::shown;
+use crate::runs::comparison::{Comparison, FILE, Pair};
+use crate::runs::grid_scan::PARABOLOID;
+use crate::runs::run::CHAIN;
 use std::path::PathBuf;
 
 /// Compare a chain with a landscape of the same data
 ///
-/// Parameter by parameter: the chain's median and 68 % interval; vertex and error bar of the paraboloid; median and 68 %
-/// interval of the whole landscape under the chain's prior; how far they are apart, and what each took. The two must be of the
-/// same data, star, image and objective. Writes comparison.json.
+/// Parameter by parameter: the chain's median and 68 % interval; vertex and error bar of the paraboloid; median and 68
+/// % interval of the whole landscape under the chain's prior; how far they are apart, and what each took. The two must
+/// be of the same data, star, image and objective. Writes comparison.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc compare runs/demo runs/demo_grid --out runs/demo_comparison")]
 pub struct Args {

@@ -5,8 +5,8 @@ use clap_complete::Shell;
 
 /// Print a shell's completions of commands and options
 ///
-/// For bash, put them where bash-completion looks (~/.local/share/bash-completion/completions/dimcmc); for zsh, as _dimcmc in a
-/// folder of $fpath; for fish, in ~/.config/fish/completions/dimcmc.fish.
+/// For bash, put them where bash-completion looks (~/.local/share/bash-completion/completions/dimcmc); for zsh, as
+/// _dimcmc in a folder of $fpath; for fish, in ~/.config/fish/completions/dimcmc.fish.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc completions bash > dimcmc.bash")]
 pub struct Args {

@@ -3,7 +3,7 @@
 //! disk has swallowed are a failure once the command has ended.
 
 use super::Failure;
-use dimcmc::text::escaped;
+use crate::numerics::text::escaped;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::process::ExitCode;

@@ -1,8 +1,8 @@
 //! `dimcmc export`: a run's chain for other programs.
 
 use super::{Failure, Global, console};
-use dimcmc::export::{self, Contents};
-use dimcmc::text::shown;
+use crate::numerics::text::shown;
+use crate::runs::export::{self, Contents};
 use std::path::PathBuf;
 
 /// Write a run's chain for other programs

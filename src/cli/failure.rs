@@ -1,21 +1,22 @@
-//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 75 where a scheduler stopped what can go on, 1
-//! for anything else. Which error of the system is the input's fault is said in one place, [`Failure::of`].
+//! Why a command stopped, and the exit code that says so: 2 for bad usage or input, 75 where a scheduler stopped what
+//! can go on, 1 for anything else. Which error of the system is the input's fault is said in one place,
+//! [`Failure::of`].
 
-use dimcmc::comparison::PairError;
-use dimcmc::config::ConfigError;
-use dimcmc::export::ExportError;
-use dimcmc::io::atomic::WriteError;
-use dimcmc::io::journal::JournalError;
-use dimcmc::io::lsd::LsdError;
-use dimcmc::io::zdipy::ZdipyError;
-use dimcmc::objective::ReferenceError;
-use dimcmc::origin::OriginError;
-use dimcmc::plot::PlotError;
-use dimcmc::proposal::ProposalError;
-use dimcmc::run::RunError;
-use dimcmc::scene::SceneError;
-use dimcmc::search::SearchError;
-use dimcmc::survey::SurveyError;
+use crate::data::config::ConfigError;
+use crate::data::init::ProposalError;
+use crate::data::io::atomic::WriteError;
+use crate::data::io::journal::JournalError;
+use crate::data::io::lsd::LsdError;
+use crate::data::io::zdipy::ZdipyError;
+use crate::data::scene::SceneError;
+use crate::data::search::SearchError;
+use crate::figures::plot::PlotError;
+use crate::posterior::objective::ReferenceError;
+use crate::runs::comparison::PairError;
+use crate::runs::export::ExportError;
+use crate::runs::grid_scan::GridScanError;
+use crate::runs::origin::OriginError;
+use crate::runs::run::RunError;
 use std::error::Error;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -96,18 +97,20 @@ impl Failure {
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
             RunError::Merged(_) => Failure::of(error),
-            RunError::PriorStart | RunError::SpotsLeft(_) => Failure::input(format!("{}: {error}", path.display())),
+            RunError::PriorStart | RunError::UnresolvedSpots(_) => {
+                Failure::input(format!("{}: {error}", path.display()))
+            }
             RunError::Journal(error) => error.into(),
             RunError::Interrupted => Failure::failed(error),
         }
     }
 
     /// A landscape of the config at `path` that cannot begin or go on.
-    pub fn survey(path: &Path, error: SurveyError) -> Self {
+    pub fn survey(path: &Path, error: GridScanError) -> Self {
         match error {
-            SurveyError::Origin(error) => Failure::origin(path, error),
-            SurveyError::Journal(error) => error.into(),
-            SurveyError::Write(_) | SurveyError::Landscape(_) => Failure::failed(error),
+            GridScanError::Origin(error) => Failure::origin(path, error),
+            GridScanError::Journal(error) => error.into(),
+            GridScanError::Write(_) | GridScanError::Landscape(_) => Failure::failed(error),
         }
     }
 

@@ -4,24 +4,25 @@ use super::output::{Output, remarks};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
-use dimcmc::io::effort::{EFFORT, Effort};
-use dimcmc::io::paraboloid::ParaboloidFile;
-use dimcmc::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
-use dimcmc::scene::Scene;
-use dimcmc::survey::{HEADER, NODES, PARABOLOID, Survey};
-use dimcmc::text::shown;
+use crate::data::io::effort::{EFFORT, Effort};
+use crate::data::io::paraboloid::ParaboloidFile;
+use crate::data::scene::Scene;
+use crate::numerics::text::shown;
+use crate::runs::grid_scan::{GridScan, HEADER, NODES, PARABOLOID};
+use crate::sampling::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Compute the landscape: a reconstruction at every node of a grid
 ///
-/// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values. ln L is
-/// the log-probability of `sample` without the prior, relative to the same reference: the best parameters along the axes,
-/// which are searched for first. Around the highest node a paraboloid is fitted to chi2 = -2 ln L: its vertex is the estimate,
-/// and the projection of its surface one above the minimum the error bar. Writes landscape.json (what it was begun with),
-/// landscape.jsonl (a line per node) and paraboloid.json. A landscape that was stopped, by whatever, goes on with --resume and
-/// comes to the same bytes as one that was not; a finished one gets its paraboloid anew.
+/// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values.
+/// ln L is the log-probability of `sample` without the prior, relative to the same reference: the best parameters along
+/// the axes, which are searched for first. Around the highest node a paraboloid is fitted to chi2 = -2 ln L: its vertex
+/// is the estimate, and the projection of its surface one above the minimum the error bar. Writes landscape.json (what
+/// it was begun with), landscape.jsonl (a line per node) and paraboloid.json. A landscape that was stopped, by
+/// whatever, goes on with --resume and comes to the same bytes as one that was not; a finished one gets its paraboloid
+/// anew.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc grid configs/demo.json --out runs/demo_grid\n  \
                         dimcmc grid configs/demo.json --out runs/demo_grid --resume")]
@@ -33,7 +34,8 @@ pub struct Args {
     /// Go on with the landscape in the folder
     #[arg(long)]
     resume: bool,
-    /// Fit the paraboloid to the N highest nodes; by default to all up to 4 above the lowest chi2, or as many as it takes
+    /// Fit the paraboloid to the N highest nodes; by default to all up to 4 above the lowest chi2, or as many as it
+    /// takes
     #[arg(long, value_name = "N")]
     fit_nodes: Option<NonZeroUsize>,
     /// Fit it to nodes no farther than N from the highest one along any axis
@@ -59,7 +61,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut survey = if resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the landscape, reference image");
-        let survey = Survey::resume(&scene, plan, folder);
+        let survey = GridScan::resume(&scene, plan, folder);
         spinner.finish_and_clear();
         survey.map_err(failed)?
     } else {
@@ -67,7 +69,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         signals.defer();
         let folder = args.output.create()?;
         let spinner = progress::bar(global, None, "images that nodes far from the best one start from");
-        let survey = Survey::begin(&scene, plan, found, folder, args.output.replaces());
+        let survey = GridScan::begin(&scene, plan, found, folder, args.output.replaces());
         spinner.finish_and_clear();
         survey.map_err(failed)?
     };
@@ -82,7 +84,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         )));
     }
     noted?;
-    let Survey { header, landscape, .. } = &survey;
+    let GridScan { header, landscape, .. } = &survey;
     let truth = header.origin.truth.as_ref();
     let rule = Rule { nodes: args.fit_nodes.map(NonZeroUsize::get), radius: args.fit_radius.map(NonZeroUsize::get) };
     let found = paraboloid(landscape, rule);
@@ -90,7 +92,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     // whoever reads may stop reading
     console::print(table(landscape, truth));
     console::print(paraboloid_table(&found, landscape.grid(), truth));
-    let images = match survey.footholds() {
+    let images = match survey.warm_starts() {
         0 => String::new(),
         others => format!(" from {} images", others + 1),
     };

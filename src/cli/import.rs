@@ -3,18 +3,18 @@
 use super::init::{KnownArgs, next_commands};
 use super::output::{ConfigFile, folder_of};
 use super::{Failure, Global, console, progress};
-use dimcmc::import::Import;
-use dimcmc::io::atomic;
-use dimcmc::io::zdipy::{Input, LINE_FILE, LocalLineFile};
-use dimcmc::proposal::{Place, propose};
-use dimcmc::text::shown;
+use crate::data::import::Import;
+use crate::data::init::{Place, propose};
+use crate::data::io::atomic;
+use crate::data::io::zdipy::{Input, LINE_FILE, LocalLineFile};
+use crate::numerics::text::shown;
 use std::path::{Path, PathBuf};
 
 /// Write a config from ZDIpy's input files
 ///
-/// Reads inzdi.dat, model-voigt-line.dat beside it, and the profiles that it lists. Writes the config and the list of profiles
-/// beside it (star.json, star_observations.txt). Epoch, angles, signs and units are the same in both programs. What has no
-/// counterpart is listed; what ZDIpy does not know, the priors among it, is found as by `init`.
+/// Reads inzdi.dat, model-voigt-line.dat beside it, and the profiles that it lists. Writes the config and the list of
+/// profiles beside it (star.json, star_observations.txt). Epoch, angles, signs and units are the same in both programs.
+/// What has no counterpart is listed; what ZDIpy does not know, the priors among it, is found as by `init`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc import inzdi.dat --out star.json")]
 pub struct Args {

@@ -2,22 +2,24 @@
 
 use super::output::ConfigFile;
 use super::{Failure, Global, console, progress};
-use dimcmc::config::ConfigError;
-use dimcmc::io::lsd::LsdError;
-use dimcmc::io::{atomic, lsd};
-use dimcmc::proposal::{Given, Known, Place, Proposal, ProposalError, propose};
-use dimcmc::star::BrightnessModel;
-use dimcmc::text::shown;
+use crate::data::config::ConfigError;
+use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
+use crate::data::io::lsd::LsdError;
+use crate::data::io::{atomic, lsd};
+use crate::numerics::text::shown;
+use crate::star::BrightnessModel;
 use std::path::{Path, PathBuf};
 
 /// Write a first config for observed profiles
 ///
-/// Takes from the profiles what they say: velocity range, vsini, systemic velocity, noise, and priors of the orbit. The rest is
-/// given by options or assumed; a list says which is which. The rotation period cannot be assumed: without it the config holds a
-/// null in its place, and no other command takes it. Then tries out whether a map can be made of it all.
+/// Takes from the profiles what they say: velocity range, vsini, systemic velocity, noise, and priors of the orbit. The
+/// rest is given by options or assumed; a list says which is which. The rotation period cannot be assumed: without it
+/// the config holds a null in its place, and no other command takes it. Then tries out whether a map can be made of it
+/// all.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out demo.json"
+    after_help = "Example:\n  dimcmc init demo_data/observations.txt --rotation-period 3.0 --inclination 38 --out \
+    demo.json"
 )]
 pub struct Args {
     /// List of the profiles: file, time in days, and perhaps the velocity (km/s) to be subtracted, a line
@@ -162,8 +164,10 @@ pub fn next_commands(proposal: &Proposal, path: &Path) {
     let config = shown(path);
     let next = match proposal.complete {
         true => format!(
-            "next:\n  dimcmc map {config} --out map               does the model fit? is the map plausible?\n  dimcmc periodogram \
-             {config} --out search    is there a planet at all?\n  dimcmc sample {config} --out run            the posterior\n"
+            "next:\n  dimcmc map {config} --out map               does the model fit? is the map plausible?\n  dimcmc \
+            periodogram \
+             {config} --out search    is there a planet at all?\n  dimcmc sample {config} --out run            the \
+             posterior\n"
         ),
         false => format!("next: put right what the notes say in {config}, then\n  dimcmc map {config} --out map\n"),
     };

@@ -3,14 +3,14 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
-use dimcmc::config::{self, Settings};
-use dimcmc::injection::inject;
-use dimcmc::io::truth::InjectedTruth;
-use dimcmc::io::{atomic, lsd, truth};
-use dimcmc::objective::Parameter;
-use dimcmc::observation::Observations;
-use dimcmc::scene::Scene;
-use dimcmc::star::Orbit;
+use crate::data::config::{self, Settings};
+use crate::data::io::truth::InjectedTruth;
+use crate::data::io::{atomic, lsd, truth};
+use crate::data::scene::Scene;
+use crate::posterior::objective::Parameter;
+use crate::star::Orbit;
+use crate::star::injection::inject;
+use crate::star::observation::Observations;
 use std::path::PathBuf;
 
 /// Name of the config that is written beside the profiles.
@@ -18,14 +18,16 @@ const CONFIG: &str = "config.json";
 
 /// Put the orbit of a planet into observed profiles
 ///
-/// Each profile is shifted by the orbit's velocity at its time and resampled on its own velocity axis, in its whole width; errors
-/// travel along, times and VRAD stay. The interpolation is band-limited and leaves white noise nearly white (half way between two
-/// bins, the worst case, 0.93 of its variance, with a correlation of 0.07 between neighbours); beyond the ends of a profile the
-/// continuum goes on flat. Stokes V and N are left out. Writes observations.txt and the profiles it lists, config.json (the config,
-/// for these profiles; its start is not the orbit put in) and truth.json. An orbit that the profiles have already adds up with it.
+/// Each profile is shifted by the orbit's velocity at its time and resampled on its own velocity axis, in its whole
+/// width; errors travel along, times and VRAD stay. The interpolation is band-limited and leaves white noise nearly
+/// white (half way between two bins, the worst case, 0.93 of its variance, with a correlation of 0.07 between
+/// neighbours); beyond the ends of a profile the continuum goes on flat. Stokes V and N are left out. Writes
+/// observations.txt and the profiles it lists, config.json (the config, for these profiles; its start is not the orbit
+/// put in) and truth.json. An orbit that the profiles have already adds up with it.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  dimcmc inject configs/demo.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.25 --out demo_injected"
+    after_help = "Example:\n  dimcmc inject configs/demo.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.25 --out \
+    demo_injected"
 )]
 pub struct Args {
     /// Config file (JSON)

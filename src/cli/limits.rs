@@ -3,14 +3,14 @@
 use super::output::{Output, remarks};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
-use dimcmc::detection::{DetectionError, DetectionSettings};
-use dimcmc::expansion::nuisances;
-use dimcmc::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
-use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
-use dimcmc::pool::Brief;
-use dimcmc::scene::Scene;
-use dimcmc::star::Orbit;
-use dimcmc::text::shown;
+use crate::data::scene::Scene;
+use crate::numerics::text::shown;
+use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::posterior::detection::{DetectionError, DetectionSettings};
+use crate::posterior::expansion::nuisances;
+use crate::runs::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
+use crate::runs::pool::Brief;
+use crate::star::Orbit;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -20,11 +20,12 @@ const LIMIT: &str = "limit";
 
 /// Find out which planets would be found: injection and recovery over period, K and phase
 ///
-/// Orbits are put into the profiles, and `periodogram` looks for them: recovered is what has a false-alarm probability below 1 %
-/// and the right period. It takes the linear shortcut, in which an orbit is a shift of the velocities around the image without a
-/// planet; with --full, some orbits near the limit go the whole way: resampled profiles, a new image, a new search. Writes
-/// limits.csv (how many phases of each period and K are recovered) and limits.json (K at 50 and 95 %, the comparison); `plot`
-/// draws the map. A signal that the profiles hold already stays in them without --without-best.
+/// Orbits are put into the profiles, and `periodogram` looks for them: recovered is what has a false-alarm probability
+/// below 1 % and the right period. It takes the linear shortcut, in which an orbit is a shift of the velocities around
+/// the image without a planet; with --full, some orbits near the limit go the whole way: resampled profiles, a new
+/// image, a new search. Writes limits.csv (how many phases of each period and K are recovered) and limits.json (K at 50
+/// and 95 %, the comparison); `plot` draws the map. A signal that the profiles hold already stays in them without
+/// --without-best.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc limits configs/demo.json --periods 12 --full 2 --out runs/demo_limits")]
 pub struct Args {
@@ -63,7 +64,8 @@ pub struct Args {
     #[arg(long, alias = "marginalize")]
     marginalise: bool,
     /// Number of stars without a planet that false alarms are taken from
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1000..=10_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
     /// Seed of the draws, and of the orbits that go the whole way
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -153,12 +155,14 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
 
 /// The orbits that are put in.
 fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
-    let unbounded = || Failure::failed(format!("{}: {}", args.config.display(), dimcmc::periodogram::Unbounded));
+    let unbounded =
+        || Failure::failed(format!("{}: {}", args.config.display(), crate::planets::periodogram::Unbounded));
     let (least, most) = shortcut.k_range_kms().ok_or_else(unbounded)?;
     let (min, max) = (args.min_k_kms.unwrap_or(least), args.max_k_kms.unwrap_or(most));
     if !(min > 0.0 && min < max && max.is_finite()) {
         return Err(Failure::input(format!(
-            "--min-k-kms, --max-k-kms: {min} to {max} km/s is no range, both must be above 0, the first below the second"
+            "--min-k-kms, --max-k-kms: {min} to {max} km/s is no range, both must be above 0, the first below the \
+            second"
         )));
     }
     let (low, high) = shortcut.settings.frequencies.range();

@@ -2,14 +2,14 @@
 
 use super::output::Output;
 use super::{Failure, console};
+use crate::data::io::atomic;
+use crate::numerics::text::shown;
 use clap_mangen::Man;
-use dimcmc::io::atomic;
-use dimcmc::text::shown;
 
 /// Write the manual pages
 ///
-/// dimcmc.1, and one for each command (dimcmc-map.1, ...). `man ./man/dimcmc-map.1` shows one; in share/man/man1 of a folder of
-/// the manual's path, `man dimcmc-map` finds it.
+/// dimcmc.1, and one for each command (dimcmc-map.1, ...). `man ./man/dimcmc-map.1` shows one; in share/man/man1 of a
+/// folder of the manual's path, `man dimcmc-map` finds it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc man --out man")]
 pub struct Args {

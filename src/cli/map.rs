@@ -3,18 +3,19 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
-use dimcmc::diagnosis::Diagnosis;
-use dimcmc::fit::{Deviation, Fit, FitSummary};
-use dimcmc::io::map::{FILES, MapResult};
-use dimcmc::noise::MeasuredErrors;
-use dimcmc::objective::{Reference, ReferenceError};
-use dimcmc::scene::Scene;
+use crate::data::diagnosis::Diagnosis;
+use crate::data::io::map::{FILES, MapResult};
+use crate::data::scene::Scene;
+use crate::posterior::fit::{Deviation, Fit, FitSummary};
+use crate::posterior::noise::MeasuredErrors;
+use crate::posterior::objective::{Reference, ReferenceError};
 use std::path::{Path, PathBuf};
 
 /// Reconstruct the spots at the config's parameter values
 ///
-/// The map of greatest entropy whose chi2 is `imaging.chi2_target`. Writes map.json (the map), profiles.csv (observed and model
-/// profiles), rv.csv (radial velocities before and after the model is taken out of them) and fit.json (how good the fit is).
+/// The map of greatest entropy whose chi2 is `imaging.chi2_target`. Writes map.json (the map), profiles.csv (observed
+/// and model profiles), rv.csv (radial velocities before and after the model is taken out of them) and fit.json (how
+/// good the fit is).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
 pub struct Args {

@@ -2,16 +2,16 @@
 
 use super::output::Output;
 use super::{Failure, Global, analyse, console};
-use dimcmc::merge::{MergeError, merge};
-use dimcmc::text::shown;
+use crate::numerics::text::shown;
+use crate::runs::merge::{MergeError, merge};
 use std::path::PathBuf;
 
 /// Join runs of the same config but for the seed into one
 ///
-/// For chains that an array of jobs has sampled. The runs must be of the same config, data and program and have the same reference;
-/// their seeds must differ. The joined run has the ensembles of all, as many steps as the shortest, and R-hat between all
-/// of them; `analyse`, `compare`, `plot`, `report` and `export` take it as any other. It cannot go on: extend the runs, and join them
-/// again. Writes manifest.json, chain.jsonl and summary.json.
+/// For chains that an array of jobs has sampled. The runs must be of the same config, data and program and have the
+/// same reference; their seeds must differ. The joined run has the ensembles of all, as many steps as the shortest, and
+/// R-hat between all of them; `analyse`, `compare`, `plot`, `report` and `export` take it as any other. It cannot go
+/// on: extend the runs, and join them again. Writes manifest.json, chain.jsonl and summary.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc merge runs/demo runs/demo_2 --out runs/merged")]
 pub struct Args {

@@ -1,7 +1,8 @@
 //! The commands, one file each: what is asked, which parts of the library answer, what is printed. No formulas.
 //!
-//! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`, one line
-//! each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias = "analyze")]`.
+//! A command is a file with `Args` (clap, an example in `after_help`) and `run(&Args, &Global) -> Result<(), Failure>`,
+//! one line each in [`Command`] and [`run`], and a place in `groups`. Both spellings of a name: `#[command(alias =
+//! "analyze")]`.
 
 mod analyse;
 mod batch;
@@ -34,8 +35,7 @@ mod search;
 mod signals;
 mod simulate;
 
-pub use console::end;
-pub use failure::Failure;
+use failure::Failure;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use std::num::NonZeroUsize;
@@ -46,7 +46,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("DIMCMC_COMMIT"));
 /// Orbits of planets around spotted stars: maximum-entropy Doppler imaging inside an ensemble sampler.
 #[derive(Debug, Parser)]
 #[command(name = "dimcmc", version = VERSION, arg_required_else_help = true)]
-pub struct Cli {
+struct Cli {
     #[command(flatten)]
     global: Global,
     #[command(subcommand)]
@@ -56,7 +56,8 @@ pub struct Cli {
 /// Options of every command.
 #[derive(Debug, clap::Args)]
 pub struct Global {
-    /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do not depend on it
+    /// Number of threads; all processors if not given, but one for each rank of a cluster that evaluates. Results do
+    /// not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = threads)]
     threads: Option<NonZeroUsize>,
     /// No progress bar
@@ -107,13 +108,19 @@ fn command() -> clap::Command {
     groups::grouped(Cli::command())
 }
 
-/// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to do.
-pub fn parse() -> Cli {
+/// The whole program: reads the command line, runs the command, prints what went wrong.
+pub fn main() -> std::process::ExitCode {
+    console::end(run(&parse()))
+}
+
+/// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to
+/// do.
+fn parse() -> Cli {
     Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|e| e.exit())
 }
 
 /// Runs the command.
-pub fn run(cli: &Cli) -> Result<(), Failure> {
+fn run(cli: &Cli) -> Result<(), Failure> {
     if cluster::join(&cli.global)? == cluster::Done::Everything {
         return Ok(());
     }

@@ -3,9 +3,9 @@
 use super::output::{Output, remarks};
 use super::search::search;
 use super::{Failure, Global, console};
-use dimcmc::io::atomic::write_json;
-use dimcmc::optimum::OptimumFile;
-use dimcmc::scene::Scene;
+use crate::data::io::atomic::write_json;
+use crate::data::scene::Scene;
+use crate::runs::optimum::OptimumFile;
 use std::path::PathBuf;
 
 /// Name of the file.
@@ -13,8 +13,8 @@ const OPTIMUM: &str = "optimum.json";
 
 /// Find the best parameters and their error bars
 ///
-/// Climbs from the config's values and from other orbits of the prior, with the gradient of the log-probability; the error
-/// bars are those of its curvature. Writes optimum.json.
+/// Climbs from the config's values and from other orbits of the prior, with the gradient of the log-probability; the
+/// error bars are those of its curvature. Writes optimum.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc optimise configs/demo.json --out runs/demo_optimum")]
 pub struct Args {

@@ -1,11 +1,11 @@
 //! Where results go: a folder of their own that is absent or empty, unless the user insists.
 //!
-//! It is checked before anything is computed and created once there is something to write, so that bad input leaves nothing
-//! behind.
+//! It is checked before anything is computed and created once there is something to write, so that bad input leaves
+//! nothing behind.
 
 use super::{Failure, console};
-use dimcmc::scene::Scene;
-use dimcmc::{run, survey};
+use crate::data::scene::Scene;
+use crate::runs::{grid_scan, run};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -56,12 +56,12 @@ impl Output {
     /// has left that ended before its first result.
     pub fn replaces(&self) -> bool {
         let folder = &self.folder;
-        self.force || run::is_false_start(folder, true) || survey::is_false_start(folder, true)
+        self.force || run::is_false_start(folder, true) || grid_scan::is_false_start(folder, true)
     }
 
     /// Whether a run or a landscape ended there before it was said what it was begun with, so that it cannot go on.
     pub fn cannot_go_on(&self) -> bool {
-        run::is_false_start(&self.folder, false) || survey::is_false_start(&self.folder, false)
+        run::is_false_start(&self.folder, false) || grid_scan::is_false_start(&self.folder, false)
     }
 
     /// That nothing which the command has read is replaced by what it `writes`, whatever the user says.

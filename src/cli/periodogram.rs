@@ -2,22 +2,22 @@
 
 use super::output::Output;
 use super::{Failure, Global, console, progress};
-use dimcmc::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
-use dimcmc::expansion::nuisances;
-use dimcmc::fit::Fit;
-use dimcmc::io::periodogram::{FILES, PeriodogramResult};
-use dimcmc::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
-use dimcmc::scene::Scene;
-use dimcmc::text::shown;
+use crate::data::io::periodogram::{FILES, PeriodogramResult};
+use crate::data::scene::Scene;
+use crate::numerics::text::shown;
+use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
+use crate::posterior::expansion::nuisances;
+use crate::posterior::fit::Fit;
 use std::path::{Path, PathBuf};
 
 /// Search for a planet at every period, the star's spots marginalised out
 ///
-/// The star is imaged without a planet, and how much better the profiles fit with an orbit of each period follows in closed
-/// form, together with radial velocities that are free of spots. K at the best period is given for a target chi2 3 % lower and
-/// higher, too, and without each night. Systemic velocity and stellar parameters are those of the config, or integrated out
-/// within their priors where it leaves them free. Writes rv.csv and
-/// covariance.csv (velocities for any RV package), periodogram.csv and periodogram.json (best orbit, peaks, false alarms).
+/// The star is imaged without a planet, and how much better the profiles fit with an orbit of each period follows in
+/// closed form, together with radial velocities that are free of spots. K at the best period is given for a target chi2
+/// 3 % lower and higher, too, and without each night. Systemic velocity and stellar parameters are those of the config,
+/// or integrated out within their priors where it leaves them free. Writes rv.csv and covariance.csv (velocities for
+/// any RV package), periodogram.csv and periodogram.json (best orbit, peaks, false alarms).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc periodogram configs/demo.json --out runs/demo_periodogram")]
 pub struct Args {
@@ -25,7 +25,8 @@ pub struct Args {
     config: PathBuf,
     #[command(flatten)]
     output: Output,
-    /// Shortest period (d); by default that of 5 average Nyquist frequencies, or twice the median spacing if that is longer
+    /// Shortest period (d); by default that of 5 average Nyquist frequencies, or twice the median spacing if that is
+    /// longer
     #[arg(long, value_name = "DAYS")]
     min_period_d: Option<f64>,
     /// Longest period (d); by default twice the time base
@@ -40,14 +41,16 @@ pub struct Args {
     /// Number of planets to search for
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     planets: u8,
-    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors: the default
+    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors: the
+    /// default
     #[arg(long, alias = "marginalize", conflicts_with = "fixed")]
     marginalise: bool,
     /// Hold them at the config's values
     #[arg(long)]
     fixed: bool,
     /// Number of stars without a planet
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1000..=10_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 1)]

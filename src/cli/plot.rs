@@ -3,16 +3,16 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global};
-use dimcmc::plot::{self, DPI};
-use dimcmc::survey::HEADER;
+use crate::figures::plot::{self, DPI};
+use crate::runs::grid_scan::HEADER;
 use std::path::PathBuf;
 
 /// Draw whatever a folder holds, as SVG and PNG
 ///
-/// From saved files alone, nothing is computed anew: the map in flattened polar and Mollweide projection, profiles, residuals and
-/// radial velocities of `map`; periodogram and velocities of `periodogram`; corner plot, traces and autocorrelation of a run;
-/// slices of a landscape, with the contours of a run over them where one is given; the ellipses of `optimise`; the estimates of
-/// `compare`; the injected map of `simulate`.
+/// From saved files alone, nothing is computed anew: the map in flattened polar and Mollweide projection, profiles,
+/// residuals and radial velocities of `map`; periodogram and velocities of `periodogram`; corner plot, traces and
+/// autocorrelation of a run; slices of a landscape, with the contours of a run over them where one is given; the
+/// ellipses of `optimise`; the estimates of `compare`; the injected map of `simulate`.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  dimcmc plot runs/demo\n  dimcmc plot runs/demo_grid --with runs/demo --out figures"

@@ -5,8 +5,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal as _;
 use std::time::Duration;
 
-/// A bar of `total` steps, or a spinner where their number is not known; hidden with `--quiet` or when stderr is no terminal.
-/// Clear it with `finish_and_clear` before anything is printed.
+/// A bar of `total` steps, or a spinner where their number is not known; hidden with `--quiet` or when stderr is no
+/// terminal. Clear it with `finish_and_clear` before anything is printed.
 pub fn bar(global: &Global, total: Option<u64>, message: &'static str) -> ProgressBar {
     if global.quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();

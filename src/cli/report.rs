@@ -2,14 +2,14 @@
 
 use super::report_lines::Report;
 use super::{Failure, Global};
-use dimcmc::io::atomic;
-use dimcmc::report;
+use crate::data::io::atomic;
+use crate::figures::report;
 use std::path::PathBuf;
 
 /// Write one HTML page of whatever a folder holds
 ///
-/// Tables, the verdict in plain words, notes, figures, the config and how to cite, in a single file that needs nothing else and
-/// can be sent to others.
+/// Tables, the verdict in plain words, notes, figures, the config and how to cite, in a single file that needs nothing
+/// else and can be sent to others.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc report runs/demo\n  dimcmc report runs/demo --out demo.html")]
 pub struct Args {

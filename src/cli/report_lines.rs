@@ -1,7 +1,7 @@
 //! Short results on stdout, a label and a value a line.
 
 use super::console;
-use dimcmc::text::escaped;
+use crate::numerics::text::escaped;
 use std::fmt::Display;
 use std::path::Path;
 

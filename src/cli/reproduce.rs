@@ -2,18 +2,19 @@
 
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
-use dimcmc::experiments::files::{Made, SUMMARY, TABLE};
-use dimcmc::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
-use dimcmc::plot::{self, DPI};
-use dimcmc::run::RunError;
-use dimcmc::text::shown;
+use crate::figures::plot::{self, DPI};
+use crate::numerics::text::shown;
+use crate::runs::experiments::files::{Made, SUMMARY, TABLE};
+use crate::runs::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
+use crate::runs::run::RunError;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Repeat the experiments of Petit et al. (2015), and a few beyond them
 ///
-/// Every row of experiments gets a folder with table.csv, summary.json and figures. A row that is there already is left alone; one that
-/// was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an hour on two cores.
+/// Every row of experiments gets a folder with table.csv, summary.json and figures. A row that is there already is left
+/// alone; one that was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an
+/// hour on two cores.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc reproduce R2 --quick --out runs/reproduced --work runs/reproduce_raw\n  \
                         dimcmc reproduce --list")]

@@ -4,23 +4,23 @@ use super::output::{Output, remarks};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
-use dimcmc::chain::advice::growth_needed;
-use dimcmc::chain::{Convergence, Goals, Record};
-use dimcmc::config;
-use dimcmc::ensemble::{MOST_STEPS, StopReason};
-use dimcmc::io::effort::{EFFORT, Effort};
-use dimcmc::log_density::Status;
-use dimcmc::manifest;
-use dimcmc::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
-use dimcmc::scene::Scene;
+use crate::data::config;
+use crate::data::io::effort::{EFFORT, Effort};
+use crate::data::scene::Scene;
+use crate::runs::manifest;
+use crate::runs::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
+use crate::sampling::chain::advice::growth_needed;
+use crate::sampling::chain::{Convergence, Goals, Record};
+use crate::sampling::ensemble::{MOST_STEPS, StopReason};
+use crate::sampling::log_density::Status;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Sample the posterior of the free parameters
 ///
-/// Searches for the best parameters, then runs independent ensembles until every parameter has reached the R-hat and effective
-/// sample size of the config, or the step limit. Writes manifest.json, chain.jsonl and summary.json. A run that was stopped,
-/// by whatever, goes on with --resume and comes to the same bytes as one that was not.
+/// Searches for the best parameters, then runs independent ensembles until every parameter has reached the R-hat and
+/// effective sample size of the config, or the step limit. Writes manifest.json, chain.jsonl and summary.json. A run
+/// that was stopped, by whatever, goes on with --resume and comes to the same bytes as one that was not.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc sample configs/demo.json --out runs/demo\n  \
                         dimcmc sample configs/demo.json --out runs/demo --extend 500\n  \

@@ -1,9 +1,9 @@
 //! The search for the best parameters with its display, for the commands that begin with one.
 
 use super::{Failure, Global, progress};
-use dimcmc::objective::ParameterSpace;
-use dimcmc::scene::Scene;
-use dimcmc::search::{Found, Progress, SearchSettings, Stage, find};
+use crate::data::scene::Scene;
+use crate::data::search::{Found, Progress, SearchSettings, Stage, find};
+use crate::posterior::objective::ParameterSpace;
 use std::path::Path;
 use std::time::Instant;
 

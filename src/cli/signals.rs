@@ -1,4 +1,5 @@
-//! Ctrl-C, SIGTERM and SIGUSR1: at once where there is nothing to lose, after the reconstructions under way where there is.
+//! Ctrl-C, SIGTERM and SIGUSR1: at once where there is nothing to lose, after the reconstructions under way where there
+//! is.
 //!
 //! SIGTERM and SIGUSR1 come from a scheduler whose time is up, and the exit code says that the same command goes on.
 
@@ -17,9 +18,9 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Catches the signals: until [`Signals::defer`], the first one ends the program with a message; after it, the first one
-    /// sets the flag, and a second Ctrl-C ends the program. The message names what has not begun: the first `unit`.
-    /// What comes before this is the system's: call it first.
+    /// Catches the signals: until [`Signals::defer`], the first one ends the program with a message; after it, the
+    /// first one sets the flag, and a second Ctrl-C ends the program. The message names what has not begun: the first
+    /// `unit`. What comes before this is the system's: call it first.
     pub fn catch(unit: &'static str) -> Result<Self, Failure> {
         let signals = Signals { stop: Arc::default(), deferred: Arc::default(), code: Arc::new(INTERRUPTED.into()) };
         let Signals { stop, deferred, code } = &signals;

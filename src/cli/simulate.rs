@@ -3,15 +3,15 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
-use dimcmc::io::{lsd, truth};
-use dimcmc::scene::Scene;
-use dimcmc::{config, config::ObservationSource};
+use crate::data::config::{self, ObservationSource};
+use crate::data::io::{lsd, truth};
+use crate::data::scene::Scene;
 use std::path::PathBuf;
 
 /// Simulate observations of a spotted star with a planet
 ///
-/// Reads `observations.simulate` of the config. Writes observations.txt and the profiles it lists, which other commands read
-/// by `observations.path`, and truth.json: what they were made with.
+/// Reads `observations.simulate` of the config. Writes observations.txt and the profiles it lists, which other commands
+/// read by `observations.path`, and truth.json: what they were made with.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc simulate configs/demo.json --out demo_data")]
 pub struct Args {

@@ -1,8 +1,8 @@
 //! Conjugate gradients for the Newton system in the entropy's metric, `(1 + lambda M) z = b` (Hestenes & Stiefel 1952;
 //! truncated Newton as in Steihaug 1983: a direction of negative curvature ends it).
 
-use crate::vector::Number;
-use crate::vector::linear::{axpy, combine, dot};
+use crate::numerics::vector::Number;
+use crate::numerics::vector::linear::{axpy, combine, dot};
 
 /// When to stop, and what to do it with.
 #[derive(Clone, Copy, Debug)]
@@ -13,8 +13,8 @@ pub(super) struct CgLimits {
     pub iterations: usize,
 }
 
-/// Solves `A z = b` from the start `z`; returns the number of iterations. Once the residual is small enough one more step is taken,
-/// which costs no application of A, because its length is not computed but guessed.
+/// Solves `A z = b` from the start `z`; returns the number of iterations. Once the residual is small enough one more
+/// step is taken, which costs no application of A, because its length is not computed but guessed.
 ///
 /// The residual is measured against `b A^-1 b`: about `b z` where the start is good, about `b P b` where there is none.
 pub(super) fn solve<N: Number>(

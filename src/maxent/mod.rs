@@ -1,16 +1,16 @@
-//! Maximum-entropy inversion (method section 2; Skilling & Bryan 1984, Gull & Skilling 1999): the image of greatest entropy at
-//! a given chi2, or at a given Lagrange multiplier.
+//! Maximum-entropy inversion (`docs/method.md` section 2; Skilling & Bryan 1984, Gull & Skilling 1999): the image of
+//! greatest entropy at a given chi2, or at a given Lagrange multiplier.
 //!
-//! Knows images, data misfits and their curvature through [`Problem`] alone. Left out: stars, velocities, files.
+//! Knows images, data misfits and their curvature through [`Problem`] alone.
 
 mod cg;
+mod convergence;
 pub mod entropy;
 mod parallelism;
 pub mod preconditioner;
 pub mod problem;
 pub mod solution;
 pub mod solver;
-mod standing;
 
 pub use parallelism::parallelism;
 pub use preconditioner::Preconditioner;

@@ -1,10 +1,12 @@
-//! Skilling & Bryan's (1984, eq. 38) TEST of a maximum-entropy image: how far the gradients of entropy and chi2 are from parallel.
+//! Skilling & Bryan's (1984, eq. 38) TEST of a maximum-entropy image: how far the gradients of entropy and chi2 are
+//! from parallel.
 
 use super::entropy::Entropy;
 use super::problem::Problem;
 
-/// `1/2 |grad S / |grad S| - grad C / |grad C||^2` at the image of the given coordinates, lengths by the entropy's metric: 0 where the
-/// gradients are parallel, as at every maximum-entropy image, 1 where they are perpendicular; NaN where one of them vanishes.
+/// `1/2 |grad S / |grad S| - grad C / |grad C||^2` at the image of the given coordinates, lengths by the entropy's
+/// metric: 0 where the gradients are parallel, as at every maximum-entropy image, 1 where they are perpendicular; NaN
+/// where one of them vanishes.
 ///
 /// Moves `problem` to the image.
 pub fn parallelism(problem: &mut impl Problem, entropy: Entropy, coordinates: &[f64]) -> f64 {

@@ -1,14 +1,14 @@
-//! A truncated eigenbasis of the misfit's curvature at a reference image (method section 2): almost the inverse of the Newton
-//! system of every nearby problem.
+//! A truncated eigenbasis of the misfit's curvature at a reference image (`docs/method.md` section 2): almost the
+//! inverse of the Newton system of every nearby problem.
 //!
-//! In the entropy's metric the system is `1 + lambda M`, and M has a few hundred eigenvalues above 0.01 whatever the number
-//! of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and lives on the
-//! pixels that carry it: the spotted part of the star. Left out: how it is stored and multiplied (`rows`), when to rebuild it.
+//! In the entropy's metric the system is `1 + lambda M`, and M has a few hundred eigenvalues above 0.01 whatever the
+//! number of pixels; the basis is found in a block Krylov space from a fixed random start (Musco & Musco 2015), and
+//! lives on the pixels that carry it: the spotted part of the star.
 
 mod rows;
 
-use crate::vector::Number;
-use crate::vector::linear::dot;
+use crate::numerics::vector::Number;
+use crate::numerics::vector::linear::dot;
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -23,11 +23,13 @@ pub struct Preconditioner {
     spotted: Rows<i16>,
     /// ... and on pixels that carry less than [`FAINT_ENERGY`] together: the time goes into fetching rows.
     faint: Rows<i8>,
-    /// Of a component at most so much is subtracted: less than everything, because rounded eigenvectors are not quite orthonormal.
+    /// Of a component at most so much is subtracted: less than everything, because rounded eigenvectors are not quite
+    /// orthonormal.
     most_subtracted: f64,
 }
 
-/// Of anything at most so much is subtracted: what is left must not drown in rounding, or the inverse is no longer positive.
+/// Of anything at most so much is subtracted: what is left must not drown in rounding, or the inverse is no longer
+/// positive.
 const MOST_SUBTRACTED: f64 = 1.0 - 1e-4;
 
 /// Pixels are dropped, faintest first, as long as they carry less than this share of the basis.
@@ -54,8 +56,8 @@ impl Preconditioner {
         Preconditioner::default()
     }
 
-    /// From the operator M (`apply(v, out)`) on vectors of length `n`: at most `rank` eigenvectors, those with eigenvalues
-    /// above `smallest`.
+    /// From the operator M (`apply(v, out)`) on vectors of length `n`: at most `rank` eigenvectors, those with
+    /// eigenvalues above `smallest`.
     pub fn build(n: usize, rank: usize, smallest: f64, apply: impl FnMut(&[f64], &mut [f64])) -> Self {
         let (basis, image) = krylov(n, rank + OVERSAMPLING, apply);
         let projected = basis.transpose() * image;
@@ -133,8 +135,8 @@ impl Preconditioner {
         components
     }
 
-    /// Subtracts a combination of the eigenvectors; in the order that has the last rows of the components, which are still in the
-    /// cache, first.
+    /// Subtracts a combination of the eigenvectors; in the order that has the last rows of the components, which are
+    /// still in the cache, first.
     fn subtract<N: Number>(&self, components: &[f32], out: &mut [N]) {
         self.faint.subtract(components, out);
         self.spotted.subtract(components, out);
@@ -147,8 +149,8 @@ fn largest_eigenvalue(matrix: DMatrix<f64>) -> f64 {
     if is_one { matrix.symmetric_eigenvalues().max() } else { 0.0 }
 }
 
-/// An orthonormal basis of the block Krylov space of an operator from a fixed random start, with about so many columns, and what the
-/// operator makes of it.
+/// An orthonormal basis of the block Krylov space of an operator from a fixed random start, with about so many columns,
+/// and what the operator makes of it.
 fn krylov(n: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -> (DMatrix<f64>, DMatrix<f64>) {
     let width = BLOCK.min(n);
     let columns = width * columns.div_ceil(width).min(n / width);

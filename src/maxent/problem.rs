@@ -1,6 +1,6 @@
 //! What an inversion needs to know of its data: a misfit, its gradient and its curvature, as functions of an image.
 
-use crate::vector::Number;
+use crate::numerics::vector::Number;
 
 /// Which second derivative of the misfit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,8 +13,8 @@ pub enum Curvature {
 
 /// A twice differentiable misfit `chi2(s)` of an image s.
 ///
-/// The methods refer to the image last given to [`Problem::linearise`]. Each call counts the applications of the response
-/// that it takes: one for `linearise` and `gradient`, two for `curvature`.
+/// The methods refer to the image last given to [`Problem::linearise`]. Each call counts the applications of the
+/// response that it takes: one for `linearise` and `gradient`, two for `curvature`.
 pub trait Problem {
     /// Area of every pixel as a fraction of the whole; its length is that of every image.
     fn area(&self) -> &[f64];

@@ -1,6 +1,4 @@
 //! What the solver is asked and what it answers: goal, precision, start, image, and why it stopped.
-//!
-//! Left out: how it gets there (`solver`).
 
 use super::entropy::Entropy;
 
@@ -22,13 +20,14 @@ pub enum Goal {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverSettings {
     /// Error allowed in `S/lambda - chi2/2`, or in the chi2/2 that spottedness is worth where chi2 is the goal: by the
-    /// solver's estimate, which is no bound (`results/performance.md`: up to six times it over the bulk of a posterior).
+    /// solver's estimate, which is no bound (`results/performance.md`: up to six times it over the bulk of a
+    /// posterior).
     pub tolerance: f64,
-    /// Error allowed besides far below the best solution, over the distance to it: a chain never sees it, and a landscape
-    /// shows it as a small part of its depth.
+    /// Error allowed besides far below the best solution, over the distance to it: a chain never sees it, and a
+    /// landscape shows it as a small part of its depth.
     pub leniency: f64,
-    /// Residual of the Newton systems over their right-hand side, before a last step that takes no pass; from 3e-3 on they are solved
-    /// in single precision, below in double precision for numbers that are in single precision.
+    /// Residual of the Newton systems over their right-hand side, before a last step that takes no pass; from 3e-3 on
+    /// they are solved in single precision, below in double precision for numbers that are in single precision.
     pub cg_tolerance: f64,
     /// Most iterations of conjugate gradients for one Newton system.
     pub cg_iterations: usize,
@@ -42,8 +41,8 @@ impl Default for SolverSettings {
     }
 }
 
-/// Solutions this far below the best, in units of log-likelihood, are granted half of [`SolverSettings::leniency`], those
-/// within a quarter of it next to nothing.
+/// Solutions this far below the best, in units of log-likelihood, are granted half of [`SolverSettings::leniency`],
+/// those within a quarter of it next to nothing.
 const LENIENT_FROM: f64 = 40.0;
 
 impl SolverSettings {
@@ -91,14 +90,14 @@ pub struct Image {
 pub struct Start {
     /// Image and lambda.
     pub image: Image,
-    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none. With an adjoint
-    /// it is taken for that of a solution near by, and not solved for again in the first steps.
+    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none.
+    /// With an adjoint it is taken for that of a solution near by, and not solved for again in the first steps.
     pub path: Vec<f32>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,
-    /// The adjoint of spottedness at fixed chi2: how much of it a residual of the Newton system is worth. In the entropy's
-    /// metric, over the scale of the metric. Empty for none: then what is left of spottedness when the solver stops is not
-    /// forecast.
+    /// The adjoint of spottedness at fixed chi2: how much of it a residual of the Newton system is worth. In the
+    /// entropy's metric, over the scale of the metric. Empty for none: then what is left of spottedness when the solver
+    /// stops is not forecast.
     pub adjoint: Vec<f32>,
     /// The best solution there is, so that effort is spared far below it; none to be precise everywhere.
     pub best: Option<Best>,
@@ -145,9 +144,9 @@ pub struct Solution {
     pub chi2_slope: f64,
     /// `d spottedness / d ln(lambda)` along `path` (0 if the goal was a lambda).
     pub spottedness_slope: f64,
-    /// `dz / d ln(lambda)`: that of the start if it came with one and an adjoint, or if there was no step; else as last computed,
-    /// before the last step, in the entropy's metric there. Where `find_path` was asked, as it is at the image. Of no meaning if
-    /// the goal was a lambda.
+    /// `dz / d ln(lambda)`: that of the start if it came with one and an adjoint, or if there was no step; else as last
+    /// computed, before the last step, in the entropy's metric there. Where `find_path` was asked, as it is at the
+    /// image. Of no meaning if the goal was a lambda.
     pub path: Vec<f32>,
     /// Newton steps taken.
     pub newton_steps: usize,

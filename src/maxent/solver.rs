@@ -1,20 +1,20 @@
 //! Newton's method with preconditioned conjugate gradients for `max S subject to chi2 = target`, or at a given lambda
-//! (method section 2).
+//! (`docs/method.md` section 2).
 //!
-//! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: the linearised constraint says how
-//! far lambda is to go, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to there. The path takes
-//! a solve of its own unless a solution near by has one. The steps end where a first-order forecast of what they would still
-//! change (`standing`) is good enough. Every call starts from the image it is given and from nothing else, so the answer is a
-//! function of problem and start. Left out: what the image shows.
+//! Minimises `-S + lambda/2 chi2`. With the constraint, lambda and the image move together: the linearised constraint
+//! says how far lambda is to go, by the path `ds / d ln(lambda)` of solutions, and a solve gives the Newton step to
+//! there. The path takes a solve of its own unless a solution near by has one. The steps end where a first-order
+//! forecast of what they would still change (`convergence`) is good enough. Every call starts from the image it is
+//! given and from nothing else, so the answer is a function of problem and start.
 
 use super::cg::{self, CgLimits};
+use super::convergence::{Convergence, Guide, Point, SMALLEST_LAMBDA};
 use super::entropy::{Entropy, MetricStep, Worth};
 use super::preconditioner::Preconditioner;
 use super::problem::{Curvature, Problem};
 use super::solution::{Goal, Image, Solution, SolverSettings, Start, Termination};
-use super::standing::{Guide, Point, SMALLEST_LAMBDA, Standing};
-use crate::vector::Number;
-use crate::vector::linear::{combine, combine_two, dot, norm, rounded, scale_by, widened};
+use crate::numerics::vector::Number;
+use crate::numerics::vector::linear::{combine, combine_two, dot, norm, rounded, scale_by, widened};
 
 /// Largest change of a coordinate in one step.
 const STEP_CAP: f32 = 2.0;
@@ -81,27 +81,28 @@ impl Solver<'_> {
                 return self.finish(at, None, Vec::new(), Termination::NonFinite, newton_steps);
             }
             let guide = Guide { path: &path, adjoint: &adjoint };
-            let standing = Standing::of(problem, self.entropy, &at, goal, guide, &mut gradient);
-            let drop = best.map_or(0.0, |best| standing.below(&best, &at, goal));
+            let convergence = Convergence::of(problem, self.entropy, &at, goal, guide, &mut gradient);
+            let drop = best.map_or(0.0, |best| convergence.below(&best, &at, goal));
             let tolerance = self.settings.tolerance_at(drop).max(ROUNDING * at.chi2);
-            if standing.is_within(tolerance, &at, goal, self.preconditioner, self.entropy, problem.area()) {
-                let why = if standing.at_bound { Termination::Unreachable } else { Termination::Converged };
-                return self.finish(at, Some(standing), path, why, newton_steps);
+            if convergence.is_within(tolerance, &at, goal, self.preconditioner, self.entropy, problem.area()) {
+                let why = if convergence.at_bound { Termination::Unreachable } else { Termination::Converged };
+                return self.finish(at, Some(convergence), path, why, newton_steps);
             }
             if newton_steps == self.settings.newton_steps {
-                return self.finish(at, Some(standing), path, Termination::StepLimit, newton_steps);
+                return self.finish(at, Some(convergence), path, Termination::StepLimit, newton_steps);
             }
-            // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be; and that of a
-            // solution near by serves: lambda goes wrong by as much as the path, and the next step sees it
-            let near_by = !adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && standing.chi2_path < 0.0;
-            let mut move_lambda = standing.move_lambda;
-            if matches!(goal, Goal::Chi2 { .. }) && !standing.at_bound && !near_by {
-                self.solve_path(problem, &at, &standing, curvature, &mut path);
-                move_lambda = standing.move_lambda_by(&path, &at, goal);
+            // at the bound of lambda there is no way along the path, whose last guess is kept in case there will be;
+            // and that of a solution near by serves: lambda goes wrong by as much as the path, and the next step sees
+            // it
+            let near_by = !adjoint.is_empty() && newton_steps < KNOWN_PATH_STEPS && convergence.chi2_path < 0.0;
+            let mut move_lambda = convergence.move_lambda;
+            if matches!(goal, Goal::Chi2 { .. }) && !convergence.at_bound && !near_by {
+                self.solve_path(problem, &at, &convergence, curvature, &mut path);
+                move_lambda = convergence.move_lambda_by(&path, &at, goal);
             }
-            let newton = self.newton(problem, &at, &standing, move_lambda, curvature);
+            let newton = self.newton(problem, &at, &convergence, move_lambda, curvature);
             let decrement = newton.decrement;
-            at = self.advance(problem, &at, &standing.scale, newton);
+            at = self.advance(problem, &at, &convergence.scale, newton);
             // far away the curvature of the model may make the system indefinite, near by it makes the steps exact
             let near = 0.5 * decrement < EXACT_BELOW * at.lambda;
             curvature = if near { Curvature::Exact } else { Curvature::GaussNewton };
@@ -123,8 +124,8 @@ impl Solver<'_> {
         scaled
     }
 
-    /// The path along lambda from a solution, and the slopes along it: at the bound of lambda, where the solver needs none, or as
-    /// precise as this solver's systems are.
+    /// The path along lambda from a solution, and the slopes along it: at the bound of lambda, where the solver needs
+    /// none, or as precise as this solver's systems are.
     pub fn find_path(&self, problem: &mut impl Problem, solution: &mut Solution) {
         let s = self.entropy.image(&solution.image.coordinates);
         let scale = self.entropy.metric(&s, problem.area());
@@ -177,13 +178,13 @@ impl Solver<'_> {
         &self,
         problem: &mut impl Problem,
         at: &Point,
-        standing: &Standing,
+        convergence: &Convergence,
         curvature: Curvature,
         path: &mut Vec<f32>,
     ) {
         path.resize(at.u.len(), 0.0);
-        let mut pull: Vec<f32> = standing.chi2_gradient.iter().map(|g| -at.lambda as f32 * g).collect();
-        self.solve_system(problem, System { lambda: at.lambda, scale: &standing.scale, curvature }, &mut pull, path);
+        let mut pull: Vec<f32> = convergence.chi2_gradient.iter().map(|g| -at.lambda as f32 * g).collect();
+        self.solve_system(problem, System { lambda: at.lambda, scale: &convergence.scale, curvature }, &mut pull, path);
     }
 
     /// The Newton step to where lambda is to go.
@@ -191,20 +192,20 @@ impl Solver<'_> {
         &self,
         problem: &mut impl Problem,
         at: &Point,
-        standing: &Standing,
+        convergence: &Convergence,
         move_lambda: f64,
         curvature: Curvature,
     ) -> Newton {
-        let (mut right, mut step) = (standing.right_after(move_lambda, at), vec![0.0; at.u.len()]);
-        let system = System { lambda: at.lambda, scale: &standing.scale, curvature };
+        let (mut right, mut step) = (convergence.right_after(move_lambda, at), vec![0.0; at.u.len()]);
+        let system = System { lambda: at.lambda, scale: &convergence.scale, curvature };
         let norm = self.solve_system(problem, system, &mut right, &mut step);
         // the right-hand side has unit length now
         Newton { decrement: (norm * dot(&step, &right)).max(0.0), step, move_lambda }
     }
 
-    /// Solves a system from the start `z`. The right-hand side is scaled to unit length, so that nothing is too small or too large for
-    /// single precision; returns how long it was. In double precision where it is to be precise, but right-hand side and solution are in
-    /// single precision even then, and the steps make up for it.
+    /// Solves a system from the start `z`. The right-hand side is scaled to unit length, so that nothing is too small
+    /// or too large for single precision; returns how long it was. In double precision where it is to be precise, but
+    /// right-hand side and solution are in single precision even then, and the steps make up for it.
     fn solve_system(&self, problem: &mut impl Problem, system: System, right: &mut [f32], z: &mut [f32]) -> f64 {
         let (norm, per_norm) = norm_of(right);
         scale_by(per_norm, right);
@@ -256,14 +257,14 @@ impl Solver<'_> {
     fn finish(
         &self,
         at: Point,
-        standing: Option<Standing>,
+        convergence: Option<Convergence>,
         path: Vec<f32>,
         termination: Termination,
         newton_steps: usize,
     ) -> Solution {
         let finite = at.chi2.is_finite() && at.entropy.is_finite() && at.lambda.is_finite();
         let (chi2_slope, spottedness_slope, spottedness_left) =
-            standing.map_or((0.0, 0.0, 0.0), |s| (s.chi2_path, s.spottedness_path, s.spottedness_left));
+            convergence.map_or((0.0, 0.0, 0.0), |s| (s.chi2_path, s.spottedness_path, s.spottedness_left));
         Solution {
             termination: if finite { termination } else { Termination::NonFinite },
             chi2: at.chi2,

@@ -1,12 +1,14 @@
-//! Pairs of a visible pixel and an observation as the hot path reads them: a pixel of each of several cells side by side.
+//! Pairs of a visible pixel and an observation as the hot path reads them: a pixel of each of several cells side by
+//! side.
 //!
-//! Which pixels they are, and what is seen of them, are kept apart: stars that differ little have the same pixels in their cells. Left
-//! out: what is made of them (`kernel`), which stand side by side (`sorting`).
+//! Which pixels they are, and what is seen of them, are kept apart: stars that differ little have the same pixels in
+//! their cells.
 
 /// Cells side by side: as many as the widest registers hold in double precision.
 pub const LANES: usize = 8;
 
-/// What is seen of a pixel of each cell; a cell that has no pixel left has one of weight 0, and the cells after it have none either.
+/// What is seen of a pixel of each cell; a cell that has no pixel left has one of weight 0, and the cells after it have
+/// none either.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(32))]
 pub struct Block {

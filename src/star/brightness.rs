@@ -1,4 +1,4 @@
-//! What a map of the star holds, and how bright it makes a pixel (method section 1). Left out: the maps.
+//! What a map of the star holds, and how bright it makes a pixel (`docs/method.md` section 1).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,11 @@
 //! From the velocity grid to the bins of each observed profile: convolution with the local line, and its transpose.
 //!
-//! A bin is a whole number m of grid steps wide: kept as m interleaved rows (node i is entry i / m of row i mod m), the grid
-//! is turned into bins by one short filter a row. The orbit and the systemic velocity only shift the filters. Left out: pixels.
+//! A bin is a whole number m of grid steps wide: kept as m interleaved rows (node i is entry i / m of row i mod m), the
+//! grid is turned into bins by one short filter a row. The orbit and the systemic velocity only shift the filters.
 
 use super::correlate::{self, CHUNK, correlate};
 use super::line_profile::LineKernel;
-use crate::vector::Instructions;
+use crate::numerics::vector::Instructions;
 use std::ops::Range;
 
 /// The velocity grid, as far as filters need to know it.
@@ -40,9 +40,11 @@ struct Filter {
 }
 
 impl Convolutions {
-    /// For profiles the first bins of which lie so far (km/s) above the grid's first node, in the star's frame, with their numbers of bins.
+    /// For profiles the first bins of which lie so far (km/s) above the grid's first node, in the star's frame, with
+    /// their numbers of bins.
     ///
-    /// Left out of the filters are nodes that lie beyond the grid for every bin, however far a profile is from the grid.
+    /// Left out of the filters are nodes that lie beyond the grid for every bin, however far a profile is from the
+    /// grid.
     pub fn new(kernel: &LineKernel, grid: VelocityGrid, profiles: impl Iterator<Item = (f64, usize)>) -> Self {
         let VelocityGrid { nodes, step_kms, steps_per_bin } = grid;
         let reach = kernel.reach_kms() / step_kms;

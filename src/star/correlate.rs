@@ -1,8 +1,6 @@
 //! Short filters along a row of numbers, a chunk of results at a time in registers.
-//!
-//! Left out: what is filtered; the caller sees to it that rows reach far enough.
 
-use crate::vector::Instructions;
+use crate::numerics::vector::Instructions;
 
 /// Results that are kept in registers together.
 pub const CHUNK: usize = 32;

@@ -1,10 +1,9 @@
 //! Brightness deposited on a velocity grid, for every observation, and its transpose. This is the hot path.
 //!
-//! Every visible (pixel, observation) pair lies in one cell of a uniform velocity grid. The pairs of a cell follow each other, so
-//! that the sum over them is one of powers of the position within the cell (`kernel`); the cell's polynomials (`line_profile`)
-//! make node values of them, whatever the shape and width of the line. The pairs depend on the star's rotation, inclination
-//! and vsini alone; an orbit or a systemic velocity leaves them as they are. Left out: how pairs get into their cells
-//! (`sorting`, `filling`), the line itself (`convolution`).
+//! Every visible (pixel, observation) pair lies in one cell of a uniform velocity grid. The pairs of a cell follow each
+//! other, so that the sum over them is one of powers of the position within the cell (`kernel`); the cell's polynomials
+//! (`line_profile`) make node values of them, whatever the shape and width of the line. The pairs depend on the star's
+//! rotation, inclination and vsini alone; an orbit or a systemic velocity leaves them as they are.
 
 use super::StarState;
 use super::filling::{Refill, Source};
@@ -15,7 +14,7 @@ use super::line_profile::DEPOSIT_NODES;
 use super::placement::{Arrangement, Placement, Scale};
 use super::sorting::{Order, Sort};
 use super::view::Viewer;
-use crate::vector::{self, Instructions, Number};
+use crate::numerics::vector::{self, Instructions, Number};
 use std::sync::Arc;
 
 /// Deposits on a grid of velocities in the star's frame, for a set of observation times.
@@ -29,7 +28,8 @@ pub struct Deposit {
     placement: Placement,
 }
 
-/// Pixels in their cells, for deposits of several stars. They may be outside of them for any but the one that it was made for.
+/// Pixels in their cells, for deposits of several stars. They may be outside of them for any but the one that it was
+/// made for.
 #[derive(Clone, Debug)]
 pub struct Arranged {
     /// Step of the grid (km/s).
@@ -60,7 +60,8 @@ impl Deposit {
         Deposit::sorted(star, 0.0, false).0
     }
 
-    /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and where they come from, if they are to be seen again.
+    /// Deposits of all pixels that are visible or nearly so, by `margin` (rad); and where they come from, if they are
+    /// to be seen again.
     fn sorted(star: &Observed, margin: f64, again: bool) -> (Self, Option<Source>) {
         let &Observed { grid, state, limb, ref since_epoch_d, step_kms } = star;
         // what is said of pixels below holds for these
@@ -104,8 +105,8 @@ impl Deposit {
         self.pixels
     }
 
-    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid (overwritten). What cells leave on
-    /// each of their nodes is kept in `left`, which is empty at first.
+    /// Deposits map `x` (one number a pixel) as observation `k` sees it on the velocity grid (overwritten). What cells
+    /// leave on each of their nodes is kept in `left`, which is empty at first.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn gather<N: Number>(&self, i: impl Instructions, k: usize, x: &[N], left: &mut Vec<N>, nodes: &mut [f64]) {
@@ -155,10 +156,12 @@ impl Arranged {
     }
 }
 
-/// Up to so many pixels a cell has few, and a pass takes a tenth longer in the order of velocities (5,000 pixels, in double precision); ...
+/// Up to so many pixels a cell has few, and a pass takes a tenth longer in the order of velocities (5,000 pixels, in
+/// double precision); ...
 const MEDIUM_MAP: usize = 12_000;
 
-/// ... up to so many it takes a tenth less (20,000), and beyond it pixels of one cell should follow each other: another tenth (80,000).
+/// ... up to so many it takes a tenth less (20,000), and beyond it pixels of one cell should follow each other: another
+/// tenth (80,000).
 const LARGE_MAP: usize = 40_000;
 
 /// Nodes on either side of the line's centre.

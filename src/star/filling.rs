@@ -1,16 +1,16 @@
-//! Fills blocks with what is seen of the pixels that stand there; and does it again for a star that differs little, without sorting
-//! its pixels, which is half of what a placement takes.
+//! Fills blocks with what is seen of the pixels that stand there; and does it again for a star that differs little,
+//! without sorting its pixels, which is half of what a placement takes.
 //!
-//! A pixel may be outside of its cell then: the polynomials that say what it leaves on the cell's nodes (`line_profile`) go on beyond
-//! the border, and differ from those of the next cell by the fifth power of the way, those of its spread by the third. Left out: how
-//! pixels are sorted (`sorting`), and which stars differ little (`nearby`).
+//! A pixel may be outside of its cell then: the polynomials that say what it leaves on the cell's nodes
+//! (`line_profile`) go on beyond the border, and differ from those of the next cell by the fifth power of the way,
+//! those of its spread by the third.
 
 use super::block::{Block, LANES};
 use super::grid::SurfaceGrid;
 use super::moments::CHUNK;
 use super::placement::{Arrangement, Placement, spare_blocks};
 use super::view::{Part, Seen, Viewer};
-use crate::vector::{Instructions, Registers, Scattered, Task};
+use crate::numerics::vector::{Instructions, Registers, Scattered, Task};
 use std::sync::Arc;
 
 /// Which of the pixels that an observation sees are in the lanes of a block.

@@ -1,8 +1,8 @@
 //! The stellar surface in pixels of equal area, and the points inside a pixel at which it is looked at.
 //!
-//! Rings of constant latitude hold a number of pixels proportional to the cosine of the latitude; the latitudes of their
-//! borders are then set so that every pixel has the same area. A pixel is evaluated at its centre or, to match moments
-//! (method section 1), at 2 x 2 Gauss points in longitude and sin(latitude). Left out: what a pixel looks like from Earth.
+//! Rings of constant latitude hold a number of pixels proportional to the cosine of the latitude; the latitudes of
+//! their borders are then set so that every pixel has the same area. A pixel is evaluated at its centre or, to match
+//! moments (`docs/method.md` section 1), at 2 x 2 Gauss points in longitude and sin(latitude).
 
 use super::moments::CHUNK;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
@@ -148,8 +148,8 @@ impl SurfaceGrid {
         self.area.is_empty()
     }
 
-    /// Mean over each pixel of a function of (longitude, latitude), by `n` x `n` midpoints in longitude and sin(latitude):
-    /// the covered fraction of a pixel at the edge of a spot.
+    /// Mean over each pixel of a function of (longitude, latitude), by `n` x `n` midpoints in longitude and
+    /// sin(latitude): the covered fraction of a pixel at the edge of a spot.
     pub fn pixel_means(&self, n: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         let mut means = Vec::with_capacity(self.len());
         for ring in &self.rings {

@@ -1,22 +1,24 @@
-//! The innermost loops: sums over the visible pixels that lie in a cell of the velocity grid, for several cells side by side,
-//! and their transpose.
+//! The innermost loops: sums over the visible pixels that lie in a cell of the velocity grid, for several cells side by
+//! side, and their transpose.
 //!
-//! A pixel is a weight at a position t in [-1/2, 1/2] of its cell, or a little beyond. What it leaves on the grid is a polynomial in t (see
-//! `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in registers however many pixels
-//! there are. Left out: which pixels lie in which cell, and which cells stand side by side (`sorting`).
+//! A pixel is a weight at a position t in [-1/2, 1/2] of its cell, or a little beyond. What it leaves on the grid is a
+//! polynomial in t (see `line_profile`), so that a cell needs the sums of `x weight t^k`, k = 0 to 5, which stay in
+//! registers however many pixels there are.
 
 use super::block::{Group, LANES};
 use super::line_profile::{DEPOSIT_NODES, DEPOSIT_WEIGHTS};
-use crate::vector::{self, Number, Registers, Scattered};
+use crate::numerics::vector::{self, Number, Registers, Scattered};
 
-/// Blocks (96 bytes each, and 32 of pixels) from the one at work to the one that is asked for; all of an observation follow each other.
+/// Blocks (96 bytes each, and 32 of pixels) from the one at work to the one that is asked for; all of an observation
+/// follow each other.
 const AHEAD: usize = 32;
 
-/// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to 5.
+/// The mean of `t^k` over a pixel's extent is `t^k + k (k - 1) t^(k-2) spread` to second order: k (k - 1) for k = 2 to
+/// 5.
 const SPREAD_FACTORS: [f64; DEPOSIT_NODES - 2] = [2.0, 6.0, 12.0, 20.0];
 
-/// What the pixels of each cell, times `x`, leave on its nodes: row n of `left`, as long as the grid, gets the n-th node of the cell.
-/// Where all lanes are one cell, it gets the sum of them.
+/// What the pixels of each cell, times `x`, leave on its nodes: row n of `left`, as long as the grid, gets the n-th
+/// node of the cell. Where all lanes are one cell, it gets the sum of them.
 ///
 /// # Safety
 /// Every pixel of every block lies within `x`, and the nodes of every cell within the grid.
@@ -81,8 +83,8 @@ pub unsafe fn gather<R: Scattered>(
     }
 }
 
-/// Transpose of [`gather`]: adds to every pixel of `out` what it gets from the nodes of its cell. No pixel may be twice in a block
-/// but for lanes of weight 0, which come last.
+/// Transpose of [`gather`]: adds to every pixel of `out` what it gets from the nodes of its cell. No pixel may be twice
+/// in a block but for lanes of weight 0, which come last.
 ///
 /// # Safety
 /// Every pixel of every block lies within `out`, and the nodes of every cell within `nodes`.
@@ -150,8 +152,8 @@ fn polynomial<R: Registers>(r: R, coefficients: &[R::Lanes], t: R::Lanes, square
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::vector::{self, Instructions, Task};
     use crate::star::block::{Block, Pixels};
-    use crate::vector::{self, Instructions, Task};
 
     const PIXELS: usize = 190;
     const GRID: usize = 20;

@@ -2,18 +2,20 @@
 //!
 //! A pixel of velocity v is deposited on a uniform grid of step h with the quintic B-spline; the sum over the grid of
 //! `deposit x kernel` must give the local line `l(v - v_p)`. So the kernel is the line with the spline divided out: in
-//! Fourier space `l(k) / sinc(kh/2)^6`. For a Gaussian line `1/sinc^6 = exp(h^2 k^2/4 + h^4 k^4/480 + h^6 k^6/30240 + ...)`
-//! gives a closed form: a Gaussian narrowed by h^2/2, times two small Hermite corrections. What remains is aliasing,
-//! `2 l(k) (kh/2 pi)^6`, below 3e-7 of the line's depth for h = sigma/3.5 (the cubic spline needs h = sigma/20 for that).
+//! Fourier space `l(k) / sinc(kh/2)^6`. For a Gaussian line `1/sinc^6 = exp(h^2 k^2/4 + h^4 k^4/480 + h^6 k^6/30240 +
+//! ...)` gives a closed form: a Gaussian narrowed by h^2/2, times two small Hermite corrections. What remains is
+//! aliasing, `2 l(k) (kh/2 pi)^6`, below 3e-7 of the line's depth for h = sigma/3.5 (the cubic spline needs h =
+//! sigma/20 for that).
 //!
-//! A Voigt profile is treated in the same way, its Gaussian narrowed and its own fourth and sixth derivatives for the Hermite
-//! corrections. Its wings are followed as far as there are bins and brightness, so that nothing of them is cut off: of the
-//! equivalent width, `(2/pi) gamma/v` lies beyond v from the centre and outside a velocity range that ends there.
+//! A Voigt profile is treated in the same way, its Gaussian narrowed and its own fourth and sixth derivatives for the
+//! Hermite corrections. Its wings are followed as far as there are bins and brightness, so that nothing of them is cut
+//! off: of the equivalent width, `(2/pi) gamma/v` lies beyond v from the centre and outside a velocity range that ends
+//! there.
 
 use super::LocalLine;
 use super::voigt;
-use crate::vector::elementary::exp_minus;
-use crate::vector::{self, Instructions, Task};
+use crate::numerics::vector::elementary::exp_minus;
+use crate::numerics::vector::{self, Instructions, Task};
 use std::f64::consts::TAU;
 
 /// Reach of a Gaussian kernel in standard deviations; the tail left out is 4e-8 of the line's area.
@@ -107,12 +109,12 @@ impl Task for Sample<'_> {
 /// Nodes that a pixel is deposited on, and terms of the polynomials that say with which weights.
 pub const DEPOSIT_NODES: usize = 6;
 
-/// The quintic B-spline on one grid cell: weights of the nodes -2, -1 and 0 of the cell (rows) as polynomials in the position
-/// `t` in [-1/2, 1/2] from its middle (coefficients of 1, t, ... t^5). Those of the nodes 3, 2 and 1 are their mirror images,
-/// in which odd powers have the other sign. All six sum to the polynomial 1.
+/// The quintic B-spline on one grid cell: weights of the nodes -2, -1 and 0 of the cell (rows) as polynomials in the
+/// position `t` in [-1/2, 1/2] from its middle (coefficients of 1, t, ... t^5). Those of the nodes 3, 2 and 1 are their
+/// mirror images, in which odd powers have the other sign. All six sum to the polynomial 1.
 ///
-/// A pixel with a spread of velocities is deposited with the means of the powers over it, `t^k + k (k - 1) t^(k-2) spread`
-/// to second order, where `spread` = (variance of its velocity) / (2 h^2).
+/// A pixel with a spread of velocities is deposited with the means of the powers over it, `t^k + k (k - 1) t^(k-2)
+/// spread` to second order, where `spread` = (variance of its velocity) / (2 h^2).
 pub const DEPOSIT_WEIGHTS: [[f64; DEPOSIT_NODES]; DEPOSIT_NODES / 2] = [
     [1.0 / 3840.0, -1.0 / 384.0, 1.0 / 96.0, -1.0 / 48.0, 1.0 / 48.0, -1.0 / 120.0],
     [79.0 / 1280.0, -25.0 / 128.0, 7.0 / 32.0, -1.0 / 16.0, -1.0 / 16.0, 1.0 / 24.0],
@@ -165,7 +167,8 @@ mod tests {
     fn deposit_and_kernel_give_back_the_line_widened_by_the_pixel() {
         let line = LocalLine::gaussian(3.0, 5.8);
         let peak = gaussian(0.0, 9.0, 5.8);
-        // a point: aliasing alone; a pixel: second order in its variance, 3/8 (0.2 / 9)^2, and the aliasing of a second derivative
+        // a point: aliasing alone; a pixel: second order in its variance, 3/8 (0.2 / 9)^2, and the aliasing of a second
+        // derivative
         for (variance, tolerance) in [(0.0, 1e-6), (0.2, 3e-4)] {
             for i in 0..200 {
                 let (v, v_p) = (-9.0 + 0.09 * i as f64, 0.037 * i as f64);

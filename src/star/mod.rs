@@ -1,7 +1,8 @@
-//! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots and faculae, and the
-//! response that turns a brightness map into line profiles (method section 1; Petit et al. 2015, section 2).
+//! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots and
+//! faculae, and the response that turns a brightness map into line profiles (`docs/method.md` section 1; Petit et al.
+//! 2015, section 2).
 //!
-//! Left out: priors, chi2, chains, files. Angles are radians here, velocities km/s, times days.
+//! Angles are radians here, velocities km/s, times days.
 
 mod block;
 pub mod brightness;
@@ -10,11 +11,13 @@ mod correlate;
 mod deposit;
 mod filling;
 pub mod grid;
+pub mod injection;
 mod kernel;
 pub mod limb_darkening;
 mod line_profile;
 mod moments;
 mod nearby;
+pub mod observation;
 pub mod orbit;
 mod placement;
 pub mod planet;

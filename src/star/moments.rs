@@ -1,13 +1,13 @@
-//! What one observation sees of each pixel: its weight `a mu LD(mu)`, its mean velocity, and the variance of the velocity
-//! across it (method section 1, moment matching).
+//! What one observation sees of each pixel: its weight `a mu LD(mu)`, its mean velocity, and the variance of the
+//! velocity across it (`docs/method.md` section 1, moment matching).
 //!
-//! Pixels of a ring share their evaluation points but for the longitude, so that several of them are computed side by side, in
-//! single precision: weights, and velocities relative to the middle of the velocity grid's cell that they lie in. So are rings, as they
-//! turn. Left out: which pixels.
+//! Pixels of a ring share their evaluation points but for the longitude, so that several of them are computed side by
+//! side, in single precision: weights, and velocities relative to the middle of the velocity grid's cell that they lie
+//! in. So are rings, as they turn.
 
 use super::limb_darkening::LimbDarkening;
-use crate::vector::Instructions;
-use crate::vector::elementary::{nearest_integer, sin_cos};
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::{nearest_integer, sin_cos};
 
 /// Numbers that are computed side by side: pixels of a ring, and rings.
 pub const CHUNK: usize = 16;
@@ -44,15 +44,15 @@ pub struct Rings<const POINTS: usize> {
 #[derive(Clone, Debug)]
 struct Turned<const POINTS: usize> {
     mu: [[[f32; CHUNK]; POINTS]; 2],
-    /// Mean of the points' velocities, what single precision leaves of it (an error that a ring's pixels would have in common), and
-    /// what each has more.
+    /// Mean of the points' velocities, what single precision leaves of it (an error that a ring's pixels would have in
+    /// common), and what each has more.
     middle: [[f32; CHUNK]; 2],
     rest: [[f32; CHUNK]; 2],
     velocity: [[[f32; CHUNK]; POINTS]; 2],
 }
 
-/// Moments of the velocity distributions of pixels side by side, weighted by projected area and limb darkening. Velocities are in
-/// steps of the velocity grid.
+/// Moments of the velocity distributions of pixels side by side, weighted by projected area and limb darkening.
+/// Velocities are in steps of the velocity grid.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {
     /// Weight of each; 0 for one that is not visible.
@@ -107,7 +107,8 @@ impl<const POINTS: usize> Rings<POINTS> {
     pub fn turn(&mut self, i: impl Instructions, since_epoch_d: f64) {
         let mut velocities = [[[0.0; CHUNK]; 2]; POINTS];
         for (p, velocity) in velocities.iter_mut().enumerate() {
-            // copies: what is written could be what is read, for all that the compiler knows, and it would make no vectors
+            // copies: what is written could be what is read, for all that the compiler knows, and it would make no
+            // vectors
             let (angular_velocity, offset) = (self.angular_velocity[p], self.offset[p]);
             let (mu_equator, amplitude) = (self.mu_equator[p], self.amplitude[p]);
             let mut mu = [[0.0; CHUNK]; 2];
@@ -134,8 +135,8 @@ impl<const POINTS: usize> Rings<POINTS> {
         }
     }
 
-    /// What is seen of the pixels of a ring in these directions (cosines and sines of longitudes). Where no middles of cells are given,
-    /// pixels lie within theirs.
+    /// What is seen of the pixels of a ring in these directions (cosines and sines of longitudes). Where no middles of
+    /// cells are given, pixels lie within theirs.
     #[inline(always)]
     pub fn look(
         &self,

@@ -1,6 +1,4 @@
 //! Stars that differ little from one: their responses take the sorting of its pixels for theirs.
-//!
-//! Left out: pixels and cells (`filling`), and who asks for stars close to which.
 
 use super::deposit::{Arranged, Observed};
 use super::grid::SurfaceGrid;
@@ -8,16 +6,16 @@ use super::response::{Response, Sampling, observed};
 use super::{StarSettings, StarState};
 use std::sync::Arc;
 
-/// How far (rad) a point of the surface may be from where it was: so far beyond the limb pixels have places, for 2 % more of
-/// them to be gone through in every pass.
+/// How far (rad) a point of the surface may be from where it was: so far beyond the limb pixels have places, for 2 %
+/// more of them to be gone through in every pass.
 const MARGIN: f64 = 0.02;
 
 /// How far its velocity may be from what it was, in steps of the velocity grid, ...
 const LARGEST_MOVE: f64 = 0.4;
 
-/// ... and its third power times the spread of a pixel's velocities, whose part of what a pixel leaves on the grid goes wrong so beyond
-/// the border of its cell. On the paper's setup log-probabilities are off by 1.2e-4 at most at these limits, and by less where pixels
-/// move less (`results/performance.md`).
+/// ... and its third power times the spread of a pixel's velocities, whose part of what a pixel leaves on the grid goes
+/// wrong so beyond the border of its cell. On the paper's setup log-probabilities are off by 1.2e-4 at most at these
+/// limits, and by less where pixels move less (`results/performance.md`).
 const LARGEST_MOVE_OF_SPREAD: f64 = 0.01;
 
 /// Largest spread: a pixel that comes into sight point by point may move by as much.
@@ -37,7 +35,8 @@ impl Nearby {
         Nearby { state: *state, pixels: Arranged::new(&observed(grid, star, state, sampling), MARGIN) }
     }
 
-    /// The response at a state that is close by; nothing at any other. Everything but the state is to be the same as before.
+    /// The response at a state that is close by; nothing at any other. Everything but the state is to be the same as
+    /// before.
     pub fn response(
         &self,
         grid: &SurfaceGrid,

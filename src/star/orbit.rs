@@ -1,7 +1,7 @@
 //! The reflex velocity of the star on a circular orbit (Petit et al. 2015, section 2.2).
 //!
-//! `V(t) = K cos(2 pi (E / P - phi))` with `E` the rotation cycle and `P = Porb/Prot`; phi = 0 puts the largest receding
-//! velocity at E = 0. Left out: eccentric orbits and further planets.
+//! `V(t) = K cos(2 pi (E / P - phi))` with `E` the rotation cycle and `P = Porb/Prot`; phi = 0 puts the largest
+//! receding velocity at E = 0.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;

@@ -1,7 +1,5 @@
-//! Which cell of the velocity grid every visible pixel of every observation lies in, and where in it: the pairs as the hot path
-//! reads them.
-//!
-//! Left out: how pixels get there (`sorting`, `filling`), and what the pairs are used for (`deposit`).
+//! Which cell of the velocity grid every visible pixel of every observation lies in, and where in it: the pairs as the
+//! hot path reads them.
 
 use super::block::{Block, Group, LANES, Pixels};
 use std::cell::Cell;
@@ -63,8 +61,8 @@ impl Scale {
 }
 
 thread_local! {
-    /// Memory that a thread had. What a large map takes, tens of megabytes, the system hands out anew page by page: three times the
-    /// time of filling it.
+    /// Memory that a thread had. What a large map takes, tens of megabytes, the system hands out anew page by page:
+    /// three times the time of filling it.
     static SPARE_BLOCKS: Cell<Vec<Block>> = const { Cell::new(Vec::new()) };
     static SPARE_PIXELS: Cell<Vec<Pixels>> = const { Cell::new(Vec::new()) };
 }

@@ -1,17 +1,18 @@
-//! What is quoted of a planet's orbit: times of the largest radial velocity and of inferior conjunction, and the minimum mass.
+//! What is quoted of a planet's orbit: times of the largest radial velocity and of inferior conjunction, and the
+//! minimum mass.
 //!
-//! The z axis points away from the observer, so that the star's radial velocity is `V = dz/dt` (positive receding) and the planet,
-//! on the other side of the common centre of mass, is at `-z M / m`. At inferior conjunction the planet is nearest to the observer
-//! and the star farthest: z is largest, V = 0, and V falls through zero, from receding to approaching. On a circular orbit
-//! `V = K cos(2 pi (t - T) / P)` does so a quarter of a period *after* its maximum at T: `T_conj = T_max + P / 4`. On an orbit with
-//! `V = K (cos(nu + omega) + e cos omega)` the maximum is at the true anomaly `nu = -omega` and the conjunction at
-//! `nu = pi / 2 - omega` (the middle of the transit of an edge-on orbit).
+//! The z axis points away from the observer, so that the star's radial velocity is `V = dz/dt` (positive receding) and
+//! the planet, on the other side of the common centre of mass, is at `-z M / m`. At inferior conjunction the planet is
+//! nearest to the observer and the star farthest: z is largest, V = 0, and V falls through zero, from receding to
+//! approaching. On a circular orbit `V = K cos(2 pi (t - T) / P)` does so a quarter of a period *after* its maximum at
+//! T: `T_conj = T_max + P / 4`. On an orbit with `V = K (cos(nu + omega) + e cos omega)` the maximum is at the true
+//! anomaly `nu = -omega` and the conjunction at `nu = pi / 2 - omega` (the middle of the transit of an edge-on orbit).
 //!
-//! The minimum mass x = m sin i solves the mass function of the star, `x^3 / (M + x)^2 = P K^3 (1 - e^2)^(3/2) / (2 pi G)`, in which the
-//! planet's own mass is counted as its minimum: exact for an orbit seen edge-on.
+//! The minimum mass x = m sin i solves the mass function of the star, `x^3 / (M + x)^2 = P K^3 (1 - e^2)^(3/2) / (2 pi
+//! G)`, in which the planet's own mass is counted as its minimum: exact for an orbit seen edge-on.
 
 use super::Orbit;
-use crate::units::{JUPITERS_PER_SUN, SECONDS_PER_DAY, SOLAR_GM_KM3_S2};
+use crate::numerics::units::{JUPITERS_PER_SUN, SECONDS_PER_DAY, SOLAR_GM_KM3_S2};
 use std::f64::consts::TAU;
 
 /// From the largest radial velocity of a circular orbit to the inferior conjunction (orbital cycles).
@@ -57,7 +58,8 @@ pub fn minimum_mass(k_kms: f64, period_d: f64, mass_msun: f64) -> MinimumMass {
     MinimumMass { mjup, by_k: k_kms.signum() * 3.0 * mjup / (k * share), by_period: mjup / (period_d * share) }
 }
 
-/// Phase (orbital cycles) of the largest radial velocity of a circular orbit: phi, or opposite to it for an amplitude below zero.
+/// Phase (orbital cycles) of the largest radial velocity of a circular orbit: phi, or opposite to it for an amplitude
+/// below zero.
 pub fn maximum_phase(orbit: &Orbit) -> f64 {
     if orbit.k_kms < 0.0 { orbit.phi + 0.5 } else { orbit.phi }
 }
@@ -67,7 +69,8 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// Place of star and planet (arbitrary units; z away from the observer) at an angle along a circular orbit of that inclination.
+    /// Place of star and planet (arbitrary units; z away from the observer) at an angle along a circular orbit of that
+    /// inclination.
     fn places(angle: f64, inclination: f64, mass_ratio: f64) -> [[f64; 3]; 2] {
         // the orbit in its own plane, then tilted about the x axis, the line of nodes
         let (x, y) = (angle.cos(), angle.sin());
@@ -75,7 +78,8 @@ mod tests {
         [planet.map(|c| -c * mass_ratio), planet]
     }
 
-    /// An orbit followed in three dimensions: the planet is in front of the star a quarter period after the star recedes fastest.
+    /// An orbit followed in three dimensions: the planet is in front of the star a quarter period after the star
+    /// recedes fastest.
     #[test]
     fn the_planet_is_in_front_a_quarter_period_after_the_largest_velocity() {
         let orbit = Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.3 };
@@ -97,8 +101,8 @@ mod tests {
         assert!((opposite.velocity_kms(1.7 * maximum_phase(&opposite)) - 0.1).abs() < 1e-15);
     }
 
-    /// Jupiter moves the Sun by 12.46 m/s in 11.862 years, and a planet of Jupiter's mass in a year a sun that with it makes one
-    /// solar mass by 28.43 m/s (Lovis & Fischer 2010).
+    /// Jupiter moves the Sun by 12.46 m/s in 11.862 years, and a planet of Jupiter's mass in a year a sun that with it
+    /// makes one solar mass by 28.43 m/s (Lovis & Fischer 2010).
     #[test]
     fn jupiter_has_the_mass_of_jupiter() {
         let jupiter = minimum_mass(0.012465, 4332.59, 1.0).mjup;

@@ -1,16 +1,15 @@
-//! The linear part of the forward model: a map of the surface to the line depth and continuum of every profile, before the
-//! division of one by the other; and its transpose.
+//! The linear part of the forward model: a map of the surface to the line depth and continuum of every profile, before
+//! the division of one by the other; and its transpose.
 //!
-//! Method section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile. Left out: brightness
-//! (what x is), the division by the continuum, data.
+//! `docs/method.md` section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile.
 
 use super::convolution::{Convolutions, Rows, VelocityGrid};
 use super::deposit::{Deposit, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
-use crate::observation::Observations;
-use crate::vector::{self, Instructions, Number, Task};
+use crate::numerics::vector::{self, Instructions, Number, Task};
+use crate::star::observation::Observations;
 use std::sync::Arc;
 
 /// When and at which velocities the star is observed.
@@ -25,7 +24,7 @@ pub struct Sampling {
 impl Sampling {
     /// The sampling of a set of observations.
     pub fn of(observations: &Observations) -> Self {
-        let profile = |p: &crate::observation::Profile| (p.time_d, p.first_velocity_kms, p.intensity.len());
+        let profile = |p: &crate::star::observation::Profile| (p.time_d, p.first_velocity_kms, p.intensity.len());
         Sampling { step_kms: observations.step_kms, profiles: observations.profiles.iter().map(profile).collect() }
     }
 
@@ -35,11 +34,13 @@ impl Sampling {
     }
 }
 
-/// Most nodes of the velocity grid, which spans twice the fastest velocity in steps of a fraction of the local line's width. A
-/// star has a few hundred; this many have more cells than a map has pixels, and every pass goes through all of them.
+/// Most nodes of the velocity grid, which spans twice the fastest velocity in steps of a fraction of the local line's
+/// width. A star has a few hundred; this many have more cells than a map has pixels, and every pass goes through all of
+/// them.
 pub const MOST_NODES: f64 = 65_535.0;
 
-/// Most grid steps in a velocity bin; beyond it the line is so much narrower than a bin that it hides between two of them.
+/// Most grid steps in a velocity bin; beyond it the line is so much narrower than a bin that it hides between two of
+/// them.
 pub const MOST_STEPS_PER_BIN: f64 = 200.0;
 
 /// The response of a sampled set of profiles to a map of the star.
@@ -60,15 +61,16 @@ impl Response {
         Response::shifted(Arc::new(deposit), star, state, sampling)
     }
 
-    /// Size of the velocity grid that a response takes: grid steps a bin, and nodes. Refuse more than [`MOST_STEPS_PER_BIN`] or
-    /// [`MOST_NODES`] before a response is asked for.
+    /// Size of the velocity grid that a response takes: grid steps a bin, and nodes. Refuse more than
+    /// [`MOST_STEPS_PER_BIN`] or [`MOST_NODES`] before a response is asked for.
     pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
         let star = star.with(&state.surface);
         let steps = LineKernel::steps_per_bin(star.line, step_kms) as f64;
         (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
     }
 
-    /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is shifted.
+    /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is
+    /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
         Response::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling)
     }
@@ -146,15 +148,15 @@ impl Response {
         vector::run(ApplyTranspose { response: self, line, continuum, out });
     }
 
-    /// The transpose of what `weigh` makes of the line depth and continuum of every profile for the map `x`: given the number of a
-    /// profile, the depth of its bins, and its continuum, it replaces the depths, and returns what replaces the
-    /// continuum. `out` is overwritten. It goes there and back profile by profile: what a large map's pass reads comes from memory, and
-    /// is read once. Maps in single precision are good to six digits, and faster.
+    /// The transpose of what `weigh` makes of the line depth and continuum of every profile for the map `x`: given the
+    /// number of a profile, the depth of its bins, and its continuum, it replaces the depths, and returns what replaces
+    /// the continuum. `out` is overwritten. It goes there and back profile by profile: what a large map's pass reads
+    /// comes from memory, and is read once. Maps in single precision are good to six digits, and faster.
     pub fn apply_and_back<N: Number>(&self, x: &[N], out: &mut [N], weigh: impl FnMut(usize, &mut [f64], f64) -> f64) {
         vector::run(ApplyAndBack { response: self, x, out, weigh });
     }
 
-    /// Normalised depth `1 - I` of every bin for a brightness map: the observable of method section 1.
+    /// Normalised depth `1 - I` of every bin for a brightness map: the observable of `docs/method.md` section 1.
     pub fn depths(&self, brightness: &[f64]) -> Vec<f64> {
         let mut depths = vec![0.0; self.data_len()];
         let mut continuum = vec![0.0; self.profiles()];
@@ -294,8 +296,8 @@ fn total(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::vector::Portable;
     use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation};
-    use crate::vector::Portable;
 
     fn noise(n: usize) -> Vec<f64> {
         (0..n).map(|i| (0.7 * (i * i) as f64).sin()).collect()

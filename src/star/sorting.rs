@@ -1,16 +1,15 @@
 //! Sorts the visible pixels of every observation into the cells of the velocity grid.
 //!
-//! Cells stand side by side (`block`) as [`Order`] says: the fewer pixels a cell has, the more it matters that those of a group have
-//! as many; the larger the map, the more that neighbours are taken one after another. Left out: what becomes of the order for a
-//! star that differs little (`filling`).
+//! Cells stand side by side (`block`) as [`Order`] says: the fewer pixels a cell has, the more it matters that those of
+//! a group have as many; the larger the map, the more that neighbours are taken one after another.
 
 use super::block::{Block, LANES, Pixels};
 use super::filling::{Seats, Source, fill};
 use super::grid::SurfaceGrid;
 use super::placement::{Arrangement, Cells, Placement, Scale, spare_blocks, spare_pixels};
 use super::view::{NOTHING, Part, Seen, Sight, Viewer};
-use crate::vector::elementary::SINGLE_INTEGERS;
-use crate::vector::{Instructions, Task};
+use crate::numerics::vector::elementary::SINGLE_INTEGERS;
+use crate::numerics::vector::{Instructions, Task};
 use std::sync::Arc;
 
 /// The work that makes a [`Placement`]: looks at the pixels of every observation and sorts the visible ones into cells.
@@ -232,8 +231,8 @@ impl Sorter {
         for (group, cells) in groups.iter().zip(self.order.chunks(step)) {
             let places = end..end + LANES * group.rows();
             self.seats.resize(self.seats.len().max(places.end), 0);
-            // where cells have no pixels left: hardly ever one of the map in two blocks that follow each other, for no sum to wait
-            // for another
+            // where cells have no pixels left: hardly ever one of the map in two blocks that follow each other, for no
+            // sum to wait for another
             let full = cells.get(step - 1).map_or(0, |last| step * self.counts[*last as usize] as usize);
             for (k, place) in self.seats[places.clone()][full..].iter_mut().enumerate() {
                 *place = (self.pixels + k % NOTHING) as u32;
@@ -244,8 +243,8 @@ impl Sorter {
             end = places.end;
         }
         for (k, (cell, rank)) in self.cell[..self.pixels].iter().zip(&self.rank).enumerate() {
-            // safe: a cell is at most the last, and `firsts` has an entry for each; a rank is below what was counted of its cell, for
-            // which there is room in `seats`
+            // safe: a cell is at most the last, and `firsts` has an entry for each; a rank is below what was counted of
+            // its cell, for which there is room in `seats`
             unsafe {
                 let place = self.firsts.get_unchecked(*cell as usize) + rank;
                 *self.seats.get_unchecked_mut(place as usize) = k as u32;
@@ -257,11 +256,11 @@ impl Sorter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::vector;
     use crate::star::block::Group;
     use crate::star::kernel;
     use crate::star::line_profile::DEPOSIT_NODES;
     use crate::star::{LimbDarkening, Orbit, Quadrature, Rotation, StarState};
-    use crate::vector;
 
     /// Deposits `x` as an observation sees it on so many nodes, and gives a map what it gets from others.
     struct Both<'a>(&'a Placement, usize, &'a [f64], usize);

@@ -1,5 +1,4 @@
-//! Hard-edged circular spots and faculae: the filling factor and the excess of brightness of a point of the surface. Left out: how bright
-//! a spot is (`brightness`).
+//! Hard-edged circular spots and faculae: the filling factor and the excess of brightness of a point of the surface.
 
 /// A circle on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,8 +54,8 @@ pub fn filling_at(spots: &[Spot], longitude: f64, latitude: f64) -> f64 {
     largest(spots.iter().filter(|s| s.disc().contains(longitude, latitude)).map(|s| s.filling))
 }
 
-/// Excess of brightness at a point: the largest of the faculae that cover it, on the part of the surface that `spots` leave free;
-/// 0 elsewhere.
+/// Excess of brightness at a point: the largest of the faculae that cover it, on the part of the surface that `spots`
+/// leave free; 0 elsewhere.
 pub fn excess_at(faculae: &[Facula], spots: &[Spot], longitude: f64, latitude: f64) -> f64 {
     let excess = largest(faculae.iter().filter(|f| f.disc.contains(longitude, latitude)).map(|f| f.excess));
     if excess > 0.0 { excess * (1.0 - filling_at(spots, longitude, latitude)) } else { 0.0 }

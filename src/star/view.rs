@@ -1,14 +1,13 @@
 //! Which pixels one observation sees: those of each ring that the star has turned to the visible side.
 //!
-//! Left out: what is seen of them (`moments`), brightness, lines, orbit. The orbit and vsys shift a whole profile and are added
-//! in `response`.
+//! The orbit and vsys shift a whole profile and are added in `response`.
 
 use super::grid::{Ring, RingPoint, SurfaceGrid};
 use super::limb_darkening::LimbDarkening;
 use super::moments::{CHUNK, Moments, Point, Rings};
 use super::{Rotation, StarState};
-use crate::vector::Instructions;
-use crate::vector::elementary::INTEGERS;
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::INTEGERS;
 use std::f64::consts::TAU;
 
 /// The star's orientation, shared by all observations.
@@ -29,8 +28,8 @@ pub struct Views<'a, const POINTS: usize> {
     rings: Vec<Rings<POINTS>>,
 }
 
-/// What one observation sees: of each pixel what [`Moments`] have of it. Behind the last there are so many of weight 0 as [`NOTHING`]
-/// says.
+/// What one observation sees: of each pixel what [`Moments`] have of it. Behind the last there are so many of weight 0
+/// as [`NOTHING`] says.
 pub struct Seen {
     /// Number of pixels.
     pub pixels: usize,
@@ -93,7 +92,8 @@ impl Viewer {
         self.vsini * relative(0.0).max(relative(1.0))
     }
 
-    /// Where pixels of `grid` have an evaluation point within sight: `margin` (rad) beyond the limb, and nearer to the observer.
+    /// Where pixels of `grid` have an evaluation point within sight: `margin` (rad) beyond the limb, and nearer to the
+    /// observer.
     pub fn sight(&self, grid: &SurfaceGrid, margin: f64) -> Sight {
         let (mut rings, mut horizons) = (Vec::new(), Vec::new());
         for (index, ring) in grid.rings.iter().enumerate() {
@@ -135,8 +135,8 @@ impl Viewer {
         }
     }
 
-    /// Angular velocity (rad/d) of a point's latitude, and half the range of longitudes (rad) of pixels in which one of its points
-    /// is within sight; nothing where none ever is.
+    /// Angular velocity (rad/d) of a point's latitude, and half the range of longitudes (rad) of pixels in which one of
+    /// its points is within sight; nothing where none ever is.
     fn reach(&self, point: &RingPoint, margin: f64) -> Option<[f64; 2]> {
         // mu = sin(latitude) cos(i) + cos(latitude) sin(i) cos(longitude) > -sin(margin); i is between 0 and 180 deg
         let pole = point.sin_latitude * self.cos_inclination + margin.sin();
@@ -155,7 +155,8 @@ impl<const POINTS: usize> Views<'_, POINTS> {
         }
     }
 
-    /// Looks at the pixels of all `parts`, so many altogether; in cells with these middles, or in those that they lie in.
+    /// Looks at the pixels of all `parts`, so many altogether; in cells with these middles, or in those that they lie
+    /// in.
     #[inline(always)]
     pub fn look(&self, i: impl Instructions, parts: &[Part], pixels: usize, middles: Option<&[f32]>, seen: &mut Seen) {
         for part in parts {
@@ -236,8 +237,8 @@ impl Horizons {
         (self.first[ring], self.count[ring]) = (pixels.start as u32, pixels.len() as f64);
     }
 
-    /// First pixel of each ring that is visible, counted from the ring's first, and how many are, some of them perhaps at the ring's
-    /// beginning.
+    /// First pixel of each ring that is visible, counted from the ring's first, and how many are, some of them perhaps
+    /// at the ring's beginning.
     #[inline(always)]
     fn visible(&self, since_epoch_d: f64) -> [[u32; CHUNK]; 2] {
         let Horizons { angular_velocity, reach, count, .. } = self;
@@ -254,8 +255,8 @@ impl Horizons {
     }
 }
 
-/// Of a ring's pixels those with centres between two longitudes (rad), which may be any number of turns away: the first, and how many.
-/// A ring of one pixel may have it anywhere, and gives it always.
+/// Of a ring's pixels those with centres between two longitudes (rad), which may be any number of turns away: the
+/// first, and how many. A ring of one pixel may have it anywhere, and gives it always.
 #[inline(always)]
 fn between(count: f64, from: f64, to: f64) -> [f64; 2] {
     let place = |longitude: f64| longitude * count / TAU - 0.5;

@@ -1,8 +1,8 @@
-//! The Voigt profile by the Faddeeva function `w(z) = exp(-z^2) erfc(-i z)`: `Re w` at `z = (v + i gamma) / (sqrt(2) sigma)`.
+//! The Voigt profile by the Faddeeva function `w(z) = exp(-z^2) erfc(-i z)`: `Re w` at `z = (v + i gamma) / (sqrt(2)
+//! sigma)`.
 //!
-//! Weideman (1994, SIAM J. Numer. Anal. 31, 1497), a rational function good to 1e-13 in the upper half plane, with 40 terms;
-//! far out the asymptotic series. Derivatives by `w' = -2 z w + 2i/sqrt(pi)`. Left out: what a line is made of it
-//! (`line_profile`).
+//! Weideman (1994, SIAM J. Numer. Anal. 31, 1497), a rational function good to 1e-13 in the upper half plane, with 40
+//! terms; far out the asymptotic series. Derivatives by `w' = -2 z w + 2i/sqrt(pi)`.
 
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_2_SQRT_PI, PI, SQRT_2};
@@ -45,9 +45,9 @@ fn faddeeva(z: Complex<f64>) -> Complex<f64> {
     (2.0 * polynomial / below + 0.5 * FRAC_2_SQRT_PI) / below
 }
 
-/// `f`, and its fourth and sixth derivatives with respect to x, of `f(x) = Re w((x + i y) / sqrt(2))`: the Voigt profile of a
-/// Gaussian of standard deviation 1 and a Lorentzian of half width y, times `sqrt(2 pi)`. Far out, where both derivatives are
-/// below 1e-3, they are left out: they only ever enter with factors of 1e-5 and less.
+/// `f`, and its fourth and sixth derivatives with respect to x, of `f(x) = Re w((x + i y) / sqrt(2))`: the Voigt
+/// profile of a Gaussian of standard deviation 1 and a Lorentzian of half width y, times `sqrt(2 pi)`. Far out, where
+/// both derivatives are below 1e-3, they are left out: they only ever enter with factors of 1e-5 and less.
 pub fn even_derivatives(x: f64, y: f64) -> [f64; 3] {
     let z = Complex::new(x, y) / SQRT_2;
     let mut derivatives = [Complex::from(0.0); 7];
@@ -67,9 +67,9 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// The integral of a Gaussian of standard deviation 1 times `sqrt(2 pi)` and a Lorentzian of half width y at distance x, by the
-    /// trapezoidal rule, which converges faster than any power of its step: in `t = x + y sinh(u)`, or in t where the peak of the
-    /// Lorentzian is out of the Gaussian's reach.
+    /// The integral of a Gaussian of standard deviation 1 times `sqrt(2 pi)` and a Lorentzian of half width y at
+    /// distance x, by the trapezoidal rule, which converges faster than any power of its step: in `t = x + y sinh(u)`,
+    /// or in t where the peak of the Lorentzian is out of the Gaussian's reach.
     fn by_integration(x: f64, y: f64) -> f64 {
         let step = 0.01;
         if x > 10.0 {

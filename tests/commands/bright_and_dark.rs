@@ -1,13 +1,13 @@
-//! Images of bright and dark pixels: derivatives, optimality, the limit in which they are those of spots, faculae where they were
-//! put, and every command with them.
+//! Images of bright and dark pixels: derivatives, optimality, the limit in which they are those of spots, faculae where
+//! they were put, and every command with them.
 
 use crate::desk::{Desk, says, two_spots};
-use dimcmc::config;
-use dimcmc::imaging::Imager;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::maxent::{Curvature, Problem, SolverSettings};
-use dimcmc::objective::{ObjectiveKind, Posterior, Reference};
-use dimcmc::scene::Scene;
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{ObjectiveKind, Posterior, Reference};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -93,7 +93,7 @@ fn the_solution_meets_its_optimality_conditions_and_shows_what_is_there() {
     assert!(correlation > 0.8);
     let inside = |disc: &[f64]| {
         let [longitude, latitude, radius] = [0, 1, 2].map(|k| disc[k].to_radians());
-        let disc = dimcmc::star::Disc { longitude, latitude, radius };
+        let disc = dimcmc::internals::star::Disc { longitude, latitude, radius };
         let grid = &imager.grid;
         let pixels = seen.iter().filter(|&&p| disc.contains(grid.longitude[p], grid.latitude[p]));
         let (count, sum) = pixels.fold((0.0, 0.0), |(count, sum), &p| (count + 1.0, sum + b[p]));
@@ -107,9 +107,10 @@ fn the_solution_meets_its_optimality_conditions_and_shows_what_is_there() {
     assert!(spots.iter().all(|b| *b < 0.6));
 }
 
-/// Of faint features both entropies are quadratic: with a default filling factor of one half, `-S` of spots is
-/// `2 a (s - 1/2)^2`, and that of brightnesses `a (B/B0 - 1)^2 / 2` with `B0` the brightness at one half. Images and ln L are the
-/// same then, and lambda differs by the factor `4 (B0 / (1 - c))^2`. What is left is of third order: the features, 1e-3.
+/// Of faint features both entropies are quadratic: with a default filling factor of one half, `-S` of spots is `2 a (s
+/// - 1/2)^2`, and that of brightnesses `a (B/B0 - 1)^2 / 2` with `B0` the brightness at one half. Images and ln L are
+/// the same then, and lambda differs by the factor `4 (B0 / (1 - c))^2`. What is left is of third order: the features,
+/// 1e-3.
 #[test]
 fn faint_features_look_the_same_to_both_models() {
     let Scene { mut imager, settings, space, .. } = scene();
@@ -195,7 +196,8 @@ fn every_command_takes_it_and_the_injected_orbit_is_found() {
     let svg = desk.read("map/figures/map.svg");
     assert!(svg.contains("injected-facula") && svg.contains("brightness over that of the photosphere"));
 
-    // chain, paraboloid and blind search know the injected K, within errors that are as large as those of a star with spots alone
+    // chain, paraboloid and blind search know the injected K, within errors that are as large as those of a star with
+    // spots alone
     let k = &desk.json("sample/summary.json")["parameters"]["k_kms"];
     let [low, high] = [0, 1].map(|i| k["ci95"][i].as_f64().unwrap());
     let sd = k["sd"].as_f64().unwrap();

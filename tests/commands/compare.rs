@@ -1,4 +1,5 @@
-//! `compare` as users run it: chain, paraboloid and landscape agree on one posterior, and what does not belong together is refused.
+//! `compare` as users run it: chain, paraboloid and landscape agree on one posterior, and what does not belong together
+//! is refused.
 
 use crate::desk::{Desk, says, two_spots};
 use serde_json::{Value, json};

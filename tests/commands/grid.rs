@@ -1,13 +1,13 @@
-//! `grid` as users run it: values that are those of the posterior, the same bytes whatever happens on the way, and refusals
-//! that write nothing.
+//! `grid` as users run it: values that are those of the posterior, the same bytes whatever happens on the way, and
+//! refusals that write nothing.
 
 #[cfg(unix)]
 use crate::desk::interrupt;
 use crate::desk::{Desk, dimcmc, kill, says, text, two_spots};
-use dimcmc::log_density::{LogDensity, Status};
-use dimcmc::objective::{Parameter, Posterior, Reference};
-use dimcmc::scene::Scene;
-use dimcmc::search::{SearchSettings, find};
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{SearchSettings, find};
+use dimcmc::internals::posterior::objective::{Parameter, Posterior, Reference};
+use dimcmc::internals::sampling::log_density::{LogDensity, Status};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -19,8 +19,8 @@ const NODES: &str = "landscape.jsonl";
 
 const PARABOLOID: &str = "paraboloid.json";
 
-/// The injected orbit (0.2, 1.7, 0.5) is nearest to value 2 of K, 1 of the period and 0 of the phase. The last K is outside its
-/// prior.
+/// The injected orbit (0.2, 1.7, 0.5) is nearest to value 2 of K, 1 of the period and 0 of the phase. The last K is
+/// outside its prior.
 const AXES: &str = r#"{ "k_kms": [0.11, 0.26, 4], "porb_over_prot": [1.62, 1.92, 4], "phi": [0.49, 0.55, 3] }"#;
 
 const COUNT: usize = 48;
@@ -101,8 +101,8 @@ fn the_landscape_is_that_of_the_chain() {
     let scene = Scene::load(&desk.path(CONFIG)).unwrap();
     let place = |node: &Value| scene.space.names().iter().map(|name| node[name].as_f64().unwrap()).collect();
     let thetas: Vec<Vec<f64>> = nodes.iter().map(place).collect();
-    let posterior = sampled(&scene).with_footholds_for(&thetas, COUNT);
-    assert!(posterior.footholds().count() > 0, "nodes far from the best one are worth an image there");
+    let posterior = sampled(&scene).with_warm_starts_for(&thetas, COUNT);
+    assert!(posterior.warm_starts().count() > 0, "nodes far from the best one are worth an image there");
     for (index, node) in nodes.iter().enumerate() {
         assert_eq!(node["index"], index);
         let theta = &thetas[index];
@@ -305,8 +305,8 @@ fn a_phase_axis_may_wrap_or_go_once_around() {
     }
 }
 
-/// The paraboloid beside the landscape: its error bar is that of the curvature at the best parameters, for which the search has
-/// derivatives; and the user may say which nodes.
+/// The paraboloid beside the landscape: its error bar is that of the curvature at the best parameters, for which the
+/// search has derivatives; and the user may say which nodes.
 #[test]
 fn the_paraboloid_is_the_curvature() {
     let mut config = config();

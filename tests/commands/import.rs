@@ -1,4 +1,5 @@
-//! `dimcmc import`: ZDIpy's star in this program's terms, what has no counterpart, and every way in which its files can be wrong.
+//! `dimcmc import`: ZDIpy's star in this program's terms, what has no counterpart, and every way in which its files can
+//! be wrong.
 
 use crate::desk::{Desk, says, with_line};
 use serde_json::{Value, json};
@@ -8,7 +9,8 @@ fn data(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/zdipy").join(name)
 }
 
-/// ZDIpy's files in `zdi`, with profiles of the star that they describe: 17 of the demo's times, in ZDIpy's Julian dates.
+/// ZDIpy's files in `zdi`, with profiles of the star that they describe: 17 of the demo's times, in ZDIpy's Julian
+/// dates.
 fn desk() -> Desk {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json");
     let mut demo: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();

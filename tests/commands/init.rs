@@ -1,5 +1,5 @@
-//! `dimcmc init`: the config that it writes is taken by the other commands as it is, its values are those of the star, and
-//! nothing that is not known is passed over in silence.
+//! `dimcmc init`: the config that it writes is taken by the other commands as it is, its values are those of the star,
+//! and nothing that is not known is passed over in silence.
 
 use crate::desk::{Desk, dimcmc, says, text};
 use serde_json::{Value, json};
@@ -285,7 +285,8 @@ fn a_vsini_of_another_star_is_put_right() {
         &table,
         &[
             "note: vsini is given as 45 km/s, the mean profile looks like 2",
-            "note: no map fits with the given vsini, and one does much better with that of the mean profile, which is written: 2",
+            "note: no map fits with the given vsini, and one does much better with that of the mean profile, which is \
+            written: 2",
             "next:\n  dimcmc map star.json",
         ],
     );
@@ -299,9 +300,8 @@ fn a_model_that_does_not_fit_is_no_dead_end() {
     let table = desk.succeed(&[&INIT[..], &["--line-sigma", "9", "--vsini", "25"]].concat());
     says(
         &table,
-        &[
-            "note: the model does not fit as well as the errors promise: the width of the local line is the likely reason",
-        ],
+        &["note: the model does not fit as well as the errors promise: the width of the local line is the likely \
+            reason"],
     );
     assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
     desk.succeed(&["map", "star.json", "--out", "map"]);
@@ -388,7 +388,8 @@ fn what_cannot_be_is_refused_in_a_line() {
     assert_ne!(desk.read("star.json"), "precious");
 }
 
-/// A single profile, or two at the same time, say nothing of spots and periods; two within minutes are enough for the rest.
+/// A single profile, or two at the same time, say nothing of spots and periods; two within minutes are enough for the
+/// rest.
 #[test]
 fn two_profiles_are_enough_for_a_start() {
     let desk = desk();
@@ -421,7 +422,7 @@ fn lo_peg_has_a_config() {
     desk.succeed(&["map", "star.json", "--out", "map"]);
     // the errors are several times too large
     let errors = desk.json("map/fit.json")["measured"]["errors"].clone();
-    // where several bins of noise go together, they are larger by the root of that
+    // where noise is correlated over several bins, they are larger by the root of that
     let alone = number(&errors, "/sigma_scale") / number(&errors, "/correlated_bins").sqrt();
     assert!((0.2..0.6).contains(&alone), "{errors}");
 }

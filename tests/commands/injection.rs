@@ -1,9 +1,9 @@
-//! `dimcmc inject` as users run it: against a star simulated with the orbit, what stays, what is refused, and what other commands
-//! make of it.
+//! `dimcmc inject` as users run it: against a star simulated with the orbit, what stays, what is refused, and what
+//! other commands make of it.
 
 use crate::desk::{Desk, says, star};
-use dimcmc::io::lsd::{self, ReadOptions};
-use dimcmc::observation::Observations;
+use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::star::observation::Observations;
 use serde_json::{Value, json};
 
 const ORBIT: [&str; 6] = ["--k-kms", "0.7", "--porb-over-prot", "1.7", "--phi", "0.3"];

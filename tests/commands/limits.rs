@@ -1,5 +1,5 @@
-//! `dimcmc limits` as users run it: against the closed form of the periodogram, against the whole way, with a planet in the
-//! profiles, refusals.
+//! `dimcmc limits` as users run it: against the closed form of the periodogram, against the whole way, with a planet in
+//! the profiles, refusals.
 
 use crate::desk::{Desk, says, star};
 use serde_json::{Value, json};
@@ -51,7 +51,8 @@ fn both_ways_and_the_closed_form_agree() {
     let table = limits(&desk, &["--full", "10", "--out", "a"]);
     says(&table, &["K 50 %", "K 95 %", "false alarms below 1 %", "the whole way:", "a: limits.csv, limits.json"]);
     let file = desk.json("a/limits.json");
-    // ten orbits within a factor of 2 of the limit, where the shortcut's second order and the noise of resampling decide
+    // ten orbits within a factor of 2 of the limit, where the shortcut's second order and the noise of resampling
+    // decide
     assert!(file["agreement"]["agree"].as_u64().unwrap() >= 8, "{}", file["agreement"]);
     assert!(file["before"]["false_alarm_probability"].as_f64().unwrap() > 0.01);
     desk.succeed(&["periodogram", "config.json", "--min-period-d", "1.7", "--max-period-d", "15", "--out", "search"]);
@@ -67,8 +68,8 @@ fn both_ways_and_the_closed_form_agree() {
         let nearest =
             (0..periods.len()).min_by(|a, b| (periods[*a] - period).abs().total_cmp(&(periods[*b] - period).abs()));
         let ratio = limit["k50_kms"].as_f64().unwrap() / closed[nearest.unwrap()];
-        // the closed form takes a mean over noise, here is one noise; and an orbit counts among the spots left over, which raises
-        // the limit
+        // the closed form takes a mean over noise, here is one noise; and an orbit counts among the unresolved spots,
+        // which raises the limit
         assert!((0.4..2.5).contains(&ratio), "{period}: {ratio}");
         ratios.push(ratio);
     }

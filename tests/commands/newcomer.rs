@@ -1,7 +1,9 @@
-//! A newcomer's first hour: init, map, periodogram, sample and report on the files of simulated stars, without a planet and with one.
+//! A newcomer's first hour: init, map, periodogram, sample and report on the files of simulated stars, without a planet
+//! and with one.
 //!
-//! No claim may be made of a star without a planet, whatever its spots and its data are like, and a planet of ten standard errors is
-//! to be found. One star without a planet is for every day; all twelve, of which `results/newcomer.md` has the table, are made by
+//! No claim may be made of a star without a planet, whatever its spots and its data are like, and a planet of ten
+//! standard errors is to be found. One star without a planet is for every day; all twelve, of which
+//! `results/newcomer.md` has the table, are made by
 //!
 //!     cargo test --release --test commands newcomer -- --ignored --nocapture
 
@@ -235,7 +237,8 @@ fn one_star() {
 #[ignore = "a quarter of an hour: the table of results/newcomer.md"]
 fn twelve_stars() {
     println!(
-        "| star | no planet: search | false alarm | chain | K (km/s) | injected K | with it: search | false alarm | chain | K (km/s) | found |"
+        "| star | no planet: search | false alarm | chain | K (km/s) | injected K | with it: search | false alarm | \
+        chain | K (km/s) | found |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
     let only = std::env::var("STAR").ok();

@@ -1,9 +1,9 @@
-//! Errors and target chi2 that are left to the observations: noise of known size comes back, slopes do not count, profiles that are
-//! noisier weigh less, and everything after it is as with the same numbers written down.
+//! Errors and target chi2 that are left to the observations: noise of known size comes back, slopes do not count,
+//! profiles that are noisier weigh less, and everything after it is as with the same numbers written down.
 
 use crate::desk::{Desk, says, star};
-use dimcmc::io::lsd::{self, ReadOptions};
-use dimcmc::observation::Observations;
+use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::star::observation::Observations;
 use serde_json::{Value, json};
 
 /// A spotted star of S/N 500 with a wide continuum, its profiles in `data` after `change`.
@@ -52,7 +52,8 @@ fn errors_quoted_too_large_are_put_right() {
     says(&table, &["errors", "times the quoted ones", "residuals of a map"]);
     let fit = desk.json("map/fit.json");
     let errors = &fit["measured"]["errors"];
-    // 20 profiles of some 24 bins of continuum know it to 1/sqrt(2 * 440), 3.4 %; a map of 620 bins to 2.8 %, and 0.97 is the paper's
+    // 20 profiles of some 24 bins of continuum know it to 1/sqrt(2 * 440), 3.4 %; a map of 620 bins to 2.8 %, and 0.97
+    // is the paper's
     assert!((number(&errors["continuum"]) / 0.25 - 1.0).abs() < 0.1, "{errors}");
     assert!((number(&errors["residual"]) / 0.25 - 1.0).abs() < 0.1, "{errors}");
     let scale = number(&errors["sigma_scale"]);
@@ -126,8 +127,8 @@ fn a_line_that_no_map_fits_counts_for_more_than_the_continuum() {
     assert_eq!(errors["sigma_scale"], errors["residual"]);
 }
 
-/// Noise smoothed over three bins by (1, 2, 1)/4 has correlations 2/3 and 1/6; the local line, 1.56 bins wide, overlaps with itself by
-/// 0.902 and 0.663 one and two bins apart: 1 + 2 (2/3 0.902 + 1/6 0.663) = 2.42.
+/// Noise smoothed over three bins by (1, 2, 1)/4 has correlations 2/3 and 1/6; the local line, 1.56 bins wide, overlaps
+/// with itself by 0.902 and 0.663 one and two bins apart: 1 + 2 (2/3 0.902 + 1/6 0.663) = 2.42.
 #[test]
 fn noise_that_goes_together_makes_errors_larger() {
     let desk = desk(|observations| {
@@ -141,7 +142,7 @@ fn noise_that_goes_together_makes_errors_larger() {
     let mut config: Value = serde_json::from_str(&desk.read("config.json")).unwrap();
     config["star"]["line"]["sigma_kms"] = json!(2.5_f64.hypot(1.8 * 0.5_f64.sqrt()));
     desk.write("config.json", &config.to_string());
-    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["noise goes together over"]);
+    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["noise correlated over"]);
     let fit = desk.json("map/fit.json");
     let errors = &fit["measured"]["errors"];
     // the variance of a smoothed bin is 6/16
@@ -170,8 +171,8 @@ fn noisier_profiles_weigh_less() {
     let factors = desk.json("map/fit.json")["measured"]["errors"]["profiles"].clone();
     let factors: Vec<f64> = factors.as_array().unwrap().iter().map(number).collect();
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
-    // each is known to 15 %, 0.02 in the variance of its logarithm, which scatters by 0.09 between such profiles: 80 % of the
-    // logarithm are left, and the means are known to 7 and 4 %
+    // each is known to 15 %, 0.02 in the variance of its logarithm, which scatters by 0.09 between such profiles: 80 %
+    // of the logarithm are left, and the means are known to 7 and 4 %
     let left = (mean(&factors[..5]) / mean(&factors[5..])).log2();
     assert!((left - 0.8).abs() < 0.2, "{left}");
     let weight = mean(&factors.iter().map(|f| f.powi(-2)).collect::<Vec<_>>());
@@ -210,7 +211,8 @@ fn without_continuum_there_are_no_weights() {
     says(&desk.refusal(&["map", "config.json", "--out", "x"]), &["observations.sigma_scale", "a number or \"auto\""]);
 }
 
-/// With the right errors the target is near 1 (a little above for few and noisy profiles), and what is left of the velocities is photon noise.
+/// With the right errors the target is near 1 (a little above for few and noisy profiles), and what is left of the
+/// velocities is photon noise.
 #[test]
 fn the_target_is_where_velocities_stop_shrinking() {
     let desk = desk(|_| ());

@@ -1,5 +1,5 @@
-//! What is usually quoted of an orbit, in every result that bears on one: period in days, times of the largest radial velocity and of
-//! inferior conjunction, minimum mass, each with its errors; and what phi is.
+//! What is usually quoted of an orbit, in every result that bears on one: period in days, times of the largest radial
+//! velocity and of inferior conjunction, minimum mass, each with its errors; and what phi is.
 
 use crate::desk::{Desk, says, two_spots};
 use serde_json::{Value, json};
@@ -141,7 +141,8 @@ fn where_there_is_no_planet_the_mass_has_a_limit() {
     assert!(summary["derived"]["period_d"].get("upper95").is_none());
 }
 
-/// `optimise` and `periodogram` propagate their errors: those of the period are the ratio's, and all agree with each other.
+/// `optimise` and `periodogram` propagate their errors: those of the period are the ratio's, and all agree with each
+/// other.
 #[test]
 fn searches_give_it_with_errors() {
     let desk = Desk::new(config());

@@ -155,7 +155,8 @@ fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_t
         for (ensemble, walker) in (0..4).flat_map(|e| (0..8).map(move |w| (e, w))) {
             let [k, ratio, phi]: [f64; 3] = rng.random();
             let line = json!({
-                "ensemble": ensemble, "step": step, "walker": walker, "accepted": true, "log_prob": -1.0, "k_kms": 0.4 + 1.5 * k,
+                "ensemble": ensemble, "step": step, "walker": walker, "accepted": true,
+                "log_prob": -1.0, "k_kms": 0.4 + 1.5 * k,
                 "porb_over_prot": 0.4 * (9.0_f64 / 0.4).powf(ratio), "phi": phi, "spottedness": 0.05, "chi2": 1.0,
                 "status": "converged", "proposed": "converged", "passes": 10
             });
@@ -279,7 +280,8 @@ fn gaussian_run(desk: &Desk, centre: [f64; 2], sd: [f64; 2]) {
             let [u, v]: [f64; 2] = [rng.sample(StandardNormal), rng.sample(StandardNormal)];
             let (k, phi) = (centre[0] + sd[0] * u, centre[1] + sd[1] * (0.6 * u + 0.8 * v));
             let line = json!({
-                "ensemble": ensemble, "step": step, "walker": walker, "accepted": true, "log_prob": -0.5 * (u * u + v * v),
+                "ensemble": ensemble, "step": step, "walker": walker, "accepted": true,
+                "log_prob": -0.5 * (u * u + v * v),
                 "k_kms": k, "phi": phi.rem_euclid(1.0), "spottedness": 0.05, "chi2": 1.0, "status": "converged",
                 "proposed": "converged", "passes": 10
             });
@@ -298,13 +300,14 @@ fn a_known_gaussian_has_its_contours_and_a_phase_wraps() {
         let svg = desk.read("out/corner.svg");
         let (inner, outer) = (paths(&svg, "area68"), paths(&svg, "area95"));
         assert_eq!((inner.len(), outer.len()), (1, 1), "one pair of parameters");
-        // the injected values are those of the centre: 12,800 independent draws place it to a hundredth of its width, their
-        // noise on a contour is some hundredths
+        // the injected values are those of the centre: 12,800 independent draws place it to a hundredth of its width,
+        // their noise on a contour is some hundredths
         let truth = middle(&paths(&svg, "truth-point")[0]);
         let (found, [x, y]) = (middle(&inner[0]), extent(&inner[0]));
         assert!((found[0] - truth[0]).abs() < 0.06 * (x[1] - x[0]), "{centre:?}: {found:?} {truth:?}");
         assert!((found[1] - truth[1]).abs() < 0.06 * (y[1] - y[0]), "{centre:?}: {found:?} {truth:?}");
-        // 68 % of two Gaussian parameters reach to 1.510 standard deviations, 95 % to 2.448, the interval of one to 1 (0.994)
+        // 68 % of two Gaussian parameters reach to 1.510 standard deviations, 95 % to 2.448, the interval of one to 1
+        // (0.994)
         let interval = extent(&paths(&svg, "interval68")[0])[0];
         let width = |[low, high]: [f64; 2]| high - low;
         let (one, inner, outer) = (width(interval), width(x), width(extent(&outer[0])[0]));

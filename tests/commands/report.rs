@@ -121,7 +121,8 @@ fn told_in_order(folder: &str, page: &str) {
         }
         for table in chapter.split("<tbody>").skip(1) {
             let rows = table.split("</tbody>").next().unwrap().split("<tr>").skip(1);
-            let cells = |row: &str| row.split("<td>").skip(1).map(|cell| cell.starts_with("–<")).collect::<Vec<bool>>();
+            let empty = |cell: &str| cell.starts_with("–<");
+            let cells = |row: &str| row.split("<td>").skip(1).map(empty).collect::<Vec<bool>>();
             let rows: Vec<Vec<bool>> = rows.map(cells).collect();
             let empty = |k: usize| rows.iter().all(|row| row[k]);
             assert!(!(0..rows[0].len()).any(empty), "{folder}: {table}");
@@ -140,8 +141,10 @@ fn browser() -> Option<String> {
 fn shown(desk: &Desk, browser: &str, folder: &str, width: u32) {
     // a script of the test's own looks at the page; the page has none
     let frame = format!(
-        "<!doctype html><body><iframe id=f src=\"{folder}.html\" style=\"width:{width}px;height:2000px;border:0\"></iframe>\
-         <p id=out></p><script>f.onload=()=>{{const d=f.contentDocument;out.textContent=['seen',d.documentElement.scrollWidth,\
+        "<!doctype html><body><iframe id=f src=\"{folder}.html\" \
+        style=\"width:{width}px;height:2000px;border:0\"></iframe>\
+         <p id=out></p><script>f.onload=()=>{{const \
+         d=f.contentDocument;out.textContent=['seen',d.documentElement.scrollWidth,\
          d.querySelectorAll('svg').length,d.querySelectorAll('table').length].join(' ')}}</script>"
     );
     desk.write("frame.html", &frame);

@@ -1,9 +1,9 @@
-//! The experiments: what must come out whatever the paper says, each test named after the mistake that it would catch; and the
-//! command on a row of them.
+//! The experiments: what must come out whatever the paper says, each test named after the mistake that it would catch;
+//! and the command on a row of them.
 
 use crate::desk::{dimcmc, text};
-use dimcmc::experiments::{Case, Nodes, Outcome, ROWS, star};
-use dimcmc::pool::Pool;
+use dimcmc::internals::runs::experiments::{Case, Nodes, Outcome, ROWS, star};
+use dimcmc::internals::runs::pool::Pool;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -15,8 +15,9 @@ const ORBIT: [(&str, f64); 3] = [("k_kms", 0.12), ("porb_over_prot", 1.6), ("phi
 
 /// Landscape and periodogram of the paper's star with that orbit, on few pixels.
 ///
-/// The program simulates the star alone, and each profile is shifted by the formula of the method as it is written here, through
-/// the velocity that the list of profiles takes off: so a mistake in the program's own orbit cannot cancel itself.
+/// The program simulates the star alone, and each profile is shifted by the formula of the method as it is written
+/// here, through the velocity that the list of profiles takes off: so a mistake in the program's own orbit cannot
+/// cancel itself.
 fn outcome(changes: &[(&str, Value)]) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
     let lone = [("/planet", json!({ "k_kms": 0.0, "porb_over_prot": 1.0, "phi": 0.0 }))];
@@ -52,7 +53,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
 
 /// Deviation of every route from the injected value, in its error bars.
 fn deviations(outcome: &Outcome, name: &str) -> Vec<(&'static str, f64)> {
-    let of_route = |(route, found): (&'static str, &dimcmc::experiments::Route)| {
+    let of_route = |(route, found): (&'static str, &dimcmc::internals::runs::experiments::Route)| {
         let estimate = found.parameters.get(name).unwrap_or_else(|| panic!("{route}: {:?}", found.note));
         (route, outcome.deviation(name, estimate).unwrap() / estimate.error())
     };
@@ -78,8 +79,8 @@ fn k_has_the_right_sign_and_phi_the_right_zero_point() {
     assert!(phi.error() < 0.05, "too uncertain for the test: {}", phi.error());
 }
 
-/// A phase that were counted from the first profile, or in rotations, would come out elsewhere: here a quarter of a turn or a
-/// fifth.
+/// A phase that were counted from the first profile, or in rotations, would come out elsewhere: here a quarter of a
+/// turn or a fifth.
 #[test]
 fn phi_is_counted_in_orbital_cycles_from_the_epoch() {
     let cycles: Vec<f64> = (0..50).map(|k| 1.2 + 0.06 * f64::from(k)).collect();
@@ -88,7 +89,8 @@ fn phi_is_counted_in_orbital_cycles_from_the_epoch() {
     assert_recovered(&outcome, "porb_over_prot");
 }
 
-/// The landscape's nodes are laid out as the table says: the best node is the injected orbit, not one with axes exchanged.
+/// The landscape's nodes are laid out as the table says: the best node is the injected orbit, not one with axes
+/// exchanged.
 #[test]
 fn axes_are_not_swapped() {
     let config = star::with(star::paper(), &[("/imaging/pixels", json!(1500))]);
@@ -104,9 +106,9 @@ fn axes_are_not_swapped() {
     assert_eq!(place, [0.1, 1.7, 0.5]);
 }
 
-/// The error bar of K is what an independent implementation found from the full curvature, 10.6 m/s (to 10 %: another orbit,
-/// other noise), and twice that at half the signal-to-noise ratio (to 15 %: fewer spots are seen in more noise). A chi2 that were
-/// scaled, or counted twice, would show in both.
+/// The error bar of K is what an independent implementation found from the full curvature, 10.6 m/s (to 10 %: another
+/// orbit, other noise), and twice that at half the signal-to-noise ratio (to 15 %: fewer spots are seen in more noise).
+/// A chi2 that were scaled, or counted twice, would show in both.
 #[test]
 fn chi2_has_its_scale() {
     const SIGMA_K_KMS: f64 = 0.0106;

@@ -1,5 +1,5 @@
-//! `sample` and what belongs to it, as users run them: the same bytes whatever happens on the way, and refusals that write
-//! nothing.
+//! `sample` and what belongs to it, as users run them: the same bytes whatever happens on the way, and refusals that
+//! write nothing.
 
 #[cfg(unix)]
 use crate::desk::interrupt;

@@ -1,12 +1,12 @@
 //! Velocity zero points: what they make of the information, how they are found, and what is said of them.
 
 use crate::desk::{Desk, dimcmc, says, star, text};
-use dimcmc::config;
-use dimcmc::expansion::Expansion;
-use dimcmc::imaging::Imager;
-use dimcmc::objective::{Parameter, Reference};
-use dimcmc::scene::Scene;
-use dimcmc::zero_points::ZeroPoints;
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::posterior::expansion::Expansion;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{Parameter, Reference};
+use dimcmc::internals::posterior::zero_points::ZeroPoints;
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;

@@ -1,12 +1,11 @@
-//! The yardstick of the response: the obvious loop over visible (pixel, profile) pairs, each of which holds the local line in
-//! a window of velocity bins around its own velocity.
+//! The yardstick of the response: the obvious loop over visible (pixel, profile) pairs, each of which holds the local
+//! line in a window of velocity bins around its own velocity.
 //!
-//! Written from the formulas of method section 1 and the public table of pixel centres alone, so that it shares nothing with
-//! what it is held against. Left out: the extent of a pixel (`Quadrature::Gauss2x2`), which would change the numbers in the
-//! windows but not the loop.
+//! Written from the formulas of `docs/method.md` section 1 and the public table of pixel centres alone, so that it
+//! shares nothing with what it is held against.
 #![allow(dead_code)]
 
-use dimcmc::star::{Sampling, StarSettings, StarState, SurfaceGrid};
+use dimcmc::internals::star::{Sampling, StarSettings, StarState, SurfaceGrid};
 use std::f64::consts::TAU;
 
 /// The response in windows of `WINDOW` bins; of the line, what lies outside is dropped.

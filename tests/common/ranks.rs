@@ -1,6 +1,6 @@
 //! What this program does as a rank of a job: go wrong on purpose, or be asked and measured.
 
-use dimcmc::cluster::{Answer, Queue, Rank, join};
+use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
 use std::convert::Infallible;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;

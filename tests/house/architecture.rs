@@ -1,80 +1,77 @@
-//! The shape of the source tree: what may import what, read from the `crate::` paths in `src`.
+//! The shape of the source tree: which room may see which, read from the `crate::` paths in `src`.
 //!
-//! Code under `#[cfg(test)]` is held to it as well. What a part must not know is stated twice where it matters most: by the
-//! order of the layers, and by name.
+//! Code under `#[cfg(test)]` is held to it as well.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The layers, lowest first. A module imports from lower layers only; those of one layer do not see each other.
-const LAYERS: &[&[&str]] = &[
-    &["units", "text", "vector", "velocities", "log_density", "verdict", "figure", "cluster"],
-    &["observation"],
-    &["star", "maxent", "chain", "landscape", "periodogram", "nuisances"],
-    &["imaging", "ensemble", "optimise", "first_look"],
-    &["objective"],
-    &["expansion"],
-    &["surrogate"],
-    &["simulate", "injection", "noise", "fit", "detection", "zero_points"],
-    &["io"],
-    &["config"],
-    &["scene", "search"],
-    &["origin", "diagnosis", "limits", "blind_search"],
-    &["proposal"],
-    &["pool"],
-    &["manifest", "survey", "optimum", "import"],
-    &["run"],
-    &["comparison", "export", "merge", "batch"],
-    &["experiments"],
-    &["plot"],
-    &["report"],
-];
-
-/// Modules, and all that they may import. What is not listed here may import whatever lies lower.
-const MAY_SEE: &[(&str, &[&str])] = &[
-    ("units", &[]),
-    ("text", &[]),
-    ("vector", &[]),
-    ("velocities", &[]),
-    ("figure", &[]),
-    ("log_density", &[]),
-    ("verdict", &[]),
-    ("cluster", &[]),
-    ("observation", &["units"]),
-    ("star", &["observation", "units", "vector"]),
-    ("maxent", &["units", "vector"]),
-    ("nuisances", &["observation", "vector"]),
-    ("imaging", &["maxent", "nuisances", "observation", "star", "units", "vector"]),
-    ("chain", &["log_density", "text", "verdict"]),
-    ("landscape", &["log_density", "text"]),
-    ("periodogram", &["velocities", "verdict"]),
-    ("ensemble", &["chain", "log_density"]),
-    ("optimise", &["log_density"]),
-    ("export", &["chain", "io", "log_density", "manifest", "objective", "origin", "run"]),
-    ("first_look", &["observation", "star"]),
-    ("injection", &["observation", "star"]),
-    ("noise", &["first_look", "imaging", "objective", "observation", "star"]),
-    // from saved files alone: nothing that reconstructs, samples or searches
+/// The rooms of `src/`, lowest first; the modules of each, lowest first, where there is an order to keep; and what it
+/// may see elsewhere: whole rooms or modules of them.
+const ROOMS: &[(&str, &[&str], &[&str])] = &[
+    ("numerics", &[], &[]),
+    ("star", &[], &["numerics"]),
+    ("maxent", &[], &["numerics"]),
+    ("planets", &["velocities", "verdict", "periodogram"], &["numerics"]),
+    ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics", "planets::verdict"]),
     (
-        "plot",
+        "posterior",
         &[
-            "chain",
-            "comparison",
-            "experiments",
-            "figure",
-            "io",
-            "landscape",
-            "manifest",
+            "nuisances",
+            "first_look",
+            "imaging",
             "objective",
-            "observation",
+            "expansion",
+            "surrogate",
+            "simulate",
+            "noise",
+            "fit",
+            "detection",
+            "zero_points",
+        ],
+        &["numerics", "star", "maxent", "planets", "sampling"],
+    ),
+    (
+        "data",
+        &["io", "config", "scene", "search", "diagnosis", "init", "import"],
+        &["numerics", "star", "maxent", "planets", "sampling", "posterior"],
+    ),
+    (
+        "runs",
+        &[
+            "cluster",
             "origin",
+            "blind_search",
+            "limits",
+            "pool",
+            "manifest",
+            "grid_scan",
+            "optimum",
             "run",
+            "comparison",
+            "export",
+            "merge",
+            "batch",
+            "experiments",
+        ],
+        &["numerics", "star", "maxent", "planets", "sampling", "posterior", "data"],
+    ),
+    // from saved files alone: nothing that makes images, samples or searches
+    (
+        "figures",
+        &["drawing", "plot", "report"],
+        &[
+            "numerics::text",
             "star",
-            "survey",
-            "verdict",
+            "planets",
+            "sampling::chain",
+            "sampling::landscape",
+            "sampling::log_density",
+            "posterior::objective",
+            "data::io",
+            "runs",
         ],
     ),
-    ("report", &["chain", "figure", "io", "manifest", "objective", "origin", "plot", "survey", "text", "verdict"]),
+    ("cli", &[], &["numerics", "star", "maxent", "planets", "sampling", "posterior", "data", "runs", "figures"]),
 ];
 
 struct Source {
@@ -83,10 +80,11 @@ struct Source {
 }
 
 impl Source {
-    /// The module at the top of the crate that the file belongs to: `star` for `src/star/grid.rs`, `run` for `src/run.rs`.
-    fn module(&self) -> String {
-        let first = self.path.components().next().unwrap();
-        Path::new(first.as_os_str()).file_stem().unwrap().to_str().unwrap().to_owned()
+    /// The room and the module in it: `star` and `grid` for `src/star/grid.rs`.
+    fn place(&self) -> (String, String) {
+        let mut names = self.path.components().map(|part| Path::new(part.as_os_str()).file_stem().unwrap());
+        let mut next = || names.next().map_or(String::new(), |name| name.to_str().unwrap().to_owned());
+        (next(), next())
     }
 
     /// Lines of code with their numbers; comments and documentation left out.
@@ -95,27 +93,18 @@ impl Source {
         lines.filter(|(_, line)| !line.trim_start().starts_with("//"))
     }
 
-    /// Modules that the file names by `crate::`, with the lines.
-    fn imports(&self) -> Vec<(usize, String)> {
+    /// Paths that the file names by `crate::`, as far as the room and the module in it, with the lines.
+    fn imports(&self) -> Vec<(usize, String, String)> {
         let mut found = Vec::new();
         for (number, line) in self.code() {
             for rest in line.split("crate::").skip(1) {
-                let names = match rest.strip_prefix('{') {
-                    Some(group) => group.split('}').next().unwrap().split(',').collect(),
-                    None => vec![rest],
-                };
-                for name in names {
-                    let is_name = |c: char| c.is_alphanumeric() || c == '_';
-                    let name = name.trim().split(|c| !is_name(c)).next().unwrap();
-                    found.push((number, name.to_owned()));
-                }
+                let is_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+                let mut names = rest.split(|c| !is_path(c)).next().unwrap().split("::");
+                let mut next = || names.next().unwrap_or_default().to_owned();
+                found.push((number, next(), next()));
             }
         }
         found
-    }
-
-    fn within(&self, module: &str) -> bool {
-        self.module() == module
     }
 }
 
@@ -138,72 +127,57 @@ fn sources() -> Vec<Source> {
     found
 }
 
-/// The files of the library: all but the binary's.
-fn library() -> Vec<Source> {
-    sources().into_iter().filter(|s| !["main", "cli", "lib"].contains(&s.module().as_str())).collect()
-}
-
-fn layers() -> BTreeMap<&'static str, usize> {
-    LAYERS.iter().enumerate().flat_map(|(k, layer)| layer.iter().map(move |module| (*module, k))).collect()
+/// The files of rooms.
+fn in_rooms() -> impl Iterator<Item = Source> {
+    sources().into_iter().filter(|source| source.path.components().count() > 1)
 }
 
 fn hold(faults: Vec<String>) {
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
 
+/// Whoever comes new to the tree sees a dozen names.
 #[test]
-fn every_module_has_its_layer() {
-    let modules: BTreeSet<String> = library().iter().map(Source::module).collect();
-    let listed: BTreeSet<String> = layers().into_keys().map(str::to_owned).collect();
-    assert_eq!(modules, listed, "the table of layers in this test names every module of the library, and no other");
+fn every_room_is_listed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();
+    let entries: BTreeSet<String> = std::fs::read_dir(root).unwrap().map(name).collect();
+    let listed: BTreeSet<String> = ROOMS.iter().map(|(room, ..)| (*room).to_owned()).chain(["lib.rs".into()]).collect();
+    assert_eq!(entries, listed, "the table of this test names every room, and no other");
+    assert!(entries.len() <= 12);
+    for (room, order, _) in ROOMS.iter().filter(|(_, order, _)| !order.is_empty()) {
+        let inside = in_rooms().map(|source| source.place()).filter(|(of, module)| of == room && module != "mod");
+        let inside: BTreeSet<String> = inside.map(|(_, module)| module).collect();
+        assert_eq!(inside, order.iter().map(|module| (*module).to_owned()).collect(), "{room}");
+    }
 }
 
 #[test]
 fn imports_run_downwards() {
-    let layers = layers();
     let mut faults = Vec::new();
-    for source in library() {
-        let module = source.module();
-        for (line, other) in source.imports().into_iter().filter(|(_, other)| *other != module) {
-            match layers.get(other.as_str()) {
-                Some(layer) if *layer < layers[module.as_str()] => {}
-                Some(_) => faults.push(format!("{}:{line}: {module} sees {other}", source.path.display())),
-                // a name that lib.rs re-exports is for users of the library, not for itself
-                None => faults.push(format!("{}:{line}: crate::{other} is no module", source.path.display())),
+    for source in in_rooms() {
+        let (room, module) = source.place();
+        let (_, order, sees) = ROOMS.iter().find(|(name, ..)| *name == room).unwrap();
+        let rank = |module: &str| order.iter().position(|name| *name == module);
+        for (line, other, inside) in source.imports() {
+            let allowed = match other == room {
+                true => inside == module || rank(&inside).is_none() || rank(&inside) < rank(&module),
+                false => sees.contains(&other.as_str()) || sees.contains(&format!("{other}::{inside}").as_str()),
+            };
+            if !allowed {
+                faults.push(format!("{}:{line}: sees {other}::{inside}", source.path.display()));
             }
         }
     }
     hold(faults);
 }
 
+/// Only the command line prints and ends the program.
 #[test]
-fn parts_see_no_more_than_they_need() {
-    let mut faults = Vec::new();
-    for source in library() {
-        let Some((module, allowed)) = MAY_SEE.iter().find(|(module, _)| source.within(module)) else { continue };
-        for (line, other) in source.imports() {
-            if other != *module && !allowed.contains(&other.as_str()) {
-                faults.push(format!("{}:{line}: {module} sees {other}", source.path.display()));
-            }
-        }
-    }
-    hold(faults);
-}
-
-#[test]
-fn commands_belong_to_the_binary() {
-    for source in sources() {
-        let declares = source.code().any(|(_, line)| line.trim_end().ends_with("mod cli;"));
-        assert_eq!(declares, source.within("main"), "{}: cli is declared in main.rs", source.path.display());
-    }
-}
-
-/// The library prints nothing and never ends the program; only the binary does.
-#[test]
-fn the_library_is_silent() {
+fn all_but_the_command_line_are_silent() {
     let loud = ["println!", "print!", "eprintln!", "eprint!", "dbg!", "process::exit", "std::io::stdout", "stderr()"];
     let mut faults = Vec::new();
-    for source in library() {
+    for source in in_rooms().filter(|source| source.place().0 != "cli") {
         for (line, code) in source.code() {
             for word in loud.iter().filter(|word| code.contains(*word)) {
                 faults.push(format!("{}:{line}: {word}", source.path.display()));

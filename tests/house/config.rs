@@ -1,7 +1,8 @@
-//! Configs: those that ship resolve, their resolved form is stable, and every mistake gets one line that names file and key.
+//! Configs: those that ship resolve, their resolved form is stable, and every mistake gets one line that names file and
+//! key.
 
-use dimcmc::config::{self, EquivalentWidth, ObservationSource, Settings};
-use dimcmc::objective::{Parameter, Prior};
+use dimcmc::internals::data::config::{self, EquivalentWidth, ObservationSource, Settings};
+use dimcmc::internals::posterior::objective::{Parameter, Prior};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -67,7 +68,7 @@ fn the_seven_dimensional_config_starts_off_the_truth() {
     let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
     let demo = config::load(&shipped("demo.json")).unwrap();
     assert_eq!(simulation.truth, demo.values);
-    // Widths of method section 5; gamma times Omega_eq for the shear.
+    // Widths of `docs/method.md` section 5; gamma times Omega_eq for the shear.
     let sigma = [0.0106, 0.073, 0.041, 0.00038 * 2.0944, 0.00093 * 2.0944, 0.46, 0.022];
     for (k, sigma) in sigma.into_iter().enumerate() {
         let off = (settings.values.0[k] - simulation.truth.0[k]) / sigma;
@@ -96,7 +97,7 @@ fn lo_peg_resolves() {
     assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 1.0));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
-        let data = dimcmc::io::lsd::read(list, options).unwrap().observations;
+        let data = dimcmc::internals::data::io::lsd::read(list, options).unwrap().observations;
         assert!((settings.star_for(&data).unwrap().line.equivalent_width_kms - 2.6700).abs() < 1e-3);
     }
 }
@@ -119,7 +120,7 @@ fn the_resolved_form_is_a_config_with_the_same_fingerprint() {
     }
     let resolved = resolve(&minimal).unwrap().resolved;
     assert_eq!(resolved["imaging"]["chi2_target"], 0.97);
-    assert_eq!(resolved["imaging"]["spots_left"], "fitted");
+    assert_eq!(resolved["imaging"]["unresolved_spots"], "fitted");
     assert_eq!(resolved["sampler"]["walkers"], 32);
     assert_eq!(resolved["observations"], json!({ "path": "observations.txt", "sigma_scale": 1.0 }));
     assert_eq!(resolved["parameters"]["inclination_deg"]["max"], 90.0);
@@ -425,4 +426,12 @@ fn replace_number(base: &[u8], at: usize, piece: &[u8]) -> Vec<u8> {
     let Some(start) = (at..base.len()).find(starts) else { return base.to_vec() };
     let end = (start + 1..base.len()).find(|k| !part_of_number(&base[*k])).unwrap_or(base.len());
     [&base[..=start], piece, &base[end..]].concat()
+}
+
+/// A key that was renamed is refused with its new name.
+#[test]
+fn an_old_key_names_the_new_one() {
+    let text = std::fs::read_to_string(shipped("demo.json")).unwrap().replace("unresolved_spots", "spots_left");
+    let error = config::from_json(text.as_bytes(), Path::new("old.json")).unwrap_err().to_string();
+    assert_eq!(error, "old.json: unknown key imaging.spots_left: it is now called unresolved_spots");
 }

@@ -5,6 +5,8 @@ mod desk;
 
 mod architecture;
 mod config;
+mod docs;
 mod examples;
-mod readme;
+mod reference;
 mod schema;
+mod small;

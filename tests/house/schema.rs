@@ -1,6 +1,6 @@
 //! The JSON Schema of the config: it is the one of the config's types, and explains every key.
 
-use dimcmc::config;
+use dimcmc::internals::data::config;
 use serde_json::Value;
 use std::path::Path;
 

@@ -1,8 +1,10 @@
 //! Journal and summary from outside: torn tails against corruption, exact floats, circular statistics, advice.
 
-use dimcmc::chain::{Chain, Goals, MoveKind, ParameterKind, Record, Shape, Summary, summarise, table};
-use dimcmc::io::journal::{self, Journal};
-use dimcmc::log_density::Status;
+use dimcmc::internals::data::io::journal::{self, Journal};
+use dimcmc::internals::sampling::chain::{
+    Chain, Goals, MoveKind, ParameterKind, Record, Shape, Summary, summarise, table,
+};
+use dimcmc::internals::sampling::log_density::Status;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

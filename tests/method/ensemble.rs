@@ -1,12 +1,12 @@
 //! The sampler from outside: threads, starts, wraps, and a chain cut and resumed through its journal.
 
-use dimcmc::chain::{Chain, ParameterKind, Record, Shape, summarise};
-use dimcmc::ensemble::moves::{DifferentialEvolution, Stretch};
-use dimcmc::ensemble::{
+use dimcmc::internals::data::io::journal::{self, Journal};
+use dimcmc::internals::sampling::chain::{Chain, ParameterKind, Record, Shape, summarise};
+use dimcmc::internals::sampling::ensemble::moves::{DifferentialEvolution, Stretch};
+use dimcmc::internals::sampling::ensemble::{
     EnsembleError, Mix, Positions, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start, run,
 };
-use dimcmc::io::journal::{self, Journal};
-use dimcmc::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
+use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
 use nalgebra::DMatrix;
 use std::cell::Cell;
 use std::convert::Infallible;
@@ -14,8 +14,8 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// An orbit's (K, phi, v): K and phi move as (x, y). Gaussian in K around 0.1, von Mises in phi around 0.97, so that the
-/// posterior lies across the wrap; uniform prior in K from 0 to 0.3. Some places fail, in every way there is.
+/// An orbit's (K, phi, v): K and phi move as (x, y). Gaussian in K around 0.1, von Mises in phi around 0.97, so that
+/// the posterior lies across the wrap; uniform prior in K from 0 to 0.3. Some places fail, in every way there is.
 struct Orbit {
     names: Vec<String>,
     /// Whether some evaluations fail.
@@ -46,10 +46,10 @@ impl LogDensity for Orbit {
         };
         Evaluation { log_prob, spottedness: 0.06 + 1e-3 * k, chi2: 2764.5 - v, passes: 20 + (v.abs() as u32), status }
     }
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         vec![theta[0] * (TAU * theta[1]).cos(), theta[0] * (TAU * theta[1]).sin(), theta[2]]
     }
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         let phi = (internal[1].atan2(internal[0]) / TAU).rem_euclid(1.0);
         vec![internal[0].hypot(internal[1]), if phi < 1.0 { phi } else { 0.0 }, internal[2]]
     }
@@ -187,7 +187,8 @@ fn an_orbit_is_recovered_and_failures_are_counted() {
     assert_eq!(reason, StopReason::Converged);
     let summary = summarise(&chain, &KINDS, &policy.goals).unwrap();
     assert!(summary.converged);
-    // Mean and variance of the Gaussian of K, cut at 0 and 0.3, i.e. -2 and +4 sigma: mean from the densities at the walls.
+    // Mean and variance of the Gaussian of K, cut at 0 and 0.3, i.e. -2 and +4 sigma: mean from the densities at the
+    // walls.
     let (lower, mass) = ((-2.0f64).powi(2), 0.977250 - 3.17e-5);
     let density_at = |square: f64| (-0.5 * square).exp() / TAU.sqrt();
     let mean = 0.1 + 0.05 * (density_at(lower) - density_at(16.0)) / mass;
@@ -222,7 +223,7 @@ impl LogDensity for Phase {
         let log_prob = (TAU * (theta[0] - 0.1)).cos();
         Evaluation { log_prob, spottedness: 0.0, chi2: 0.0, passes: 1, status: Status::Converged }
     }
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         vec![internal[0].rem_euclid(1.0).min(1.0 - f64::EPSILON)]
     }
 }
@@ -272,7 +273,7 @@ fn degenerate_and_forbidden_starts_name_the_culprit() {
     assert_eq!(equal, EnsembleError::StartNoSpread { ensemble: 1, name: "vsys_kms".to_owned() });
     let plane = refused(&|p| {
         p[0].iter_mut().for_each(|theta| {
-            let internal = density.to_internal(theta);
+            let internal = density.to_sampling(theta);
             theta[2] = 20.0 * internal[0] - 70.0 * internal[1] + 2.0;
         });
     });

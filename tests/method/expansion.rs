@@ -1,15 +1,15 @@
 //! The quadratic against full reconstructions and against the independent posterior, on the oracle's data and pixels.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
-use dimcmc::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
-use dimcmc::imaging::Imager;
-use dimcmc::maxent::SolverSettings;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::objective::{
+use dimcmc::internals::maxent::SolverSettings;
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::posterior::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
-use dimcmc::star::{Quadrature, SurfaceGrid};
-use dimcmc::surrogate::Surrogate;
+use dimcmc::internals::posterior::surrogate::Surrogate;
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -88,7 +88,8 @@ fn orbits(oracle: &Oracle, imager: &Imager) {
         let [k, period, phi] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi].map(|p| orbit[p]);
         println!("K {k:.3} P {period:.3} phi {phi:.3}: {full:9.3}, quadratic {quadratic:9.3}");
         let difference = (full - quadratic).abs();
-        // near co-rotation the spots answer by moving, which the entropy of dark and bright pixels makes less than linear
+        // near co-rotation the spots answer by moving, which the entropy of dark and bright pixels makes less than
+        // linear
         let worst = if (period - 1.0).abs() < 0.3 { &mut worst_near } else { &mut worst };
         *worst = worst.max(difference);
     }
@@ -149,7 +150,7 @@ fn posterior_of_the_orbit() {
     let space = space(&imager, reference.values, &free);
     let surrogate = Surrogate::new(&imager, &space, &reference).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let draws: Vec<Vec<f64>> = (0..20_000).map(|_| space.to_written(&surrogate.draw(&mut rng).unwrap())).collect();
+    let draws: Vec<Vec<f64>> = (0..20_000).map(|_| space.to_physical(&surrogate.draw(&mut rng).unwrap())).collect();
     let wanted = json("posterior.json");
     for (i, key) in ["K", "P", "phi"].into_iter().enumerate() {
         let mut values: Vec<f64> = draws.iter().map(|theta| theta[i]).collect();
@@ -231,11 +232,11 @@ fn co_rotation_hides_a_planet() {
     assert!(eigen.min() > -1e-2 * quadratic.information.diagonal().max());
 }
 
-/// Spots left over counted in the posterior: the same at the reference; near it ln of the density of the gradient, its size
-/// integrated over by a sum of its own; everywhere a fall, not faster than without them, and one that goes on where the
-/// quadratics would have turned the sum of exact ln L and their difference upwards.
+/// Unresolved spots counted in the posterior: the same at the reference; near it ln of the density of the gradient, its
+/// size integrated over by a sum of its own; everywhere a fall, not faster than without them, and one that goes on
+/// where the quadratics would have turned the sum of exact ln L and their difference upwards.
 #[test]
-fn a_posterior_that_counts_spots_left_over() {
+fn a_posterior_that_counts_unresolved_spots() {
     let oracle = oracle();
     let imager = imager(&oracle, oracle.grid.clone());
     let at = truth(&oracle);
@@ -292,10 +293,10 @@ fn a_posterior_that_counts_spots_left_over() {
     }
 }
 
-/// What ln L has beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the reference, as it is
-/// next to one that is not its maximum, and the density of the gradient below it.
+/// What ln L has beyond the quadratic is tempered, nowhere magnified: also where the quadratic is above the reference,
+/// as it is next to one that is not its maximum, and the density of the gradient below it.
 #[test]
-fn spots_left_over_magnify_nothing() {
+fn unresolved_spots_magnify_nothing() {
     let oracle = oracle();
     let imager = imager(&oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2));
     let mut at = truth(&oracle);

@@ -1,6 +1,6 @@
 //! Figures: places on the page, the same bytes every time, both formats from one description.
 
-use dimcmc::figure::{Axis, Errors, Panel, Rect, Reference, ScatterPanel, Series, scatter};
+use dimcmc::internals::figures::drawing::{Axis, Errors, Panel, Rect, Reference, ScatterPanel, Series, scatter};
 
 fn table() -> ScatterPanel {
     ScatterPanel {

@@ -1,11 +1,11 @@
-//! The first look at simulated stars: vsini and centre within the errors that it gives, lines found where they are, and every
-//! reason to see nothing.
+//! The first look at simulated stars: vsini and centre within the errors that it gives, lines found where they are, and
+//! every reason to see nothing.
 
-use dimcmc::first_look::{FirstLook, LineModel, LookError, MeanProfile};
-use dimcmc::objective::{Parameter, ParameterValues};
-use dimcmc::observation::{Observations, Profile};
-use dimcmc::simulate::Simulation;
-use dimcmc::star::{LimbDarkening, LocalLine, Spot, StarSettings};
+use dimcmc::internals::posterior::first_look::{FirstLook, LineModel, LookError, MeanProfile};
+use dimcmc::internals::posterior::objective::{Parameter, ParameterValues};
+use dimcmc::internals::posterior::simulate::Simulation;
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{LimbDarkening, LocalLine, Spot, StarSettings};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -81,7 +81,8 @@ fn vsini_and_centre_are_within_their_errors() {
                 let by_spots = 0.01 * vsini + 0.3;
                 vsini_pulls.push((look.unspotted.vsini_kms - vsini) / by_spots);
                 centre_pulls.push((look.unspotted.centre_kms - VSYS_KMS) / look.centre_error_kms);
-                // where the line is as narrow as the star is slow, its width decides; a fifth of 3.2 km/s is 1.6 km/s of vsini
+                // where the line is as narrow as the star is slow, its width decides; a fifth of 3.2 km/s is 1.6 km/s
+                // of vsini
                 let error = look.vsini_error_kms;
                 let largest = if vsini > 20.0 { 0.02 * vsini + 0.8 } else { 2.0 };
                 assert!((by_spots..largest).contains(&error), "{vsini}: {error}");

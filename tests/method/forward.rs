@@ -1,7 +1,9 @@
 //! Truths about the forward model: symmetry, limit cases, adjointness, convergence with the number of pixels.
 
 use crate::common::{oracle, values};
-use dimcmc::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid};
+use dimcmc::internals::star::{
+    LimbDarkening, LocalLine, Orbit, Quadrature, Response, Rotation, Sampling, StarState, SurfaceGrid,
+};
 
 fn state() -> StarState {
     StarState {
@@ -82,8 +84,8 @@ fn limb_darkening_shapes_the_profile_as_an_integral_over_the_disc_says() {
     let line = oracle().star.line;
     for limb in [LINEAR, LimbDarkening::Quadratic(0.3, 0.35), LimbDarkening::Quadratic(0.8, -0.2)] {
         let depth = unspotted(&grid, &state(), &sampling(&[0.0]), limb);
-        // strips of the disc at x = v / vsini, each the integral of LD(mu) along it; midpoints in angle, so that the limb is
-        // resolved
+        // strips of the disc at x = v / vsini, each the integral of LD(mu) along it; midpoints in angle, so that the
+        // limb is resolved
         let angle = |i: usize, n: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * std::f64::consts::PI;
         let strip = |x: f64| {
             let half = (1.0 - x * x).sqrt();
@@ -172,8 +174,9 @@ fn the_transpose_is_the_transpose() {
     assert!((there / here - 1.0).abs() < 1e-11, "{there} {here}");
 }
 
-/// The profile of an unspotted star with a Voigt line, against strips of the disc of which each shows its Voigt profile, itself
-/// the sum of Lorentzians over a Gaussian; far into the wings, which reach beyond the star and all bins.
+/// The profile of an unspotted star with a Voigt line, against strips of the disc of which each shows its Voigt
+/// profile, itself the sum of Lorentzians over a Gaussian; far into the wings, which reach beyond the star and all
+/// bins.
 #[test]
 fn voigt_profile_of_the_whole_disc() {
     let grid = SurfaceGrid::equal_area(20_000, Quadrature::Gauss2x2);
@@ -213,7 +216,8 @@ fn gaussian(x: f64, sigma: f64) -> f64 {
     (-0.5 * (x / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
 }
 
-/// Nothing of the equivalent width is lost but what lies beyond the bins: `(gamma/pi) / v` on either side, to first order.
+/// Nothing of the equivalent width is lost but what lies beyond the bins: `(gamma/pi) / v` on either side, to first
+/// order.
 #[test]
 fn voigt_wings_hold_their_share_of_the_equivalent_width() {
     let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
@@ -243,7 +247,7 @@ fn surface_parameters_stand_in_place_of_settings() {
     other.contrast = 0.3;
     other.line.sigma_kms = 4.0f64.hypot(other.line.instrumental_sigma_kms);
     other.line.equivalent_width_kms = 7.0;
-    let surface = dimcmc::star::Surface {
+    let surface = dimcmc::internals::star::Surface {
         limb_darkening: Some(0.4),
         line_sigma_kms: Some(4.0),
         equivalent_width_kms: Some(7.0),

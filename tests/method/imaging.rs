@@ -1,15 +1,15 @@
-//! Truths about the maximum-entropy image: derivatives of the misfit, the solver's optimality conditions, and that the answer
-//! does not depend on the way to it.
+//! Truths about the maximum-entropy image: derivatives of the misfit, the solver's optimality conditions, and that the
+//! answer does not depend on the way to it.
 
 use crate::common::{Oracle, oracle, values};
-use dimcmc::imaging::{Data, Imager, ImagingProblem};
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::maxent::{
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::maxent::{
     Curvature, Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
 };
-use dimcmc::objective::{Parameter, Reference};
-use dimcmc::observation::{Observations, Profile};
-use dimcmc::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::posterior::imaging::{Data, Imager, ImagingProblem};
+use dimcmc::internals::posterior::objective::{Parameter, Reference};
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 
 fn imager(oracle: &Oracle) -> Imager {
     Imager {
@@ -181,7 +181,8 @@ fn the_answer_does_not_depend_on_start_and_preconditioner() {
     same(&solver.solve(&mut problem, goal, there.start()), &here.solution, 1e-6);
 }
 
-/// A pixel of next to nothing that should have something: its gradient, in a metric that has shrunk with it, is next to nothing, too.
+/// A pixel of next to nothing that should have something: its gradient, in a metric that has shrunk with it, is next to
+/// nothing, too.
 #[test]
 fn a_pixel_in_the_dark_is_not_taken_for_solved() {
     let oracle = oracle();

@@ -1,7 +1,7 @@
 //! LSD profiles in and out: the real formats, round trips, and one clear line for everything that can be wrong.
 
-use dimcmc::io::lsd::{self, ReadOptions};
-use dimcmc::observation::{Observations, Profile};
+use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::star::observation::{Observations, Profile};
 use std::path::{Path, PathBuf};
 
 fn options(range: Option<(f64, f64)>) -> ReadOptions {

@@ -1,6 +1,5 @@
 //! The method against independent numbers, limit cases and itself: the library alone.
 
-#[path = "../common/mod.rs"]
 mod common;
 
 mod chain;

@@ -1,18 +1,18 @@
 //! Nuisances of line and continuum against dense algebra, differences and simulated stars whose continua wander.
 
 use crate::common::{imager, oracle, truth};
-use dimcmc::config;
-use dimcmc::expansion::{Expansion, STELLAR};
-use dimcmc::fit::Fit;
-use dimcmc::imaging::Imager;
-use dimcmc::maxent::{Curvature, Problem, SolverSettings};
-use dimcmc::nuisances::LineAndContinuum;
-use dimcmc::objective::{
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
+use dimcmc::internals::posterior::expansion::{Expansion, STELLAR};
+use dimcmc::internals::posterior::fit::Fit;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::nuisances::LineAndContinuum;
+use dimcmc::internals::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
 };
-use dimcmc::observation::{Observations, Profile};
-use dimcmc::scene::Scene;
-use dimcmc::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -189,7 +189,8 @@ fn an_orbit_is_found_under_wandering_continua() {
     let reference = Reference::build(&scene.imager, scene.settings.values, 0.97).unwrap();
     let fit = Fit::new(&scene.imager, &scene.observations, &reference);
     assert!(fit.summary.residual_rms < 1.05e-3, "{}", fit.summary.residual_rms);
-    // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth of the prior
+    // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth
+    // of the prior
     let config::ObservationSource::Simulate(simulation) = &scene.settings.source else { panic!() };
     for i in 0..3 {
         let (found, injected): (Vec<f64>, Vec<f64>) =

@@ -1,17 +1,20 @@
 //! Truths about the objectives: gradients, agreement near the optimum, precision, and a monotone fall far from it.
 
 use crate::common::{oracle, values, whole_truth};
-use dimcmc::imaging::Imager;
-use dimcmc::log_density::{Gradient, LogDensity, Status};
-use dimcmc::maxent::SolverSettings;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference};
-use dimcmc::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::maxent::SolverSettings;
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{
+    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
+};
+use dimcmc::internals::sampling::log_density::{Gradient, LogDensity, Status};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 
 const KINDS: [ObjectiveKind; 3] =
     [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];
 
-/// All eight parameters free, with the reference near the optimum of the oracle's data; maps of spots, or of the given entropy.
+/// All eight parameters free, with the reference near the optimum of the oracle's data; maps of spots, or of the given
+/// entropy.
 fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
     let oracle = oracle();
     let imager = Imager {
@@ -71,13 +74,13 @@ fn gradients_match_differences_of_reconstructions() {
         let exact = posterior.with_settings(SolverSettings::exact());
         let theta = nearby(exact.space(), 1);
         let (_, gradient) = exact.evaluate_with_gradient(&theta);
-        let x = exact.to_internal(&theta);
+        let x = exact.to_sampling(&theta);
         for (j, scale) in exact.scales().iter().enumerate() {
             let h = 0.05 * scale;
             let at = |h: f64| {
                 let mut y = x.clone();
                 y[j] += h;
-                exact.evaluate(&exact.to_written(&y)).log_prob
+                exact.evaluate(&exact.to_physical(&y)).log_prob
             };
             let difference = (at(h) - at(-h)) / (2.0 * h);
             let size = difference.abs() + 0.3 / scale;
@@ -144,8 +147,8 @@ fn agree_and_are_precise(posteriors: &[Posterior]) {
     }
 }
 
-/// Errors of predictions at `theta`: of the map, in its metric at the start, and of ln(lambda). A solver that takes whatever it starts
-/// from leaves the prediction as it is.
+/// Errors of predictions at `theta`: of the map, in its metric at the start, and of ln(lambda). A solver that takes
+/// whatever it starts from leaves the prediction as it is.
 fn prediction_errors(posterior: &Posterior, theta: &[f64]) -> [f64; 2] {
     let careless = SolverSettings { tolerance: f64::INFINITY, ..SolverSettings::default() };
     let predicted = posterior.clone().with_settings(careless);
@@ -174,7 +177,8 @@ fn predictions_are_right_to_first_order() {
                 prediction_errors(&posterior, &theta)
             });
             println!("{j}: {errors:?}");
-            // twice the step, four times the error: an error of first order would double, those of third order are smaller
+            // twice the step, four times the error: an error of first order would double, those of third order are
+            // smaller
             assert!((0..2).all(|i| (errors[1][i] / errors[0][i] - 4.0).abs() < 0.6), "{j}: {errors:?}");
         }
     }
@@ -248,7 +252,7 @@ fn evaluations_are_as_precise_as_they_say() {
 }
 
 #[test]
-fn footholds_save_passes_and_change_nothing_else() {
+fn warm_starts_save_passes_and_change_nothing_else() {
     for posterior in MAPS.into_iter().flat_map(posteriors) {
         let start = posterior.space().start();
         let other = |k: f64, phi: f64| {
@@ -259,8 +263,8 @@ fn footholds_save_passes_and_change_nothing_else() {
         // two places in half a turn of the orbit, and one that is none
         let thetas: Vec<Vec<f64>> = (0..8).map(|i| other(0.09, 0.3 + 0.01 * f64::from(i))).collect();
         let absurd = other(f64::INFINITY, 0.3);
-        let placed = posterior.clone().with_footholds(&[thetas[2].clone(), absurd, thetas[6].clone()]);
-        assert_eq!(placed.footholds().collect::<Vec<_>>(), [&thetas[2], &thetas[6]]);
+        let placed = posterior.clone().with_warm_starts(&[thetas[2].clone(), absurd, thetas[6].clone()]);
+        assert_eq!(placed.warm_starts().collect::<Vec<_>>(), [&thetas[2], &thetas[6]]);
         let best = posterior.evaluate(&start).log_prob;
         assert_eq!(placed.evaluate(&start), posterior.evaluate(&start), "the reference is the nearest there");
         let exact = posterior.clone().with_settings(SolverSettings::exact());
@@ -274,15 +278,18 @@ fn footholds_save_passes_and_change_nothing_else() {
         println!("{:?}: {with} passes instead of {without}", posterior.kind());
         assert!(3 * with < 2 * without, "{:?}: {with} passes instead of {without}", posterior.kind());
         // as many as they are worth, and none where nothing is far
-        assert_eq!(posterior.clone().with_footholds_for(std::slice::from_ref(&start), 10_000).footholds().count(), 0);
-        let few = posterior.clone().with_footholds_for(&thetas, 1).footholds().count();
-        let many = posterior.with_footholds_for(&thetas, 100_000).footholds().count();
+        assert_eq!(
+            posterior.clone().with_warm_starts_for(std::slice::from_ref(&start), 10_000).warm_starts().count(),
+            0
+        );
+        let few = posterior.clone().with_warm_starts_for(&thetas, 1).warm_starts().count();
+        let many = posterior.with_warm_starts_for(&thetas, 100_000).warm_starts().count();
         assert!(few == 0 && many > 0, "{few} {many}");
     }
 }
 
 #[test]
-fn a_foothold_out_of_the_targets_reach_is_right_for_those_within() {
+fn a_warm_start_out_of_the_targets_reach_is_right_for_those_within() {
     for posterior in MAPS.map(|entropy| posteriors(entropy).swap_remove(0)) {
         assert_eq!(posterior.kind(), ObjectiveKind::Spottedness);
         let exact = posterior.clone().with_settings(SolverSettings::exact());
@@ -293,8 +300,8 @@ fn a_foothold_out_of_the_targets_reach_is_right_for_those_within() {
             theta
         };
         let beyond = (1..100).find(|i| posterior.evaluate(&at(*i)).status == Status::Unreachable).unwrap();
-        let placed = posterior.with_footholds(&[at(beyond)]);
-        assert_eq!(placed.footholds().count(), 1);
+        let placed = posterior.with_warm_starts(&[at(beyond)]);
+        assert_eq!(placed.warm_starts().count(), 1);
         let best = exact.evaluate(&start).log_prob;
         for theta in (1..4).map(|i| at(beyond - i)) {
             let (got, wanted) = (placed.evaluate(&theta), exact.evaluate(&theta).log_prob);

@@ -1,11 +1,11 @@
 //! Forward model and maximum entropy against an independent implementation.
 
 use crate::common::{json, numbers, oracle, values};
-use dimcmc::imaging::ImagingProblem;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
-use dimcmc::star::spots::filling_at;
-use dimcmc::star::{Quadrature, Response, Sampling, Spot, SurfaceGrid};
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
+use dimcmc::internals::posterior::imaging::ImagingProblem;
+use dimcmc::internals::star::spots::filling_at;
+use dimcmc::internals::star::{Quadrature, Response, Sampling, Spot, SurfaceGrid};
 use serde_json::Value;
 
 /// Relative accuracy asked for against the oracle's numbers.
@@ -48,7 +48,7 @@ fn profiles_of_the_oracle_star_on_20000_pixels() {
     assert!(worst < 1e-4, "largest difference {worst:.2e}");
 }
 
-fn solve(oracle: &crate::common::Oracle, theta: &Value, goal: Goal) -> Solution {
+fn solve(oracle: &super::common::Oracle, theta: &Value, goal: Goal) -> Solution {
     let state = values(theta, oracle.star.rotation_period_d).state();
     let response = Response::new(&oracle.grid, &oracle.star, &state, &oracle.sampling);
     let mut problem = ImagingProblem::new(&oracle.grid.area, &oracle.data, response, oracle.star.contrast);

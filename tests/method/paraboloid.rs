@@ -1,9 +1,9 @@
 //! The paraboloid and the marginals of landscapes whose answer is known.
 
-use dimcmc::landscape::{
+use dimcmc::internals::sampling::landscape::{
     Axis, Grid, Landscape, Marginal, Node, Paraboloid, Rule, Undefined, paraboloid, paraboloid_table,
 };
-use dimcmc::log_density::{Likelihood, Reconstruction, Status};
+use dimcmc::internals::sampling::log_density::{Likelihood, Reconstruction, Status};
 use nalgebra::{DMatrix, DVector};
 
 fn axis(name: &str, min: f64, max: f64, nodes: usize) -> Axis {
@@ -79,7 +79,8 @@ fn refusal(landscape: &Landscape) -> String {
     text.strip_prefix("no well-defined minimum: ").unwrap().to_owned()
 }
 
-/// One to three axes of quite different scales, correlated, phi across 0: nothing that comes out could be taken for another.
+/// One to three axes of quite different scales, correlated, phi across 0: nothing that comes out could be taken for
+/// another.
 fn examples() -> Vec<Gaussian> {
     let k = axis("k_kms", 0.0, 0.2, 15);
     let period = axis("porb_over_prot", 1.2, 2.2, 15);

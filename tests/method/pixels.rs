@@ -1,11 +1,13 @@
 //! Moment-matched pixels: the star's parameters do not depend on how many there are.
 
 use crate::common::{oracle, values};
-use dimcmc::imaging::Imager;
-use dimcmc::maxent::entropy::Entropy;
-use dimcmc::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference};
-use dimcmc::optimise::climb;
-use dimcmc::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::posterior::imaging::Imager;
+use dimcmc::internals::posterior::objective::{
+    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
+};
+use dimcmc::internals::sampling::optimise::climb;
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 
 /// Best vsini and its standard deviation, the rest fixed at the injected values.
 fn vsini(pixels: usize) -> (f64, f64) {

@@ -4,7 +4,7 @@
 mod plain_loop;
 
 use crate::common::{oracle, values};
-use dimcmc::star::{Quadrature, Response, SurfaceGrid};
+use dimcmc::internals::star::{Quadrature, Response, SurfaceGrid};
 use plain_loop::PlainLoop;
 
 fn noise(n: usize, a: f64) -> Vec<f64> {

@@ -1,11 +1,11 @@
 //! Simulated observations and first-moment velocities, against the oracle's star and against statistics.
 
 use crate::common::{json, numbers, oracle};
-use dimcmc::config;
-use dimcmc::observation::{Observations, Profile};
-use dimcmc::scene::{Scene, fingerprint};
-use dimcmc::simulate::{SIGMA_WITHOUT_NOISE, Simulation};
-use dimcmc::star::{Disc, Facula, Quadrature, Spot, SurfaceGrid};
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::{Scene, fingerprint};
+use dimcmc::internals::posterior::simulate::{SIGMA_WITHOUT_NOISE, Simulation};
+use dimcmc::internals::star::observation::{Observations, Profile};
+use dimcmc::internals::star::{Disc, Facula, Quadrature, Spot, SurfaceGrid};
 use std::path::Path;
 
 /// The demo's star, which is the oracle's, with `change` made to its simulation.

@@ -1,10 +1,10 @@
-//! Parameters of the star's surface as free parameters: a star simulated with others than the config's is found again, and what
-//! does not free them does not know of them.
+//! Parameters of the star's surface as free parameters: a star simulated with others than the config's is found again,
+//! and what does not free them does not know of them.
 
-use dimcmc::config;
-use dimcmc::objective::{ObjectiveKind, Parameter, Posterior, Reference};
-use dimcmc::scene::Scene;
-use dimcmc::search::{self, SearchSettings};
+use dimcmc::internals::data::config;
+use dimcmc::internals::data::scene::Scene;
+use dimcmc::internals::data::search::{self, SearchSettings};
+use dimcmc::internals::posterior::objective::{ObjectiveKind, Parameter, Posterior, Reference};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -19,8 +19,9 @@ fn scene(change: impl Fn(&mut Value)) -> Scene {
     Scene::new(config::from_json(json.to_string().as_bytes(), &path).unwrap()).unwrap()
 }
 
-/// Line and limb darkening of a star simulated with others than the config's. Its spots are faint: the map of highest entropy has
-/// them without their hard edges, and a line that is narrower makes up for it (dark spots: by 4 % of its width).
+/// Line and limb darkening of a star simulated with others than the config's. Its spots are faint: the map of highest
+/// entropy has them without their hard edges, and a line that is narrower makes up for it (dark spots: by 4 % of its
+/// width).
 #[test]
 fn a_surface_other_than_the_configs_is_found() {
     let truth = json!({ "limb_darkening": 0.55, "line_sigma_kms": 2.9, "equivalent_width_kms": 5.6 });
@@ -50,8 +51,8 @@ fn a_surface_other_than_the_configs_is_found() {
     assert_eq!(written.as_object().unwrap().len(), 11, "the eight and the free ones: {written}");
 }
 
-/// What data say of the contrast: spots so bright that they would have to fill more than all of a pixel are out; but the darker
-/// they are, the fewer there need be, and the higher the entropy is.
+/// What data say of the contrast: spots so bright that they would have to fill more than all of a pixel are out; but
+/// the darker they are, the fewer there need be, and the higher the entropy is.
 #[test]
 fn the_contrast_has_an_upper_bound_alone() {
     let scene = scene(|json| {
@@ -84,7 +85,8 @@ fn what_is_not_free_is_not_written() {
     assert_eq!(one.settings.values[Parameter::Contrast], one.imager.star.contrast);
 }
 
-/// Which is why a nuisance of every profile's equivalent width and a free one that all share are told apart by priors alone.
+/// Which is why a nuisance of every profile's equivalent width and a free one that all share are told apart by priors
+/// alone.
 #[test]
 fn equivalent_widths_scale_the_depth() {
     let at = |width: f64| {

@@ -2,12 +2,12 @@
 //! surrogate.
 
 use crate::common::{imager, oracle, truth};
-use dimcmc::chain::{Chain, Goals, MoveKind, ParameterKind, Shape, Summary, summarise};
-use dimcmc::ensemble::{Sampler, SamplerSettings};
-use dimcmc::log_density::{Evaluation, LogDensity, Status, Threads};
-use dimcmc::objective::{FreeParameter, Parameter, ParameterSpace, Prior, Reference};
-use dimcmc::star::{Quadrature, SurfaceGrid};
-use dimcmc::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterSpace, Prior, Reference};
+use dimcmc::internals::posterior::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::sampling::chain::{Chain, Goals, MoveKind, ParameterKind, Shape, Summary, summarise};
+use dimcmc::internals::sampling::ensemble::{Sampler, SamplerSettings};
+use dimcmc::internals::sampling::log_density::{Evaluation, LogDensity, Status, Threads};
+use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::sync::atomic::AtomicBool;
@@ -59,16 +59,16 @@ impl LogDensity for Tilted<'_> {
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
         let inside = self.space.log_prior(theta).is_finite();
         let log_density =
-            if inside { self.surrogate.log_density(&self.space.to_internal(theta)) } else { f64::NEG_INFINITY };
+            if inside { self.surrogate.log_density(&self.space.to_sampling(theta)) } else { f64::NEG_INFINITY };
         let log_prob = log_density - self.space.log_jacobian(theta) + (self.tilt)(theta);
         let status = if log_prob.is_finite() { Status::Converged } else { Status::OutsidePrior };
         Evaluation { log_prob, spottedness: 0.1, chi2: 1.0, passes: 1, status }
     }
-    fn to_internal(&self, theta: &[f64]) -> Vec<f64> {
-        self.space.to_internal(theta)
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
+        self.space.to_sampling(theta)
     }
-    fn to_written(&self, internal: &[f64]) -> Vec<f64> {
-        self.space.to_written(internal)
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
+        self.space.to_physical(internal)
     }
     fn log_jacobian(&self, theta: &[f64]) -> f64 {
         self.space.log_jacobian(theta)
@@ -84,7 +84,7 @@ fn chain(density: &Tilted, steps: usize, weight: f64) -> Summary {
 fn chain_with(surrogate: &Surrogate, density: &Tilted, steps: usize, weight: f64) -> Summary {
     let settings = SamplerSettings { ensembles: 4, walkers: 16, seed: 3, ..SamplerSettings::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(9);
-    let mut draw = || density.space.to_written(&density.surrogate.draw(&mut rng).unwrap());
+    let mut draw = || density.space.to_physical(&density.surrogate.draw(&mut rng).unwrap());
     let start: Vec<Vec<Vec<f64>>> = (0..4).map(|_| (0..16).map(|_| draw()).collect()).collect();
     let evaluator = Threads(density);
     let mut sampler = Sampler::new(density, &evaluator, &settings).unwrap();
@@ -165,7 +165,7 @@ fn peaks_are_where_the_likelihood_is_highest() {
     let (surrogate, space) = surrogate(0.0);
     let peaks = surrogate.peaks(20.0, 5);
     assert!(!peaks.is_empty() && peaks[0].drop == 0.0 && peaks.windows(2).all(|p| p[0].drop <= p[1].drop));
-    let best = space.to_written(&peaks[0].position);
+    let best = space.to_physical(&peaks[0].position);
     // the injected planet: 0.1 km/s at 1.7 rotation periods, errors 0.01 and 0.07
     assert!((best[0] - 0.1).abs() < 0.04 && (best[1] - 1.7).abs() < 0.2, "{best:?}");
 }
@@ -180,7 +180,8 @@ fn a_wide_prior_of_the_period_is_covered_whole() {
     ] {
         let (surrogate, space) = surrogate_with(0.1, period);
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let mut periods: Vec<f64> = (0..200).map(|_| space.to_written(&surrogate.draw(&mut rng).unwrap())[1]).collect();
+        let mut periods: Vec<f64> =
+            (0..200).map(|_| space.to_physical(&surrogate.draw(&mut rng).unwrap())[1]).collect();
         periods.sort_by(f64::total_cmp);
         assert!((periods[100] - 1.75).abs() < 0.1, "{period:?}: {}", periods[100]);
     }

@@ -1,16 +1,16 @@
-//! Entropy of an image of brightnesses above and below that of the photosphere (method section 2, Gull & Skilling 1999):
-//! `S(B) = - sum_p a_p [ B ln(B/m) - B + m ]` with the default m = 1: profiles are divided by their continuum, and say nothing of
-//! the scale of B.
+//! Entropy of an image of brightnesses above and below that of the photosphere (`docs/method.md` section 2, Gull &
+//! Skilling 1999): `S(B) = - sum_p a_p [ B ln(B/m) - B + m ]` with the default m = 1: profiles are divided by their
+//! continuum, and say nothing of the scale of B.
 //!
-//! The coordinate is `u = ln B`, which keeps B above 0. Spottedness is the root mean square of `B - 1` over the surface. Its mean
-//! modulus would be nearer to the coverage of spots, but is traded for chi2 less faithfully: on the paper's star with faculae, two
-//! standard errors of K from the optimum, ln L by the root mean square is within 4 % of the regularised likelihood, by the mean
-//! modulus within 22 % (softened at 0.003 to 0.1: 12 to 21 %), because -S is the mean square to lowest order. It has no kink either.
-//! Left out: which entropy an image has (`entropy`), data.
+//! The coordinate is `u = ln B`, which keeps B above 0. Spottedness is the root mean square of `B - 1` over the
+//! surface. Its mean modulus would be nearer to the coverage of spots, but is traded for chi2 less faithfully: on the
+//! paper's star with faculae, two standard errors of K from the optimum, ln L by the root mean square is within 4 % of
+//! the regularised likelihood, by the mean modulus within 22 % (softened at 0.003 to 0.1: 12 to 21 %), because -S is
+//! the mean square to lowest order. It has no kink either.
 
 use super::pixels::{Pixel, spottedness};
-use crate::vector::Instructions;
-use crate::vector::elementary::{exp_minus, ln_1p_single};
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::{exp_minus, ln_1p_single};
 
 /// A pixel.
 #[derive(Clone, Copy)]

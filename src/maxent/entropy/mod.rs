@@ -1,15 +1,15 @@
-//! Entropies of images, by what an image holds (method section 2): filling factors of dark spots (`spots`), or brightnesses above
-//! and below that of the photosphere (`bright_and_dark`).
+//! Entropies of images, by what an image holds (`docs/method.md` section 2): filling factors of dark spots (`spots`),
+//! or brightnesses above and below that of the photosphere (`bright_and_dark`).
 //!
-//! The solver works in a coordinate u of each pixel that keeps the image inside its domain, and measures steps in the entropy's own
-//! metric, in which -S has the unit matrix as its second derivative. Left out: data.
+//! The solver works in a coordinate u of each pixel that keeps the image inside its domain, and measures steps in the
+//! entropy's own metric, in which -S has the unit matrix as its second derivative.
 
 mod bright_and_dark;
 mod pixels;
 mod spots;
 
-use crate::vector;
-use crate::vector::linear::{combine_two, combined};
+use crate::numerics::vector;
+use crate::numerics::vector::linear::{combine_two, combined};
 use bright_and_dark::Brightness;
 use pixels::{Advance, Pixel, Step, Value, spottedness};
 use spots::Filling;
@@ -59,8 +59,8 @@ impl Entropy {
         Entropy::Spots { default_logit: (default_spot / (1.0 - default_spot)).ln() }
     }
 
-    /// About how large the Lagrange multipliers of images of some data are, in units of those of spots: on the paper's star, with
-    /// and without faculae, at chi2 = 0.97 per datum.
+    /// About how large the Lagrange multipliers of images of some data are, in units of those of spots: on the paper's
+    /// star, with and without faculae, at chi2 = 0.97 per datum.
     pub fn lambda_unit(&self) -> f64 {
         match self {
             Entropy::Spots { .. } => 1.0,
@@ -76,7 +76,8 @@ impl Entropy {
         }
     }
 
-    /// Bound of the coordinates, below which no step leads: the image is as good as 0 there. The upper bound is as far from 0.
+    /// Bound of the coordinates, below which no step leads: the image is as good as 0 there. The upper bound is as far
+    /// from 0.
     pub fn lowest_coordinate(&self) -> f64 {
         match self {
             Entropy::Spots { .. } => -Filling::LIMIT,
@@ -122,13 +123,15 @@ impl Entropy {
         }
     }
 
-    /// Gradient of -S with respect to the image: by either entropy the distance of the coordinate from that of the default, per area.
+    /// Gradient of -S with respect to the image: by either entropy the distance of the coordinate from that of the
+    /// default, per area.
     pub fn gradient(&self, u: &[f64], area: &[f64]) -> Vec<f64> {
         let default = self.default_coordinate();
         combined(u, area, |u, area| area * (u - default))
     }
 
-    /// Scale of the metric: a step z in it is the image step `scale * z`. Single precision suffices for coordinates to take steps in.
+    /// Scale of the metric: a step z in it is the image step `scale * z`. Single precision suffices for coordinates to
+    /// take steps in.
     pub fn metric(&self, image: &[f64], area: &[f64]) -> Vec<f32> {
         let mut scale = vec![0.0; image.len()];
         match self {
@@ -140,7 +143,8 @@ impl Entropy {
         scale
     }
 
-    /// What a pixel gains, per area, by a change of its coordinate from `u` to the best for a misfit that is linear in the image.
+    /// What a pixel gains, per area, by a change of its coordinate from `u` to the best for a misfit that is linear in
+    /// the image.
     pub fn gain(&self, u: f64, change: f64) -> f64 {
         match self {
             Entropy::Spots { .. } => spots::gain(u, change),

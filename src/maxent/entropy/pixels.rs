@@ -1,10 +1,8 @@
 //! Values and steps of an image, pixel by pixel, as its entropy has them.
-//!
-//! Left out: what an entropy is (`spots`, `bright_and_dark`).
 
 use super::{MetricStep, Worth};
-use crate::vector::linear::short_dot;
-use crate::vector::{Instructions, Task};
+use crate::numerics::vector::linear::short_dot;
+use crate::numerics::vector::{Instructions, Task};
 
 /// Pixels whose terms are summed at a time.
 const CHUNK: usize = 512;
@@ -26,10 +24,12 @@ pub(super) trait Pixel: Copy {
     /// The image in single precision, and what it lacks of the end of its domain.
     fn in_single(x: f64) -> [f32; 2];
 
-    /// Change of the coordinate that moves the image by `dx`, if that is no great part of the way to the end of its domain.
+    /// Change of the coordinate that moves the image by `dx`, if that is no great part of the way to the end of its
+    /// domain.
     ///
-    /// Data are nearly linear in the image, so that a step straight in it keeps what the stiff directions have gained; a step straight
-    /// in the coordinate, equal to first order, would undo it to second order. To single precision: where a step leads is computed anew.
+    /// Data are nearly linear in the image, so that a step straight in it keeps what the stiff directions have gained;
+    /// a step straight in the coordinate, equal to first order, would undo it to second order. To single precision:
+    /// where a step leads is computed anew.
     fn step(self, i: impl Instructions, image: [f32; 2], dx: f32) -> f32;
 }
 
@@ -76,8 +76,8 @@ impl<P: Pixel> Task for Step<'_, P> {
     }
 }
 
-/// A step in the metric, and image, entropy and spottedness where it leads to: a chunk of pixels after another, because most of the time goes into
-/// fetching them.
+/// A step in the metric, and image, entropy and spottedness where it leads to: a chunk of pixels after another, because
+/// most of the time goes into fetching them.
 pub(super) struct Advance<'a, P> {
     pub pixel: P,
     pub step: MetricStep<'a>,

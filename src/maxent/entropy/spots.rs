@@ -1,11 +1,11 @@
-//! Two-component entropy of an image of spot filling factors (method section 2, Collier Cameron 1992):
+//! Two-component entropy of an image of spot filling factors (`docs/method.md` section 2, Collier Cameron 1992):
 //! `S(s) = - sum_p a_p [ s ln(s/m) + (1-s) ln((1-s)/(1-m)) ]` with default filling m.
 //!
-//! The coordinate is `u = logit(s)`, which keeps s inside (0, 1). Left out: which entropy an image has (`entropy`), data.
+//! The coordinate is `u = logit(s)`, which keeps s inside (0, 1).
 
 use super::pixels::Pixel;
-use crate::vector::Instructions;
-use crate::vector::elementary::{exp_minus, ln_1p_and_inverse, ln_1p_single};
+use crate::numerics::vector::Instructions;
+use crate::numerics::vector::elementary::{exp_minus, ln_1p_and_inverse, ln_1p_single};
 
 /// A pixel with its default.
 #[derive(Clone, Copy)]

@@ -1,9 +1,9 @@
 //! Eigenvectors in whole numbers: a unit for each of them, and pixels side by side.
 //!
-//! An application reads every entry twice, and waits for memory: two bytes or one instead of four (`results/performance.md`). Left out:
-//! what the eigenvectors are of, and which pixels have them (`preconditioner`).
+//! An application reads every entry twice, and waits for memory: two bytes or one instead of four
+//! (`results/performance.md`).
 
-use crate::vector::{self, Instructions, Number, Registers, Task};
+use crate::numerics::vector::{self, Instructions, Number, Registers, Task};
 use nalgebra::DMatrix;
 
 /// Eigenvectors on some of the pixels.
@@ -19,8 +19,8 @@ pub struct Rows<W> {
     units: Vec<f32>,
 }
 
-/// Pixels side by side: four of the widest registers, so that a sum over pixels is stored once for four products, and sums over
-/// eigenvectors do not wait for each other.
+/// Pixels side by side: four of the widest registers, so that a sum over pixels is stored once for four products, and
+/// sums over eigenvectors do not wait for each other.
 const LANES: usize = 64;
 
 /// Rows from the one at work to the one that is asked for.
@@ -154,7 +154,8 @@ impl Whole for i8 {
 #[repr(align(64))]
 struct Sums([f32; PARTS]);
 
-/// Scalar products of `r` with the eigenvectors, in units of each; single precision suffices for an approximate inverse.
+/// Scalar products of `r` with the eigenvectors, in units of each; single precision suffices for an approximate
+/// inverse.
 struct Components<'a, W, N> {
     basis: &'a Rows<W>,
     r: &'a [N],

@@ -1,0 +1,7 @@
+//! The program: see `dimcmc::command_line`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    dimcmc::command_line()
+}

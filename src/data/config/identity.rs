@@ -1,0 +1,124 @@
+//! The fingerprint of a config: what must be the same for a chain to be resumed; and what two configs that belong
+//! together share.
+
+use crate::posterior::objective::Parameter;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, the star's
+/// mass, and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
+pub(super) fn fingerprint(resolved: &Value) -> String {
+    let mut text = String::new();
+    canonical(&decisive(resolved), &mut text);
+    format!("{:x}", Sha256::digest(text))
+}
+
+/// A key that is not the same in two configs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// The key with all its parents, dotted.
+    pub key: String,
+    /// Its value in the one, for a message.
+    pub first: String,
+    /// Its value in the other.
+    pub second: String,
+}
+
+/// The first key that matters for the fingerprint and is not the same in both resolved configs, with both values.
+pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
+    let Difference { key, first, second } = difference("", &decisive(then), &decisive(now))?;
+    Some(format!("{key} ({first} then, {second} now)"))
+}
+
+/// The first key in which two resolved configs do not ask for the same model: star, instrument and image, whatever the
+/// values of the parameters that may be free.
+pub fn model_difference(first: &Value, second: &Value) -> Option<Difference> {
+    ["star", "instrument", "imaging"].iter().find_map(|name| section_difference(name, first, second))
+}
+
+/// Whether two resolved configs count velocity zero points alike.
+pub fn jitter_difference(first: &Value, second: &Value) -> Option<Difference> {
+    const KEY: &str = "velocity_jitter_kms";
+    let [first, second] = [first, second].map(|resolved| &resolved["observations"][KEY]);
+    difference(&format!("observations.{KEY}"), first, second)
+}
+
+/// The same within one section, which need not be there.
+pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<Difference> {
+    let without_parameters = |resolved: &Value| {
+        let mut section = resolved.get(name).cloned().unwrap_or(Value::Null);
+        if let Some(map) = section.as_object_mut() {
+            // a landscape has unresolved spots as the entropy has them, whatever the chain does
+            let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_surface());
+            map.retain(|key, _| !free(key) && key != "unresolved_spots" && key != "mass_msun");
+        }
+        section
+    };
+    difference(name, &without_parameters(first), &without_parameters(second))
+}
+
+fn difference(key: &str, first: &Value, second: &Value) -> Option<Difference> {
+    let (Value::Object(a), Value::Object(b)) = (first, second) else {
+        let differ = || Difference { key: key.to_owned(), first: brief(first), second: brief(second) };
+        return (first != second).then(differ);
+    };
+    let mut names: Vec<&String> = a.keys().chain(b.keys()).collect();
+    names.sort();
+    names.into_iter().find_map(|name| {
+        let inner = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+        difference(&inner, a.get(name).unwrap_or(&Value::Null), b.get(name).unwrap_or(&Value::Null))
+    })
+}
+
+/// A value for a message: numbers and words whole, lists and sections by what they are.
+fn brief(value: &Value) -> String {
+    match value {
+        Value::Null => "absent".into(),
+        Value::Array(_) => "a list".into(),
+        Value::Object(_) => "a section".into(),
+        scalar => scalar.to_string(),
+    }
+}
+
+/// The part of a resolved config that decides the posterior and the chain.
+fn decisive(resolved: &Value) -> Value {
+    let mut value = resolved.clone();
+    if let Some(top) = value.as_object_mut() {
+        top.remove("$schema");
+        top.remove("grid");
+        if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut) {
+            star.remove("mass_msun");
+        }
+        if let Some(sampler) = top.get_mut("sampler").and_then(Value::as_object_mut) {
+            sampler.retain(|key, _| !["steps", "rhat", "ess"].contains(&key.as_str()));
+        }
+    }
+    value
+}
+
+/// Compact JSON with sorted keys, whatever the features serde_json was built with.
+fn canonical(value: &Value, text: &mut String) {
+    match value {
+        Value::Object(map) => {
+            let mut entries: Vec<_> = map.iter().collect();
+            entries.sort_by_key(|(key, _)| *key);
+            text.push('{');
+            for (key, value) in entries {
+                text.push_str(&Value::from(key.as_str()).to_string());
+                text.push(':');
+                canonical(value, text);
+                text.push(',');
+            }
+            text.push('}');
+        }
+        Value::Array(items) => {
+            text.push('[');
+            for item in items {
+                canonical(item, text);
+                text.push(',');
+            }
+            text.push(']');
+        }
+        scalar => text.push_str(&scalar.to_string()),
+    }
+}

@@ -1,0 +1,79 @@
+//! The config file: JSON as users write it -> checked, resolved [`Settings`]; and its JSON Schema.
+//!
+//! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for),
+//! and every error names the file and the key.
+
+mod automatic;
+mod domain;
+mod draft;
+mod error;
+mod identity;
+mod jitter;
+mod raw;
+mod raw_parts;
+mod resolve;
+mod resolve_grid;
+mod resolve_observations;
+mod resolve_star;
+mod settings;
+mod suggest;
+
+pub use crate::sampling::ensemble::SamplerSettings;
+pub use automatic::Automatic;
+pub use draft::Draft;
+pub use error::ConfigError;
+pub use identity::{Difference, first_difference, jitter_difference, model_difference, section_difference};
+pub use jitter::VelocityJitter;
+pub use resolve_grid::MOST_NODES;
+pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
+
+use std::path::Path;
+
+/// Equivalent width of the local line; automatic: the mean area of the observed profiles.
+pub type EquivalentWidth = Automatic;
+
+/// Reads and resolves the config at `path`. Paths in it start from its folder.
+///
+/// # Errors
+/// A file that cannot be read, is not JSON, or has a key that is unknown, missing, or does not make sense.
+pub fn load(path: &Path) -> Result<Settings, ConfigError> {
+    let bytes = std::fs::read(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
+    from_json(&bytes, path)
+}
+
+/// As [`load`], the sampler's seed replaced if another one is given.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with_seed(path: &Path, seed: Option<u64>) -> Result<Settings, ConfigError> {
+    let settings = load(path)?;
+    let Some(seed) = seed else { return Ok(settings) };
+    let mut config = settings.resolved;
+    config["sampler"]["seed"] = seed.into();
+    from_json(config.to_string().as_bytes(), path)
+}
+
+/// Resolves a config already read; `path` is what errors name and whose folder paths start from.
+///
+/// # Errors
+/// As [`load`], but for reading.
+pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
+    // Editors on Windows put a byte-order mark first.
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    let mut deserializer = serde_json::Deserializer::from_slice(json);
+    let raw = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
+    deserializer.end().map_err(|e| ConfigError::json(path, &e))?;
+    resolve::resolve(raw, path).map_err(|fault| fault.within(path))
+}
+
+/// A config as text, laid out for people.
+pub fn to_text(config: &serde_json::Value) -> String {
+    draft::compact(&format!("{config:#}"))
+}
+
+/// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.
+pub fn schema() -> String {
+    let schema = schemars::schema_for!(raw::Config);
+    // `{:#}` of a `Value` is its pretty-printed JSON.
+    format!("{:#}\n", schema.as_value())
+}

@@ -1,0 +1,274 @@
+//! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
+
+use super::automatic::Automatic;
+use super::jitter::VelocityJitter;
+use crate::posterior::noise::Weights;
+use crate::posterior::objective::Parameter;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// One optional entry for each parameter that may be free.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "PerParameter_{T}")]
+pub(super) struct PerParameter<T> {
+    /// Semi-amplitude of the planet's orbit (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k_kms: Option<T>,
+    /// Orbital period over the rotation period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub porb_over_prot: Option<T>,
+    /// Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's radial
+    /// velocity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phi: Option<T>,
+    /// Angular velocity of the equator (rad/d).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub omega_eq_rad_d: Option<T>,
+    /// Angular velocity of the equator minus that of the pole (rad/d).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub domega_rad_d: Option<T>,
+    /// Inclination (degrees).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inclination_deg: Option<T>,
+    /// Projected equatorial rotation velocity (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vsini_kms: Option<T>,
+    /// Systemic radial velocity (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vsys_kms: Option<T>,
+    /// First coefficient of the limb darkening, 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limb_darkening: Option<T>,
+    /// Standard deviation of the local line (km/s), before the spectrograph.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line_sigma_kms: Option<T>,
+    /// Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a nuisance of
+    /// each profile's own by the priors alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equivalent_width_kms: Option<T>,
+    /// Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter than some
+    /// value: the darker they are, the fewer a map needs, so that a flat prior ends at 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<T>,
+}
+
+impl<T> Default for PerParameter<T> {
+    fn default() -> Self {
+        PerParameter {
+            k_kms: None,
+            porb_over_prot: None,
+            phi: None,
+            omega_eq_rad_d: None,
+            domega_rad_d: None,
+            inclination_deg: None,
+            vsini_kms: None,
+            vsys_kms: None,
+            limb_darkening: None,
+            line_sigma_kms: None,
+            equivalent_width_kms: None,
+            contrast: None,
+        }
+    }
+}
+
+impl<T> PerParameter<T> {
+    /// The entry of one parameter.
+    pub fn slot(&mut self, parameter: Parameter) -> &mut Option<T> {
+        match parameter {
+            Parameter::K => &mut self.k_kms,
+            Parameter::PorbOverProt => &mut self.porb_over_prot,
+            Parameter::Phi => &mut self.phi,
+            Parameter::OmegaEq => &mut self.omega_eq_rad_d,
+            Parameter::DOmega => &mut self.domega_rad_d,
+            Parameter::Inclination => &mut self.inclination_deg,
+            Parameter::Vsini => &mut self.vsini_kms,
+            Parameter::Vsys => &mut self.vsys_kms,
+            Parameter::LimbDarkening => &mut self.limb_darkening,
+            Parameter::LineSigma => &mut self.line_sigma_kms,
+            Parameter::EquivalentWidth => &mut self.equivalent_width_kms,
+            Parameter::Contrast => &mut self.contrast,
+        }
+    }
+}
+
+impl<T: Clone> PerParameter<T> {
+    /// The entries that are there, in the order of [`Parameter::ALL`].
+    pub fn entries(&self) -> Vec<(Parameter, T)> {
+        let mut all = self.clone();
+        Parameter::ALL.into_iter().filter_map(|p| Some((p, all.slot(p).take()?))).collect()
+    }
+}
+
+/// A prior. Which of the other keys belong to it depends on its kind.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PriorSection {
+    /// Kind of the prior.
+    pub prior: PriorKind,
+    /// Lower bound; needed for uniform and log-uniform (there above 0), optional for normal and isotropic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min: Option<f64>,
+    /// Upper bound, above the lower one; needed for uniform and log-uniform, optional for normal and isotropic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
+    /// Mean of a normal prior.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean: Option<f64>,
+    /// Standard deviation of a normal prior, above 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd: Option<f64>,
+}
+
+/// Kinds of priors.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum PriorKind {
+    /// Constant between `min` and `max`.
+    Uniform,
+    /// Proportional to 1/x between `min` and `max`.
+    LogUniform,
+    /// A Gaussian of `mean` and `sd`, cut off at `min` and `max` if given.
+    Normal,
+    /// For `inclination_deg`: proportional to sin i, between `min` (0 if not given) and `max` (90).
+    Isotropic,
+    /// For `phi`: constant on the circle from 0 to 1.
+    Periodic,
+}
+
+/// The line profiles: either `path` (with its options), or `simulate`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ObservationsSection {
+    /// The list of profiles, `FILE TIME_DAYS [VRAD_KMS]` a line, relative to the folder of this config. Times are days,
+    /// of the middle of each exposure, all counted from one zero point: BJD_TDB, whole or less a constant. Velocities
+    /// are barycentric: those of the profiles, or what VRAD, which is subtracted from them, makes of them. Without the
+    /// correction the Earth's motion, up to 30 km/s, looks like an orbit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<PathBuf>,
+    /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_range_kms: Option<[f64; 2]>,
+    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given. "auto": the larger of what
+    /// the scatter of the continuum says and what a map at the config's values leaves over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_scale: Option<Automatic>,
+    /// With `path`: level of the continuum in the files, from 0.5 to 2; 1 if not given. Intensities and standard errors
+    /// are divided by it as they are read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuum_level: Option<f64>,
+    /// With `path`: how the profiles are weighted against each other.
+    #[serde(default, skip_serializing_if = "Weights::is_default")]
+    pub weights: Weights,
+    /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
+    /// beside that of the bins; 0 if not given. It should be small against the width of the local line. "fitted": as
+    /// large as the profiles say at the config's values, before anything else.
+    #[serde(default, skip_serializing_if = "VelocityJitter::is_default")]
+    pub velocity_jitter_kms: VelocityJitter,
+    /// Simulated profiles of the star and planet of this config.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulate: Option<SimulateSection>,
+}
+
+/// Simulated profiles.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SimulateSection {
+    /// Hard-edged circular spots `[longitude, latitude, radius, filling]`: degrees, and the filling factor from 0 to 1.
+    /// The larger filling counts where they overlap.
+    #[serde(default)]
+    pub spots: Vec<[f64; 4]>,
+    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter
+    /// than the photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of
+    /// filling s overlaps, the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faculae: Vec<[f64; 4]>,
+    /// Rotation cycles of the profiles, counted from `epoch_d`.
+    pub cycles: Vec<f64>,
+    /// Velocity bins.
+    pub velocity_kms: VelocitySection,
+    /// Signal-to-noise ratio of each bin, above 0; null for no noise (standard errors as for 1000).
+    #[serde(default = "default_snr")]
+    pub snr: Option<f64>,
+    /// Seed of the noise.
+    #[serde(default = "default_seed")]
+    pub seed: u64,
+    /// Pixels of the star that is simulated, 100 to 2,000,000; more than of the image, for honesty.
+    #[serde(default = "default_simulation_pixels")]
+    pub pixels: usize,
+    /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuum: Option<ContinuumSection>,
+    /// Standard deviation (km/s), from 0 to 100, of the velocity zero points: one Gaussian number a profile, drawn with
+    /// the same seed and added to its velocity; 0 if not given.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub velocity_jitter_kms: f64,
+    /// Over how many bins the noise is correlated, from 1 (white noise, if not given) to 1000: c makes correlations of
+    /// ((c - 1) / (c + 1))^m at a distance of m bins, which add up to c. The variance of a bin stays.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub correlated_bins: f64,
+    /// Values of parameters that are simulated in place of those under `star` and `planet`, so that the start of an
+    /// inference may be wrong.
+    #[serde(default)]
+    pub truth: PerParameter<f64>,
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
+}
+
+fn default_snr() -> Option<f64> {
+    Some(1000.0)
+}
+
+fn default_seed() -> u64 {
+    1
+}
+
+fn default_simulation_pixels() -> usize {
+    20_000
+}
+
+/// Wandering line and continuum: standard deviations, from 0 to 10, of one Gaussian number a profile.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct ContinuumSection {
+    /// Level of the continuum, in its own units.
+    pub offset: f64,
+    /// Slope of the continuum: by how much it is higher at the last bin than in the middle.
+    pub slope: f64,
+    /// Equivalent width of the line, relative.
+    pub equivalent_width: f64,
+}
+
+/// Centres of the velocity bins: `min`, `min + step`, ... up to `max` (km/s).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct VelocitySection {
+    /// First velocity (km/s).
+    pub min: f64,
+    /// Last velocity (km/s).
+    pub max: f64,
+    /// Width of a bin (km/s), above 0.
+    pub step: f64,
+}
+
+/// The landscape that `dimcmc grid` computes: ln L of the reconstructions, without priors. All parameters without an
+/// axis are fixed at their values under `star` and `planet`, those with a prior too.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Grid {
+    /// One to three axes `[min, max, n]`: n nodes (2 or more) from min to max, both included, 1,000,000 nodes in all at
+    /// most. An axis of `phi` may wrap around 0 or 1 (nodes are written in [0, 1)); where it spans a whole period, as
+    /// [0, 1, n], max is the same place as min and is left out.
+    pub axes: PerParameter<(f64, f64, usize)>,
+}

@@ -1,0 +1,188 @@
+//! From the config as written to [`Settings`]: checks, defaults that depend on other keys, units.
+
+use super::domain::{check_value, key, resolve_prior};
+use super::error::Fault;
+use super::identity::fingerprint;
+use super::raw::Config;
+use super::resolve_grid::resolve_grid;
+use super::resolve_observations::resolve_observations;
+use super::resolve_star::resolve_star;
+use super::{Automatic, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
+use crate::posterior::nuisances::LineAndContinuum;
+use crate::posterior::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use crate::star::{BrightnessModel, StarSettings};
+use std::path::Path;
+
+/// Fewest and most pixels of an image or a simulated star.
+pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
+
+pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
+    let star = resolve_star(&mut raw.star, &raw.instrument)?;
+    let mut values = values(&mut raw, &star)?;
+    let source = resolve_observations(&mut raw, &star, &values, path)?;
+    check_imaging(&raw.imaging, raw.observations.velocity_jitter_kms)?;
+    let free = resolve_free(&mut raw, &mut values)?;
+    check_sampler(&raw.sampler, free.len())?;
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
+        return Err(Fault::new(
+            "parameters.contrast",
+            "has no effect on a bright-and-dark map, which holds the brightness itself",
+        ));
+    }
+    let grid = raw.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && raw.parameters.contrast.is_some() {
+        let problem = "an image of bright and dark pixels knows no spots: contrast has no effect";
+        return Err(Fault::new("parameters.contrast", problem));
+    }
+    let resolved = serde_json::to_value(&raw).map_err(|e| Fault::new("config", e.to_string()))?;
+    Ok(Settings {
+        path: path.into(),
+        star,
+        mass_msun: raw.star.mass_msun,
+        equivalent_width: raw.star.line.equivalent_width_kms,
+        values,
+        source,
+        velocity_jitter: raw.observations.velocity_jitter_kms,
+        imaging: raw.imaging,
+        free,
+        sampler: raw.sampler,
+        grid,
+        sha256: fingerprint(&resolved),
+        resolved,
+    })
+}
+
+/// The parameters as the config gives them; those of the surface where they are free or on an axis.
+fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, Fault> {
+    let free = Parameter::ALL.map(|p| {
+        let axis = raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(p).is_some());
+        axis || raw.parameters.slot(p).is_some()
+    });
+    let (star, planet) = (&raw.star, &raw.planet);
+    let mut values = ParameterValues::of_eight([0.0; 8]);
+    for parameter in Parameter::ALL {
+        if parameter.is_surface() && !free[parameter as usize] {
+            continue;
+        }
+        values[parameter] = match parameter {
+            Parameter::K => planet.k_kms,
+            Parameter::PorbOverProt => planet.porb_over_prot,
+            Parameter::Phi => planet.phi,
+            // Filled in by `resolve_star`.
+            Parameter::OmegaEq => star.omega_eq_rad_d.unwrap_or(f64::NAN),
+            Parameter::DOmega => star.domega_rad_d,
+            Parameter::Inclination => star.inclination_deg,
+            Parameter::Vsini => star.vsini_kms,
+            Parameter::Vsys => star.vsys_kms,
+            Parameter::LimbDarkening => resolved.limb_darkening.coefficients().0,
+            Parameter::LineSigma => star.line.sigma_kms,
+            Parameter::EquivalentWidth if resolved.line.equivalent_width_kms.is_nan() => {
+                return Err(Fault::new(key(parameter), "auto is no start of a free parameter, give a number"));
+            }
+            Parameter::EquivalentWidth => resolved.line.equivalent_width_kms,
+            Parameter::Contrast => resolved.contrast,
+        };
+        check_value(parameter, values[parameter], &key(parameter))?;
+    }
+    Ok(values)
+}
+
+/// Priors of the free parameters, with their defaults filled into `raw`, and their starts checked (and wrapped) in
+/// `values`.
+fn resolve_free(raw: &mut Config, values: &mut ParameterValues) -> Result<Vec<FreeParameter>, Fault> {
+    let phi_free = raw.parameters.phi.is_some();
+    let mut free = Vec::new();
+    for (parameter, mut section) in raw.parameters.entries() {
+        let prior = resolve_prior(parameter, &section, phi_free)?;
+        let start = prior.wrap(values[parameter]);
+        if !prior.log_density(start).is_finite() {
+            let (min, max) = prior.bounds();
+            let problem = format!("{start} is outside its prior, [{min}, {max}] by parameters.{}", parameter.name());
+            return Err(Fault::new(key(parameter), problem));
+        }
+        values[parameter] = start;
+        if prior != Prior::Periodic {
+            let (min, max) = prior.bounds();
+            section.min = min.is_finite().then_some(min);
+            section.max = max.is_finite().then_some(max);
+        }
+        *raw.parameters.slot(parameter) = Some(section);
+        free.push(FreeParameter { parameter, prior });
+    }
+    match without_planet(&free, values) {
+        Some(parameter) => {
+            let name = parameter.name();
+            let problem =
+                format!("{name} has no effect while planet.k_kms is fixed at 0: free k_kms too, or fix {name}");
+            Err(Fault::new(format!("parameters.{name}"), problem))
+        }
+        None => Ok(free),
+    }
+}
+
+/// A free parameter of an orbit of which K is fixed at 0.
+pub(super) fn without_planet(free: &[FreeParameter], values: &ParameterValues) -> Option<Parameter> {
+    let mut parameters = free.iter().map(|f| f.parameter);
+    let no_planet = values[Parameter::K] == 0.0 && free.iter().all(|f| f.parameter != Parameter::K);
+    parameters.find(|parameter| no_planet && parameter.is_orbital())
+}
+
+fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<(), Fault> {
+    check_pixels("imaging.pixels", imaging.pixels)?;
+    if !(imaging.default_spot > 0.0 && imaging.default_spot < 0.5) {
+        let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
+        return Err(Fault::new("imaging.default_spot", problem));
+    }
+    if imaging.nuisances.is_some() && imaging.chi2_target == Automatic::Auto {
+        let problem =
+            "auto goes by velocities that nuisances of line and continuum take up: give a number, such as 0.97";
+        return Err(Fault::new("imaging.chi2_target", problem));
+    }
+    if !jitter.is_default() && imaging.chi2_target == Automatic::Auto {
+        let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
+                       give a number, such as 0.97";
+        return Err(Fault::new("imaging.chi2_target", problem));
+    }
+    if let Some(priors) = &imaging.nuisances {
+        check_nuisances(
+            priors,
+            ["continuum_offset", "continuum_slope", "equivalent_width"].map(|n| format!("imaging.nuisances.{n}")),
+        )?;
+    }
+    automatic("imaging.chi2_target", imaging.chi2_target)
+}
+
+/// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
+pub(super) fn check_nuisances(priors: &LineAndContinuum, keys: [String; 3]) -> Result<(), Fault> {
+    match keys.iter().zip(priors.numbers()).find(|(_, sd)| !(0.0..=10.0).contains(sd)) {
+        Some((key, sd)) => Err(Fault::new(key, format!("{sd} must be from 0 to 10"))),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
+    if PIXELS.contains(&pixels) {
+        return Ok(());
+    }
+    Err(Fault::new(key, format!("{pixels} must be from {} to {}", PIXELS.start(), PIXELS.end())))
+}
+
+pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
+}
+
+/// Positive, or left to the observations.
+pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
+    match value {
+        Automatic::Fixed(value) => positive(key, value),
+        Automatic::Auto => Ok(()),
+    }
+}
+
+fn check_sampler(sampler: &SamplerSettings, free: usize) -> Result<(), Fault> {
+    // Commands that do not sample need no free parameter. The message starts with the key.
+    let message = |e: String| {
+        e.split_once(": ").map(|(key, problem)| Fault::new(key, problem)).unwrap_or(Fault::new("sampler", e))
+    };
+    sampler.validate(free.max(1)).map_err(|e| message(e.to_string()))
+}

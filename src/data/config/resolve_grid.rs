@@ -1,0 +1,76 @@
+//! The landscape: its axes, and the priors of the search for its reference.
+
+use super::GridSettings;
+use super::domain::check_value;
+use super::error::Fault;
+use super::raw_parts::Grid as GridSection;
+use super::resolve::without_planet;
+use crate::posterior::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use crate::sampling::landscape::{Axis, Grid};
+
+/// Most nodes of a landscape: a day or so of reconstructions.
+pub const MOST_NODES: usize = 1_000_000;
+
+/// Values closer than this, relative to their size, would drown in rounding.
+const SMALLEST_SPACING: f64 = 1e-12;
+
+/// Resolves `grid`, where `free` are the parameters with a prior and `values` those of the config.
+pub(super) fn resolve_grid(
+    section: &GridSection,
+    free: &[FreeParameter],
+    values: &ParameterValues,
+) -> Result<GridSettings, Fault> {
+    let axes = section.axes.entries();
+    if !(1..=3).contains(&axes.len()) {
+        return Err(Fault::new("grid.axes", format!("{} axes must be 1 to 3", axes.len())));
+    }
+    let total = axes.iter().fold(1usize, |product, (_, (_, _, nodes))| product.saturating_mul(*nodes));
+    if total > MOST_NODES {
+        return Err(Fault::new("grid.axes", format!("{total} nodes exceed {MOST_NODES}")));
+    }
+    let mut settings = GridSettings { grid: Grid { axes: Vec::new() }, free: Vec::new() };
+    for (parameter, (min, max, nodes)) in axes {
+        let name = parameter.name().to_string();
+        let axis = Axis { name, min, max, nodes, periodic: parameter == Parameter::Phi };
+        check_axis(parameter, &axis)?;
+        let with_prior = free.iter().find(|f| f.parameter == parameter);
+        settings.free.push(with_prior.copied().unwrap_or_else(|| along_the_axis(parameter, &axis, values)));
+        settings.grid.axes.push(axis);
+    }
+    match without_planet(&settings.free, values) {
+        Some(parameter) => {
+            let problem = "has no effect while planet.k_kms is fixed at 0: give k_kms an axis or planet.k_kms a value";
+            Err(Fault::new(format!("grid.axes.{}", parameter.name()), problem))
+        }
+        None => Ok(settings),
+    }
+}
+
+fn check_axis(parameter: Parameter, axis: &Axis) -> Result<(), Fault> {
+    let key = format!("grid.axes.{}", axis.name);
+    let &Axis { min, max, nodes, .. } = axis;
+    check_value(parameter, min, &key)?;
+    check_value(parameter, max, &key)?;
+    let problem = match () {
+        _ if nodes < 2 => format!("{nodes} nodes must be 2 or more; a parameter without an axis is fixed"),
+        _ if min >= max => format!("min {min} must be below max {max}"),
+        _ if !(max - min).is_finite() => format!("max {max} is too far from min {min}"),
+        _ if axis.overlaps() => format!("from {min} to {max} is more than the period, which is 1"),
+        _ if axis.spacing() < (SMALLEST_SPACING * min.abs().max(max.abs())).max(f64::MIN_POSITIVE) => {
+            format!("{nodes} nodes from {min} to {max} are too close for double precision")
+        }
+        _ => return Ok(()),
+    };
+    Err(Fault::new(key, problem))
+}
+
+/// Where the search looks for the best value of a parameter that has an axis and no prior: along the axis, and as far
+/// as the value of the config, from which it starts.
+fn along_the_axis(parameter: Parameter, axis: &Axis, values: &ParameterValues) -> FreeParameter {
+    let start = values[parameter];
+    let prior = match axis.periodic {
+        true => Prior::Periodic,
+        false => Prior::Uniform { min: axis.min.min(start), max: axis.max.max(start) },
+    };
+    FreeParameter { parameter, prior }
+}

@@ -1,0 +1,188 @@
+//! Where the profiles come from: files, or a simulation of the config's own star and planet.
+
+use super::domain::{check_size, check_value, most};
+use super::error::Fault;
+use super::raw::Config;
+use super::raw_parts::{SimulateSection, VelocitySection};
+use super::resolve::{automatic, check_nuisances, check_pixels, positive};
+use super::{Automatic, ObservationSource, VelocityJitter};
+use crate::data::io::lsd::ReadOptions;
+use crate::posterior::noise::ErrorSettings;
+use crate::posterior::nuisances::LineAndContinuum;
+use crate::posterior::objective::ParameterValues;
+use crate::posterior::simulate::Simulation;
+use crate::star::{Disc, Facula, Spot, StarSettings};
+use std::path::Path;
+
+/// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
+const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+
+/// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start
+/// from.
+pub(super) fn resolve_observations(
+    raw: &mut Config,
+    star: &StarSettings,
+    values: &ParameterValues,
+    config: &Path,
+) -> Result<ObservationSource, Fault> {
+    let section = &mut raw.observations;
+    if let VelocityJitter::Known(kms) = section.velocity_jitter_kms {
+        check_jitter("observations.velocity_jitter_kms", kms)?;
+    }
+    let path = match (&section.path, &section.simulate) {
+        (Some(path), None) => path,
+        (None, Some(simulate)) => {
+            let file_only = [
+                ("velocity_range_kms", section.velocity_range_kms.is_some()),
+                ("sigma_scale", section.sigma_scale.is_some()),
+                ("continuum_level", section.continuum_level.is_some()),
+                ("weights", !section.weights.is_default()),
+            ];
+            if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
+                return Err(Fault::new(format!("observations.{name}"), "for observations from files only"));
+            }
+            if star.line.equivalent_width_kms.is_nan() {
+                return Err(Fault::new("star.line.equivalent_width_kms", "auto is for observations from files only"));
+            }
+            return Ok(ObservationSource::Simulate(simulation(simulate, star, values)?));
+        }
+        (Some(_), Some(_)) => return Err(Fault::new("observations", "give either path or simulate, not both")),
+        (None, None) => return Err(Fault::new("observations", "give path (of the list of profiles) or simulate")),
+    };
+    if path.as_os_str().is_empty() {
+        return Err(Fault::new("observations.path", "is empty"));
+    }
+    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Fixed(ReadOptions::default().sigma_scale));
+    automatic("observations.sigma_scale", sigma_scale)?;
+    let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
+    let sigma_scale = if errors.measured { 1.0 } else { sigma_scale.value() };
+    for end in section.velocity_range_kms.into_iter().flatten() {
+        check_size("observations.velocity_range_kms", end, most::VELOCITY_KMS)?;
+    }
+    let continuum_level = section.continuum_level.unwrap_or(1.0);
+    if !CONTINUUM_LEVELS.contains(&continuum_level) {
+        let (min, max) = (CONTINUUM_LEVELS.start(), CONTINUUM_LEVELS.end());
+        let problem = format!("{continuum_level} must be from {min} to {max}");
+        return Err(Fault::new("observations.continuum_level", problem));
+    }
+    if let Some([min, max]) = section.velocity_range_kms
+        && min >= max
+    {
+        let problem = format!("first velocity {min} must be below last velocity {max}");
+        return Err(Fault::new("observations.velocity_range_kms", problem));
+    }
+    let options = ReadOptions { velocity_range_kms: section.velocity_range_kms.map(Into::into), sigma_scale };
+    let path = config.parent().unwrap_or(Path::new("")).join(path);
+    Ok(ObservationSource::Files { path, options, continuum_level, errors })
+}
+
+fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {
+    let at = |field: &str| format!("observations.simulate.{field}");
+    let spots = section.spots.iter().enumerate().map(|(k, s)| spot(s, &at(&format!("spots[{k}]"))));
+    let faculae = section.faculae.iter().enumerate().map(|(k, f)| facula(f, &at(&format!("faculae[{k}]"))));
+    if section.cycles.is_empty() {
+        return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
+    }
+    let times_d: Vec<f64> = section.cycles.iter().map(|c| star.epoch_d + c * star.rotation_period_d).collect();
+    for (k, (cycle, time_d)) in section.cycles.iter().zip(&times_d).enumerate() {
+        let key = at(&format!("cycles[{k}]"));
+        check_size(&key, *cycle, most::TIME)?;
+        check_size(&format!("{key}: its time (d)"), *time_d, most::TIME)?;
+    }
+    if let Some(snr) = section.snr {
+        positive(&at("snr"), snr)?;
+    }
+    check_pixels(&at("pixels"), section.pixels)?;
+    let continuum = section
+        .continuum
+        .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
+    check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
+    check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
+    if !(section.correlated_bins >= 1.0 && section.correlated_bins <= MOST_CORRELATED_BINS) {
+        let problem = format!("{} must be from 1 (white noise) to {MOST_CORRELATED_BINS}", section.correlated_bins);
+        return Err(Fault::new(at("correlated_bins"), problem));
+    }
+    let mut truth = *values;
+    for (parameter, value) in section.truth.entries() {
+        check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
+        truth[parameter] = value;
+    }
+    Ok(Simulation {
+        spots: spots.collect::<Result<_, _>>()?,
+        faculae: faculae.collect::<Result<_, _>>()?,
+        truth,
+        times_d,
+        first_velocity_kms: section.velocity_kms.min,
+        step_kms: section.velocity_kms.step,
+        bins: bins(&section.velocity_kms, &at("velocity_kms"))?,
+        snr: section.snr,
+        seed: section.seed,
+        pixels: section.pixels,
+        continuum,
+        velocity_jitter_kms: section.velocity_jitter_kms,
+        correlated_bins: section.correlated_bins,
+    })
+}
+
+/// Noise that is correlated over more bins is a mistake.
+const MOST_CORRELATED_BINS: f64 = 1000.0;
+
+/// Velocity zero points that scatter by more (km/s) are a mistake: profiles would be seen as the wrong part of a line.
+const LARGEST_JITTER_KMS: f64 = 100.0;
+
+fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
+    match (0.0..=LARGEST_JITTER_KMS).contains(&kms) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{kms} must be from 0 to {LARGEST_JITTER_KMS} km/s"))),
+    }
+}
+
+/// Most brightness that a facula may add, in units of the photosphere's.
+const LARGEST_EXCESS: f64 = 10.0;
+
+fn spot(&[longitude, latitude, radius, filling]: &[f64; 4], key: &str) -> Result<Spot, Fault> {
+    let Disc { longitude, latitude, radius } = disc([longitude, latitude, radius], key)?;
+    match (0.0..=1.0).contains(&filling) {
+        true => Ok(Spot { longitude, latitude, radius, filling }),
+        false => Err(Fault::new(key, format!("filling {filling} must be from 0 to 1"))),
+    }
+}
+
+fn facula(&[longitude, latitude, radius, excess]: &[f64; 4], key: &str) -> Result<Facula, Fault> {
+    let disc = disc([longitude, latitude, radius], key)?;
+    match excess > 0.0 && excess <= LARGEST_EXCESS {
+        true => Ok(Facula { disc, excess }),
+        false => Err(Fault::new(key, format!("excess {excess} must be above 0 and up to {LARGEST_EXCESS}"))),
+    }
+}
+
+/// A circle given in degrees.
+fn disc([longitude, latitude, radius]: [f64; 3], key: &str) -> Result<Disc, Fault> {
+    let problem = match () {
+        _ if latitude.abs() > 90.0 => format!("latitude {latitude} must be from -90 to 90"),
+        _ if !(radius > 0.0 && radius <= 180.0) => format!("radius {radius} must be above 0 and up to 180"),
+        _ => {
+            let [longitude, latitude, radius] = [longitude, latitude, radius].map(f64::to_radians);
+            return Ok(Disc { longitude, latitude, radius });
+        }
+    };
+    Err(Fault::new(key, problem))
+}
+
+/// Number of velocity bins; the last lies at or below `max`.
+fn bins(axis: &VelocitySection, key: &str) -> Result<usize, Fault> {
+    const LEAST: f64 = 5.0;
+    const MOST: f64 = 100_000.0;
+    positive(&format!("{key}.step"), axis.step)?;
+    check_size(&format!("{key}.min"), axis.min, most::VELOCITY_KMS)?;
+    check_size(&format!("{key}.max"), axis.max, most::VELOCITY_KMS)?;
+    if axis.min >= axis.max {
+        return Err(Fault::new(format!("{key}.min"), format!("{} must be below max, which is {}", axis.min, axis.max)));
+    }
+    // Where max is meant to be a bin, rounding must not lose it.
+    let bins = ((axis.max - axis.min) / axis.step + 1e-6).floor() + 1.0;
+    if !(LEAST..=MOST).contains(&bins) {
+        return Err(Fault::new(format!("{key}.step"), format!("makes {bins} bins, they must be {LEAST} to {MOST}")));
+    }
+    Ok(bins as usize)
+}

@@ -1,0 +1,122 @@
+//! The star: rotation, limb darkening, spot contrast and local line.
+
+use super::EquivalentWidth;
+use super::domain::{check_size, most};
+use super::error::Fault;
+use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
+use super::resolve::positive;
+use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
+use crate::star::{LimbDarkening, LocalLine, StarSettings};
+use std::f64::consts::TAU;
+
+/// Lightest and heaviest star (solar masses).
+const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
+
+/// Checks and resolves the star; fills the default of its `omega_eq_rad_d`. An equivalent width "auto" becomes NaN.
+pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<StarSettings, Fault> {
+    positive("star.rotation_period_d", star.rotation_period_d)?;
+    check_size("star.rotation_period_d", star.rotation_period_d, most::TIME)?;
+    check_size("star.epoch_d", star.epoch_d, most::TIME)?;
+    let omega = TAU / star.rotation_period_d;
+    if !(omega.is_finite() && omega > 0.0) {
+        let problem = format!("{} leaves the range of double precision", star.rotation_period_d);
+        return Err(Fault::new("star.rotation_period_d", problem));
+    }
+    star.omega_eq_rad_d.get_or_insert(omega);
+    if let Some(mass) = star.mass_msun.filter(|mass| !MASSES_MSUN.contains(mass)) {
+        let (least, most) = (MASSES_MSUN.start(), MASSES_MSUN.end());
+        let problem = format!("{mass} must be from {least} to {most} solar masses");
+        return Err(Fault::new("star.mass_msun", problem));
+    }
+    Ok(StarSettings {
+        rotation_period_d: star.rotation_period_d,
+        epoch_d: star.epoch_d,
+        limb_darkening: limb_darkening(&star.limb_darkening)?,
+        contrast: contrast(star)?,
+        line: local_line(&star.line, instrument)?,
+    })
+}
+
+fn limb_darkening(section: &LimbDarkeningSection) -> Result<LimbDarkening, Fault> {
+    let fault = |problem: String| Err(Fault::new("star.limb_darkening.coefficients", problem));
+    match (section.law, &section.coefficients[..]) {
+        (LimbLaw::Linear, &[u]) if (0.0..=1.0).contains(&u) => Ok(LimbDarkening::Linear(u)),
+        (LimbLaw::Linear, &[u]) => fault(format!("{u} must be from 0 to 1")),
+        (LimbLaw::Linear, other) => fault(format!("the linear law has 1 coefficient, not {}", other.len())),
+        (LimbLaw::Quadratic, &[a, b]) => match LimbDarkening::Quadratic(a, b).is_positive() {
+            true => Ok(LimbDarkening::Quadratic(a, b)),
+            false => fault(format!("[{a}, {b}] make the intensity negative somewhere on the disc")),
+        },
+        (LimbLaw::Quadratic, other) => fault(format!("the quadratic law has 2 coefficients, not {}", other.len())),
+    }
+}
+
+fn contrast(star: &Star) -> Result<f64, Fault> {
+    let (photosphere, spot) = match (star.contrast, star.photosphere_k, star.spot_k) {
+        (Some(contrast), None, None) => {
+            return match (0.0..1.0).contains(&contrast) {
+                true => Ok(contrast),
+                false => Err(Fault::new("star.contrast", format!("{contrast} must be 0 or more and below 1"))),
+            };
+        }
+        (Some(_), _, _) => {
+            return Err(Fault::new("star.contrast", "give either contrast or photosphere_k and spot_k, not both"));
+        }
+        (None, Some(photosphere), Some(spot)) => (photosphere, spot),
+        (None, None, Some(_)) => return Err(Fault::new("star.photosphere_k", "missing, spot_k needs it")),
+        (None, Some(_), None) => return Err(Fault::new("star.spot_k", "missing, photosphere_k needs it")),
+        (None, None, None) => {
+            return Err(Fault::new("star.photosphere_k", "missing: give photosphere_k and spot_k, or contrast"));
+        }
+    };
+    positive("star.photosphere_k", photosphere)?;
+    positive("star.spot_k", spot)?;
+    positive("star.wavelength_nm", star.wavelength_nm)?;
+    if spot >= photosphere {
+        return Err(Fault::new("star.spot_k", format!("{spot} must be below photosphere_k, which is {photosphere}")));
+    }
+    let contrast = planck_contrast(spot, photosphere, star.wavelength_nm);
+    match (0.0..1.0).contains(&contrast) {
+        true => Ok(contrast),
+        false => Err(Fault::new("star.spot_k", format!("{spot} gives a contrast of {contrast}, not in [0, 1)"))),
+    }
+}
+
+/// Widest Lorentzian (km/s).
+const WIDEST_GAMMA_KMS: f64 = 100.0;
+
+fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> {
+    let gamma_kms = match (line.shape, line.gamma_kms) {
+        (LineShape::Gaussian, None) => 0.0,
+        (LineShape::Gaussian, Some(_)) => return Err(Fault::new("star.line.gamma_kms", "not for a gaussian line")),
+        (LineShape::Voigt, None) => return Err(Fault::new("star.line.gamma_kms", "missing, a voigt line needs it")),
+        (LineShape::Voigt, Some(gamma)) => {
+            positive("star.line.gamma_kms", gamma)?;
+            if gamma > WIDEST_GAMMA_KMS {
+                let problem = format!("{gamma} must be at most {WIDEST_GAMMA_KMS}: a wider line is no line");
+                return Err(Fault::new("star.line.gamma_kms", problem));
+            }
+            gamma
+        }
+    };
+    positive("star.line.sigma_kms", line.sigma_kms)?;
+    let instrumental = match instrument.resolving_power {
+        Some(power) => {
+            positive("instrument.resolving_power", power)?;
+            instrumental_sigma_kms(power)
+        }
+        None => 0.0,
+    };
+    let sigma_kms = line.sigma_kms.hypot(instrumental);
+    if !sigma_kms.is_finite() {
+        return Err(Fault::new("instrument.resolving_power", "the line becomes infinitely broad"));
+    }
+    let equivalent_width_kms = match line.equivalent_width_kms {
+        EquivalentWidth::Fixed(width) => {
+            positive("star.line.equivalent_width_kms", width)?;
+            width
+        }
+        EquivalentWidth::Auto => f64::NAN,
+    };
+    Ok(LocalLine { sigma_kms, instrumental_sigma_kms: instrumental, gamma_kms, equivalent_width_kms })
+}

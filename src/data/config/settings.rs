@@ -1,0 +1,270 @@
+//! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
+
+use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
+use crate::data::io::lsd::ReadOptions;
+use crate::maxent::entropy::Entropy;
+use crate::posterior::noise::ErrorSettings;
+use crate::posterior::nuisances::LineAndContinuum;
+use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, UnresolvedSpots};
+use crate::posterior::simulate::Simulation;
+use crate::sampling::landscape::Grid;
+use crate::star::observation::Observations;
+use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
+use crate::star::{BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A whole config, resolved.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The config file.
+    pub path: PathBuf,
+    /// The star. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through
+    /// [`Settings::star_for`].
+    pub star: StarSettings,
+    /// Mass of the star (solar masses), for the minimum mass of the planet.
+    pub mass_msun: Option<f64>,
+    /// Where the equivalent width of the line comes from.
+    pub equivalent_width: EquivalentWidth,
+    /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
+    pub values: ParameterValues,
+    /// Where the profiles come from.
+    pub source: ObservationSource,
+    /// Scatter of the profiles' velocity zero points.
+    pub velocity_jitter: VelocityJitter,
+    /// The Doppler image.
+    pub imaging: ImagingSettings,
+    /// The free parameters in the order of [`Parameter::ALL`]; may be empty, see [`Settings::require_free`].
+    pub free: Vec<FreeParameter>,
+    /// The chain.
+    pub sampler: SamplerSettings,
+    /// The landscape.
+    pub grid: Option<GridSettings>,
+    /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
+    pub resolved: serde_json::Value,
+    /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
+    /// `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    pub sha256: String,
+}
+
+/// Where the profiles come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ObservationSource {
+    /// Files.
+    Files {
+        /// The list, relative to the working directory.
+        path: PathBuf,
+        /// Cut and scaling, by 1 where that is left to the observations.
+        options: ReadOptions,
+        /// Level of the continuum in the files: what is read is divided by it.
+        continuum_level: f64,
+        /// What the observations are to say of their errors.
+        errors: ErrorSettings,
+    },
+    /// A simulation.
+    Simulate(Simulation),
+}
+
+/// The Doppler image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImagingSettings {
+    /// Pixels of the image, 100 to 2,000,000 (approximately: rings hold whole numbers of pixels).
+    pub pixels: usize,
+    /// What the pixels of the image hold.
+    #[serde(skip_serializing_if = "BrightnessModel::is_default")]
+    pub brightness: BrightnessModel,
+    /// Spot filling factor of a pixel that the data say nothing about, above 0 and below 0.5; an image of bright and
+    /// dark pixels has no use for it.
+    pub default_spot: f64,
+    /// Target chi2 per datum, above 0. "auto": the highest value below which the radial velocities that are left over,
+    /// observed minus modelled, stop shrinking, at the config's values.
+    pub chi2_target: Automatic,
+    /// What a reconstruction is judged by.
+    pub objective: ObjectiveKind,
+    /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has
+    /// them.
+    pub unresolved_spots: UnresolvedSpots,
+    /// Line and continuum of each profile by itself, integrated out: standard deviations of their Gaussian priors
+    /// around 0, from 0 (no nuisance) to 10.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nuisances: Option<LineAndContinuum>,
+}
+
+impl Default for ImagingSettings {
+    fn default() -> Self {
+        ImagingSettings {
+            pixels: 2000,
+            brightness: BrightnessModel::default(),
+            default_spot: 1e-4,
+            chi2_target: Automatic::Fixed(0.97),
+            objective: ObjectiveKind::default(),
+            unresolved_spots: UnresolvedSpots::default(),
+            nuisances: None,
+        }
+    }
+}
+
+impl ImagingSettings {
+    /// Entropy of the image.
+    pub fn entropy(&self) -> Entropy {
+        match self.brightness {
+            BrightnessModel::Spots => Entropy::new(self.default_spot),
+            BrightnessModel::BrightAndDark => Entropy::BrightAndDark,
+        }
+    }
+}
+
+/// The landscape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridSettings {
+    /// Its nodes, the axes in the order of [`Parameter::ALL`].
+    pub grid: Grid,
+    /// The parameters on its axes, in the same order, with the priors of the search for the reference: those under
+    /// `parameters`, or uniform along the axis. All other parameters are fixed at their values in the config. The
+    /// priors do not enter the landscape.
+    pub free: Vec<FreeParameter>,
+}
+
+impl Settings {
+    /// The free parameters, for commands that cannot do without.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn require_free(&self) -> Result<&[FreeParameter], ConfigError> {
+        match &self.free[..] {
+            [] => Err(self.fault("parameters", "no parameter is free: give at least one of them a prior")),
+            free => Ok(free),
+        }
+    }
+
+    /// The landscape, for the command that cannot do without.
+    ///
+    /// # Errors
+    /// If the config has no `grid`.
+    pub fn require_grid(&self) -> Result<&GridSettings, ConfigError> {
+        self.grid.as_ref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
+    }
+
+    /// The star, its equivalent width measured on `observations` if that is [`EquivalentWidth::Auto`].
+    ///
+    /// # Errors
+    /// If the equivalent width so measured is not positive.
+    pub fn star_for(&self, observations: &Observations) -> Result<StarSettings, ConfigError> {
+        let mut star = self.star.clone();
+        if self.equivalent_width == EquivalentWidth::Auto {
+            let beside = match self.imaging.nuisances.is_some_and(|priors| priors.continuum_offset > 0.0) {
+                true => self.above_its_continuum(&star, observations),
+                false => None,
+            };
+            let width = beside.unwrap_or_else(|| observations.mean_equivalent_width_kms());
+            if !(width.is_finite() && width > 0.0) {
+                let problem = format!("auto gives {width} km/s: the observed profiles are no absorption line");
+                return Err(self.fault("star.line.equivalent_width_kms", &problem));
+            }
+            star.line.equivalent_width_kms = width;
+            if beside.is_none() && star.line.gamma_kms > 0.0 {
+                // wings beyond the profiles count too
+                star.line.equivalent_width_kms = width / share_observed(&star, &self.values, observations);
+            }
+        }
+        Ok(star)
+    }
+
+    /// Equivalent width (km/s) of the line below the continuum that each profile has beside it, wherever that is;
+    /// `None` where the profiles do not reach into it. What an unspotted star loses by the same measure, wings under
+    /// the continuum, is allowed for.
+    fn above_its_continuum(&self, star: &StarSettings, observations: &Observations) -> Option<f64> {
+        let reach_kms = self.values[Parameter::Vsini] + BESIDE * star.line.sigma_kms;
+        let mut unit = star.clone();
+        unit.line.equivalent_width_kms = 1.0;
+        let model = unspotted(&unit, &self.values, observations);
+        let (mut observed, mut expected, mut first) = (0.0, 0.0, 0);
+        for profile in &observations.profiles {
+            let bins = profile.intensity.len();
+            let centre = self.values[Parameter::Vsys];
+            let distance = |j: usize| profile.velocity_kms(j, observations.step_kms) - centre;
+            let area = |depth: &dyn Fn(usize) -> f64| {
+                let side = |sign: f64| {
+                    let beyond: Vec<f64> = (0..bins).filter(|j| sign * distance(*j) > reach_kms).map(depth).collect();
+                    (beyond.len() >= FEWEST_BESIDE).then(|| beyond.iter().sum::<f64>() / beyond.len() as f64)
+                };
+                let continuum = 0.5 * (side(-1.0)? + side(1.0)?);
+                Some((0..bins).map(|j| depth(j) - continuum).sum::<f64>())
+            };
+            observed += area(&|j| 1.0 - profile.intensity[j])?;
+            expected += area(&|j| model[first + j])?;
+            first += bins;
+        }
+        Some(observed / expected)
+    }
+
+    /// Whether profiles in velocity bins of `step_kms` can be computed at `values`.
+    ///
+    /// # Errors
+    /// If the local line is so narrow, or the star so fast, that the velocity grid grows out of hand.
+    pub fn check_velocity_grid(&self, values: &ParameterValues, step_kms: f64) -> Result<(), ConfigError> {
+        let (steps, nodes) = Response::velocity_grid(&self.star, &values.state(), step_kms);
+        if steps.is_nan() || steps > MOST_STEPS_PER_BIN {
+            let sigma = self.star.line.sigma_kms;
+            let problem = format!("{sigma} (with the instrument) is too narrow for velocity bins of {step_kms} km/s");
+            return Err(self.fault("star.line.sigma_kms", &problem));
+        }
+        if nodes.is_nan() || nodes > MOST_NODES {
+            let vsini = values[Parameter::Vsini];
+            let problem = format!(
+                "{vsini} km/s, at the pole or the equator, takes {nodes:.1e} steps of a fraction of the line's width, \
+                over \
+                 {MOST_NODES}: see star.domega_rad_d, star.line.sigma_kms and the velocity bins too"
+            );
+            return Err(self.fault("star.vsini_kms", &problem));
+        }
+        Ok(())
+    }
+
+    /// The config with other observations in place of its own, those of a list at `path`; cut and errors of observed
+    /// ones stay.
+    pub fn with_observations(&self, path: &str) -> serde_json::Value {
+        let mut config = self.resolved.clone();
+        if let Some(top) = config.as_object_mut() {
+            top.remove("$schema");
+        }
+        let section = &mut config["observations"];
+        match section.as_object_mut().filter(|section| !section.contains_key("simulate")) {
+            Some(section) => {
+                section.insert("path".into(), path.into());
+            }
+            None => {
+                let jitter = section.get("velocity_jitter_kms").cloned();
+                *section = serde_json::json!({ "path": path });
+                jitter.into_iter().for_each(|jitter| section["velocity_jitter_kms"] = jitter);
+            }
+        }
+        config
+    }
+
+    /// That something is wrong with a key.
+    pub fn fault(&self, key: &str, problem: &str) -> ConfigError {
+        ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
+    }
+}
+
+/// Bins farther than this many local line widths beyond vsini are taken for continuum, and so many of them on a side
+/// will do.
+const BESIDE: f64 = 2.0;
+const FEWEST_BESIDE: usize = 2;
+
+/// How much of its line an unspotted star shows within the velocities of `observations`.
+fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
+    let depths = unspotted(star, values, observations);
+    let areas = depths.iter().sum::<f64>() * observations.step_kms / observations.profiles.len() as f64;
+    areas / star.line.equivalent_width_kms
+}
+
+/// Depths of an unspotted star in all bins of `observations`.
+fn unspotted(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> Vec<f64> {
+    const PIXELS: usize = 2000;
+    let grid = SurfaceGrid::equal_area(PIXELS, Quadrature::Gauss2x2);
+    Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()])
+}

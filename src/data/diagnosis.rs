@@ -1,0 +1,180 @@
+//! Why no map fits: one thing at a time is changed, and what helps most is the likely reason.
+//!
+//! Tried are vsini, width, wings and strength of the local line, the continuum, the velocity range, the rotation period
+//! and faculae, each on coarse maps at the errors with which the config's own map fits. Of what helps most the best
+//! value is looked for, and the smallest chi2 that a map then comes down to. Where nothing helps the errors are left:
+//! they are too small, or the profiles hold something that the model of the star does not know. Two things wrong at
+//! once show as the one that helps more.
+
+mod change;
+
+use crate::data::scene::{self, Scene};
+use crate::posterior::noise::{FITTED, chi2_at, factor_to_fit};
+use crate::star::observation::Observations;
+use change::{Change, Patient};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Pixels of the maps: enough to see whether a change helps.
+const PIXELS: usize = 500;
+
+/// A change is a reason when chi2 falls to less than this share of what it was, and what it has above its target
+/// likewise.
+const HELPS: f64 = 0.8;
+const HELPS_EXCESS: f64 = 0.6;
+
+/// Rounds of looking for a better value between those tried.
+const REFINEMENTS: usize = 2;
+
+/// What is likely to keep a map from fitting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// Projected rotation velocity.
+    Vsini,
+    /// Width of the local line.
+    LineWidth,
+    /// Shape of the local line: wings that a Gaussian lacks.
+    LineWings,
+    /// Strength of the local line.
+    EquivalentWidth,
+    /// Level of the continuum.
+    Continuum,
+    /// Velocities that are used.
+    VelocityRange,
+    /// Rotation period.
+    RotationPeriod,
+    /// What the map holds: bright pixels beside dark ones.
+    Brightness,
+    /// Nothing that was tried.
+    Errors,
+}
+
+/// Why no map fits, by trying.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// The likely reason.
+    pub reason: Reason,
+    /// It in words, with what helps.
+    pub text: String,
+    /// chi2 per independent datum that a map comes down to as it is, with errors as the continuum has them, or as
+    /// given.
+    pub chi2_per_datum: f64,
+    /// The same with the change that helps most.
+    pub chi2_per_datum_changed: f64,
+    /// Everything that was tried, with chi2 relative to that without a change.
+    pub tried: Vec<Tried>,
+}
+
+/// One change.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tried {
+    /// The change.
+    pub change: String,
+    /// chi2 of its map relative to the unchanged one's; null where there is none.
+    pub relative_chi2: Option<f64>,
+}
+
+impl Diagnosis {
+    /// Of a scene that no map fits as well as its errors promise, by trying; `whole` are its profiles in their whole
+    /// width, in units of their continuum, if they are at hand. `None` where there is no map at all.
+    pub fn of(scene: &Scene, whole: Option<&Observations>) -> Option<Self> {
+        let patient = patient(scene, whole);
+        let unchanged = factor(&patient, 1.0)?;
+        let relative = |changes: &[Change]| -> Vec<Option<f64>> {
+            changes.par_iter().map(|change| relative_chi2(&patient, change, unchanged)).collect()
+        };
+        let changes = Change::all(&patient);
+        let found = relative(&changes);
+        let mut tried: Vec<(Change, Option<f64>)> = changes.into_iter().zip(found).collect();
+        for _ in 0..REFINEMENTS {
+            let Some(best) = best(&tried) else { break };
+            let between = best.between(&tried.iter().map(|(change, _)| change.clone()).collect::<Vec<_>>());
+            let found = relative(&between);
+            tried.extend(between.into_iter().zip(found));
+        }
+        let cure = best(&tried).and_then(|change| {
+            let changed = factor(&change.applied(&patient)?, unchanged)?;
+            helps(unchanged, changed).then_some((change, changed))
+        });
+        let chi2 = |factor: f64| FITTED * factor * factor;
+        let (reason, changed) = cure.as_ref().map_or((Reason::Errors, unchanged), |(c, f)| (c.reason(), *f));
+        let text = match &cure {
+            Some((change, changed)) => format!(
+                "{} is the likely reason: with {} a map comes down to chi2 = {:.3} per datum instead of {:.3}",
+                change.name(),
+                change.words(&patient),
+                chi2(*changed),
+                chi2(unchanged)
+            ),
+            None => format!(
+                "the errors are the likely reason, or something that the model does not know: a map comes down to \
+                chi2 = {:.3} per \
+                 datum, and other values of vsini, line, continuum, velocity range and rotation period, one at a \
+                 time, do not help; \
+                 errors {unchanged:.2} times as large would do",
+                chi2(unchanged)
+            ),
+        };
+        let tried = tried
+            .iter()
+            .map(|(change, relative_chi2)| Tried { change: change.words(&patient), relative_chi2: *relative_chi2 });
+        Some(Diagnosis {
+            reason,
+            text,
+            chi2_per_datum: chi2(unchanged),
+            chi2_per_datum_changed: chi2(changed),
+            tried: tried.collect(),
+        })
+    }
+}
+
+/// What is examined: coarse maps of the scene, with errors as the continuum has them where that was measured.
+fn patient<'a>(scene: &Scene, whole: Option<&'a Observations>) -> Patient<'a> {
+    let mut settings = scene.settings.clone();
+    settings.imaging.pixels = settings.imaging.pixels.min(PIXELS);
+    let (mut scale, mut correlated_bins) = (1.0, 1.0);
+    if let Some(errors) = scene.measured.errors.as_ref() {
+        correlated_bins = errors.correlated_bins;
+        if let (Some(applied), quoted) = (errors.sigma_scale, errors.continuum.unwrap_or(1.0)) {
+            scale = quoted * correlated_bins.sqrt() / applied;
+        }
+    }
+    let mut observations = scene.observations.clone();
+    scale_errors(&mut observations, scale);
+    Patient { settings, observations, whole, correlated_bins }
+}
+
+fn scale_errors(observations: &mut Observations, factor: f64) {
+    observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
+}
+
+/// Factor on the errors with which a map fits; `start` is a guess.
+fn factor(patient: &Patient, start: f64) -> Option<f64> {
+    let imager = |factor: f64| {
+        let mut observations = patient.observations.clone();
+        scale_errors(&mut observations, start * factor);
+        scene::imager(&patient.settings, &observations)
+    };
+    factor_to_fit(patient.settings.values, patient.correlated_bins, imager).ok()?.ok().map(|found| start * found)
+}
+
+/// Whether a map that fits with errors times `changed`, instead of `unchanged`, fits so much better.
+fn helps(unchanged: f64, changed: f64) -> bool {
+    let excess = |factor: f64| (factor * factor - 1.0).max(0.0);
+    changed.powi(2) < HELPS * unchanged.powi(2) && excess(changed) < HELPS_EXCESS * excess(unchanged)
+}
+
+/// chi2 with a change over that without, both with the errors with which a map fits without it.
+fn relative_chi2(patient: &Patient, change: &Change, unchanged: f64) -> Option<f64> {
+    let mut changed = change.applied(patient)?;
+    scale_errors(&mut changed.observations, unchanged);
+    let imager = scene::imager(&changed.settings, &changed.observations).ok()?;
+    chi2_at(&imager, changed.settings.values, changed.correlated_bins).ok().map(|chi2| chi2 / FITTED)
+}
+
+/// The change with the smallest chi2.
+fn best(tried: &[(Change, Option<f64>)]) -> Option<Change> {
+    let found = tried.iter().filter_map(|(change, chi2)| Some((change, (*chi2)?)));
+    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(change, _)| change.clone())
+}

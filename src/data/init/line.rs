@@ -1,0 +1,68 @@
+//! What a first look says of line and continuum, as values of a config: where the continuum is, how wide the local line
+//! is, and which velocities hold it with some continuum on both sides.
+
+use super::Known;
+use super::digits::rounded;
+use super::ledger::{Ledger, Source};
+use super::values::origin;
+use crate::posterior::first_look::{FirstLook, LineModel};
+
+/// The velocity range reaches so many bins, and so many widths of the line as the spectrograph shows it, into the
+/// continuum on either side.
+const CONTINUUM: (f64, f64) = (6.0, 2.0);
+
+/// A line width is poorly determined where its error is more than this share of it.
+const POORLY: f64 = 0.25;
+
+/// Where the continuum is, where it is not at 1.
+pub(super) fn note_continuum(look: &FirstLook, level: Option<f64>, ledger: &mut Ledger) {
+    if let (Some(level), Some(continuum)) = (level, look.continuum) {
+        let remark = format!(
+            "the continuum beside the line is there, +- {:.0e}: profiles are divided by it",
+            continuum.level_error
+        );
+        ledger.note("observations.continuum_level", level, "", Source::Data, remark);
+    }
+}
+
+/// Width of the local line: given, or as the flanks of the mean profile have it.
+pub(super) fn sigma_kms(look: &FirstLook, line: LineModel, known: &Known, ledger: &mut Ledger) -> f64 {
+    let (sigma, error) = (look.unspotted.line_sigma_kms, look.line_sigma_error_kms.unwrap_or(0.0));
+    let (source, remark) = match error > POORLY * sigma {
+        true => (
+            Source::Assumed,
+            format!(
+                "+- {error:.1}: the flanks hardly tell it from vsini, a usual {} counts too; --line-sigma",
+                line.sigma_kms
+            ),
+        ),
+        false => (Source::Data, format!("+- {error:.1}, local line, by the flanks of the mean profile; --line-sigma")),
+    };
+    ledger.settle(("star.line.sigma_kms", "km/s"), &known.line_sigma_kms, (rounded(sigma, 1), source, remark.as_str()))
+}
+
+/// The line with some continuum on both sides, as far as the profiles have it.
+pub(super) fn velocity_range(
+    look: &FirstLook,
+    line: LineModel,
+    step_kms: f64,
+    known: &Known,
+    ledger: &mut Ledger,
+) -> (f64, f64) {
+    let total_kms = look.unspotted.line_sigma_kms.hypot(line.instrumental_sigma_kms);
+    let (bins, widths) = CONTINUUM;
+    let reach = look.reach_kms + (bins * step_kms).max(widths * total_kms);
+    let centre = look.unspotted.centre_kms;
+    let (first, last) = look.range_kms;
+    let inside = (centre - reach >= first, centre + reach <= last);
+    let from = if inside.0 { rounded(centre - reach, 1) } else { first };
+    let to = if inside.1 { rounded(centre + reach, 1) } else { last };
+    let value = known.velocity_range_kms.as_ref().map_or((from, to), |given| given.value);
+    let measured = match inside {
+        (true, true) => "the line, to 3 standard deviations beyond vsini, and continuum on both sides",
+        _ => "the profiles, which hold little or no continuum beside the line",
+    };
+    let (source, remark) = origin(&known.velocity_range_kms, measured);
+    ledger.note("observations.velocity_range_kms", format!("[{}, {}]", value.0, value.1), "km/s", source, remark);
+    value
+}

@@ -1,0 +1,247 @@
+//! Tries a draft out: whether a map reaches its target chi2 with errors as the continuum has them, without a planet or
+//! with the best orbit that a search finds, and what is likely to be wrong if none does.
+
+use super::digits::rounded;
+use super::values::Values;
+use super::{Known, Place, ProposalError, to_json};
+use crate::data::config::{self, Automatic, ConfigError, Draft, VelocityJitter};
+use crate::data::diagnosis::{Diagnosis, Reason};
+use crate::data::scene::Scene;
+use crate::data::search::{self, SearchError, SearchSettings};
+use crate::posterior::noise::MeasuredErrors;
+use crate::posterior::objective::{Parameter, Reference, ReferenceError};
+use crate::star::BrightnessModel;
+use crate::star::observation::Observations;
+use std::path::Path;
+
+/// Stands in for a rotation period that is still to be given, so that everything else is checked (d).
+const STAND_IN_D: f64 = 1.0;
+
+/// Errors that a map needs may be larger by this than those that it is hoped to do with.
+const AS_GOOD: f64 = 0.8;
+
+/// Where errors have to be larger than those of the continuum by more than this, and nothing that is tried helps, they
+/// are not at fault: the model is.
+const MOST_MISFIT: f64 = 5.0;
+
+/// More of a star is hardly ever spotted in a maximum-entropy map.
+const MANY_SPOTS: f64 = 0.25;
+
+/// Profiles in units of their continuum, errors as quoted.
+#[derive(Clone, Copy)]
+pub(super) struct Profiles<'a> {
+    pub whole: &'a Observations,
+    /// Within the draft's velocity range.
+    pub cut: &'a Observations,
+}
+
+/// What became of it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Trial {
+    /// How it ended.
+    pub end: End,
+    /// What the profiles say of their errors, where that is left to them.
+    pub errors: Option<MeasuredErrors>,
+    /// Why no map fits as well as the errors promise, if none does.
+    pub diagnosis: Option<Diagnosis>,
+    /// Whether the start is an orbit, since there is no fit without one.
+    pub orbit: bool,
+    /// Whether the measured vsini stands in place of the given one, with which nothing fits.
+    pub measured_vsini: bool,
+}
+
+/// How it ended.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum End {
+    /// It was not tried: there is no rotation period.
+    Untried,
+    /// A map reaches the target.
+    Reached {
+        /// How spotted the star is then.
+        spottedness: f64,
+    },
+    /// None does, and none will: why.
+    Failed(String),
+}
+
+/// The key of the velocity zero points.
+const JITTER: &str = "observations.velocity_jitter_kms";
+
+/// One draft, tried.
+struct Attempt {
+    /// The draft with its profiles; `None` where their errors cannot be measured.
+    scene: Option<Scene>,
+    reached: Result<f64, String>,
+    /// Whether errors are larger than those of the continuum, or than those given would have to be, because no map
+    /// fits.
+    misfits: bool,
+    /// By how much; 1 where they do not.
+    misfit: f64,
+}
+
+/// Tries `draft` on its profiles. Changes the draft's start where only an orbit makes a map fit, and vsini where the
+/// given one is far from that of the profiles and no map fits with it. No orbit is searched for with such a vsini.
+///
+/// # Errors
+/// Given values that make no sense; a model so far from the profiles that nothing helps.
+pub(super) fn run(
+    draft: &mut Draft,
+    Place { config, list, .. }: &Place,
+    profiles: Profiles,
+    values: &Values,
+    known: &Known,
+) -> Result<Trial, ProposalError> {
+    let mut trial = Trial { end: End::Untried, errors: None, diagnosis: None, orbit: false, measured_vsini: false };
+    if draft.rotation_period_d.is_none() {
+        let stand_in = Draft {
+            rotation_period_d: Some(STAND_IN_D),
+            sigma_scale: Automatic::Fixed(1.0),
+            velocity_jitter: VelocityJitter::default(),
+            ..draft.clone()
+        };
+        scene(&stand_in, config, profiles)?;
+        return Ok(trial);
+    }
+    let mut attempt = match attempt_of(draft, config, profiles) {
+        // few profiles do not tell how much their zero points scatter
+        Err(ProposalError::Config(ConfigError::Key { key, .. })) if key == JITTER => {
+            draft.velocity_jitter = VelocityJitter::default();
+            attempt_of(draft, config, profiles)?
+        }
+        attempt => attempt?,
+    };
+    if attempt.misfits && values.is_another_star(known) {
+        let measured = Draft { vsini_kms: rounded(values.look.unspotted.vsini_kms, 1), ..draft.clone() };
+        let other = attempt_of(&measured, config, profiles)?;
+        if other.misfit < AS_GOOD * attempt.misfit {
+            (*draft, attempt, trial.measured_vsini) = (measured, other, true);
+        }
+    }
+    if attempt.misfits && (trial.measured_vsini || !values.is_another_star(known)) {
+        let mut with_orbit = draft.clone();
+        if search(&mut with_orbit, config, profiles, attempt.scene.as_ref())? {
+            let other = attempt_of(&with_orbit, config, profiles)?;
+            if other.reached.is_ok() && (!other.misfits || other.misfit < AS_GOOD * attempt.misfit) {
+                (*draft, attempt, trial.orbit) = (with_orbit, other, true);
+            }
+        }
+    }
+    if attempt.misfits {
+        trial.diagnosis = attempt.scene.as_ref().and_then(|scene| Diagnosis::of(scene, Some(profiles.whole)));
+    }
+    let hopeless = |diagnosis: &&Diagnosis| diagnosis.reason == Reason::Errors && attempt.misfit > MOST_MISFIT;
+    if let Some(diagnosis) = trial.diagnosis.as_ref().filter(hopeless) {
+        let (factor, reason) = (attempt.misfit, diagnosis.text.clone());
+        return Err(ProposalError::OutOfReach { list: list.into(), factor, reason });
+    }
+    trial.errors = attempt.scene.and_then(|scene| scene.measured.errors);
+    trial.end = match attempt.reached {
+        Ok(spottedness) => End::Reached { spottedness },
+        Err(error) => End::Failed(error),
+    };
+    Ok(trial)
+}
+
+/// The draft as commands see it.
+fn scene(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Scene, ProposalError> {
+    let settings = config::from_json(to_json(draft, config)?.as_bytes(), config)?;
+    Ok(Scene::of_whole(settings, profiles.whole, profiles.cut)?)
+}
+
+/// The map at the draft's values.
+fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attempt, ProposalError> {
+    let scene = match scene(draft, config, profiles) {
+        Ok(scene) => scene,
+        // what is measured, not what is given
+        Err(ProposalError::Config(ConfigError::Key { key, problem, .. }))
+            if key == "observations.sigma_scale"
+                || key == JITTER && draft.velocity_jitter != VelocityJitter::Fitted =>
+        {
+            let reached = Err(format!("{key}: {problem}"));
+            return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
+        }
+        Err(error) => return Err(error),
+    };
+    let target = scene.settings.imaging.chi2_target.value();
+    let reference = Reference::build(&scene.imager, scene.settings.values, target);
+    let floor = match &reference {
+        Err(ReferenceError::TargetBelowFloor { target, floor }) => Some((floor / target).sqrt()),
+        _ => None,
+    };
+    let errors = scene.measured.errors.as_ref();
+    let larger = errors.and_then(|errors| errors.misfit()).map_or(1.0, |misfit| misfit.max(1.0));
+    Ok(Attempt {
+        misfits: floor.is_some() || errors.is_some_and(MeasuredErrors::is_misfit),
+        misfit: larger * floor.unwrap_or(1.0),
+        reached: reference.map(|reference| reference.solution.spottedness).map_err(|error| error.to_string()),
+        scene: Some(scene),
+    })
+}
+
+/// Puts the best orbit and systemic velocity into the draft, searched for with errors as the continuum has them;
+/// whether there are any.
+fn search(draft: &mut Draft, config: &Path, profiles: Profiles, tried: Option<&Scene>) -> Result<bool, ProposalError> {
+    let measured = tried.and_then(|scene| scene.measured.errors.as_ref());
+    let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
+    let sigma_scale = by_continuum.map_or(draft.sigma_scale, Automatic::Fixed);
+    let Scene { settings, imager, space, .. } = scene(&Draft { sigma_scale, ..draft.clone() }, config, profiles)?;
+    let found = match search::find(&imager, &space, SearchSettings::new(&settings), &|_| ()) {
+        Ok(found) => found,
+        // what matters is that there is no map
+        Err(SearchError::Reference(_) | SearchError::Optimise(_)) => return Ok(false),
+    };
+    let best = space.values_at(&found.optimum.theta);
+    // rounding does not lead out of the priors
+    let within = |parameter, (min, max): (f64, f64)| rounded(best[parameter], 4).clamp(min, max);
+    let k = within(Parameter::K, (0.0, draft.k_max_kms));
+    let period = within(Parameter::PorbOverProt, draft.porb_over_prot_range);
+    draft.orbit = (k, period, rounded(best[Parameter::Phi], 4).rem_euclid(1.0));
+    draft.vsys_kms = within(Parameter::Vsys, draft.vsys_range_kms);
+    Ok(true)
+}
+
+impl Trial {
+    /// Whether a map can be made of the config as it is.
+    pub fn is_complete(&self) -> bool {
+        matches!(self.end, End::Reached { .. })
+    }
+
+    /// It in words.
+    pub fn notes(&self, draft: &Draft) -> Vec<String> {
+        let vsini = self.measured_vsini.then(|| {
+            format!(
+                "no map fits with the given vsini, and one does much better with that of the mean profile, which is \
+                written: {} km/s",
+                draft.vsini_kms
+            )
+        });
+        let misfit = self.diagnosis.as_ref().map(|diagnosis| {
+            let larger = self.errors.as_ref().and_then(MeasuredErrors::misfit).map_or_else(String::new, |misfit| {
+                format!("; as it is, \"auto\" makes the errors {misfit:.1} times those of the continuum")
+            });
+            format!("the model does not fit as well as the errors promise: {}{larger}", diagnosis.text)
+        });
+        vsini.into_iter().chain(misfit).chain([self.ending(draft)]).collect()
+    }
+
+    fn ending(&self, draft: &Draft) -> String {
+        match &self.end {
+            End::Untried => "without a rotation period no command takes the config".into(),
+            End::Reached { spottedness } => {
+                let orbit =
+                    if self.orbit { ", but only with an orbit; `periodogram` says what it is worth" } else { "" };
+                let (percent, spots) = (100.0 * spottedness, draft.imaging.brightness == BrightnessModel::Spots);
+                let many = match spots && *spottedness > MANY_SPOTS {
+                    true => "; that is a lot: are vsini, inclination and line right?",
+                    false => "",
+                };
+                let what = match spots {
+                    true => format!("spots on {percent:.1} % of the star fit"),
+                    false => format!("a brightness that varies by {percent:.1} % rms fits"),
+                };
+                format!("tried out: {what} the profiles{orbit}{many}")
+            }
+            End::Failed(error) => format!("no command takes the config as it is: {error}"),
+        }
+    }
+}

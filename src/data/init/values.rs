@@ -1,0 +1,384 @@
+//! The values of a proposal: measured, given, or assumed.
+
+use super::digits::{rounded, significant};
+use super::ledger::{Ledger, Source};
+use super::{Given, Known, line};
+use crate::data::config::{Automatic, Draft, EquivalentWidth, ImagingSettings, VelocityJitter};
+use crate::numerics::units::instrumental_sigma_kms;
+use crate::planets::periodogram::{Frequencies, FrequencySettings};
+use crate::posterior::first_look::{Continuum, FirstLook, LineModel, LookError};
+use crate::posterior::noise::MeasuredErrors;
+use crate::posterior::nuisances::LineAndContinuum;
+use crate::star::BrightnessModel;
+use crate::star::observation::Observations;
+
+/// What is assumed where nobody says otherwise.
+mod assumed {
+    /// Inclination (degrees): half of all stars are seen at less.
+    pub const INCLINATION_DEG: f64 = 60.0;
+    /// Temperatures (K) of a young K dwarf and its spots.
+    pub const PHOTOSPHERE_K: f64 = 5000.0;
+    pub const SPOT_K: f64 = 3500.0;
+    /// Wavelength (nm) that LSD profiles of the visible are often normalised to.
+    pub const WAVELENGTH_NM: f64 = 550.0;
+    /// Coefficient of linear limb darkening of a cool dwarf in the visible.
+    pub const LIMB_DARKENING: f64 = 0.65;
+    /// Standard deviation (km/s) of the lines of a dwarf that does not rotate.
+    pub const LINE_SIGMA_KMS: f64 = 2.5;
+    /// Resolving power of ESPaDOnS and NARVAL.
+    pub const RESOLVING_POWER: f64 = 65_000.0;
+    /// Periods over the rotation period, where that is not known.
+    pub const PORB_OVER_PROT: (f64, f64) = (0.5, 5.0);
+}
+
+/// The prior of the systemic velocity reaches that many errors, and this far (km/s) at least.
+const VSYS_REACH: (f64, f64) = (6.0, 0.5);
+
+/// Given and measured vsini that differ by more than that many errors are worth a note.
+const DISAGREEMENT: f64 = 3.0;
+
+/// By more than that many, no orbit makes up for it.
+const ANOTHER_STAR: f64 = 5.0;
+
+/// Differential rotation of the Sun (rad/d), and the angle (rad) between equator and pole from which a map shows it.
+const SOLAR_DOMEGA_RAD_D: f64 = 0.055;
+const SHEAR_RAD: f64 = 0.2;
+
+/// Profiles that show an orbit.
+const FEWEST_FOR_AN_ORBIT: usize = 3;
+
+/// What is needed before the velocity range is cut.
+pub(super) struct Values {
+    pub look: FirstLook,
+    pub velocity_range_kms: (f64, f64),
+    /// Level of the continuum that the profiles were divided by, if they were.
+    pub continuum_level: Option<f64>,
+    profiles: usize,
+    line_sigma_kms: f64,
+    resolving_power: f64,
+    limb_darkening: f64,
+}
+
+impl Values {
+    /// A look at all that was observed, and where the line is in it. Profiles whose continuum is elsewhere than at 1
+    /// are divided by its level.
+    pub fn measure(whole: &mut Observations, known: &Known, ledger: &mut Ledger) -> Result<Self, LookError> {
+        let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
+        let resolving_power = ledger.settle(
+            ("instrument.resolving_power", ""),
+            &known.resolving_power,
+            assume(assumed::RESOLVING_POWER, "--resolving-power"),
+        );
+        let limb_darkening = ledger.settle(
+            ("star.limb_darkening", ""),
+            &known.limb_darkening,
+            assume(assumed::LIMB_DARKENING, "coefficient of the linear law; --limb-darkening"),
+        );
+        if let Some(given) = &known.line_gamma_kms {
+            ledger.note("star.line.gamma_kms", given.value, "km/s", Source::Given, given.by.as_str());
+        }
+        let sigma_kms = known.line_sigma_kms.as_ref().map_or(assumed::LINE_SIGMA_KMS, |given| given.value);
+        let model = LineModel {
+            limb_darkening,
+            sigma_kms: known.line_width_kms(sigma_kms),
+            instrumental_sigma_kms: instrumental_sigma_kms(resolving_power),
+            is_guess: known.line_sigma_kms.is_none(),
+        };
+        let mut look = FirstLook::at(whole, model)?;
+        let mut continuum_level = None;
+        if let Some(continuum) = look.continuum.filter(Continuum::is_off) {
+            let level = rounded(continuum.level, 4);
+            *whole = whole.clone().over_continuum(level);
+            look = FirstLook::at(whole, model)?;
+            continuum_level = Some(level);
+        }
+        line::note_continuum(&look, continuum_level, ledger);
+        let line_sigma_kms = line::sigma_kms(&look, model, known, ledger);
+        let velocity_range_kms = line::velocity_range(&look, model, whole.step_kms, known, ledger);
+        let profiles = whole.profiles.len();
+        Ok(Values {
+            look,
+            velocity_range_kms,
+            continuum_level,
+            profiles,
+            line_sigma_kms,
+            resolving_power,
+            limb_darkening,
+        })
+    }
+
+    /// The config's values, from the profiles within the velocity range.
+    pub fn draft(&self, cut: &Observations, known: &Known, ledger: &mut Ledger) -> Draft {
+        let look = &self.look;
+        let assume = |value: f64, remark: &'static str| (value, Source::Assumed, remark);
+        let rotation_period_d = self.rotation_period(known, ledger);
+        let mid_d = rounded(0.5 * (look.span_d.0 + look.span_d.1), 3);
+        let epoch = (mid_d, Source::Data, "middle of the observations; --epoch");
+        let inclination = assume(assumed::INCLINATION_DEG, "half of all stars are seen at less; --inclination");
+        let by_fit = format!("+- {:.1}, flanks of the mean profile; --vsini", look.vsini_error_kms);
+        let vsini = (rounded(look.unspotted.vsini_kms, 1), Source::Data, by_fit.as_str());
+        let by_centre = format!("+- {:.2}, centre of the mean profile", look.centre_error_kms);
+        let vsys = (rounded(look.unspotted.centre_kms, 2), Source::Data, by_centre.as_str());
+        let vsys_kms = ledger.settle(("star.vsys_kms", "km/s"), &known.vsys_kms, vsys);
+        let (porb_over_prot, porb_over_prot_range) = self.periods(cut, rotation_period_d, ledger);
+        Draft {
+            schema: None,
+            observations: Default::default(),
+            rotation_period_d,
+            epoch_d: ledger.settle(("star.epoch_d", "d"), &known.epoch_d, epoch),
+            inclination_deg: ledger.settle(("star.inclination_deg", "deg"), &known.inclination_deg, inclination),
+            vsini_kms: ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini),
+            vsys_kms,
+            domega_rad_d: ledger.settle(
+                ("star.domega_rad_d", "rad/d"),
+                &known.domega_rad_d,
+                assume(0.0, "no differential rotation; --domega"),
+            ),
+            limb_darkening: self.limb_darkening,
+            photosphere_k: ledger.settle(
+                ("star.photosphere_k", "K"),
+                &known.photosphere_k,
+                assume(assumed::PHOTOSPHERE_K, "--photosphere"),
+            ),
+            spot_k: ledger.settle(("star.spot_k", "K"), &known.spot_k, assume(assumed::SPOT_K, "--spot")),
+            wavelength_nm: ledger.settle(
+                ("star.wavelength_nm", "nm"),
+                &known.wavelength_nm,
+                assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --wavelength"),
+            ),
+            line_sigma_kms: self.line_sigma_kms,
+            line_gamma_kms: known.line_gamma_kms.as_ref().map(|given| given.value),
+            equivalent_width: equivalent_width(cut, known, ledger),
+            resolving_power: self.resolving_power,
+            velocity_range_kms: self.velocity_range_kms,
+            sigma_scale: known.sigma_scale.as_ref().map_or(Automatic::Auto, |given| Automatic::Fixed(given.value)),
+            continuum_level: self.continuum_level,
+            velocity_jitter: VelocityJitter::Fitted,
+            imaging: ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) },
+            orbit: (0.0, porb_over_prot, 0.0),
+            porb_over_prot_range,
+            k_max_kms: k_max(cut, ledger),
+            vsys_range_kms: self.vsys_range(vsys_kms, ledger),
+        }
+    }
+
+    fn rotation_period(&self, known: &Known, ledger: &mut Ledger) -> Option<f64> {
+        const KEY: &str = "star.rotation_period_d";
+        match &known.rotation_period_d {
+            Some(given) => ledger.note(KEY, given.value, "d", Source::Given, given.by.as_str()),
+            None => ledger.note(KEY, "null", "d", Source::Missing, "--rotation-period, or by hand in the config"),
+        }
+        known.rotation_period_d.as_ref().map(|given| given.value)
+    }
+
+    /// Start and prior of `Porb/Prot`: the periods that `periodogram` searches, up to one orbit in the whole time base.
+    fn periods(&self, cut: &Observations, rotation: Option<f64>, ledger: &mut Ledger) -> (f64, (f64, f64)) {
+        const KEY: &str = "parameters.porb_over_prot";
+        let searched = rotation.filter(|period| *period > 0.0).and_then(|period| {
+            let cycles: Vec<f64> = cut.times_d().iter().map(|time| time / period).collect();
+            let frequencies = Frequencies::new(&cycles, period, FrequencySettings::default()).ok()?;
+            let shortest = 1.0 / frequencies.per_cycle.last()?;
+            Some((significant(shortest, f64::ceil), significant(frequencies.time_base_cycles, f64::floor)))
+        });
+        let usable = searched.filter(|(min, max)| min < max);
+        let (min, max) = usable.unwrap_or(assumed::PORB_OVER_PROT);
+        let shown = format!("{min} to {max}");
+        match (usable, rotation) {
+            (Some(_), Some(period)) => {
+                let days = format!("log-uniform; {:.3} to {:.3} d, from the times", min * period, max * period);
+                ledger.note(KEY, shown, "", Source::Data, days);
+            }
+            _ => ledger.note(KEY, shown, "", Source::Assumed, "log-uniform; give what the times can show"),
+        }
+        let start = if (min..=max).contains(&2.0) { 2.0 } else { significant((min * max).sqrt(), f64::round) };
+        (start.clamp(min, max), (min, max))
+    }
+
+    /// Levels of single continua, where these wander by more than their noise.
+    fn nuisances(&self, ledger: &mut Ledger) -> Option<LineAndContinuum> {
+        let wandering = self.look.continuum.and_then(|continuum| continuum.wandering)?;
+        let continuum_offset = significant(wandering, f64::ceil);
+        let remark = format!("continua of single profiles scatter by {wandering:.1e}, more than their noise explains");
+        ledger.note("imaging.nuisances.continuum_offset", continuum_offset, "", Source::Data, remark);
+        Some(LineAndContinuum { continuum_offset, ..LineAndContinuum::default() })
+    }
+
+    /// The factor on the errors with its reason; `measured` is what "auto" came to.
+    pub fn note_errors(&self, known: &Known, measured: Option<&MeasuredErrors>, ledger: &mut Ledger) {
+        let noise = &self.look.noise;
+        let auto = match (measured, noise.scatter) {
+            (Some(measured), _) => format!("measured by every command: {}", measured.line()),
+            (None, Some(scatter)) => {
+                format!(
+                    "measured by every command: quoted errors are {:.1e}, the continuum scatters by {scatter:.1e}",
+                    noise.quoted
+                )
+            }
+            (None, None) => {
+                format!("measured by every command: quoted errors are {:.1e}, by a map alone", noise.quoted)
+            }
+        };
+        let given =
+            known.sigma_scale.as_ref().map(|given| Given { value: given.value.to_string(), by: given.by.clone() });
+        ledger.settle(("observations.sigma_scale", ""), &given, ("auto".to_owned(), Source::Data, &auto));
+    }
+
+    /// The scatter of zero points with its reason.
+    pub fn note_jitter(jitter: VelocityJitter, ledger: &mut Ledger) {
+        const KEY: &str = "observations.velocity_jitter_kms";
+        match jitter {
+            VelocityJitter::Fitted => {
+                let remark = "measured by every command: zero points of single profiles, counted as noise";
+                ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
+            }
+            VelocityJitter::Known(kms) => {
+                let remark = "the profiles do not tell how much their zero points scatter";
+                ledger.note(KEY, kms, "km/s", Source::Assumed, remark);
+            }
+        }
+    }
+
+    fn vsys_range(&self, vsys_kms: f64, ledger: &mut Ledger) -> (f64, f64) {
+        let (errors, least) = VSYS_REACH;
+        let (centre, reach) = (self.look.unspotted.centre_kms, (errors * self.look.centre_error_kms).max(least));
+        let min = rounded(vsys_kms.min(centre) - reach, 1);
+        let max = rounded(vsys_kms.max(centre) + reach, 1);
+        ledger.note(
+            "parameters.vsys_kms",
+            format!("{min} to {max}"),
+            "km/s",
+            Source::Data,
+            "uniform; around the centre",
+        );
+        (min, max)
+    }
+
+    /// What was observed.
+    pub fn observed(&self, whole: &Observations) -> String {
+        let (first, last) = self.look.span_d;
+        let bins = whole.len() / whole.profiles.len().max(1);
+        format!(
+            "{} profiles of {bins} bins of {:.3} km/s, from {first:.3} to {last:.3} ({:.3} d); S/N {:.0} a bin by \
+            their errors",
+            whole.profiles.len(),
+            whole.step_kms,
+            last - first,
+            1.0 / self.look.noise.quoted
+        )
+    }
+
+    /// By how many of its errors the given vsini is off the measured one; 0 if none is given.
+    fn disagreement(&self, known: &Known) -> f64 {
+        let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
+        known.vsini_kms.as_ref().map_or(0.0, |given| (given.value - measured).abs() / error)
+    }
+
+    /// Whether the given vsini is so wrong that it is not worth searching for an orbit.
+    pub fn is_another_star(&self, known: &Known) -> bool {
+        self.disagreement(known) > ANOTHER_STAR
+    }
+
+    /// Given values that the profiles do not agree with, and an assumed one that matters.
+    pub fn notes(&self, known: &Known) -> Vec<String> {
+        let (measured, error) = (self.look.unspotted.vsini_kms, self.look.vsini_error_kms);
+        let disagrees = self.disagreement(known) > DISAGREEMENT;
+        let vsini = known.vsini_kms.as_ref().filter(|_| disagrees).map(|given| {
+            format!("vsini is given as {} km/s, the mean profile looks like {measured:.1} +- {error:.1}", given.value)
+        });
+        let days = self.look.span_d.1 - self.look.span_d.0;
+        let shear = SOLAR_DOMEGA_RAD_D * days;
+        let rigid = known.domega_rad_d.is_none() && shear > SHEAR_RAD;
+        let domega = rigid.then(|| {
+            format!(
+                "in {days:.1} d the equator of a star like the Sun gains {:.0} degrees on its poles: give --domega, \
+                or a prior of \
+                 domega_rad_d",
+                shear.to_degrees()
+            )
+        });
+        let few = (self.profiles < FEWEST_FOR_AN_ORBIT).then(|| {
+            format!(
+                "{} profiles make a map, and show no orbit: `periodogram` and `sample` take {FEWEST_FOR_AN_ORBIT} or \
+                more",
+                self.profiles
+            )
+        });
+        vsini.into_iter().chain(domega).chain(few).collect()
+    }
+}
+
+pub(super) fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, String) {
+    match given {
+        Some(given) => (Source::Given, given.by.clone()),
+        None => (Source::Data, otherwise.to_owned()),
+    }
+}
+
+fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> EquivalentWidth {
+    let auto = format!("{:.3} km/s in this range", cut.mean_equivalent_width_kms());
+    let value = known.equivalent_width.as_ref().map_or(EquivalentWidth::Auto, |given| given.value);
+    let (source, by) = origin(&known.equivalent_width, "");
+    let (shown, unit, remark) = match value {
+        EquivalentWidth::Auto => {
+            ("auto".to_owned(), "", [by, auto].join(if source == Source::Given { "; " } else { "" }))
+        }
+        EquivalentWidth::Fixed(width) => (width.to_string(), "km/s", format!("{by}; the profiles have {auto}")),
+    };
+    ledger.note("star.line.equivalent_width_kms", shown, unit, source, remark);
+    value
+}
+
+fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
+    let brightness = known.brightness.as_ref().map_or(BrightnessModel::BrightAndDark, |given| given.value);
+    let mut imaging = ImagingSettings { brightness, ..ImagingSettings::default() };
+    let (source, remark) = match &known.brightness {
+        Some(given) => (Source::Given, given.by.as_str()),
+        None => (Source::Assumed, "a star with faculae is no map of spots, and what does not fit looks like an orbit"),
+    };
+    ledger.note("imaging.brightness", brightness.name(), "", source, remark);
+    if let Some(given) = &known.pixels {
+        imaging.pixels = given.value;
+        ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());
+    }
+    if let Some(given) = &known.chi2_target {
+        imaging.chi2_target = Automatic::Fixed(given.value);
+        ledger.note("imaging.chi2_target", given.value, "", Source::Given, given.by.as_str());
+    }
+    imaging
+}
+
+/// Upper bound of K: as far as the lines are seen to move from peak to peak, twice of what moves them if that is a
+/// planet.
+fn k_max(cut: &Observations, ledger: &mut Ledger) -> f64 {
+    const PHOTON_ERRORS: f64 = 5.0;
+    let moments = cut.first_moments();
+    let extreme = |f: fn(f64, f64) -> f64| moments.iter().map(|m| m.value_kms).reduce(f).unwrap_or(f64::NAN);
+    let photons = PHOTON_ERRORS * moments.iter().map(|m| m.sigma_kms).sum::<f64>() / moments.len() as f64;
+    let max = significant((extreme(f64::max) - extreme(f64::min)).max(photons), f64::ceil);
+    let rms = {
+        let mean = moments.iter().map(|m| m.value_kms).sum::<f64>() / moments.len() as f64;
+        (moments.iter().map(|m| (m.value_kms - mean).powi(2)).sum::<f64>() / moments.len() as f64).sqrt()
+    };
+    let remark = format!("uniform; as far as first moments move from peak to peak (rms {rms:.3})");
+    ledger.note("parameters.k_kms", format!("0 to {max}"), "km/s", Source::Data, remark);
+    max
+}
+
+/// The orbit that the config starts from, and the systemic velocity that comes with it.
+pub(super) fn note_orbit(draft: &Draft, found: bool, ledger: &mut Ledger) {
+    let (k, period, phi) = draft.orbit;
+    match found {
+        true => {
+            let shown = format!("{k}, {period}, {phi}");
+            ledger.note(
+                "planet.k_kms, ...",
+                shown,
+                "",
+                Source::Data,
+                "start: K (km/s), Porb/Prot, phi of the best orbit",
+            );
+            ledger.replace("star.vsys_kms", draft.vsys_kms, "start: with the best orbit");
+        }
+        false => ledger.note("planet.k_kms", k, "km/s", Source::Assumed, "start: no planet"),
+    }
+}

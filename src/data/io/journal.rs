@@ -1,0 +1,255 @@
+//! The journal: `chain.jsonl`, one line per step, ensemble and walker, appended by whole steps.
+
+use super::lines::{self, LineFile, Refusal};
+use crate::sampling::chain::{Chain, ChainError, MoveKind, Record, Shape};
+use crate::sampling::log_density::Status;
+use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Serialize, Serializer};
+use std::path::Path;
+
+pub use super::lines::JournalError;
+
+/// Keys of a line that are not parameters.
+const KEYS: [&str; 11] = [
+    "ensemble",
+    "step",
+    "walker",
+    "accepted",
+    "log_prob",
+    "spottedness",
+    "chi2",
+    "status",
+    "proposed",
+    "passes",
+    "move",
+];
+
+/// A journal open for appending, locked against other processes until it is dropped.
+#[derive(Debug)]
+pub struct Journal {
+    file: LineFile,
+    shape: Shape,
+    lines: usize,
+}
+
+impl Journal {
+    /// Makes a new, empty journal; one that is there already is emptied if `replace`, and refused otherwise.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`] (the file is there already, for one), [`JournalError::Locked`], [`JournalError::Name`].
+    pub fn create(path: &Path, shape: Shape, replace: bool) -> Result<Self, JournalError> {
+        check_names(&shape)?;
+        Ok(Journal { file: LineFile::create(path, replace)?, shape, lines: 0 })
+    }
+
+    /// Opens a journal to go on with it: reads the complete steps, and cuts the file after them.
+    ///
+    /// # Errors
+    /// Those of [`read`], and [`JournalError::Locked`]. The file is only cut when it can be read without error.
+    pub fn recover(path: &Path, shape: Shape) -> Result<(Self, Chain), JournalError> {
+        check_names(&shape)?;
+        let mut reader = StepReader::new(&shape);
+        let file = LineFile::recover(path, &mut |line| reader.take(line))?;
+        let chain = reader.chain;
+        let lines = chain.records().len();
+        Ok((Journal { file, shape, lines }, chain))
+    }
+
+    /// Appends one whole step and hands it to the operating system.
+    ///
+    /// # Errors
+    /// [`JournalError::Next`] when it is not the next step, whole and finite (nothing is written then);
+    /// [`JournalError::Io`].
+    pub fn append(&mut self, step: &[Record]) -> Result<(), JournalError> {
+        let refuse =
+            |error: ChainError| JournalError::Next { path: self.file.path().into(), problem: error.to_string() };
+        if step.len() != self.shape.size() {
+            return Err(refuse(ChainError::StepSize { expected: self.shape.size(), found: step.len() }));
+        }
+        for (index, record) in step.iter().enumerate() {
+            self.shape.check(self.lines + index, record).map_err(refuse)?;
+        }
+        self.file.append(step.iter().map(|record| Line { names: &self.shape.names, record }))?;
+        self.lines += step.len();
+        Ok(())
+    }
+}
+
+/// Reads the complete steps of a journal and leaves the file alone; it may be being written meanwhile.
+///
+/// # Errors
+/// [`JournalError::Io`]; [`JournalError::Line`] for anything wrong but a torn tail.
+pub fn read(path: &Path, shape: &Shape) -> Result<Chain, JournalError> {
+    check_names(shape)?;
+    let mut reader = StepReader::new(shape);
+    lines::read(path, &mut |line| reader.take(line))?;
+    Ok(reader.chain)
+}
+
+/// Gathers lines into whole steps.
+struct StepReader {
+    chain: Chain,
+    step: Vec<Record>,
+}
+
+impl StepReader {
+    fn new(shape: &Shape) -> Self {
+        StepReader { chain: Chain::new(shape.clone()), step: Vec::with_capacity(shape.size()) }
+    }
+
+    /// Takes the next line; whether a step is whole with it.
+    fn take(&mut self, line: &[u8]) -> Result<bool, Refusal> {
+        let shape = self.chain.shape();
+        let record = parse_line(line, &shape.names)?;
+        let index = self.chain.records().len() + self.step.len();
+        shape.check(index, &record).map_err(|error| error.to_string())?;
+        self.step.push(record);
+        if self.step.len() < shape.size() {
+            return Ok(false);
+        }
+        self.chain.push_step(&self.step).map_err(|error| error.to_string())?;
+        self.step.clear();
+        Ok(true)
+    }
+}
+
+fn parse_line(text: &[u8], names: &[String]) -> Result<Record, serde_json::Error> {
+    let mut deserializer = serde_json::Deserializer::from_slice(text);
+    let record = LineSeed { names }.deserialize(&mut deserializer)?;
+    deserializer.end()?;
+    Ok(record)
+}
+
+fn check_names(shape: &Shape) -> Result<(), JournalError> {
+    let taken = |(i, name): &(usize, &String)| KEYS.contains(&name.as_str()) || shape.names[..*i].contains(name);
+    match shape.names.iter().enumerate().find(taken) {
+        Some((_, name)) => Err(JournalError::Name { name: name.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// A record on its way to text.
+struct Line<'a> {
+    names: &'a [String],
+    record: &'a Record,
+}
+
+impl Serialize for Line<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let record = self.record;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("ensemble", &record.ensemble)?;
+        map.serialize_entry("step", &record.step)?;
+        map.serialize_entry("walker", &record.walker)?;
+        map.serialize_entry("accepted", &record.accepted)?;
+        map.serialize_entry("log_prob", &record.log_prob)?;
+        for (name, value) in self.names.iter().zip(&record.theta) {
+            map.serialize_entry(name, value)?;
+        }
+        map.serialize_entry("spottedness", &record.spottedness)?;
+        map.serialize_entry("chi2", &record.chi2)?;
+        map.serialize_entry("status", &record.status)?;
+        map.serialize_entry("proposed", &record.proposed)?;
+        map.serialize_entry("passes", &record.passes)?;
+        if let Some(by) = record.by {
+            map.serialize_entry("move", &by)?;
+        }
+        map.end()
+    }
+}
+
+/// Reads a line whose parameters have these names: each key once, none missing, none unknown.
+#[derive(Clone, Copy)]
+struct LineSeed<'a> {
+    names: &'a [String],
+}
+
+impl<'de> DeserializeSeed<'de> for LineSeed<'_> {
+    type Value = Record;
+    fn deserialize<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<Record, D::Error> {
+        deserializer.deserialize_map(self)
+    }
+}
+
+/// A line, as far as it is read.
+#[derive(Default)]
+struct Slots {
+    counts: [Option<usize>; 3],
+    accepted: Option<bool>,
+    numbers: [Option<f64>; 3],
+    status: [Option<Status>; 2],
+    passes: Option<u32>,
+    by: Option<MoveKind>,
+    theta: Vec<Option<f64>>,
+}
+
+impl<'de> Visitor<'de> for LineSeed<'_> {
+    type Value = Record;
+
+    fn expecting(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        formatter.write_str("a line of a chain")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Record, A::Error> {
+        let mut slots = Slots { theta: vec![None; self.names.len()], ..Slots::default() };
+        while let Some(key) = map.next_key::<String>()? {
+            match key.as_str() {
+                "ensemble" => fill(&mut slots.counts[0], &key, &mut map)?,
+                "step" => fill(&mut slots.counts[1], &key, &mut map)?,
+                "walker" => fill(&mut slots.counts[2], &key, &mut map)?,
+                "accepted" => fill(&mut slots.accepted, &key, &mut map)?,
+                "log_prob" => fill(&mut slots.numbers[0], &key, &mut map)?,
+                "spottedness" => fill(&mut slots.numbers[1], &key, &mut map)?,
+                "chi2" => fill(&mut slots.numbers[2], &key, &mut map)?,
+                "status" => fill(&mut slots.status[0], &key, &mut map)?,
+                "proposed" => fill(&mut slots.status[1], &key, &mut map)?,
+                "passes" => fill(&mut slots.passes, &key, &mut map)?,
+                "move" => fill(&mut slots.by, &key, &mut map)?,
+                name => match self.names.iter().position(|known| known == name) {
+                    Some(index) => fill(&mut slots.theta[index], &key, &mut map)?,
+                    None => {
+                        map.next_value::<IgnoredAny>()?;
+                        return Err(A::Error::custom(format!("unknown key `{key}`")));
+                    }
+                },
+            }
+        }
+        slots.record(self.names).map_err(|name| A::Error::custom(format!("missing key `{name}`")))
+    }
+}
+
+impl Slots {
+    /// The record, or the key that is missing.
+    fn record(self, names: &[String]) -> Result<Record, &str> {
+        let theta: Result<Vec<f64>, &str> =
+            self.theta.iter().zip(names).map(|(value, name)| value.ok_or(name.as_str())).collect();
+        Ok(Record {
+            ensemble: self.counts[0].ok_or("ensemble")?,
+            step: self.counts[1].ok_or("step")?,
+            walker: self.counts[2].ok_or("walker")?,
+            accepted: self.accepted.ok_or("accepted")?,
+            log_prob: self.numbers[0].ok_or("log_prob")?,
+            theta: theta?,
+            spottedness: self.numbers[1].ok_or("spottedness")?,
+            chi2: self.numbers[2].ok_or("chi2")?,
+            status: self.status[0].ok_or("status")?,
+            proposed: self.status[1].ok_or("proposed")?,
+            passes: self.passes.ok_or("passes")?,
+            by: self.by,
+        })
+    }
+}
+
+/// Puts the next value into its slot, once.
+fn fill<'de, T: Deserialize<'de>, A: MapAccess<'de>>(
+    slot: &mut Option<T>,
+    key: &str,
+    map: &mut A,
+) -> Result<(), A::Error> {
+    let value = map.next_value().map_err(|error| A::Error::custom(format!("`{key}`: {error}")))?;
+    match slot.replace(value) {
+        Some(_) => Err(A::Error::custom(format!("key `{key}` twice"))),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,200 @@
+//! Files of JSON lines that grow by whole blocks while something long is computed, and are gone on with after whatever
+//! stopped it.
+//!
+//! What a crash can leave is recovered: a torn last line and an incomplete last block are dropped. Anything else that
+//! is wrong is refused with file and line number; a bad line that any complete line follows is corruption, not a torn
+//! tail. While a process writes such a file it holds a lock on it.
+
+use super::atomic;
+use serde::Serialize;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// What can be wrong with a journal.
+#[derive(Debug, thiserror::Error)]
+pub enum JournalError {
+    /// The file cannot be opened, read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Another process is writing the file.
+    #[error("{}: another process is writing this run", path.display())]
+    Locked {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A line is wrong, and not because writing it was interrupted.
+    #[error("{}, line {line}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// What was to be written is not what comes next.
+    #[error("{}: {problem}", path.display())]
+    Next {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A parameter has the name of another key of a line, or of another parameter.
+    #[error("`{name}` cannot be the name of a parameter in a chain: it is taken")]
+    Name {
+        /// The name.
+        name: String,
+    },
+}
+
+/// Why a line is refused by whoever understands it.
+#[derive(Debug)]
+pub(super) struct Refusal {
+    problem: String,
+    /// Whether it may be what an interruption left of a line.
+    torn: bool,
+}
+
+impl From<serde_json::Error> for Refusal {
+    fn from(error: serde_json::Error) -> Self {
+        let text = error.to_string();
+        // "line 1", which JSON's own message ends with, would be misleading
+        let message = text.rfind(" at line ").map_or(text.as_str(), |end| &text[..end]);
+        Refusal { problem: format!("{message} (column {})", error.column()), torn: !error.is_data() }
+    }
+}
+
+impl From<String> for Refusal {
+    fn from(problem: String) -> Self {
+        Refusal { problem, torn: false }
+    }
+}
+
+/// Whether all that there is in `folder` of a computation is `lines`, still empty, and perhaps the `head` that says
+/// what it was begun with: it was stopped, or could not write, before its first result. Nothing is lost when it begins
+/// again.
+pub fn is_false_start(folder: &Path, head: Option<&str>, lines: &str) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else { return false };
+    let mut found = false;
+    for entry in entries {
+        let Ok(entry) = entry else { return false };
+        let name = entry.file_name();
+        let is_empty = entry.metadata().is_ok_and(|file| file.is_file() && file.len() == 0);
+        match name == lines && is_empty {
+            true => found = true,
+            false if atomic::is_temporary(&name) || head.is_some_and(|head| name == head) => {}
+            false => return false,
+        }
+    }
+    found
+}
+
+/// Takes the lines one by one, without their ends; says whether a block is whole with this one.
+pub(super) type TakeLine<'a> = &'a mut dyn FnMut(&[u8]) -> Result<bool, Refusal>;
+
+/// A file open for appending, locked against other processes until it is dropped.
+#[derive(Debug)]
+pub struct LineFile {
+    writer: BufWriter<File>,
+    path: PathBuf,
+}
+
+impl LineFile {
+    /// Makes a new, empty file; one that is there already is emptied if `replace`, and refused otherwise.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`] (the file is there already, for one), [`JournalError::Locked`].
+    pub fn create(path: &Path, replace: bool) -> Result<Self, JournalError> {
+        let mut options = OpenOptions::new();
+        options.read(true).write(true);
+        if replace {
+            options.create(true)
+        } else {
+            options.create_new(true)
+        };
+        let file = options.open(path).map_err(at(path))?;
+        lock(&file, path)?;
+        file.set_len(0).map_err(at(path))?;
+        Ok(LineFile { writer: BufWriter::new(file), path: path.to_owned() })
+    }
+
+    /// Opens a file to go on with it: hands its lines to `take`, and cuts it after the last whole block. It is only cut
+    /// when it can be read without error.
+    pub(super) fn recover(path: &Path, take: TakeLine) -> Result<Self, JournalError> {
+        let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(at(path))?;
+        lock(&file, path)?;
+        let end = scan(&mut BufReader::new(&file), path, take)?;
+        file.set_len(end).map_err(at(path))?;
+        file.seek(SeekFrom::Start(end)).map_err(at(path))?;
+        Ok(LineFile { writer: BufWriter::new(file), path: path.to_owned() })
+    }
+
+    /// Appends lines and hands them to the operating system.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`].
+    pub fn append(&mut self, lines: impl IntoIterator<Item = impl Serialize>) -> Result<(), JournalError> {
+        for line in lines {
+            serde_json::to_writer(&mut self.writer, &line).map_err(|e| at(&self.path)(e.into()))?;
+            self.writer.write_all(b"\n").map_err(at(&self.path))?;
+        }
+        self.writer.flush().map_err(at(&self.path))
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// Hands the lines of a file to `take` and leaves it alone; it may be being written meanwhile.
+pub(super) fn read(path: &Path, take: TakeLine) -> Result<(), JournalError> {
+    let file = File::open(path).map_err(at(path))?;
+    scan(&mut BufReader::new(file), path, take).map(drop)
+}
+
+/// The byte after the last whole block.
+fn scan(reader: &mut dyn BufRead, path: &Path, take: TakeLine) -> Result<u64, JournalError> {
+    let (mut end, mut complete, mut line) = (0u64, 0u64, 0usize);
+    let mut bytes = Vec::new();
+    loop {
+        bytes.clear();
+        end += reader.read_until(b'\n', &mut bytes).map_err(at(path))? as u64;
+        line += 1;
+        // No newline: the end of the file, or of what was written of its last line.
+        let Some(text) = bytes.strip_suffix(b"\n") else { return Ok(complete) };
+        match take(text) {
+            Ok(true) => complete = end,
+            Ok(false) => {}
+            Err(Refusal { problem, torn }) => {
+                let mut rest = Vec::new();
+                reader.read_until(b'\n', &mut rest).map_err(at(path))?;
+                if torn && !rest.ends_with(b"\n") {
+                    return Ok(complete);
+                }
+                return Err(JournalError::Line { path: path.to_owned(), line, problem });
+            }
+        }
+    }
+}
+
+fn at(path: &Path) -> impl Fn(std::io::Error) -> JournalError {
+    move |source| JournalError::Io { path: path.to_owned(), source }
+}
+
+fn lock(file: &File, path: &Path) -> Result<(), JournalError> {
+    match file.try_lock() {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => Err(JournalError::Locked { path: path.to_owned() }),
+        // A file system without locks: then nobody else can hold one either.
+        Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => Ok(()),
+        Err(TryLockError::Error(error)) => Err(at(path)(error)),
+    }
+}

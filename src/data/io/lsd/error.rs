@@ -1,0 +1,62 @@
+//! What can be wrong with a list of observations or a profile: one line each, naming file and line.
+
+use crate::data::io::atomic::WriteError;
+use std::path::PathBuf;
+
+/// Why observations could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum LsdError {
+    /// A file could not be read.
+    #[error("{}: cannot read: {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The list names a profile that could not be read.
+    #[error("{}:{line}: cannot read profile {}: {source}", .list.display(), .profile.display())]
+    Profile {
+        /// The list.
+        list: PathBuf,
+        /// Line in the list (from 1).
+        line: usize,
+        /// The file it names.
+        profile: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A line of a list or profile is wrong.
+    #[error("{}:{line}: {problem}", .path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Line in it (from 1).
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A file holds nothing of use.
+    #[error("{}: {problem}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Two profiles differ in their velocity axes.
+    #[error("{}: velocity axis ({axis}) differs from that of {} ({expected})", .path.display(), .first.display())]
+    Axis {
+        /// The profile that differs.
+        path: PathBuf,
+        /// Its axis.
+        axis: String,
+        /// The first profile of the list.
+        first: PathBuf,
+        /// The axis of that one.
+        expected: String,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

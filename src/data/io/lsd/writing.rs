@@ -1,0 +1,66 @@
+//! Observations as files: a list and its profiles, which reading gives back.
+
+use super::super::atomic;
+use super::{Label, LsdError};
+use crate::star::observation::{Observations, Profile};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Name of the list that is written.
+const LIST: &str = "observations.txt";
+
+/// Whether [`write()`] may write a file of this name.
+pub fn is_written(name: &str) -> bool {
+    let number = name.strip_prefix('p').and_then(|rest| rest.strip_suffix(".prof"));
+    name == LIST || number.is_some_and(|number| number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Writes `observations.txt` and `p000.prof`, ... (two columns after the velocity) into `folder`, which must exist. The
+/// list comes last, so that where it is the profiles are; files of these names are replaced.
+///
+/// Times are exact, intensities good to 5e-13. Profiles that do not share one velocity axis can be written, but not
+/// read back.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
+    let mut list = String::from("# file  time_d\n");
+    for (k, profile) in observations.profiles.iter().enumerate() {
+        let name = format!("p{k:03}.prof");
+        let title = format!("Synthetic Stokes I profile {k}");
+        save(&folder.join(&name), &profile_text(&title, profile, 0.0, observations.step_kms))?;
+        // Writing to a String cannot fail.
+        let _ = writeln!(list, "{name} {}", profile.time_d);
+    }
+    save(&folder.join(LIST), &list)
+}
+
+/// The same for what became of observed profiles, one of the `labels` each: VRAD stays in the list and in the velocity
+/// axis, and a comment names the file that a profile comes from. `what` says in its title what became of it.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], what: &str) -> Result<(), LsdError> {
+    let mut list = String::from("# file  time_d  vrad_kms\n");
+    for (k, (profile, Label { file, vrad_kms })) in observations.profiles.iter().zip(labels).enumerate() {
+        let name = format!("p{k:03}.prof");
+        let title = format!("{file} {what}");
+        save(&folder.join(&name), &profile_text(&title, profile, *vrad_kms, observations.step_kms))?;
+        // Writing to a String cannot fail.
+        let _ = writeln!(list, "{name} {} {vrad_kms}  # {file}", profile.time_d);
+    }
+    save(&folder.join(LIST), &list)
+}
+
+fn profile_text(title: &str, profile: &Profile, vrad_kms: f64, step_kms: f64) -> String {
+    let mut text = format!("*** {title}\n {} 2\n", profile.intensity.len());
+    for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
+        let velocity = profile.velocity_kms(j, step_kms) + vrad_kms;
+        let _ = writeln!(text, "{velocity:16.9} {intensity:.12} {sigma:.12e}");
+    }
+    text
+}
+
+fn save(path: &Path, text: &str) -> Result<(), LsdError> {
+    Ok(atomic::write(path, text.as_bytes())?)
+}

@@ -1,0 +1,148 @@
+//! The files of a blind search: `rv.csv`, `covariance.csv`, `periodogram.csv` (with a second planet
+//! `periodogram_2.csv`) and `periodogram.json`.
+
+mod alarm;
+mod quantities;
+mod record;
+mod report;
+mod robustness;
+
+use super::atomic::{WriteError, write, write_json};
+use super::csv::Table;
+use super::provenance::Provenance;
+use crate::planets::periodogram::Search;
+use crate::planets::periodogram::orbits::scan;
+use crate::planets::verdict::{Remark, Verdict};
+use crate::posterior::detection::{Detection, DetectionSettings, Robustness};
+use crate::posterior::fit::Fit;
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::ParameterValues;
+use nalgebra::{DMatrix, DVector};
+use std::path::Path;
+
+/// A blind search with all that its files say of it.
+#[derive(Clone, Copy, Debug)]
+pub struct PeriodogramResult<'a> {
+    /// What the data were imaged with.
+    pub imager: &'a Imager,
+    /// What was found.
+    pub detection: &'a Detection,
+    /// What is said of it.
+    pub verdict: &'a Verdict,
+    /// What has to be known beside the verdict.
+    pub remarks: &'a [Remark],
+    /// Whether that depends on a choice.
+    pub robustness: &'a Robustness,
+    /// How it was asked for.
+    pub settings: &'a DetectionSettings,
+    /// The planet-free image held against the data.
+    pub fit: &'a Fit,
+    /// The true parameters, for simulated data.
+    pub truth: Option<ParameterValues>,
+    /// Mass of the star (solar masses), for the minimum mass of the planet.
+    pub mass_msun: Option<f64>,
+    /// Config, data and program.
+    pub provenance: &'a Provenance,
+}
+
+/// Columns of `periodogram.csv`.
+const COLUMNS: [&str; 12] = [
+    "period_d",
+    "porb_over_prot",
+    "frequency_per_d",
+    "delta_ln_l",
+    "k_kms",
+    "sigma_k_kms",
+    "phi",
+    "sigma_phi",
+    "k_upper95_kms",
+    "window",
+    "k_limit_kms",
+    "k_limit95_kms",
+];
+
+/// Names of all files that a search may write.
+pub const FILES: [&str; 5] = ["rv.csv", "covariance.csv", "periodogram.csv", "periodogram_2.csv", "periodogram.json"];
+
+impl PeriodogramResult<'_> {
+    /// Names of the files, in the order in which they are written.
+    pub fn files(&self) -> Vec<&'static str> {
+        let second = self.detection.second.as_ref().map(|_| "periodogram_2.csv");
+        ["rv.csv", "covariance.csv", "periodogram.csv"].into_iter().chain(second).chain(["periodogram.json"]).collect()
+    }
+
+    /// Writes all files into `folder`, which must exist.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        let (velocities, covariance) = self.velocities();
+        write(&folder.join("rv.csv"), &self.rv(&velocities, &covariance).into_bytes())?;
+        write(&folder.join("covariance.csv"), matrix(&covariance).as_bytes())?;
+        write(&folder.join("periodogram.csv"), &self.first_periodogram().into_bytes())?;
+        if let Some(second) = &self.detection.second {
+            write(&folder.join("periodogram_2.csv"), &self.periodogram(&second.search).into_bytes())?;
+        }
+        write_json(&folder.join("periodogram.json"), &self.record())
+    }
+
+    /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
+    fn velocities(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let quadratic = &self.detection.last().quadratic;
+        let n = quadratic.len();
+        let missing = |_| (DVector::from_element(n, f64::NAN), DMatrix::from_element(n, n, f64::NAN));
+        quadratic.radial_velocities().unwrap_or_else(missing)
+    }
+
+    fn rv(&self, velocities: &DVector<f64>, covariance: &DMatrix<f64>) -> Table {
+        let moments = ["first_moment_kms", "first_moment_sigma_kms", "filtered_kms"];
+        let mut table = Table::new(&[&["time_d", "cycle", "rv_kms", "rv_sigma_kms"][..], &moments].concat());
+        for (k, v) in self.fit.velocities.iter().enumerate() {
+            let (rv, sigma) = (velocities[k], covariance[(k, k)].sqrt());
+            let moment = v.observed;
+            table.row(&[v.time_d, v.cycle, rv, sigma, moment.value_kms, moment.sigma_kms, v.filtered_kms()]);
+        }
+        table
+    }
+
+    /// That of the first search, with Delta ln L of the regularised likelihood beside it.
+    fn first_periodogram(&self) -> Table {
+        let found = self.detection;
+        let regularised = scan(&found.planet_free.regularised, &found.frequencies.per_cycle);
+        let mut table = Table::new(&[&COLUMNS[..], &["regularised_delta_ln_l"]].concat());
+        for (mut numbers, trial) in self.rows(&found.blind).zip(regularised) {
+            numbers.push(trial.orbit.map_or(f64::NAN, |orbit| orbit.delta_ln_l));
+            table.row(&numbers);
+        }
+        table
+    }
+
+    fn periodogram(&self, search: &Search) -> Table {
+        let mut table = Table::new(&COLUMNS);
+        self.rows(search).for_each(|numbers| table.row(&numbers));
+        table
+    }
+
+    /// The numbers under [`COLUMNS`].
+    fn rows<'a>(&self, search: &'a Search) -> impl Iterator<Item = Vec<f64>> + 'a {
+        let rotation_period_d = self.imager.star.rotation_period_d;
+        search.rows.iter().map(move |row| {
+            let frequency = row.trial.frequency;
+            let mut numbers = vec![rotation_period_d / frequency, 1.0 / frequency, frequency / rotation_period_d];
+            match row.trial.orbit {
+                Some(o) => numbers.extend([o.delta_ln_l, o.k_kms, o.sigma_k_kms, o.phi, o.sigma_phi]),
+                None => numbers.extend([f64::NAN; 5]),
+            }
+            let or_missing = |x: Option<f64>| x.unwrap_or(f64::NAN);
+            let (upper, fair, safe) = (row.k_upper95_kms, row.k_limit50_kms, row.k_limit95_kms);
+            numbers.extend([or_missing(upper), row.window, or_missing(fair), or_missing(safe)]);
+            numbers
+        })
+    }
+}
+
+/// Rows of comma-separated numbers, without names above them.
+fn matrix(m: &DMatrix<f64>) -> String {
+    let row = |k: usize| m.row(k).iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
+    (0..m.nrows()).map(row).collect()
+}

@@ -1,0 +1,120 @@
+//! What is usually quoted of an orbit that was found: times of the largest radial velocity and of inferior conjunction
+//! nearest to the middle of the data, and the minimum mass where the star's is known.
+//!
+//! Errors are to first order in K, period and phase; where the period has none, at that period.
+
+use super::PeriodogramResult;
+use crate::planets::periodogram::KeplerianOrbit;
+use crate::planets::periodogram::peaks::Peak;
+use crate::posterior::objective::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
+use crate::star::Orbit;
+use crate::star::planet::minimum_mass;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// In a file.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct QuantitiesRecord {
+    pub t_max_rv_d: Option<f64>,
+    pub sigma_t_max_rv_d: Option<f64>,
+    pub t_conjunction_d: Option<f64>,
+    pub sigma_t_conjunction_d: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub msini_mjup: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma_msini_mjup: Option<f64>,
+}
+
+impl QuantitiesRecord {
+    fn new([maximum, conjunction, mass]: [Option<Estimate>; 3]) -> Self {
+        // what is not a number comes of an orbit that is not bounded
+        let value = |one: Option<Estimate>| one.map(|one| one.value).filter(|x| x.is_finite());
+        let sigma = |one: Option<Estimate>| one.map(|one| one.sd).filter(|x| x.is_finite());
+        QuantitiesRecord {
+            t_max_rv_d: value(maximum),
+            sigma_t_max_rv_d: sigma(maximum),
+            t_conjunction_d: value(conjunction),
+            sigma_t_conjunction_d: sigma(conjunction),
+            msini_mjup: value(mass),
+            sigma_msini_mjup: sigma(mass),
+        }
+    }
+
+    /// Value and error of a quantity that is in it.
+    pub(super) fn of(&self, quantity: OrbitQuantity) -> Option<(f64, Option<f64>)> {
+        let (value, sigma) = match quantity {
+            OrbitQuantity::Period => return None,
+            OrbitQuantity::Maximum => (self.t_max_rv_d, self.sigma_t_max_rv_d),
+            OrbitQuantity::Conjunction => (self.t_conjunction_d, self.sigma_t_conjunction_d),
+            OrbitQuantity::MinimumMass => (self.msini_mjup, self.sigma_msini_mjup),
+        };
+        value.map(|value| (value, sigma))
+    }
+}
+
+impl PeriodogramResult<'_> {
+    pub(super) fn orbit_quantities(&self) -> OrbitQuantities {
+        let times = || self.fit.velocities.iter().map(|velocity| velocity.time_d);
+        let span = times().reduce(f64::min).zip(times().reduce(f64::max)).map(|(first, last)| [first, last]);
+        OrbitQuantities::new(&self.imager.star, self.mass_msun, span)
+    }
+
+    /// Of a circular orbit.
+    pub(super) fn quantities(&self, peak: &Peak) -> QuantitiesRecord {
+        let found = peak.orbit;
+        let orbit = Orbit { k_kms: found.k_kms, porb_over_prot: peak.porb_over_prot, phi: found.phi };
+        let at_period = [[found.sigma_k_kms.powi(2), 0.0, 0.0], [0.0; 3], [0.0, 0.0, found.sigma_phi.powi(2)]];
+        let covariance = peak.covariance.map_or(at_period, |c| [0, 1, 2].map(|i| [0, 1, 2].map(|j| c[(i, j)])));
+        let quantities = self.orbit_quantities();
+        let of = [OrbitQuantity::Maximum, OrbitQuantity::Conjunction, OrbitQuantity::MinimumMass];
+        QuantitiesRecord::new(of.map(|quantity| quantities.estimate(quantity, &orbit, &covariance)))
+    }
+
+    /// Of an eccentric orbit; the error of the mass is that of `K sqrt(1 - e^2)`.
+    pub(super) fn eccentric_quantities(&self, orbit: &KeplerianOrbit) -> QuantitiesRecord {
+        let star = &self.imager.star;
+        let prot = star.rotation_period_d;
+        let event = |cycle: f64, sigma: f64| Some(Estimate { value: star.epoch_d + prot * cycle, sd: prot * sigma });
+        let mass = self.mass_msun.map(|mass_msun| {
+            let mass = minimum_mass(orbit.mass_amplitude_kms, prot * orbit.porb_over_prot, mass_msun);
+            Estimate { value: mass.mjup, sd: mass.by_k * orbit.sigma_mass_amplitude_kms }
+        });
+        QuantitiesRecord::new([
+            event(orbit.maximum_cycle, orbit.sigma_maximum_cycle),
+            event(orbit.conjunction_cycle, orbit.sigma_conjunction_cycle),
+            mass,
+        ])
+    }
+
+    /// The injected value of a quantity of the best orbit, an event's nearest to the one found.
+    pub(super) fn true_quantity(&self, quantity: OrbitQuantity, found: f64) -> Option<f64> {
+        let injected = self.truth.map(|truth| truth.state().orbit).filter(|orbit| orbit.k_kms != 0.0)?;
+        self.orbit_quantities().value(quantity, &injected, Some(found))
+    }
+
+    /// Injected values by name.
+    pub(super) fn derived_truth(&self) -> BTreeMap<&'static str, f64> {
+        let best = self.quantities(&self.detection.best);
+        let value = |quantity: OrbitQuantity| {
+            let (found, _) = best.of(quantity)?;
+            Some((quantity.name(), self.true_quantity(quantity, found)?))
+        };
+        OrbitQuantity::ALL.into_iter().filter_map(value).collect()
+    }
+
+    /// What the names in the table of orbits mean, a line each.
+    pub(super) fn meanings(&self, found: &QuantitiesRecord) -> String {
+        let given = OrbitQuantity::ALL.into_iter().filter(|quantity| found.of(*quantity).is_some());
+        let mut text = String::new();
+        for name in ["phi"].into_iter().chain(given.map(OrbitQuantity::name)) {
+            if let Some(meaning) = definition(name) {
+                let _ = writeln!(text, "{name}: {meaning}");
+            }
+        }
+        if let Some(earths) = found.msini_mjup.and_then(in_earths) {
+            let _ = writeln!(text, "{earths}");
+        }
+        text
+    }
+}

@@ -1,0 +1,77 @@
+//! What a simulation, or an injection into observed profiles, was made with: `truth.json`.
+
+use super::atomic::{WriteError, write_json};
+use super::provenance::Provenance;
+use crate::posterior::nuisances::LineAndContinuum;
+use crate::posterior::objective::ParameterValues;
+use crate::star::Orbit;
+use serde::Serialize;
+use std::path::Path;
+
+/// Name of the file.
+pub const FILE: &str = "truth.json";
+
+/// The content of `truth.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Truth {
+    /// The parameters as simulated.
+    pub parameters: ParameterValues,
+    /// The spots: longitude, latitude and radius in degrees, filling factor.
+    pub spots: serde_json::Value,
+    /// The faculae, if there are any: longitude, latitude and radius in degrees, excess of brightness.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faculae: Option<serde_json::Value>,
+    /// Beside faculae: brightness of a spot over that of the photosphere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<f64>,
+    /// What is wrong with each profile by itself, in line and continuum.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub continuum: Vec<LineAndContinuum>,
+    /// The velocity zero point of each profile (km/s), which is not part of `orbit_kms`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub zero_points_kms: Vec<f64>,
+    /// Over how many bins the noise is correlated, where it is not white.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlated_bins: Option<f64>,
+    /// Fractional spot coverage.
+    pub spottedness: f64,
+    /// Signal-to-noise ratio of each bin; null for no noise.
+    pub snr: Option<f64>,
+    /// Standard error written with each bin, in units of the continuum.
+    pub sigma: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Pixels of the simulated star.
+    pub pixels: usize,
+    /// Times of the profiles (d).
+    pub times_d: Vec<f64>,
+    /// Velocity of the orbit at each of them, plus the systemic velocity (km/s).
+    pub orbit_kms: Vec<f64>,
+    /// Where all this came from.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+}
+
+/// The content of `truth.json` beside profiles that an orbit was put into.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InjectedTruth {
+    /// The orbit, by the names of its parameters.
+    pub injected: Orbit,
+    /// What the profiles held before, where they are simulated.
+    pub before: Option<ParameterValues>,
+    /// Times of the profiles (d).
+    pub times_d: Vec<f64>,
+    /// By how much each was shifted (km/s).
+    pub velocity_kms: Vec<f64>,
+    /// The observations and the config before.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+}
+
+/// Writes `truth.json` into `folder`: a [`Truth`] or an [`InjectedTruth`].
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(folder: &Path, truth: &impl Serialize) -> Result<(), WriteError> {
+    write_json(&folder.join(FILE), truth)
+}

@@ -1,0 +1,385 @@
+//! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
+//! with.
+
+use crate::data::config::{self, Automatic, ConfigError, ObservationSource, Settings, VelocityJitter};
+use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
+use crate::data::io::provenance::{Measured, Provenance};
+use crate::data::io::truth::Truth;
+use crate::posterior::imaging::Imager;
+use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
+use crate::posterior::objective::{FreeParameter, ParameterSpace, ParameterValues, ReferenceError, target};
+use crate::posterior::simulate::Simulation;
+use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
+use crate::star::injection::inject;
+use crate::star::observation::Observations;
+use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+/// A config with its observations.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The config, resolved.
+    pub settings: Settings,
+    /// The line profiles, read or simulated.
+    pub observations: Observations,
+    /// SHA-256 (hex) of the observations: of the bytes of their files, or of the numbers simulated.
+    pub data_sha256: String,
+    /// The parameters that were simulated; `None` for observations from files.
+    pub truth: Option<ParameterValues>,
+    /// What the config leaves to the observations: errors, velocity jitter, target chi2. In `settings` the last two are
+    /// numbers.
+    pub measured: Measured,
+    /// What the observations are imaged with.
+    pub imager: Imager,
+    /// The free parameters, starting at the config's values; its dimension may be 0.
+    pub space: ParameterSpace,
+}
+
+/// Why there is no scene: one line that names file, and line or key.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The config is at fault.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The observations are.
+    #[error(transparent)]
+    Observations(#[from] LsdError),
+}
+
+impl Scene {
+    /// Reads the config at `path` and reads or simulates its observations.
+    ///
+    /// # Errors
+    /// A config or observations that cannot be read or make no sense.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        Scene::new(config::load(path)?)
+    }
+
+    /// Of a config at hand as if it were read from `path`.
+    ///
+    /// # Errors
+    /// A config or observations that cannot be read or make no sense.
+    pub fn of_config(config: &Value, path: &Path) -> Result<Self, SceneError> {
+        Scene::new(config::from_json(config.to_string().as_bytes(), path)?)
+    }
+
+    /// Reads or simulates the observations of `settings`.
+    ///
+    /// # Errors
+    /// Observations that cannot be read or make no sense.
+    pub fn new(settings: Settings) -> Result<Self, SceneError> {
+        let (mut errors, mut remarks) = (None, Vec::new());
+        let (observations, data_sha256, truth) = match &settings.source {
+            ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
+                let mut data = lsd::read(path, options)?;
+                remarks = std::mem::take(&mut data.remarks);
+                let as_quoted = *wanted == ErrorSettings::default();
+                if as_quoted && *continuum_level == 1.0 {
+                    (data.observations, data.sha256, None)
+                } else {
+                    let mut observations = data.observations.over_continuum(*continuum_level);
+                    if !as_quoted {
+                        let whole = lsd::read(path, &ReadOptions::default())?.observations;
+                        let whole = whole.over_continuum(*continuum_level);
+                        let measured = measured_errors(&settings, *wanted, &whole, &observations)?;
+                        measured.apply(&mut observations);
+                        errors = Some(measured);
+                    }
+                    let sha256 = fingerprint(&observations);
+                    (observations, sha256, None)
+                }
+            }
+            ObservationSource::Simulate(simulation) => {
+                settings.check_velocity_grid(&simulation.truth, simulation.step_kms)?;
+                let observations = simulation.observe(&settings.star);
+                let sha256 = fingerprint(&observations);
+                (observations, sha256, Some(simulation.truth))
+            }
+        };
+        let mut scene = Scene::with_noise(settings, observations, errors)?;
+        scene.measured.profiles = remarks;
+        Ok(Scene { data_sha256, truth, ..scene })
+    }
+
+    /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left
+    /// to them is chosen.
+    ///
+    /// # Errors
+    /// Settings that make no sense with these observations.
+    pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
+        Scene::with_noise(settings, observations, None)
+    }
+
+    /// The same of profiles in their `whole` width and `cut` to the config's velocity range, both in units of their
+    /// continuum and with errors as quoted. Errors that `settings` leave to them are measured.
+    ///
+    /// # Errors
+    /// Settings that make no sense with these observations, and errors that cannot be measured.
+    pub fn of_whole(settings: Settings, whole: &Observations, cut: &Observations) -> Result<Self, ConfigError> {
+        let ObservationSource::Files { options, errors: wanted, .. } = &settings.source else {
+            return Scene::of(settings, cut.clone());
+        };
+        let (scale, wanted) = (options.sigma_scale, *wanted);
+        let mut observations = cut.clone();
+        observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= scale);
+        if wanted == ErrorSettings::default() {
+            return Scene::of(settings, observations);
+        }
+        let measured = measured_errors(&settings, wanted, whole, &observations)?;
+        measured.apply(&mut observations);
+        Scene::with_noise(settings, observations, Some(measured))
+    }
+
+    /// The same where the errors were measured: a target chi2 is then that of independent data.
+    fn with_noise(
+        mut settings: Settings,
+        observations: Observations,
+        errors: Option<MeasuredErrors>,
+    ) -> Result<Self, ConfigError> {
+        let mut imager = imager(&settings, &observations)?;
+        let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        imager.data.correlated_bins = correlated_bins;
+        let mut measured = Measured { errors, ..Measured::default() };
+        settings.imaging.chi2_target = match settings.imaging.chi2_target {
+            Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
+            Automatic::Auto => {
+                let fault = |e: ReferenceError| settings.fault("imaging.chi2_target", &e.to_string());
+                let chosen = target::choose(&imager, settings.values, correlated_bins).map_err(fault)?;
+                measured.chi2_target = Some(chosen);
+                Automatic::Fixed(chosen.value)
+            }
+        };
+        let (zero_points, jitter) = zero_points(&settings, &imager, settings.imaging.chi2_target.value())?;
+        if let Some(zero_points) = zero_points {
+            settings.velocity_jitter = VelocityJitter::Known(zero_points.sd_kms);
+            imager = zero_points.counted_in(imager);
+        }
+        measured.velocity_jitter = jitter;
+        let space = space(&settings.free, &settings, &imager);
+        let data_sha256 = fingerprint(&observations);
+        Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
+    }
+
+    /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected
+    /// into.
+    ///
+    /// # Errors
+    /// Files that are no longer what they were.
+    pub fn whole(&self) -> Result<(Observations, Vec<Label>), LsdError> {
+        match &self.settings.source {
+            ObservationSource::Files { path, .. } => {
+                Ok((lsd::read(path, &ReadOptions::default())?.observations, lsd::labels(path)?))
+            }
+            ObservationSource::Simulate(_) => {
+                let name = |k: usize| Label { file: format!("simulated profile {k}"), vrad_kms: 0.0 };
+                let profiles = self.observations.profiles.len();
+                Ok((self.observations.clone(), (0..profiles).map(name).collect()))
+            }
+        }
+    }
+
+    /// The files that it was read from: config, list, profiles.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mut files = vec![self.settings.path.clone()];
+        if let ObservationSource::Files { path, .. } = &self.settings.source {
+            files.extend(lsd::files(path));
+        }
+        files
+    }
+
+    /// The profiles in their whole width and in units of their continuum, errors as quoted; `None` if they are no
+    /// longer there.
+    pub fn whole_over_continuum(&self) -> Option<Observations> {
+        self.whole().ok().map(|(whole, _)| whole.over_continuum(self.continuum_level()))
+    }
+
+    /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors
+    /// stay.
+    ///
+    /// # Errors
+    /// Profiles that no longer make sense.
+    pub fn injected(&self, whole: &Observations, orbits: &[Orbit]) -> Result<Self, ConfigError> {
+        let mut observations = self.observations.clone();
+        let injected = inject(whole, &self.imager.star, orbits).over_continuum(self.continuum_level());
+        for (cut, whole) in observations.profiles.iter_mut().zip(&injected.profiles) {
+            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / injected.step_kms).round() as usize;
+            for (intensity, shifted) in cut.intensity.iter_mut().zip(whole.intensity.iter().skip(first)) {
+                *intensity = *shifted;
+            }
+        }
+        Scene::of(self.settings.clone(), observations)
+    }
+
+    /// The space of the parameters in `free`, starting at the config's values, all others fixed there.
+    pub fn space_of(&self, free: &[FreeParameter]) -> ParameterSpace {
+        space(free, &self.settings, &self.imager)
+    }
+
+    /// The true spot map on the pixels of the image, if the observations are simulated.
+    pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
+        self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
+    }
+
+    /// What the image should hold on its pixels, if the observations are simulated.
+    pub fn true_map(&self) -> Option<Vec<f64>> {
+        match self.settings.imaging.brightness {
+            BrightnessModel::Spots => self.true_spot_filling(),
+            BrightnessModel::BrightAndDark => self
+                .simulation()
+                .map(|simulation| simulation.brightness(&self.imager.grid, simulation.contrast(&self.imager.star))),
+        }
+    }
+
+    fn continuum_level(&self) -> f64 {
+        match self.settings.source {
+            ObservationSource::Files { continuum_level, .. } => continuum_level,
+            ObservationSource::Simulate(_) => 1.0,
+        }
+    }
+
+    fn simulation(&self) -> Option<&Simulation> {
+        match &self.settings.source {
+            ObservationSource::Simulate(simulation) => Some(simulation),
+            ObservationSource::Files { .. } => None,
+        }
+    }
+
+    /// What the scene's `simulation` was made with.
+    pub fn truth_of(&self, simulation: &Simulation) -> Truth {
+        let grid = SurfaceGrid::equal_area(simulation.pixels, Quadrature::Gauss2x2);
+        let filling = simulation.spot_filling(&grid);
+        let state = simulation.truth.state();
+        let velocity = |time: &f64| state.vsys_kms + state.orbit.velocity_kms(self.imager.star.cycle(*time));
+        Truth {
+            parameters: simulation.truth,
+            // as the user wrote them: degrees of radians of degrees are not
+            spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
+            faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
+            contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
+            continuum: simulation.nuisances(),
+            zero_points_kms: simulation.zero_points_kms(),
+            correlated_bins: Some(simulation.correlated_bins).filter(|bins| *bins != 1.0),
+            spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
+            snr: simulation.snr,
+            sigma: simulation.sigma(),
+            seed: simulation.seed,
+            pixels: grid.len(),
+            orbit_kms: simulation.times_d.iter().map(velocity).collect(),
+            times_d: simulation.times_d.clone(),
+            provenance: self.provenance(),
+        }
+    }
+
+    /// What results say of where they came from.
+    pub fn provenance(&self) -> Provenance {
+        Provenance {
+            version: env!("CARGO_PKG_VERSION"),
+            data_sha256: self.data_sha256.clone(),
+            config_sha256: self.settings.sha256.clone(),
+            config: self.settings.resolved.clone(),
+            measured: self.measured.clone(),
+        }
+    }
+}
+
+/// What `observations` are imaged with.
+///
+/// # Errors
+/// Settings that make no sense with these observations.
+pub fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
+    settings.check_velocity_grid(&settings.values, observations.step_kms)?;
+    let star = settings.star_for(observations)?;
+    let imager = Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy());
+    Ok(match settings.imaging.nuisances {
+        Some(priors) => imager.with_nuisances(priors, observations),
+        None => imager,
+    })
+}
+
+/// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
+/// target chi2 is per datum, independent or not.
+fn zero_points(
+    settings: &Settings,
+    imager: &Imager,
+    chi2_target: f64,
+) -> Result<(Option<ZeroPoints>, Option<MeasuredJitter>), ConfigError> {
+    let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
+    let (sd_kms, measured) = match settings.velocity_jitter {
+        VelocityJitter::Known(0.0) => return Ok((None, None)),
+        VelocityJitter::Known(sd_kms) => (sd_kms, None),
+        VelocityJitter::Fitted => {
+            let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;
+            (measured.value_kms, Some(measured))
+        }
+    };
+    let zero_points = ZeroPoints::new(imager, settings.values, chi2_target, sd_kms).map_err(|e| fault(e.into()))?;
+    Ok((Some(zero_points), measured))
+}
+
+/// Errors and velocity zero points are settled in turn that many times at most, until errors move by less than this
+/// part.
+const SETTLED: (usize, f64) = (3, 0.03);
+
+/// The errors that the observations, `cut` as they are used, and the `whole` profiles ask for.
+fn measured_errors(
+    settings: &Settings,
+    wanted: ErrorSettings,
+    whole: &Observations,
+    cut: &Observations,
+) -> Result<MeasuredErrors, ConfigError> {
+    let fault = |e: NoiseError| settings.fault(e.key(), &e.to_string());
+    let scaled = |measured: &MeasuredErrors| {
+        let mut observations = cut.clone();
+        measured.apply(&mut observations);
+        observations
+    };
+    let continuum = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
+    if !wanted.measured {
+        return Ok(continuum);
+    }
+    let before = scaled(&continuum);
+    let chi2_target = settings.imaging.chi2_target.value() / continuum.correlated_bins;
+    let mut measured = continuum.clone();
+    for _ in 0..SETTLED.0 {
+        // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
+        let (zero_points, _) = zero_points(settings, &imager(settings, &scaled(&measured))?, chi2_target)?;
+        let with_factor = |factor: f64| {
+            let mut observations = before.clone();
+            observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
+            let imager = imager(settings, &observations)?;
+            Ok(zero_points.iter().fold(imager, |imager, zero_points| zero_points.counted_in(imager)))
+        };
+        let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);
+        measured.count_residuals(settings.values, with_factor)?.map_err(fault)?;
+        let moved = (measured.sigma_scale.unwrap_or(1.0) / then).ln().abs();
+        if settings.velocity_jitter != VelocityJitter::Fitted || moved < SETTLED.1 {
+            break;
+        }
+    }
+    Ok(measured)
+}
+
+fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {
+    let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
+    ParameterSpace::new(free.to_vec(), settings.values, mid, base, imager.star.rotation_period_d)
+}
+
+/// SHA-256 (hex) of the numbers of `observations`, little-endian: the step, then for each profile time, number of bins,
+/// and velocity, intensity and sigma of each bin.
+pub fn fingerprint(observations: &Observations) -> String {
+    let step = observations.step_kms;
+    let mut hash = Sha256::new();
+    hash.update(step.to_le_bytes());
+    for profile in &observations.profiles {
+        hash.update(profile.time_d.to_le_bytes());
+        hash.update((profile.intensity.len() as u64).to_le_bytes());
+        for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
+            for number in [profile.velocity_kms(j, step), *intensity, *sigma] {
+                hash.update(number.to_le_bytes());
+            }
+        }
+    }
+    format!("{:x}", hash.finalize())
+}

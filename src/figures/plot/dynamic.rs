@@ -1,0 +1,127 @@
+//! The dynamic spectrum: what changes in the profiles with rotation phase, observed and modelled, and what is left
+//! over.
+
+use super::profiles::{Line, extent};
+use crate::figures::drawing::colour::{ColourMap, GREY};
+use crate::figures::drawing::panel::{Shade, Sides, Tile};
+use crate::figures::drawing::{Align, Axis, Figure, Font, PAGE_MM, Paint, Panel, Rect};
+
+/// Half the phase that a profile fills, at most.
+const HALF_ROW: f64 = 0.015;
+
+/// Largest residual that has a colour of its own (standard errors).
+const RESIDUAL: f64 = 4.0;
+
+/// The figure of profiles with a model, which are in the order of their phase.
+pub(super) fn figure(lines: &[Line]) -> Figure {
+    let mut figure = Figure::new("residuals", PAGE_MM, 92.0);
+    figure.caption = "Dynamic spectra: observed and modelled profiles minus the mean observed profile, and observed \
+    minus \
+                      modelled in units of the standard error. Rows are profiles, at their rotation phases; phases \
+                      that were \
+                      not observed are grey."
+        .into();
+    let mean = mean(lines);
+    let deviation = |values: &[f64], k: usize| mean.get(k).map_or(f64::NAN, |mean| 100.0 * (values[k] - mean));
+    let largest = lines
+        .iter()
+        .flat_map(|line| (0..line.observed.len()).map(|k| deviation(&line.observed, k).abs()))
+        .filter(|x| x.is_finite())
+        .fold(0.0, f64::max);
+    // of profiles that are all alike, too, zero is in the middle
+    let largest = if largest > 0.0 { largest } else { 1.0 };
+    let change = Shade { map: ColourMap::Diverging, low: -largest, high: largest };
+    let left_over = Shade { map: ColourMap::Diverging, low: -RESIDUAL, high: RESIDUAL };
+    let velocities = extent(lines, |line| &line.velocity_kms);
+    let (left, gap, bar) = (36.0, 12.0, 52.0);
+    let width = (figure.width - left - gap - 2.0 * bar) / 3.0;
+    type Value<'a> = &'a dyn Fn(&Line, usize) -> f64;
+    let panels: [(&str, Value, Shade, f64); 3] = [
+        ("observed − mean", &|line, k| deviation(&line.observed, k), change, left),
+        ("model − mean", &|line, k| deviation(&line.model, k), change, left + width + gap),
+        (
+            "observed − model",
+            &|line, k| (line.observed[k] - line.model[k]) / line.sigma[k],
+            left_over,
+            left + 2.0 * width + gap + bar,
+        ),
+    ];
+    for (k, (title, value, shade, left)) in panels.into_iter().enumerate() {
+        let frame = Rect { left, top: 16.0, width, height: figure.height - 46.0 };
+        let y = Axis::linear(if k == 0 { "rotation phase" } else { "" }, [0.0, 1.0]);
+        let panel = Panel { frame, x: Axis::linear("velocity (km/s)", velocities), y };
+        let tiles = lines.iter().zip(rows(lines)).flat_map(|(line, rows)| {
+            let edges = edges(&line.velocity_kms);
+            rows.into_iter().flat_map(move |y| {
+                let edges = edges.clone();
+                (0..line.velocity_kms.len()).map(move |k| Tile {
+                    x: [edges[k], edges[k + 1]],
+                    y,
+                    value: value(line, k),
+                })
+            })
+        });
+        figure.rect("not-observed", frame, Paint::fill(GREY.opacity(0.35)));
+        panel.tiles(&mut figure, tiles, shade);
+        panel.narrow_frame(&mut figure, Sides { below: true, left: k == 0 });
+        figure.text(title, [frame.centre()[0], 10.0], Font::LABEL, Align::Centre, 0.0);
+        match k {
+            1 => shade.upright_bar(&mut figure, frame, "% of the continuum"),
+            2 => shade.upright_bar(&mut figure, frame, "standard errors"),
+            _ => {}
+        }
+    }
+    figure
+}
+
+/// Mean observed profile; empty if the profiles are not on the same bins.
+fn mean(lines: &[Line]) -> Vec<f64> {
+    let bins = lines[0].observed.len();
+    if lines.iter().any(|line| line.observed.len() != bins) {
+        return Vec::new();
+    }
+    (0..bins).map(|k| lines.iter().map(|line| line.observed[k]).sum::<f64>() / lines.len() as f64).collect()
+}
+
+/// Borders of bins around their centres.
+fn edges(centres: &[f64]) -> Vec<f64> {
+    let step = if centres.len() > 1 { centres[1] - centres[0] } else { 1.0 };
+    let first = centres.first().map(|v| v - 0.5 * step);
+    first.into_iter().chain(centres.iter().map(|v| v + 0.5 * step)).collect()
+}
+
+/// From which phase to which each profile is drawn: half way to its neighbours, [`HALF_ROW`] at most; in two parts
+/// around 0.
+fn rows(lines: &[Line]) -> Vec<Vec<[f64; 2]>> {
+    let phases: Vec<f64> = lines.iter().map(Line::phase).collect();
+    let n = phases.len();
+    let half = |from: f64, to: f64| (0.5 * (to - from).rem_euclid(1.0)).min(HALF_ROW);
+    let row = |k: usize| {
+        let phase = phases[k];
+        let (before, after) = (phases[(k + n - 1) % n], phases[(k + 1) % n]);
+        // one profile alone has no neighbours
+        let (down, up) = if n == 1 { (HALF_ROW, HALF_ROW) } else { (half(before, phase), half(phase, after)) };
+        let (low, high) = (phase - down, phase + up);
+        match (low < 0.0, high > 1.0) {
+            (true, _) => vec![[0.0, high], [1.0 + low, 1.0]],
+            (_, true) => vec![[low, 1.0], [0.0, high - 1.0]],
+            _ => vec![[low, high]],
+        }
+    };
+    (0..n).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_meet_half_way_and_go_around() {
+        let at = |cycle: f64| Line { cycle, ..Line::default() };
+        let rows = rows(&[at(0.005), at(2.025), at(1.5)]);
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(close(rows[0][0][0], 0.0) && close(rows[0][0][1], 0.015) && close(rows[0][1][0], 0.99));
+        assert!(close(rows[1][0][0], 0.015) && close(rows[1][0][1], 0.04));
+        assert!(close(rows[2][0][0], 0.485) && close(rows[2][0][1], 0.515));
+    }
+}

@@ -1,0 +1,129 @@
+//! The detection map: which share of the orbits of each period and semi-amplitude a blind search recovers.
+
+use super::{POSITIVE, PlotError};
+use crate::data::io::csv::Columns;
+use crate::figures::drawing::colour::{ColourMap, GREY, VERMILION, WHITE};
+use crate::figures::drawing::panel::{Marker, Shade, Sides, Tile};
+use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
+use crate::runs::origin;
+use serde::Deserialize;
+use std::path::Path;
+
+/// The file.
+pub(super) const FILE: &str = "limits.json";
+
+/// The table beside it.
+const TABLE: &str = "limits.csv";
+
+/// What is used of the file.
+#[derive(Deserialize)]
+struct LimitsFile {
+    k_kms: Vec<f64>,
+    limits: Vec<Limit>,
+    comparisons: Vec<Comparison>,
+}
+
+#[derive(Deserialize)]
+struct Limit {
+    period_d: f64,
+    porb_over_prot: f64,
+    k50_kms: Option<f64>,
+    k95_kms: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct Comparison {
+    k_kms: f64,
+    porb_over_prot: f64,
+    full: Option<Outcome>,
+}
+
+#[derive(Deserialize)]
+struct Outcome {
+    recovered: bool,
+}
+
+/// The figures.
+pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
+    let file: LimitsFile = origin::read(folder, FILE)?;
+    let table = Columns::read(&folder.join(TABLE))?;
+    let tried = file.limits.len() * file.k_kms.len();
+    table.check_rows(tried, &format!("periods times semi-amplitudes, by {FILE}"))?;
+    Ok(vec![figure(&file, &table)?])
+}
+
+fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
+    let (period, k) = (table.column_within("period_d", POSITIVE)?, table.column_within("k_kms", POSITIVE)?);
+    let (phases, recovered) = (table.column("phases")?, table.column("recovered")?);
+    let mut figure = Figure::new("limits", PAGE_MM, 92.0);
+    figure.caption = CAPTION.into();
+    let (left, top) = (40.0, 24.0);
+    let frame = Rect { left, top, width: figure.width - left - 56.0, height: figure.height - top - 46.0 };
+    let edges = |values: &[f64]| [below(values), above(values)];
+    let panel = Panel { frame, x: Axis::log("period (d)", edges(period)), y: Axis::log("*K* (km/s)", edges(k)) };
+    let shade = Shade { map: ColourMap::Cividis, low: 0.0, high: 100.0 };
+    let (across, up) = (half_step(period), half_step(k));
+    let tile = |j: usize| Tile {
+        x: [period[j] / across, period[j] * across],
+        y: [k[j] / up, k[j] * up],
+        value: 100.0 * recovered[j] / phases[j],
+    };
+    panel.tiles(&mut figure, (0..period.len()).map(tile), shade);
+    let curve = |of: fn(&Limit) -> Option<f64>| -> Vec<[f64; 2]> {
+        file.limits.iter().map(|limit| [limit.period_d, of(limit).unwrap_or(f64::NAN)]).collect()
+    };
+    let (half, nearly_all) = (Stroke::new(WHITE, 1.2).dashed(), Stroke::new(VERMILION, 1.2));
+    panel.line(&mut figure, "k50", &curve(|limit| limit.k50_kms), half);
+    panel.line(&mut figure, "k95", &curve(|limit| limit.k95_kms), nearly_all);
+    let rotation = file.limits.first().map_or(f64::NAN, |limit| limit.period_d / limit.porb_over_prot);
+    for (n, text) in [(1.0, "*P*_{rot}"), (2.0, "*P*_{rot}/2"), (3.0, "*P*_{rot}/3"), (4.0, "*P*_{rot}/4")] {
+        let period = rotation / n;
+        if (0.0..=1.0).contains(&panel.x.share(period)) {
+            panel.vertical(&mut figure, "rotation", period, Stroke::new(GREY, 0.7).dotted());
+            let at = [panel.place(period, 1.0)[0], frame.top - 4.0];
+            figure.text(text, at, Font::SMALL, Align::Centre, 0.0);
+        }
+    }
+    let whole = |found: bool| -> Vec<[f64; 2]> {
+        let of = |c: &&Comparison| c.full.as_ref().is_some_and(|full| full.recovered) == found;
+        file.comparisons.iter().filter(of).map(|c| [c.porb_over_prot * rotation, c.k_kms]).collect()
+    };
+    panel.points(&mut figure, "recovered", &whole(true), (Marker::Disc, 4.0, VERMILION));
+    panel.points(&mut figure, "missed", &whole(false), (Marker::Cross, 4.5, VERMILION));
+    panel.frame(&mut figure, Sides::BOTH);
+    shade.upright_bar(&mut figure, frame, "recovered (% of the phases)");
+    let mut legend = Legend::default();
+    legend.add(Key::Line(Stroke { colour: GREY, ..half }), "50 %");
+    legend.add(Key::Line(nearly_all), "95 %");
+    if !file.comparisons.is_empty() {
+        legend.add(Key::Point(Marker::Disc, VERMILION), "whole way: recovered");
+        legend.add(Key::Point(Marker::Cross, VERMILION), "missed");
+    }
+    legend.row(&mut figure, [frame.centre()[0], frame.bottom() + 36.0]);
+    Ok(figure)
+}
+
+/// Half the distance of neighbours on a logarithmic axis, as a factor; of one value alone some per cent.
+fn half_step(values: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    let (first, last) = (sorted.first().copied().unwrap_or(1.0), sorted.last().copied().unwrap_or(1.0));
+    if sorted.len() < 2 { 1.05 } else { (last / first).powf(0.5 / (sorted.len() - 1) as f64) }
+}
+
+fn below(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::INFINITY, f64::min) / half_step(values)
+}
+
+fn above(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::NEG_INFINITY, f64::max) * half_step(values)
+}
+
+const CAPTION: &str = "Detection map. Orbits of each period and semi-amplitude K were put into the profiles; colour: \
+the share of \
+                       their phases at which the blind search finds a planet, false-alarm probability below 1 %, of \
+                       that period. \
+                       Lines: K recovered at 50 and 95 % of the phases. Points: orbits that went the whole way, with \
+                       resampled \
+                       profiles. Dotted: the rotation period and its fractions.";

@@ -1,0 +1,186 @@
+//! Figures of what a folder holds, from its files alone; nothing is computed anew.
+//!
+//! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`,
+//! `optimise`, `grid`, `sample`, `compare` and `reproduce`.
+
+mod comparison;
+mod content;
+mod corner;
+mod density;
+mod dynamic;
+mod experiment;
+mod injected;
+mod landscape;
+mod limits;
+mod optimum;
+mod paraboloid;
+mod periodogram;
+mod profiles;
+mod projection;
+mod star_map;
+mod surface;
+pub mod symbols;
+mod trace;
+mod velocities;
+
+pub use density::Density;
+pub use projection::Projection;
+pub use trace::Sampled;
+
+use crate::data::io::atomic::{self, WriteError};
+use crate::data::io::csv::CsvError;
+use crate::data::io::journal::JournalError;
+use crate::data::io::lsd::LsdError;
+use crate::figures::drawing::Figure;
+use crate::runs::grid_scan;
+use crate::runs::manifest;
+use crate::runs::origin::OriginError;
+use crate::runs::run::CHAIN;
+use std::path::{Path, PathBuf};
+
+/// Pixels to the inch of PNG files where nothing else is asked for.
+pub const DPI: f64 = 200.0;
+
+/// Why there is no figure: one line that names file or folder.
+#[derive(Debug, thiserror::Error)]
+pub enum PlotError {
+    /// The folder is not there.
+    #[error("{}: no such folder", .0.display())]
+    NoFolder(PathBuf),
+    /// There is nothing in it that could be drawn.
+    #[error("{}: nothing to draw: it holds none of {}", folder.display(), known_files().join(", "))]
+    Nothing {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A JSON file is missing or wrong.
+    #[error(transparent)]
+    Origin(#[from] OriginError),
+    /// A table is wrong.
+    #[error(transparent)]
+    Csv(#[from] CsvError),
+    /// A chain or a landscape is wrong.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// Profiles are wrong.
+    #[error(transparent)]
+    Profiles(#[from] LsdError),
+    /// A file is read, but does not say what it should.
+    #[error("{}: {problem}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// Periods (d), periods over that of the rotation, and semi-amplitudes (km/s) that a logarithmic axis may show.
+const POSITIVE: [f64; 2] = [1e-12, 1e12];
+
+/// Times (d), rotation cycles and velocities (km/s).
+const ANY: [f64; 2] = [-1e12, 1e12];
+
+/// Draws the figures of one kind of folder.
+type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
+
+/// The files by which a folder is known, with what draws it.
+const KINDS: [(&str, Draw); 9] = [
+    (star_map::FILE, star_map_figures),
+    (periodogram::FILE, |folder, _| periodogram::figures(folder)),
+    (limits::FILE, |folder, _| limits::figures(folder)),
+    (manifest::FILE, |folder, _| chain_figures(folder)),
+    (grid_scan::HEADER, landscape::figures),
+    (optimum::FILE, |folder, _| optimum::figures(folder)),
+    (comparison::FILE, |folder, _| comparison::figures(folder)),
+    (experiment::FILE, |folder, _| experiment::figures(folder)),
+    (star_map::TRUTH, |folder, _| simulation_figures(folder)),
+];
+
+fn known_files() -> Vec<&'static str> {
+    KINDS.map(|(file, _)| file).to_vec()
+}
+
+/// The files by which a folder is known that are in it.
+pub fn kinds(folder: &Path) -> Vec<&'static str> {
+    known_files().into_iter().filter(|file| folder.join(file).is_file()).collect()
+}
+
+/// All figures of what `folder` holds; over a landscape also the contours of the run in folder `run`.
+///
+/// # Errors
+/// [`PlotError`]: a folder that is not there or holds nothing that is known, files that are wrong.
+pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
+    if !folder.is_dir() {
+        return Err(PlotError::NoFolder(folder.into()));
+    }
+    let here = kinds(folder);
+    // a simulation beside a map of it is drawn beside the map
+    let drawn = |file: &str| here.contains(&file) && (file != star_map::TRUTH || !here.contains(&star_map::FILE));
+    let mut figures: Vec<Figure> = Vec::new();
+    for (_, draw) in KINDS.into_iter().filter(|(file, _)| drawn(file)) {
+        for mut figure in draw(folder, run)? {
+            // two kinds in one folder
+            while figures.iter().any(|other| other.name == figure.name) {
+                figure.name.push_str("_2");
+            }
+            figures.push(figure);
+        }
+    }
+    if figures.is_empty() {
+        return Err(PlotError::Nothing { folder: folder.into() });
+    }
+    Ok(figures)
+}
+
+fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
+    let mut figures = vec![star_map::figure(folder)?];
+    if folder.join(profiles::FILE).is_file() {
+        let profiles = profiles::read(folder)?;
+        figures.extend([profiles::figure(&profiles), dynamic::figure(&profiles)]);
+    }
+    if folder.join(velocities::FILE).is_file() {
+        figures.push(velocities::of_map(folder)?);
+    }
+    Ok(figures)
+}
+
+fn simulation_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
+    let mut figures: Vec<Figure> = star_map::injected(folder)?.into_iter().collect();
+    figures.push(profiles::figure(&profiles::simulated(folder)?));
+    Ok(figures)
+}
+
+fn chain_figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
+    if !folder.join(CHAIN).is_file() {
+        return Err(OriginError::Missing { folder: folder.into(), file: CHAIN }.into());
+    }
+    let sampled = trace::Sampled::read(folder)?;
+    Ok(vec![corner::figure(&sampled), trace::traces(&sampled), trace::autocorrelation(&sampled)])
+}
+
+/// Writes a figure into `folder` as SVG and PNG; the names of the files.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(figure: &Figure, folder: &Path, dpi: f64) -> Result<[String; 2], WriteError> {
+    let names = names(figure);
+    atomic::write(&folder.join(&names[0]), figure.svg().as_bytes())?;
+    atomic::write(&folder.join(&names[1]), &figure.png(dpi))?;
+    Ok(names)
+}
+
+/// Writes a figure into `folder` as PNG alone; the name of the file.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_png(figure: &Figure, folder: &Path, dpi: f64) -> Result<String, WriteError> {
+    let [_, name] = names(figure);
+    atomic::write(&folder.join(&name), &figure.png(dpi))?;
+    Ok(name)
+}
+
+/// The names of a figure's files.
+pub fn names(figure: &Figure) -> [String; 2] {
+    ["svg", "png"].map(|ending| format!("{}.{ending}", figure.name))
+}

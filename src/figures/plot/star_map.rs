@@ -1,0 +1,244 @@
+//! The map of the star: flattened polar projection and Mollweide's, beside it the injected map where it is known.
+
+use super::content::Content;
+use super::injected::{Injected, TruthFile};
+use super::projection::Projection;
+use super::surface::{PixelMap, Scale, graticule, outline, paint_discs, photosphere};
+use super::{PlotError, velocities};
+use crate::data::io::csv::Columns;
+use crate::figures::drawing::colour::{BLACK, BLUE, VERMILION, WHITE};
+use crate::figures::drawing::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, Stroke, open, width_pt};
+use crate::runs::origin;
+use crate::star::{Brightness, Disc};
+use serde::Deserialize;
+use serde_json::Value;
+use std::path::Path;
+
+/// The file of a map.
+pub(super) const FILE: &str = "map.json";
+
+/// The file of a simulation.
+pub(super) const TRUTH: &str = "truth.json";
+
+/// What is used of `map.json`.
+#[derive(Deserialize)]
+struct MapFile {
+    ring_pixels: Vec<usize>,
+    /// One of the two.
+    spot_filling: Option<Vec<f64>>,
+    brightness: Option<Vec<f64>>,
+    contrast: f64,
+    spottedness: f64,
+    true_spottedness: Option<f64>,
+}
+
+/// One star on the page.
+struct Star {
+    title: String,
+    /// Its pixels, or the discs on it.
+    surface: Surface,
+    /// What was injected: its rims are drawn over pixels.
+    rims: Injected,
+}
+
+enum Surface {
+    Pixels(PixelMap),
+    /// Each with what a map holds inside it.
+    Discs(Vec<(Disc, f64)>),
+}
+
+/// The map in `folder`.
+pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
+    let map: MapFile = origin::read(folder, FILE)?;
+    let (content, values) = match (map.spot_filling, map.brightness) {
+        (None, Some(brightness)) => (Content::Brightness(Brightness::of_spots(map.contrast)), brightness),
+        (filling, _) => (Content::Spots, filling.unwrap_or_default()),
+    };
+    let pixels = PixelMap { ring_pixels: map.ring_pixels, values };
+    if !pixels.is_whole() {
+        let what = if content == Content::Spots { "spot_filling" } else { "brightness" };
+        let problem = format!("ring_pixels and {what} do not belong together");
+        return Err(PlotError::Content { path: folder.join(FILE), problem });
+    }
+    let known = Injected::of(folder)?;
+    let cycles = match folder.join(velocities::FILE) {
+        table if table.is_file() => Columns::read(&table)?.column("cycle")?.to_vec(),
+        _ => Vec::new(),
+    };
+    let title = content.title("reconstructed", Some(map.spottedness));
+    let mut stars = vec![Star { title, surface: Surface::Pixels(pixels), rims: Injected::default() }];
+    let mut compared = "";
+    if let Some(injected) = known {
+        compared = match injected.faculae.is_empty() {
+            true => "; rims of injected spots are outlined",
+            false => "; rims of injected spots are outlined in blue, those of faculae in red",
+        };
+        let spottedness = match content {
+            Content::Spots => injected.coverage.or(map.true_spottedness),
+            Content::Brightness(_) => map.true_spottedness,
+        };
+        stars.push(Star::injected(content, spottedness, &injected));
+        stars[0].rims = injected;
+    }
+    let what = if content == Content::Spots { "spots" } else { "brightness" };
+    Ok(draw(&stars, content, &cycles, format!("Map of the {what} at cycle 0{compared}. {HOW_TO_READ}")))
+}
+
+/// The injected map of the simulation in `folder`.
+///
+/// `None` of observed profiles that an orbit was put into.
+pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
+    let truth: TruthFile = origin::read(folder, TRUTH)?;
+    let Some(injected) = Injected::of_truth(&truth) else { return Ok(None) };
+    let number = |key: &str| truth.config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
+    let (period, epoch) = (number("rotation_period_d").unwrap_or(f64::NAN), number("epoch_d").unwrap_or(0.0));
+    let cycles: Vec<f64> = truth.times_d.iter().map(|t| (t - epoch) / period).filter(|c| c.is_finite()).collect();
+    let (content, what) = match (injected.faculae.is_empty(), truth.contrast) {
+        (false, Some(contrast)) => (Content::Brightness(Brightness::of_spots(contrast)), "spots and faculae"),
+        _ => (Content::Spots, "spots"),
+    };
+    let mut star = Star::injected(content, None, &injected);
+    star.title = Content::Spots.title("injected", injected.coverage);
+    Ok(Some(draw(&[star], content, &cycles, format!("Map of the injected {what} at cycle 0. {HOW_TO_READ}"))))
+}
+
+/// How phases and longitudes are to be read.
+const HOW_TO_READ: &str = "Discs: flattened polar projection, seen from above the visible pole: parallels at +60, \
++30, 0 \
+                           (bold) and -30 degrees, the star turns anticlockwise, numbers outside are the rotation \
+                           phases at which \
+                           a meridian faces the observer, ticks the observed phases. Ellipses: Mollweide projection; \
+                           longitude = 360 (1 - phase) degrees.";
+
+/// Radius of the polar projection (pt).
+const RADIUS: f64 = 84.0;
+/// Half the height of Mollweide's.
+const HALF_HEIGHT: f64 = 56.0;
+
+impl Star {
+    fn injected(content: Content, spottedness: Option<f64>, injected: &Injected) -> Self {
+        let title = content.title("injected", spottedness);
+        Star { title, surface: Surface::Discs(content.discs(injected)), rims: Injected::default() }
+    }
+
+    fn values(&self) -> Vec<f64> {
+        match &self.surface {
+            Surface::Pixels(map) => map.values.clone(),
+            Surface::Discs(discs) => discs.iter().map(|(_, value)| *value).collect(),
+        }
+    }
+
+    fn paint(&self, figure: &mut Figure, projection: Projection, scale: Scale) {
+        photosphere(figure, projection, scale);
+        match &self.surface {
+            Surface::Pixels(map) => map.paint(figure, projection, scale),
+            Surface::Discs(discs) => paint_discs(figure, projection, discs, scale),
+        }
+        graticule(figure, projection);
+        for facula in &self.rims.faculae {
+            outline(figure, "injected-facula", projection, &facula.disc, Stroke::new(VERMILION, 0.6));
+        }
+        for spot in &self.rims.spots {
+            outline(figure, "injected-spot", projection, &spot.disc(), Stroke::new(BLUE, 0.6));
+        }
+    }
+}
+
+/// One star: the projections side by side; two stars: a column each.
+fn draw(stars: &[Star], content: Content, cycles: &[f64], caption: String) -> Figure {
+    let two = stars.len() > 1;
+    let mut figure = Figure::new("map", PAGE_MM, if two { 136.0 } else { 92.0 });
+    figure.caption = caption;
+    let scale = content.scale(stars.iter().flat_map(Star::values));
+    let half = 0.5 * figure.width;
+    let middle = 28.0 + RADIUS + 8.0;
+    for (k, star) in stars.iter().enumerate() {
+        let x = half * (0.5 + k as f64);
+        let mollweide =
+            if two { [x + 6.0, middle + RADIUS + 26.0 + HALF_HEIGHT] } else { [1.5 * half - 4.0, middle - 8.0] };
+        polar(&mut figure, star, [x, middle], cycles, scale);
+        flat(&mut figure, star, mollweide, HALF_HEIGHT, scale);
+        figure.text(&star.title, [if two { x } else { half }, 10.0], Font::LABEL, Align::Centre, 0.0);
+    }
+    let bar = Rect { left: half - 70.0, top: figure.height - 30.0, width: 140.0, height: 6.0 };
+    scale.shade.lying_bar(&mut figure, bar, content.label());
+    figure
+}
+
+const TINY: Font = Font { size: 6.0, colour: BLACK };
+
+fn polar(figure: &mut Figure, star: &Star, centre: Point, cycles: &[f64], scale: Scale) {
+    let projection = Projection::Polar { centre, radius: RADIUS };
+    star.paint(figure, projection, scale);
+    // the meridian that faces the observer at a phase
+    let toward = |phase: f64, distance: f64| {
+        let (sin, cos) = (-360.0 * phase).to_radians().sin_cos();
+        [centre[0] + distance * sin, centre[1] + distance * cos]
+    };
+    for cycle in cycles {
+        let tick = [toward(*cycle, RADIUS + 1.5), toward(*cycle, RADIUS + 7.0)];
+        figure.path("observed-phase", open(&tick), Paint::stroke(Stroke::new(BLACK, 0.6)));
+    }
+    for (phase, text, align, down) in [
+        (0.0, "phase 0", Align::Centre, 6.5),
+        (0.25, "0.25", Align::Right, 2.5),
+        (0.5, "0.5", Align::Centre, -1.5),
+        (0.75, "0.75", Align::Left, 2.5),
+    ] {
+        let at = toward(phase, RADIUS + 9.5);
+        figure.text(text, [at[0], at[1] + down], Font::SMALL, align, 0.0);
+    }
+    for latitude in [60.0, 30.0, 0.0, -30.0] {
+        let [x, y] = projection.place(207.0, latitude);
+        let text = degrees(latitude);
+        let width = width_pt(&text, TINY.size);
+        let ground = Rect { left: x - 0.5 * width - 1.0, top: y - 3.2, width: width + 2.0, height: 6.4 };
+        figure.rect("label-ground", ground, Paint::fill(WHITE.opacity(0.75)));
+        figure.text(&text, [x, y + 2.1], TINY, Align::Centre, 0.0);
+    }
+    if !cycles.is_empty() {
+        let [x, y] = [centre[0] - RADIUS + 2.0, centre[1] + RADIUS + 2.0];
+        figure.path("phase-key", open(&[[x, y - 11.0], [x, y - 5.5]]), Paint::stroke(Stroke::new(BLACK, 0.6)));
+        figure.text("observed phases", [x, y + 2.0], TINY, Align::Centre, 0.0);
+    }
+    rotation_arrow(figure, [centre[0] + RADIUS + 2.0, centre[1] + RADIUS - 6.0]);
+}
+
+/// A latitude with its sign.
+fn degrees(latitude: f64) -> String {
+    if latitude == 0.0 { "0°".to_owned() } else { format!("{latitude:+}°") }
+}
+
+/// An arrow on an arc with the way the star turns: anticlockwise.
+fn rotation_arrow(figure: &mut Figure, at: Point) {
+    let radius = 7.0;
+    let on = |degrees: f64, radius: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        [at[0] + radius * cos, at[1] - radius * sin]
+    };
+    let arc: Vec<Point> = (0..=30).map(|k| on(-60.0 + 8.6 * f64::from(k), radius)).collect();
+    figure.polyline("rotation", &arc, Stroke::new(BLACK, 0.9));
+    let head = [on(232.0, radius), on(190.0, radius - 3.0), on(190.0, radius + 3.0)];
+    figure.polygon("rotation", &head, Paint::fill(BLACK));
+    figure.text("rotation", [at[0], at[1] + radius + 8.0], TINY, Align::Centre, 0.0);
+}
+
+fn flat(figure: &mut Figure, star: &Star, centre: Point, radius: f64, scale: Scale) {
+    let projection = Projection::Mollweide { centre, radius };
+    star.paint(figure, projection, scale);
+    for latitude in [-60.0, -30.0, 0.0, 30.0, 60.0_f64] {
+        let at = projection.place(0.0, latitude);
+        // clear of the edge, which leans where it is far from the equator
+        let text = [at[0] - 3.0 - latitude.abs() / 14.0, at[1] + 2.5];
+        figure.text(&degrees(latitude), text, Font::SMALL, Align::Right, 0.0);
+    }
+    // in the corner that the ellipse leaves free
+    let corner = [projection.place(0.0, 0.0)[0] - 14.0, centre[1] - radius + 3.0];
+    figure.text("latitude", corner, Font::LABEL, Align::Left, 0.0);
+    let below = centre[1] + radius + 9.0;
+    for longitude in [0.0, 60.0, 120.0, 180.0, 240.0, 300.0, 360.0] {
+        let at = projection.place(longitude, 0.0);
+        figure.text(&format!("{longitude}°"), [at[0], below], Font::SMALL, Align::Centre, 0.0);
+    }
+    figure.text("longitude", [centre[0], below + 10.0], Font::LABEL, Align::Centre, 0.0);
+}

@@ -1,0 +1,111 @@
+//! The symbols of astronomers for parameters.
+
+use crate::posterior::objective::Parameter;
+
+/// Decimals of a period in days, in figures and tables alike.
+pub const PERIOD_DIGITS: usize = 4;
+
+/// Unit of phi: the part of an orbit from the epoch to the largest radial velocity.
+const PHASE_UNIT: &str = "cycles to max. RV";
+
+/// Symbol and unit of a parameter by its name in files; the name itself if it is another one.
+pub fn symbol(name: &str) -> (&str, &'static str) {
+    match Parameter::from_name(name) {
+        Some(Parameter::K) => ("*K*", "km/s"),
+        Some(Parameter::PorbOverProt) => ("*P*_{orb}/*P*_{rot}", ""),
+        Some(Parameter::Phi) => ("*φ*", PHASE_UNIT),
+        Some(Parameter::OmegaEq) => ("*Ω*_{eq}", "rad/d"),
+        Some(Parameter::DOmega) => ("d*Ω*", "rad/d"),
+        Some(Parameter::Inclination) => ("*i*", "°"),
+        Some(Parameter::Vsini) => ("*v* sin *i*", "km/s"),
+        Some(Parameter::Vsys) => ("*v*_{sys}", "km/s"),
+        Some(Parameter::LimbDarkening) => ("*u*", ""),
+        Some(Parameter::LineSigma) => ("*σ*_{line}", "km/s"),
+        Some(Parameter::EquivalentWidth) => ("*W*_{line}", "km/s"),
+        Some(Parameter::Contrast) => ("*c*", ""),
+        None if name == "period_d" => ("*P*_{orb}", "d"),
+        None if name == "t_max_rv_d" => ("*T*_{max RV}", "d"),
+        None if name == "t_conjunction_d" => ("*T*_{conj}", "d"),
+        None if name == "msini_mjup" => ("*M* sin *i*", "*M*_{Jup}"),
+        // columns of the experiments' tables
+        None if name == "assumed_deg" => ("assumed *i*", "°"),
+        None => (name, ""),
+    }
+}
+
+/// Label of an axis: symbol and unit.
+pub fn label(name: &str) -> String {
+    if let Some(injected) = name.strip_prefix("true_") {
+        return format!("injected {}", label(injected));
+    }
+    match symbol(name) {
+        (symbol, "") => symbol.to_owned(),
+        (symbol, unit) => format!("{symbol} ({unit})"),
+    }
+}
+
+/// Short label of an axis, for narrow panels.
+pub fn short_label(name: &str) -> String {
+    label(name).replace(PHASE_UNIT, "cycles")
+}
+
+/// What is said of a parameter above a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Title {
+    symbol: String,
+    /// The value; `None` where the data do not constrain it.
+    value: Option<String>,
+    errors: String,
+    unit: String,
+}
+
+impl Title {
+    /// Lines that a title has at most.
+    pub const LINES: usize = 3;
+
+    /// A value with its error bars, downwards and upwards.
+    pub fn value(name: &str, value: f64, [down, up]: [f64; 2], digits: usize) -> Self {
+        let (down, up) = (format!("{down:.digits$}"), format!("{up:.digits$}"));
+        let (symbol, unit) = symbol(name);
+        let unit = match unit {
+            // those of a phase go without saying
+            "" | PHASE_UNIT => String::new(),
+            "°" => "°".to_owned(),
+            unit => format!(" {unit}"),
+        };
+        Title {
+            symbol: symbol.to_owned(),
+            value: Some(format!("{value:.digits$}")),
+            errors: if down == up { format!("± {up}") } else { format!("+{up} -{down}") },
+            unit,
+        }
+    }
+
+    /// Of a parameter that the data do not constrain, so that no value means anything.
+    pub fn unconstrained(name: &str) -> Self {
+        let symbol = symbol(name).0.to_owned();
+        Title { symbol, value: None, errors: String::new(), unit: String::new() }
+    }
+
+    /// In so many lines, [`Title::LINES`] at most.
+    pub fn lines(&self, lines: usize) -> Vec<String> {
+        let Title { symbol, value, errors, unit } = self;
+        match (value, lines) {
+            (None, 1) => vec![format!("{symbol} unconstrained")],
+            (None, _) => vec![symbol.clone(), "unconstrained".to_owned()],
+            (Some(value), 1) => vec![format!("{symbol} = {value} {errors}{unit}")],
+            (Some(value), 2) => vec![symbol.clone(), format!("{value} {errors}{unit}")],
+            (Some(value), _) => vec![symbol.clone(), value.clone(), errors.clone()],
+        }
+    }
+}
+
+/// `x` by the whole number of turns that brings it nearest to `centre`, for a periodic parameter (period 1).
+pub fn nearest_turn(x: f64, centre: f64) -> f64 {
+    x - (x - centre).round()
+}
+
+/// Decimals that show two digits of `error`.
+pub fn decimals(error: f64) -> usize {
+    if error > 0.0 && error.is_finite() { (1.0 - error.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 }
+}

@@ -1,0 +1,168 @@
+//! What is said of a run.
+
+use super::{Chapter, NOTHING, Table, Tone, verdicts};
+use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
+use crate::figures::plot::{PlotError, Sampled};
+use crate::runs::manifest::Manifest;
+use crate::sampling::chain::{ParameterSummary, PeriodMode, Summary};
+use std::path::Path;
+
+/// The chapter of the run in `folder`.
+pub(super) fn chapter(folder: &Path) -> Result<Chapter, PlotError> {
+    let sampled = Sampled::read(folder)?;
+    let (manifest, summary) = (&sampled.manifest, &sampled.summary);
+    let mut notes = measured(manifest);
+    notes.extend(upper_limits(summary));
+    let truth = sampled.truth.as_ref();
+    let mut head = ["parameter", "median", "68 % interval", "95 % interval", "95 % HDI", "R-hat", "ESS", "τ (steps)"]
+        .map(String::from)
+        .to_vec();
+    if truth.is_some() {
+        head.insert(1, "injected".into());
+    }
+    let row = |name: &String| {
+        let one = &summary.parameters[name];
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let digits = decimals(one.sd);
+            row.insert(1, truth.get(name).map_or_else(|| NOTHING.into(), |value| format!("{value:.digits$}")));
+        }
+        row
+    };
+    let parameters = Table { head: head.clone(), rows: summary.names.iter().map(row).collect() };
+    let derived = summary.derived_names.iter().filter_map(|name| {
+        let one = summary.derived.get(name)?;
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let digits = decimals(one.sd);
+            row.insert(1, truth.get(name).map_or_else(|| NOTHING.into(), |value| format!("{value:.digits$}")));
+        }
+        Some(row)
+    });
+    let derived = Table { head, rows: derived.collect() };
+    notes.extend(meanings(summary));
+    let chain = Table {
+        head: ["steps", "burn-in", "ensembles × walkers", "evaluations", "failed", "accepted"]
+            .map(String::from)
+            .to_vec(),
+        rows: vec![vec![
+            summary.steps.to_string(),
+            summary.discarded_steps.to_string(),
+            format!("{} × {}", manifest.ensembles, manifest.walkers),
+            summary.evaluations.to_string(),
+            summary.failures.to_string(),
+            format!("{:.0} %", 100.0 * summary.acceptance_fraction),
+        ]],
+    };
+    Ok(Chapter {
+        heading: "Posterior".into(),
+        verdicts: summary.verdict.as_ref().map(verdicts::of).into_iter().chain([convergence(summary)]).collect(),
+        warnings: warnings(manifest, summary),
+        notes,
+        tables: [
+            ("The sampled parameters.", parameters),
+            ("Modes of the period.", period_modes(manifest, summary)),
+            ("What follows from them, draw by draw.", derived),
+            ("The chain.", chain),
+        ]
+        .into_iter()
+        .filter(|(_, table)| !table.rows.is_empty())
+        .map(|(caption, table)| (caption.to_owned(), table))
+        .collect(),
+    })
+}
+
+fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
+    let digits = decimals(one.sd);
+    let interval = |[low, high]: [f64; 2]| format!("{low:.digits$} to {high:.digits$}");
+    let optional = |x: Option<f64>, digits: usize| x.map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"));
+    vec![
+        label(name),
+        if one.unconstrained { "unconstrained".into() } else { format!("{:.digits$}", one.median) },
+        interval(one.ci68),
+        interval(one.ci95),
+        interval(one.hdi95),
+        optional(one.rhat, 3),
+        optional(one.ess, 0),
+        optional(one.tau, 1),
+    ]
+}
+
+/// What the blind search and the chain say against it, and what else must be known beside the verdict.
+fn warnings(manifest: &Manifest, summary: &Summary) -> Vec<String> {
+    let measured = measured(manifest);
+    let begun = manifest.warnings().into_iter().filter(|line| !measured.contains(line));
+    summary.remarks.iter().cloned().chain(begun).chain(manifest.co_rotation(summary)).collect()
+}
+
+/// What was taken from the observations, one line each.
+fn measured(manifest: &Manifest) -> Vec<String> {
+    let lines = manifest.origin.measured.lines();
+    lines.into_iter().map(|(label, text)| format!("{label}: {text}")).collect()
+}
+
+/// The modes of the period, where there are several or spots may make the one.
+fn period_modes(manifest: &Manifest, summary: &Summary) -> Table {
+    let modes = &summary.period_modes;
+    if modes.len() < 2 && modes.iter().all(|mode| mode.rotation.is_none()) {
+        return Table::default();
+    }
+    let rotation_period = manifest.origin.config.pointer("/star/rotation_period_d").and_then(serde_json::Value::as_f64);
+    let days = |p: f64, mode: &PeriodMode| {
+        let digits = decimals(0.5 * p * (mode.ci68[1] - mode.ci68[0])).min(PERIOD_DIGITS);
+        format!("{:.digits$}", p * mode.porb_over_prot)
+    };
+    let row = |mode: &PeriodMode| {
+        let [low, high] = mode.ci68;
+        let digits = decimals(0.5 * (high - low));
+        vec![
+            format!("{:.0} %", 100.0 * mode.weight),
+            rotation_period.map_or_else(|| NOTHING.into(), |p| days(p, mode)),
+            format!("{:.digits$}", mode.porb_over_prot),
+            format!("{low:.digits$} to {high:.digits$}"),
+            format!("{:.3}", mode.k_kms),
+            mode.rotation.clone().unwrap_or_else(|| NOTHING.into()),
+        ]
+    };
+    let head = [
+        "share of the draws",
+        "period (d)",
+        "*P*_{orb}/*P*_{rot}",
+        "68 % interval",
+        "*K* (km/s)",
+        "period of the star",
+    ];
+    Table { head: head.map(String::from).to_vec(), rows: modes.iter().map(row).collect() }
+}
+
+/// Whether the chain has converged, and what that means.
+fn convergence(summary: &Summary) -> (Tone, String) {
+    if !summary.converged {
+        let advice = summary.advice.join("; ");
+        return (Tone::Doubt, format!("The chain has not converged, its intervals are not to be quoted: {advice}."));
+    }
+    let all = || summary.parameters.values();
+    let worst = all().filter_map(|one| one.rhat).fold(1.0, f64::max);
+    let least = all().filter_map(|one| one.ess).fold(f64::INFINITY, f64::min);
+    let remark = if summary.advice.is_empty() { String::new() } else { format!(" But {}.", summary.advice.join("; ")) };
+    let sentence = format!(
+        "The chain has converged: independent ensembles agree on every parameter (R-hat at most {worst:.3}), and its \
+        draws are \
+         worth {least:.0} independent ones or more.{remark}"
+    );
+    (if summary.advice.is_empty() { Tone::Good } else { Tone::Neutral }, sentence)
+}
+
+/// What parameters and quantities are, where their names do not say it.
+fn meanings(summary: &Summary) -> impl Iterator<Item = String> {
+    let names = summary.names.iter().chain(&summary.derived_names);
+    names.filter_map(|name| Some(format!("{}: {}.", symbol(name).0, summary.definitions.get(name)?)))
+}
+
+fn upper_limits(summary: &Summary) -> Vec<String> {
+    let limit = |(name, one): (&String, &ParameterSummary)| {
+        let digits = decimals(one.sd);
+        Some(format!("{} is compatible with zero: below {:.digits$} at 95 %.", label(name), one.upper95?))
+    };
+    summary.parameters.iter().chain(&summary.derived).filter_map(limit).collect()
+}

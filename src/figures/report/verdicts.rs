@@ -1,0 +1,21 @@
+//! The sentences that head a result, as its file has them.
+
+use super::Tone;
+use crate::planets::verdict::{Finding, Verdict};
+use serde_json::Value;
+
+/// Of a verdict on a planet: a detection can be relied on, a candidate is to be doubted.
+pub(super) fn of(verdict: &Verdict) -> (Tone, String) {
+    let tone = match verdict.finding {
+        Finding::Detection => Tone::Good,
+        Finding::Candidate => Tone::Doubt,
+        Finding::NoPlanetNeeded | Finding::NotJudged => Tone::Neutral,
+    };
+    (tone, verdict.sentence.clone())
+}
+
+/// The verdict at a place of a file; `None` where there is none.
+pub(super) fn at(file: &Value, pointer: &str) -> Option<(Tone, String)> {
+    let verdict: Verdict = serde_json::from_value(file.pointer(pointer)?.clone()).ok()?;
+    Some(of(&verdict))
+}

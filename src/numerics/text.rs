@@ -1,0 +1,57 @@
+//! Tables as text, and text of others in a line of one's own.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Text of others, such as a file's name, with control characters as escapes (`\n`, `\u{1b}`): it can neither break a
+/// line nor command a terminal.
+pub fn escaped(text: &str) -> Cow<'_, str> {
+    if !text.contains(char::is_control) {
+        return Cow::Borrowed(text);
+    }
+    let escape = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(escape).collect())
+}
+
+/// A path as it is shown.
+pub fn shown(path: &Path) -> String {
+    escaped(&path.to_string_lossy()).into_owned()
+}
+
+/// How a column is set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Align {
+    /// To the left.
+    Left,
+    /// To the right.
+    Right,
+}
+
+/// Columns under each other: the first to the left, the others to the right. Rows are as long as the first one.
+pub fn aligned(rows: &[Vec<String>]) -> String {
+    let mut aligns = vec![Align::Right; rows.first().map_or(0, Vec::len)];
+    if let Some(first) = aligns.first_mut() {
+        *first = Align::Left;
+    }
+    columns(rows, &aligns)
+}
+
+/// Columns under each other, each set as `aligns` says; rows have as many. Nothing trails a line.
+pub fn columns(rows: &[Vec<String>], aligns: &[Align]) -> String {
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..aligns.len()).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).zip(aligns).map(|((cell, width), align)| match align {
+            Align::Left => format!("{cell:<width$}"),
+            Align::Right => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+    };
+    rows.iter().map(line).collect()
+}
+
+#[test]
+fn names_stay_in_their_line() {
+    assert_eq!(escaped("a\nb\u{1b}[31m\u{9b}c\td\u{7f}"), "a\\nb\\u{1b}[31m\\u{9b}c\\td\\u{7f}");
+    assert!(matches!(escaped("K \u{2212} \u{b1} \\ \"quoted\" 'one'"), Cow::Borrowed(_)));
+}

@@ -1,0 +1,69 @@
+//! What a periodogram looks like without a planet: the highest peak of many draws of the gradient.
+//!
+//! Without a planet the gradient has mean 0 and the information as covariance: noise, and spots that the map leaves
+//! over. `Delta ln L(P) = |L^-1 X' gradient|^2 / 2` with `A = L L'` at every trial period. The whitened rows of all
+//! periods are one matrix, times a square root of the information, times the deviates. Each block of draws has its own
+//! stream of random numbers, so that the number of threads does not matter.
+
+use super::orbits::{Trial, design};
+use crate::planets::velocities::VelocityQuadratic;
+use nalgebra::DMatrix;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+
+/// Draws that share one matrix product, and one stream of random numbers.
+const DRAWS: usize = 250;
+
+/// Rows, two a trial period, whose product with the draws is held at once.
+const ROWS: usize = 1024;
+
+/// Directions of the gradient with less than this part of the largest variance do not move.
+const STILL: f64 = 1e-13;
+
+/// The highest Delta ln L over the trial periods of each of `draws` gradients.
+pub fn maxima(quadratic: &VelocityQuadratic, trials: &[Trial], draws: usize, seed: u64) -> Vec<f64> {
+    let rows = whitened(quadratic, trials);
+    let block = |block: usize| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(block as u64);
+        let size = DRAWS.min(draws - block * DRAWS);
+        let deviates = DMatrix::from_fn(rows.ncols(), size, |_, _| rng.sample::<f64, _>(StandardNormal));
+        let mut highest = vec![0.0f64; size];
+        for first in (0..rows.nrows()).step_by(ROWS) {
+            let amplitudes = rows.rows(first, ROWS.min(rows.nrows() - first)) * &deviates;
+            for (highest, column) in highest.iter_mut().zip(amplitudes.column_iter()) {
+                let pairs = column.as_slice().chunks_exact(2).map(|w| 0.5 * (w[0] * w[0] + w[1] * w[1]));
+                *highest = pairs.fold(*highest, f64::max);
+            }
+        }
+        highest
+    };
+    (0..draws.div_ceil(DRAWS)).into_par_iter().flat_map_iter(block).collect()
+}
+
+/// `L^-1 X' S` of all periods, two rows each, S S' being the information.
+fn whitened(quadratic: &VelocityQuadratic, trials: &[Trial]) -> DMatrix<f64> {
+    let bounded: Vec<&Trial> = trials.iter().filter(|t| t.orbit.is_some()).collect();
+    let frequencies: Vec<f64> = bounded.iter().map(|t| t.frequency).collect();
+    let mut columns = root(&quadratic.information) * design(&quadratic.cycles, &frequencies);
+    for (j, trial) in bounded.iter().enumerate() {
+        let Some(factor) = trial.information.cholesky().map(|c| c.l()) else { continue };
+        for i in 0..columns.nrows() {
+            let first = columns[(i, 2 * j)] / factor[(0, 0)];
+            let second = (columns[(i, 2 * j + 1)] - factor[(1, 0)] * first) / factor[(1, 1)];
+            (columns[(i, 2 * j)], columns[(i, 2 * j + 1)]) = (first, second);
+        }
+    }
+    columns.transpose()
+}
+
+/// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do
+/// draws.
+fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut eigen = covariance.clone().symmetric_eigen();
+    let still = STILL * eigen.eigenvalues.max();
+    eigen.eigenvalues.apply(|variance| *variance = if *variance > still { variance.sqrt() } else { 0.0 });
+    eigen.recompose()
+}

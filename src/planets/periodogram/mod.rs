@@ -1,0 +1,135 @@
+//! The Doppler-imaging periodogram: orbits blindly searched in the velocities of the profiles, spots marginalised out
+//! (`docs/method.md` section 4).
+//!
+//! All of it follows from one quadratic in the velocities. Periods are in rotation cycles, `Porb/Prot`; days only where
+//! the user states what to search (`frequencies`).
+
+mod draws;
+pub mod eccentric;
+pub mod false_alarm;
+pub mod frequencies;
+pub mod kepler;
+pub mod limits;
+pub mod normal;
+pub mod offset;
+pub mod orbits;
+pub mod peaks;
+mod refine;
+pub mod rotation;
+#[cfg(test)]
+mod sample;
+pub mod two_planets;
+pub mod window;
+
+pub use eccentric::KeplerianOrbit;
+pub use false_alarm::FalseAlarm;
+pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
+pub use orbits::{CircularOrbit, Trial};
+pub use peaks::Peak;
+pub use rotation::{Imitation, RotationPeriods};
+pub use two_planets::TwoOrbits;
+
+use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::CANDIDATE_FAP;
+use limits::{detection_limit_kms, upper_limit_kms};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use window::{window, window_peaks};
+
+/// Probability of the upper limit on K.
+const CREDENCE: f64 = 0.95;
+
+/// How a search is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SearchSettings {
+    /// Number of such draws.
+    pub draws: usize,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        SearchSettings { draws: 10_000, seed: 1 }
+    }
+}
+
+/// One trial period with all that is said of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// The trial.
+    pub trial: Trial,
+    /// 95 % upper limit on K at this period (km/s).
+    pub k_upper95_kms: Option<f64>,
+    /// The window function at this frequency.
+    pub window: f64,
+    /// The K (km/s) that makes a candidate ([`CANDIDATE_FAP`]) with a chance of 50 %.
+    pub k_limit50_kms: Option<f64>,
+    /// The same with a chance of 95 %.
+    pub k_limit95_kms: Option<f64>,
+}
+
+/// A blind search: every trial period, the peaks, and how often stars without a planet show as high ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Search {
+    /// The trial periods, from long to short.
+    pub rows: Vec<Row>,
+    /// The peaks, from high to low; there is one at least.
+    pub peaks: Vec<Peak>,
+    /// The star's own periods, where spots imitate orbits.
+    pub rotation: RotationPeriods,
+    /// Judges them.
+    pub false_alarm: FalseAlarm,
+}
+
+/// No trial period at which the data bound an orbit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the profiles do not bound the velocities of an orbit at any of the trial periods")]
+pub struct Unbounded;
+
+impl Search {
+    /// Searches `quadratic` at the `frequencies`.
+    ///
+    /// # Errors
+    /// [`Unbounded`].
+    pub fn new(
+        quadratic: &VelocityQuadratic,
+        frequencies: &Frequencies,
+        settings: SearchSettings,
+    ) -> Result<Self, Unbounded> {
+        let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+        let Frequencies { time_base_cycles, rotation_period_d, .. } = *frequencies;
+        let window_peaks = window_peaks(&quadratic.cycles, frequencies);
+        let rotation = RotationPeriods::new(&quadratic.cycles, rotation_period_d, &window_peaks, time_base_cycles);
+        let peaks = peaks::peaks(quadratic, frequencies, &trials, &rotation);
+        if peaks.is_empty() {
+            return Err(Unbounded);
+        }
+        let false_alarm = FalseAlarm::draw(quadratic, &trials, settings.draws, settings.seed);
+        let level = false_alarm.level(CANDIDATE_FAP);
+        let row = |trial: &Trial| Row {
+            trial: *trial,
+            k_upper95_kms: upper_limit_kms(trial, CREDENCE),
+            window: window(&quadratic.cycles, trial.frequency),
+            k_limit50_kms: detection_limit_kms(trial, level, 0.5),
+            k_limit95_kms: detection_limit_kms(trial, level, 0.95),
+        };
+        let rows = trials.par_iter().map(row).collect();
+        Ok(Search { rows, peaks, rotation, false_alarm })
+    }
+
+    /// The highest peak.
+    pub fn best(&self) -> &Peak {
+        &self.peaks[0]
+    }
+}
+
+/// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is bounded where
+/// the star's spots imitate one. `None` where the data bound none there.
+pub fn co_rotation_penalty(quadratic: &VelocityQuadratic, frequencies: &Frequencies, rows: &[Row]) -> Option<f64> {
+    let here = orbits::at(quadratic, 1.0).orbit?.sigma_k_kms;
+    let away = |row: &&Row| (row.trial.frequency - 1.0).abs() * frequencies.time_base_cycles > 1.0;
+    let mut others: Vec<f64> = rows.iter().filter(away).filter_map(|row| Some(row.trial.orbit?.sigma_k_kms)).collect();
+    others.sort_by(f64::total_cmp);
+    others.get(others.len() / 2).map(|median| here / median)
+}

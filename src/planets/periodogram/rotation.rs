@@ -1,0 +1,141 @@
+//! Periods at which spots imitate orbits: the rotation period, its multiples and fractions, and their aliases by the
+//! sampling and by the day.
+//!
+//! Spots return with the rotation and distort each line several times on their way across the disc, which gives signals
+//! at `Prot/n`; where they change, or the sampling sees every other rotation, at multiples, too. Profiles taken from
+//! one place come once a day, so that each of these has reflections at one and two a day (Dawson & Fabrycky 2010),
+//! however weak the window function is there.
+
+use super::window::{Alias, SAME, WindowPeak, alias, window};
+use serde::{Deserialize, Serialize};
+
+/// Fractions and multiples of the rotation period that are looked at.
+const FRACTIONS: u32 = 4;
+const MULTIPLES: u32 = 4;
+
+/// A period is told from another if its frequency differs by more than so many standard errors, but for the second
+/// number (in inverse time bases) within which it never is: spots that change or rotate differentially do not keep
+/// their period.
+const TOLD_APART: (f64, f64) = (3.0, 0.2);
+
+/// The sampling sees the day where its window function is at least this high at one or two a day.
+const DAILY: f64 = 0.1;
+
+/// A period of the star, `numerator / denominator` rotations, and perhaps an alias of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Imitation {
+    /// Rotations in so many periods.
+    pub numerator: u32,
+    /// Periods in so many rotations.
+    pub denominator: u32,
+    /// The peak of the window function that joins the two, for an alias; frequencies are a cycle of rotation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alias: Option<Alias>,
+}
+
+impl Imitation {
+    /// `Prot`, `Prot/3`, `2 Prot`.
+    pub fn period(&self) -> String {
+        match (self.numerator, self.denominator) {
+            (1, 1) => "Prot".to_owned(),
+            (1, n) => format!("Prot/{n}"),
+            (n, _) => format!("{n} Prot"),
+        }
+    }
+
+    /// Whether spots are likely to make a signal there: at the rotation period, its fractions and multiples, and at
+    /// aliases of the first two, where most of their power is. Aliases of all others fill a large part of all periods.
+    pub fn is_likely(&self) -> bool {
+        self.alias.is_none() || self.numerator == 1 && self.denominator <= 2
+    }
+
+    /// In a few words: `close to 2 Prot`, `an alias of Prot/3 by 1.003/d`.
+    pub fn words(&self, rotation_period_d: f64) -> String {
+        match &self.alias {
+            None => format!("close to {}", self.period()),
+            Some(alias) => {
+                format!("an alias of {} by {:.3}/d", self.period(), alias.window.frequency / rotation_period_d)
+            }
+        }
+    }
+}
+
+/// The star's own periods under a sampling.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RotationPeriods {
+    /// What makes aliases: strong peaks of the window function, and the day where the sampling sees it.
+    pub window: Vec<WindowPeak>,
+    /// Time base in rotation cycles.
+    pub time_base_cycles: f64,
+}
+
+impl RotationPeriods {
+    /// Of profiles at `cycles` of a star with that rotation period, whose window function has these strong `peaks`.
+    pub fn new(cycles: &[f64], rotation_period_d: f64, peaks: &[WindowPeak], time_base_cycles: f64) -> Self {
+        let mut all = peaks.to_vec();
+        for days in [1.0, 2.0] {
+            let frequency = days * rotation_period_d;
+            let near = |peak: &WindowPeak| (peak.frequency - frequency).abs() * time_base_cycles < SAME;
+            let height = window(cycles, frequency);
+            if !all.iter().any(near) && height >= DAILY {
+                all.push(WindowPeak { frequency, height });
+            }
+        }
+        RotationPeriods { window: all, time_base_cycles }
+    }
+
+    /// The star's period that `porb_over_prot`, known to `sigma`, is not told from, if there is one: itself rather than
+    /// an alias, and fractions rather than multiples.
+    pub fn imitated(&self, porb_over_prot: f64, sigma: Option<f64>) -> Option<Imitation> {
+        let frequency = 1.0 / porb_over_prot;
+        let sigma = sigma.filter(|s| s.is_finite()).unwrap_or(f64::INFINITY) * frequency * frequency;
+        let wide = SAME / self.time_base_cycles;
+        let tight = (TOLD_APART.0 * sigma).max(TOLD_APART.1 / self.time_base_cycles).min(wide);
+        let own = || (1..=FRACTIONS).map(|n| (1, n)).chain((2..=MULTIPLES).map(|n| (n, 1)));
+        let of = |(n, d): (u32, u32)| f64::from(d) / f64::from(n);
+        let direct = own().find(|&pair| {
+            let within = if pair.0 == 1 { wide } else { tight };
+            (frequency - of(pair)).abs() < within
+        });
+        if let Some((numerator, denominator)) = direct {
+            return Some(Imitation { numerator, denominator, alias: None });
+        }
+        let joined = |(numerator, denominator): (u32, u32)| {
+            let alias = alias(frequency, of((numerator, denominator)), &self.window, tight)?;
+            Some(Imitation { numerator, denominator, alias: Some(alias) })
+        };
+        own().find_map(joined)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// LO Peg's rotation, nights and the peaks that its spots make: 1.985 rotations, and 0.7308 d, which is 2.363/d
+    /// less 1/d.
+    #[test]
+    fn multiples_and_daily_aliases_are_named() {
+        let rotation_period_d = 0.4232;
+        let days = [0.0, 3.07, 3.09, 3.12, 3.98, 4.02, 6.98, 7.08, 8.96, 9.0, 9.05, 10.97, 11.05, 14.96, 15.02, 15.21];
+        let cycles: Vec<f64> = days.iter().map(|d| d / rotation_period_d).collect();
+        let base = 15.21 / rotation_period_d;
+        let periods = RotationPeriods::new(&cycles, rotation_period_d, &[], base);
+        assert!(periods.window.iter().any(|peak| (peak.frequency - rotation_period_d).abs() < 1e-12), "{periods:?}");
+        let words = |period: f64, sigma: f64| periods.imitated(period, Some(sigma)).map(|i| i.words(rotation_period_d));
+        assert_eq!(words(1.985, 0.007).as_deref(), Some("close to 2 Prot"));
+        assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("an alias of Prot by 1.000/d"));
+        assert_eq!(words(0.501, 0.0003).as_deref(), Some("close to Prot/2"));
+        assert_eq!(words(1.45, 0.004), None);
+    }
+
+    /// A period that is five of its errors from two rotations is another one, however few rotations were seen.
+    #[test]
+    fn what_is_told_apart_is_not_flagged() {
+        let cycles: Vec<f64> = (0..50).map(|k| 0.06 * f64::from(k)).collect();
+        let periods = RotationPeriods::new(&cycles, 3.0, &[], 2.94);
+        assert_eq!(periods.imitated(1.69, Some(0.058)), None);
+        assert!(periods.imitated(1.9, Some(0.058)).is_some());
+        assert!(periods.imitated(1.69, None).is_some(), "nobody knows how well it is known");
+    }
+}

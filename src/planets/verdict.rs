@@ -1,0 +1,194 @@
+//! What is said of a planet: every threshold, and the one sentence that heads every result.
+//!
+//! One number is compared with the thresholds: the probability that a star without a planet shows a peak as high
+//! anywhere in the blind search. A detection also needs that nothing speaks against it; otherwise it is a candidate,
+//! and the sentence names the reasons. Whether a chain has converged is another question, and is not part of it.
+
+use serde::{Deserialize, Serialize};
+
+/// Above this false-alarm probability no planet is needed.
+pub const CANDIDATE_FAP: f64 = 0.01;
+
+/// Below this false-alarm probability a candidate against which nothing speaks is a detection.
+pub const DETECTION_FAP: f64 = 1e-3;
+
+/// Another peak that is lower by less than this in ln L may as well be the true one: odds of 20 to 1.
+pub const AMBIGUOUS: f64 = 3.0;
+
+/// What the profiles say of a planet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Finding {
+    /// Stars without a planet show such peaks too often.
+    NoPlanetNeeded,
+    /// A peak that is rare by chance, but not rare enough, or something speaks against it.
+    Candidate,
+    /// A peak that is very rare by chance, and nothing speaks against it.
+    Detection,
+    /// It could not be judged.
+    NotJudged,
+}
+
+/// Something that is to be said beside a result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Remark {
+    /// What speaks against a planet, in a few words for the verdict; `None` for what only has to be known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub against: Option<String>,
+    /// The whole sentence.
+    pub text: String,
+}
+
+impl Remark {
+    /// Something that speaks against a planet, in a few words, and the whole sentence.
+    pub fn against(short: impl Into<String>, text: impl Into<String>) -> Self {
+        Remark { against: Some(short.into()), text: text.into() }
+    }
+
+    /// Something that has to be known.
+    pub fn note(text: impl Into<String>) -> Self {
+        Remark { against: None, text: text.into() }
+    }
+}
+
+/// The orbit that is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Signal {
+    /// Period (d).
+    pub period_d: f64,
+    /// Semi-amplitude (km/s).
+    pub k_kms: f64,
+    /// Its standard error (km/s).
+    pub sigma_k_kms: f64,
+}
+
+/// The verdict.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// What is found.
+    pub finding: Finding,
+    /// The sentence that heads the result.
+    pub sentence: String,
+    /// The number that was compared with the thresholds; null where there is none.
+    pub false_alarm_probability: Option<f64>,
+    /// The best orbit; null where there is none.
+    pub signal: Option<Signal>,
+    /// What speaks against a planet, in a few words each.
+    pub against: Vec<String>,
+}
+
+impl Verdict {
+    /// Of a signal with that false-alarm probability.
+    pub fn new(false_alarm_probability: f64, signal: Signal, remarks: &[Remark]) -> Self {
+        if false_alarm_probability.is_nan() {
+            return Verdict::not_judged("there is no false-alarm probability");
+        }
+        let mut against: Vec<String> = Vec::new();
+        for short in remarks.iter().filter_map(|remark| remark.against.as_ref()) {
+            if !against.contains(short) {
+                against.push(short.clone());
+            }
+        }
+        let finding = match false_alarm_probability {
+            p if p < DETECTION_FAP && against.is_empty() => Finding::Detection,
+            p if p < CANDIDATE_FAP => Finding::Candidate,
+            _ => Finding::NoPlanetNeeded,
+        };
+        let sentence = sentence(finding, false_alarm_probability, &signal, &against);
+        Verdict {
+            finding,
+            sentence,
+            false_alarm_probability: Some(false_alarm_probability),
+            signal: Some(signal),
+            against,
+        }
+    }
+
+    /// The same with more that speaks against it: a detection becomes a candidate.
+    pub fn with(self, remarks: &[Remark]) -> Self {
+        let Verdict { false_alarm_probability: Some(probability), signal: Some(signal), .. } = self else {
+            return self;
+        };
+        let mut all: Vec<Remark> = self.against.iter().map(|short| Remark::against(short, "")).collect();
+        all.extend_from_slice(remarks);
+        Verdict::new(probability, signal, &all)
+    }
+
+    /// Where there is no judgement, and why.
+    pub fn not_judged(why: impl std::fmt::Display) -> Self {
+        Verdict {
+            finding: Finding::NotJudged,
+            sentence: format!("Whether there is a planet is not judged: {why}."),
+            false_alarm_probability: None,
+            signal: None,
+            against: Vec::new(),
+        }
+    }
+}
+
+fn sentence(finding: Finding, false_alarm_probability: f64, signal: &Signal, against: &[String]) -> String {
+    let Signal { period_d, k_kms, sigma_k_kms } = *signal;
+    let digits = if sigma_k_kms > 0.0 { (1.0 - sigma_k_kms.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
+    let orbit = format!("{period_d:.4} d, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s");
+    let chance = format!("false-alarm probability {}", probability(false_alarm_probability));
+    match finding {
+        Finding::NoPlanetNeeded => {
+            let share = 100.0 * CANDIDATE_FAP;
+            format!(
+                "No planet is needed: stars without one show a peak as high as the best ({orbit}) too often ({chance}, \
+                     above {share} %)."
+            )
+        }
+        Finding::Candidate if against.is_empty() => {
+            let share = 100.0 * DETECTION_FAP;
+            format!("Candidate, not a detection: {orbit}; {chance}, and a detection needs less than {share} %.")
+        }
+        Finding::Candidate => {
+            let against = against.join("; ");
+            format!("Candidate, not a detection: {orbit}; {chance}. Against it: {against}.")
+        }
+        Finding::Detection => format!("Detection: {orbit}; {chance}, and no check speaks against it."),
+        Finding::NotJudged => String::new(),
+    }
+}
+
+/// A probability as it is written everywhere.
+pub fn probability(p: f64) -> String {
+    match p {
+        // what is smaller is no double any more
+        0.0 => "< 1e-300".to_owned(),
+        p if p >= 0.1 => format!("{p:.2}"),
+        p if p >= 1e-3 => format!("{p:.4}"),
+        p => format!("{p:.1e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIGNAL: Signal = Signal { period_d: 5.0692, k_kms: 0.1034, sigma_k_kms: 0.0108 };
+
+    #[test]
+    fn one_number_and_what_speaks_against_it_decide() {
+        let verdict = |p: f64, remarks: &[Remark]| Verdict::new(p, SIGNAL, remarks);
+        assert_eq!(verdict(1e-14, &[]).finding, Finding::Detection);
+        assert_eq!(verdict(5e-3, &[]).finding, Finding::Candidate);
+        assert_eq!(verdict(0.01, &[]).finding, Finding::NoPlanetNeeded);
+        assert_eq!(verdict(f64::NAN, &[]).finding, Finding::NotJudged);
+        assert_eq!(verdict(1e-14, &[Remark::note("few profiles")]).finding, Finding::Detection);
+        let doubted = verdict(1e-14, &[Remark::against("the period is close to 2 Prot", "long")]);
+        assert_eq!(doubted.finding, Finding::Candidate);
+        assert_eq!(
+            doubted.sentence,
+            "Candidate, not a detection: 5.0692 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. Against \
+            it: the \
+             period is close to 2 Prot."
+        );
+        assert_eq!(
+            verdict(1e-14, &[]).with(&[Remark::against("one night decides", "")]).against,
+            ["one night decides"]
+        );
+        assert!(verdict(0.71, &[]).sentence.starts_with("No planet is needed: "), "{}", verdict(0.71, &[]).sentence);
+    }
+}

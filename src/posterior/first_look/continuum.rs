@@ -1,0 +1,101 @@
+//! Where the continuum beside the line is, on average and in each profile: profiles whose continuum is not at 1, or
+//! wanders from one to the next, are fitted by no map.
+
+use super::noise::Scatter;
+use crate::star::observation::{Observations, Profile};
+
+/// The continuum reaches from the end of the line as far again, as for the noise.
+const OUTER: f64 = 2.0;
+
+/// Fewest bins on either side of the line whose mean is a level.
+const FEWEST_BINS: usize = 4;
+
+/// Levels that scatter by more than chance at this many standard deviations of chi2 wander.
+const WANDERING: f64 = 4.0;
+
+/// A level this many errors away from 1 is another one, if it is away by more than the second number.
+const ANOTHER_LEVEL: (f64, f64) = (4.0, 5e-4);
+
+/// The continuum on both sides of the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Continuum {
+    /// Its mean level, 1 where profiles are in units of it.
+    pub level: f64,
+    /// Standard error of that, by the scatter of the profiles' own levels and of their bins.
+    pub level_error: f64,
+    /// Standard deviation of the levels of single profiles about the mean, what their noise explains taken off; `None`
+    /// where the noise explains it all.
+    pub wandering: Option<f64>,
+    /// The same of half the difference of the two sides: the slope of profiles.
+    pub tilting: Option<f64>,
+}
+
+/// Levels of the two sides of one profile, and the variance of each.
+struct Sides {
+    blue: (f64, f64),
+    red: (f64, f64),
+}
+
+impl Continuum {
+    /// Of profiles whose line reaches `reach_kms` to either side of `centre_kms`; `None` where hardly any continuum is
+    /// beside it.
+    pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Option<Self> {
+        let step_kms = observations.step_kms;
+        let scatter: Scatter =
+            observations.profiles.iter().map(|p| Scatter::of(p, step_kms, centre_kms, reach_kms)).sum();
+        // bins of which several are correlated are so many fewer, and quoted errors may be wrong
+        let larger = scatter.ratio(1).unwrap_or(1.0).powi(2) * scatter.correlated_bins(f64::INFINITY);
+        let sides = |profile| sides(profile, step_kms, centre_kms, reach_kms, larger);
+        let sides = observations.profiles.iter().map(sides).collect::<Option<Vec<Sides>>>()?;
+        let half = |sign: f64| -> Vec<(f64, f64)> {
+            let of = |s: &Sides| (0.5 * (s.red.0 + sign * s.blue.0), 0.25 * (s.red.1 + s.blue.1));
+            sides.iter().map(of).collect()
+        };
+        let (levels, slopes) = (half(1.0), half(-1.0));
+        let (level, variance) = mean(&levels);
+        Some(Continuum { level, level_error: variance.sqrt(), wandering: excess(&levels), tilting: excess(&slopes) })
+    }
+
+    /// Whether the level is another one than 1, beyond doubt and beyond what matters.
+    pub fn is_off(&self) -> bool {
+        let off = (self.level - 1.0).abs();
+        off > ANOTHER_LEVEL.0 * self.level_error && off > ANOTHER_LEVEL.1
+    }
+}
+
+/// Mean levels on either side of the line, their variances `larger` than those by the quoted errors.
+fn sides(profile: &Profile, step_kms: f64, centre_kms: f64, reach_kms: f64, larger: f64) -> Option<Sides> {
+    let side = |sign: f64| {
+        let distance = |j: usize| sign * (profile.velocity_kms(j, step_kms) - centre_kms);
+        let beside = |j: &usize| (reach_kms..=OUTER * reach_kms).contains(&distance(*j));
+        let bins: Vec<usize> = (0..profile.intensity.len()).filter(beside).collect();
+        let count = bins.len() as f64;
+        let level = bins.iter().map(|&j| profile.intensity[j]).sum::<f64>() / count;
+        let variance = larger * bins.iter().map(|&j| profile.sigma[j].powi(2)).sum::<f64>() / count.powi(2);
+        (bins.len() >= FEWEST_BINS).then_some((level, variance))
+    };
+    Some(Sides { blue: side(-1.0)?, red: side(1.0)? })
+}
+
+/// Mean of values with their variances, and its variance, by their scatter where that is larger.
+fn mean(values: &[(f64, f64)]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().map(|(x, _)| x).sum::<f64>() / n;
+    let chance = values.iter().map(|(_, variance)| variance).sum::<f64>() / n;
+    (mean, scatter(values, mean).max(chance) / n)
+}
+
+/// Variance of values about their mean; 0 of one.
+fn scatter(values: &[(f64, f64)], mean: f64) -> f64 {
+    values.iter().map(|(x, _)| (x - mean).powi(2)).sum::<f64>() / (values.len() as f64 - 1.0).max(1.0)
+}
+
+/// Standard deviation that the variances do not explain, where chance does not make such a scatter.
+fn excess(values: &[(f64, f64)]) -> Option<f64> {
+    let freedom = values.len() as f64 - 1.0;
+    let mean = values.iter().map(|(x, _)| x).sum::<f64>() / values.len() as f64;
+    let chance = values.iter().map(|(_, variance)| variance).sum::<f64>() / values.len() as f64;
+    let scatter = scatter(values, mean);
+    let most = 1.0 + WANDERING * (2.0 / freedom).sqrt();
+    (freedom >= 1.0 && scatter > most * chance).then(|| (scatter - chance).sqrt())
+}

@@ -1,0 +1,144 @@
+//! The mean of all profiles, and where its line is.
+//!
+//! Profiles that stand between each other's bins, because their VRAD differ, are interpolated linearly; that is good
+//! enough for a first look and used for nothing else.
+
+use super::LookError;
+use crate::star::observation::{Observations, Profile};
+
+/// Fewest bins that a line must have above half its depth.
+const FEWEST_BINS: usize = 3;
+
+/// A line that is no deeper than that many standard errors of a bin of the mean is no line.
+const LEAST_SIGNIFICANCE: f64 = 5.0;
+
+/// Either end of a profile is one such part of it.
+const ENDS: usize = 20;
+
+/// The mean of all profiles, on the bins that all of them have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeanProfile {
+    /// Velocity of the first bin (km/s).
+    pub first_velocity_kms: f64,
+    /// Width of a bin (km/s).
+    pub step_kms: f64,
+    /// Depth `1 - I` of each bin.
+    pub depth: Vec<f64>,
+    /// Standard error of a bin, from the quoted ones (median over the bins).
+    pub sigma: f64,
+}
+
+/// Where the line of a profile crosses half its depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfDepth {
+    /// Velocity on the blue side (km/s).
+    pub blue_kms: f64,
+    /// Velocity on the red side (km/s).
+    pub red_kms: f64,
+}
+
+impl HalfDepth {
+    /// The middle (km/s).
+    pub fn centre_kms(self) -> f64 {
+        0.5 * (self.blue_kms + self.red_kms)
+    }
+
+    /// Half the distance of the two (km/s).
+    pub fn half_width_kms(self) -> f64 {
+        0.5 * (self.red_kms - self.blue_kms)
+    }
+}
+
+impl MeanProfile {
+    /// The mean of `observations`.
+    ///
+    /// # Errors
+    /// If fewer than five bins are common to all profiles.
+    pub fn of(observations: &Observations) -> Result<Self, LookError> {
+        let step = observations.step_kms;
+        let last = |p: &Profile| p.velocity_kms(p.intensity.len() - 1, step);
+        let profiles = &observations.profiles;
+        let first = profiles.iter().map(|p| p.first_velocity_kms).fold(f64::NEG_INFINITY, f64::max);
+        let end = profiles.iter().map(last).fold(f64::INFINITY, f64::min);
+        // the last bin may be lost to rounding of VRAD, not of this division
+        let bins = ((end - first) / step + 1e-6).floor();
+        if bins.is_nan() || bins < 4.0 {
+            return Err(LookError::NothingInCommon);
+        }
+        let count = profiles.len() as f64;
+        let velocities = (0..=bins as usize).map(|j| first + j as f64 * step);
+        let depth = velocities.map(|v| profiles.iter().map(|p| 1.0 - p.intensity_at(v, step)).sum::<f64>() / count);
+        let variance: f64 = profiles.iter().map(|p| super::median(p.sigma.clone()).powi(2)).sum();
+        Ok(MeanProfile {
+            first_velocity_kms: first,
+            step_kms: step,
+            depth: depth.collect(),
+            sigma: variance.sqrt() / count,
+        })
+    }
+
+    /// Velocity of bin `j` (km/s).
+    pub fn velocity_kms(&self, j: usize) -> f64 {
+        self.first_velocity_kms + j as f64 * self.step_kms
+    }
+
+    /// Velocities of the first and the last bin (km/s).
+    pub fn range_kms(&self) -> (f64, f64) {
+        (self.first_velocity_kms, self.velocity_kms(self.depth.len() - 1))
+    }
+
+    /// The same within a range of velocities (km/s); at least its first bin remains.
+    pub fn within(&self, from_kms: f64, to_kms: f64) -> Self {
+        let slack = 1e-6 * self.step_kms;
+        let inside = |j: &usize| (from_kms - slack..=to_kms + slack).contains(&self.velocity_kms(*j));
+        let kept: Vec<usize> = (0..self.depth.len()).filter(inside).collect();
+        let begin = kept.first().copied().unwrap_or(0);
+        let end = kept.last().map_or(begin, |j| *j);
+        MeanProfile {
+            first_velocity_kms: self.velocity_kms(begin),
+            depth: self.depth[begin..=end].to_vec(),
+            ..self.clone()
+        }
+    }
+
+    /// Mean depth of its ends: that of the continuum, wherever its level is, or of the last of the line.
+    fn at_its_ends(&self) -> f64 {
+        let bins = (self.depth.len() / ENDS).max(1);
+        let (first, last) = (&self.depth[..bins], &self.depth[self.depth.len() - bins..]);
+        0.5 * (super::median(first.to_vec()) + super::median(last.to_vec()))
+    }
+
+    /// Error (km/s) of the middle of two crossings by the noise of the mean profile alone.
+    pub fn centre_error_kms(&self, half_depth: HalfDepth) -> f64 {
+        let deepest = self.depth.iter().copied().fold(0.0, f64::max);
+        self.sigma / deepest * (self.step_kms * half_depth.half_width_kms()).sqrt()
+    }
+
+    /// Where the deepest line crosses half its depth on either side.
+    ///
+    /// # Errors
+    /// If there is no line, or it runs out of the data.
+    pub fn half_depth(&self) -> Result<HalfDepth, LookError> {
+        let deepest = (0..self.depth.len()).max_by(|a, b| self.depth[*a].total_cmp(&self.depth[*b])).unwrap_or(0);
+        let continuum = self.at_its_ends();
+        let depth = self.depth[deepest] - continuum;
+        if depth.is_nan() || depth < LEAST_SIGNIFICANCE * self.sigma {
+            return Err(LookError::NoLine { depth, sigma: self.sigma });
+        }
+        let half = continuum + 0.5 * depth;
+        let (from_kms, to_kms) = self.range_kms();
+        let cut = || LookError::LineCut { from_kms, to_kms };
+        let above = |j: &usize| self.depth[*j] > half;
+        let blue = (0..deepest).rev().find(|j| !above(j)).ok_or_else(cut)?;
+        let red = (deepest..self.depth.len()).find(|j| !above(j)).ok_or_else(cut)?;
+        if red - blue <= FEWEST_BINS {
+            return Err(LookError::LineTooNarrow { bins: red - blue - 1 });
+        }
+        // between the last bin below half the depth and its neighbour above it
+        let crossing = |below: usize, above: usize| {
+            let part = (half - self.depth[below]) / (self.depth[above] - self.depth[below]);
+            self.velocity_kms(below) + part * (self.velocity_kms(above) - self.velocity_kms(below))
+        };
+        Ok(HalfDepth { blue_kms: crossing(blue, blue + 1), red_kms: crossing(red, red - 1) })
+    }
+}

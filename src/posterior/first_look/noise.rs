@@ -1,0 +1,205 @@
+//! How noisy the profiles are: what their errors say, and what the continuum beside the line says.
+
+use super::median;
+use crate::star::observation::{Observations, Profile};
+use nalgebra::{DMatrix, DVector};
+
+/// Fewest bins of continuum, in all profiles together, whose scatter means something.
+const FEWEST_BINS: usize = 30;
+
+/// Fewest bins of continuum of a profile that is counted.
+const FEWEST_IN_PROFILE: usize = 4;
+
+/// Only continuum nearer to the centre than this is asked, in units of the distance at which the line ends: farther out
+/// LSD profiles ripple.
+const OUTER: f64 = 2.0;
+
+/// Errors of a bin in units of the continuum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// As quoted, median over all bins.
+    pub quoted: f64,
+    /// Scatter of the continuum about the mean of its own profile; `None` where there is too little of it.
+    pub scatter: Option<f64>,
+}
+
+/// Bins apart, at most, whose noise may be correlated.
+const LAGS: usize = 8;
+
+/// How much the continuum of a profile, or of several, scatters about straight lines.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scatter {
+    /// Sum of the squares, in units of the quoted errors.
+    pub chi2: f64,
+    /// Number of bins, less two for every line.
+    pub freedom: usize,
+    /// Sum of the products of bins 0, 1, 2, ... apart.
+    products: [f64; LAGS + 1],
+    /// Numbers of bins that lines go through.
+    lengths: Vec<usize>,
+}
+
+impl std::iter::Sum for Scatter {
+    fn sum<I: Iterator<Item = Scatter>>(all: I) -> Self {
+        all.fold(Scatter::default(), |sum, one| Scatter {
+            chi2: sum.chi2 + one.chi2,
+            freedom: sum.freedom + one.freedom,
+            products: std::array::from_fn(|lag| sum.products[lag] + one.products[lag]),
+            lengths: [sum.lengths, one.lengths].concat(),
+        })
+    }
+}
+
+impl Scatter {
+    /// The continuum of `profile` beside a line that reaches `reach_kms` to either side of `centre_kms`, as far again,
+    /// about a straight line on each side: neither level nor slope counts.
+    pub fn of(profile: &Profile, step_kms: f64, centre_kms: f64, reach_kms: f64) -> Self {
+        let side = |sign: f64| {
+            let distance = move |j: usize| sign * (profile.velocity_kms(j, step_kms) - centre_kms);
+            let inside = move |j: &usize| (reach_kms..=OUTER * reach_kms).contains(&distance(*j));
+            let bins: Vec<usize> = (0..profile.intensity.len()).filter(inside).collect();
+            about_a_line(bins.iter().map(|&j| (j as f64, profile.intensity[j], profile.sigma[j].powi(-2))))
+        };
+        [side(-1.0), side(1.0)].into_iter().sum()
+    }
+
+    /// Over how many bins noise is correlated for features of a width (standard deviation) of `sigma_bins`: `1 + 2 sum
+    /// rho a`, rho the correlation of bins so far apart, as long as it is larger than white noise shows by chance, and
+    /// `a` that of the features. What a profile says of them has an error that is larger by the root of it.
+    pub fn correlated_bins(&self, sigma_bins: f64) -> f64 {
+        let overlap = |lag: usize| (-0.25 * (lag as f64 / sigma_bins).powi(2)).exp();
+        const CHANCE: f64 = 2.5;
+        let chance = CHANCE / (self.freedom.max(1) as f64).sqrt();
+        let mut bins = 1.0;
+        for lags in 1..=LAGS {
+            let Some(correlation) = self.correlation(lags).filter(|rho| rho[lags - 1] > chance) else { break };
+            bins = 1.0 + 2.0 * correlation.iter().enumerate().map(|(k, rho)| rho * overlap(k + 1)).sum::<f64>();
+        }
+        bins
+    }
+
+    /// Correlations of bins 1, ..., `lags` apart, none beyond. The lines take up some of what is correlated; what the
+    /// products of their residuals are on average is linear in the covariances, and is solved for these.
+    fn correlation(&self, lags: usize) -> Option<Vec<f64>> {
+        let mut lengths = self.lengths.clone();
+        lengths.sort_unstable();
+        let mut mean = DMatrix::zeros(lags + 1, lags + 1);
+        for same in lengths.chunk_by(|a, b| a == b) {
+            mean += same.len() as f64 * mean_products(same[0], lags);
+        }
+        let covariance = mean.lu().solve(&DVector::from_column_slice(&self.products[..=lags]))?;
+        let correlation: Vec<f64> = covariance.iter().skip(1).map(|c| c / covariance[0]).collect();
+        (covariance[0] > 0.0 && correlation.iter().all(|rho| rho.is_finite())).then_some(correlation)
+    }
+
+    /// Scatter over quoted errors; `None` of fewer than `least` degrees of freedom, and of none at all.
+    pub fn ratio(&self, least: usize) -> Option<f64> {
+        (self.freedom >= least && self.chi2 > 0.0).then(|| (self.chi2 / self.freedom as f64).sqrt())
+    }
+}
+
+/// Of points (x, y, weight) about the straight line that fits them best; nothing of fewer than three.
+fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatter {
+    let count = points.clone().count();
+    if count < 3 {
+        return Scatter::default();
+    }
+    let sum = |f: &dyn Fn(f64, f64) -> f64| points.clone().map(|(x, y, w)| w * f(x, y)).sum::<f64>();
+    let weight = sum(&|_, _| 1.0);
+    let (x0, y0) = (sum(&|x, _| x) / weight, sum(&|_, y| y) / weight);
+    let slope = sum(&|x, y| (x - x0) * (y - y0)) / sum(&|x, _| (x - x0).powi(2));
+    let left: Vec<f64> = points.map(|(x, y, w)| w.sqrt() * (y - y0 - slope * (x - x0))).collect();
+    let products = |lag: usize| left.iter().zip(left.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
+    Scatter { chi2: products(0), freedom: count - 2, products: std::array::from_fn(products), lengths: vec![count] }
+}
+
+/// Mean of the sum of products of residuals that are so many bins apart (row) from a straight line through `bins`, for
+/// noise that has a covariance of 1 at one distance (column).
+fn mean_products(bins: usize, lags: usize) -> DMatrix<f64> {
+    let line = DMatrix::from_fn(bins, 2, |j, power| (j as f64 - 0.5 * (bins - 1) as f64).powi(power as i32));
+    let unit = DMatrix::from_fn(bins, 2, |j, k| line[(j, k)] / line.column(k).norm());
+    let left = DMatrix::identity(bins, bins) - &unit * unit.transpose();
+    let mut mean = DMatrix::zeros(lags + 1, lags + 1);
+    for column in 0..=lags {
+        let noise = DMatrix::from_fn(bins, bins, |a, b| f64::from(u8::from(a.abs_diff(b) == column)));
+        let residuals = &left * noise * &left;
+        for row in 0..=lags {
+            mean[(row, column)] = (row..bins).map(|j| residuals[(j, j - row)]).sum();
+        }
+    }
+    mean
+}
+
+impl Noise {
+    /// Errors of profiles whose line reaches `reach_kms` to either side of `centre_kms`.
+    pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Self {
+        let step = observations.step_kms;
+        let beside = |profile: &Profile| -> Vec<f64> {
+            let distance = |j: usize| (profile.velocity_kms(j, step) - centre_kms).abs();
+            let bins = profile.intensity.iter().enumerate();
+            bins.filter(|(j, _)| (reach_kms..=OUTER * reach_kms).contains(&distance(*j))).map(|(_, i)| *i).collect()
+        };
+        let (mut bins, mut freedom, mut square) = (0, 0, 0.0);
+        for continuum in observations.profiles.iter().map(beside).filter(|c| c.len() >= FEWEST_IN_PROFILE) {
+            let mean = continuum.iter().sum::<f64>() / continuum.len() as f64;
+            square += continuum.iter().map(|i| (i - mean).powi(2)).sum::<f64>();
+            bins += continuum.len();
+            freedom += continuum.len() - 1;
+        }
+        let sigmas = observations.profiles.iter().flat_map(|p| p.sigma.iter().copied()).collect();
+        Noise {
+            quoted: median(sigmas),
+            scatter: (bins >= FEWEST_BINS && square > 0.0).then(|| (square / freedom as f64).sqrt()),
+        }
+    }
+
+    /// Scatter over quoted errors; `None` where there is no continuum to tell.
+    pub fn ratio(&self) -> Option<f64> {
+        self.scatter.map(|scatter| scatter / self.quoted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// Level and slope leave no trace, and of points about a line the scatter is that of a fit by hand: y = 1, 0, 1
+    /// about 2/3.
+    #[test]
+    fn slopes_do_not_count() {
+        let line = |j: usize| 1.3 - 0.01 * j as f64;
+        let even = about_a_line((0..10).map(|j| (j as f64, line(j), 4.0)));
+        assert!(even.chi2 < 1e-20 && even.freedom == 8, "{even:?}");
+        let bent = about_a_line([(0.0, 1.0, 2.0), (1.0, 0.0, 2.0), (2.0, 1.0, 2.0)].into_iter());
+        assert!((bent.chi2 - 2.0 * 2.0 / 3.0).abs() < 1e-12 && bent.freedom == 1, "{bent:?}");
+        assert_eq!(about_a_line([(0.0, 1.0, 1.0); 2].into_iter()), Scatter::default());
+    }
+
+    /// White noise, and noise x_k = rho x_(k-1) + n_k, whose correlations rho^k add up to (1 + rho) / (1 - rho).
+    #[test]
+    fn noise_that_goes_together_is_seen() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut side = |rho: f64| {
+            let mut x = 0.0;
+            let noise: Vec<f64> = (0..40)
+                .map(|_| {
+                    x = rho * x + (1.0 - rho * rho).sqrt() * rng.sample::<f64, _>(StandardNormal);
+                    x
+                })
+                .collect();
+            about_a_line(noise.into_iter().enumerate().map(|(j, y)| (j as f64, y, 1.0)))
+        };
+        let white: Scatter = (0..100).map(|_| side(0.0)).sum();
+        assert_eq!(white.correlated_bins(9.0), 1.0);
+        let together: Scatter = (0..100).map(|_| side(0.5)).sum();
+        // what is cut off at the end is a little
+        assert!(
+            (together.correlated_bins(f64::INFINITY) / 3.0 - 1.0).abs() < 0.15,
+            "{}",
+            together.correlated_bins(f64::INFINITY)
+        );
+    }
+}

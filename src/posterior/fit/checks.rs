@@ -1,0 +1,175 @@
+//! Whether what a map leaves over looks like noise: replicated data, the model with noise of the errors given, against
+//! the data.
+//!
+//! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the
+//! profiles, between the core of the line and what lies outside, and whether neighbouring bins are correlated. In
+//! replicated data every profile has the same chi2 per datum, but for the scatter of a chi2 distribution, and
+//! neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many fewer. What
+//! the map itself takes up is spread evenly here.
+
+use super::Residual;
+use crate::planets::periodogram::normal::cumulative;
+use serde::Serialize;
+
+/// A profile is worth a warning when chance makes one so bad among all of them as rarely as this.
+const RARE: f64 = 0.01;
+
+/// Neighbouring bins, and core against wings, are worth one beyond that many standard deviations.
+const FAR: f64 = 5.0;
+
+/// How the misfit is shared.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Checks {
+    /// Profile by profile.
+    pub profiles: Vec<ProfileCheck>,
+    /// chi2 per datum in the core of the line: where the model is deeper than half its greatest depth.
+    pub chi2_per_datum_core: f64,
+    /// chi2 per datum outside of the core.
+    pub chi2_per_datum_outside: f64,
+    /// By how many standard deviations of replicated data these differ.
+    pub core_excess_sigma: f64,
+    /// Correlation of the residuals of neighbouring bins.
+    pub neighbour_correlation: f64,
+    /// Its standard deviation in replicated data.
+    pub sigma_neighbour_correlation: f64,
+    /// What does not look like noise.
+    pub warnings: Vec<String>,
+}
+
+/// The misfit of one profile.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ProfileCheck {
+    /// Time (d).
+    pub time_d: f64,
+    /// chi2.
+    pub chi2: f64,
+    /// Number of bins.
+    pub data: usize,
+    /// Probability that replicated data have a larger share of chi2 in this profile.
+    pub p_value: f64,
+}
+
+impl Checks {
+    /// Of the `residuals` of every profile at its time, where noise is correlated over so many bins: they count for one.
+    pub(super) fn of(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64) -> Self {
+        let all = || profiles.iter().flat_map(|(_, residuals)| residuals);
+        let per_datum = mean(all().map(|r| r.scaled * r.scaled));
+        let profile = |(time_d, residuals): &(f64, Vec<Residual>)| {
+            let chi2: f64 = residuals.iter().map(|r| r.scaled * r.scaled).sum();
+            let data = residuals.len();
+            ProfileCheck {
+                time_d: *time_d,
+                chi2,
+                data,
+                p_value: chi2_exceeds(chi2 / per_datum / correlated_bins, data as f64 / correlated_bins),
+            }
+        };
+        let deepest = all().map(|r| r.depth).fold(0.0, f64::max);
+        let share = |core: bool| {
+            let part = || all().filter(move |r| (r.depth > 0.5 * deepest) == core);
+            (mean(part().map(|r| r.scaled * r.scaled)), part().count() as f64 / correlated_bins)
+        };
+        let ((core, inside), (outside, beyond)) = (share(true), share(false));
+        let pairs = || profiles.iter().flat_map(|(_, residuals)| residuals.windows(2));
+        let mut checks = Checks {
+            profiles: profiles.iter().map(profile).collect(),
+            chi2_per_datum_core: core,
+            chi2_per_datum_outside: outside,
+            core_excess_sigma: (core - outside) / (per_datum * (2.0 / inside + 2.0 / beyond).sqrt()),
+            neighbour_correlation: mean(pairs().map(|pair| pair[0].scaled * pair[1].scaled)) / per_datum,
+            sigma_neighbour_correlation: (pairs().count() as f64).sqrt().recip(),
+            warnings: Vec::new(),
+        };
+        checks.warnings = checks.doubts(correlated_bins > 1.0);
+        checks
+    }
+
+    fn doubts(&self, neighbours_go_together: bool) -> Vec<String> {
+        let mut doubts = Vec::new();
+        let rare = RARE / self.profiles.len() as f64;
+        for (k, profile) in self.profiles.iter().enumerate().filter(|(_, profile)| profile.p_value < rare) {
+            doubts.push(format!(
+                "profile {} ({:.4} d) fits worse than the others: chi2 {:.2} per datum, by chance once in {:.0e}",
+                k + 1,
+                profile.time_d,
+                profile.chi2 / profile.data as f64,
+                1.0 / profile.p_value.max(1e-300)
+            ));
+        }
+        if self.core_excess_sigma.abs() > FAR {
+            doubts.push(format!(
+                "chi2 is {:.2} per datum in the core of the line and {:.2} outside: errors, local line or continuum \
+                are not right \
+                 everywhere",
+                self.chi2_per_datum_core, self.chi2_per_datum_outside
+            ));
+        }
+        let correlated = self.neighbour_correlation.abs() > FAR * self.sigma_neighbour_correlation;
+        if correlated && !neighbours_go_together {
+            doubts.push(format!(
+                "residuals of neighbouring bins correlate by {:.2}: what is left over is not only noise",
+                self.neighbour_correlation
+            ));
+        }
+        doubts
+    }
+}
+
+/// Mean of some numbers; NaN of none.
+fn mean(x: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = x.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
+    sum / n
+}
+
+/// Probability that chi2 of that many degrees of freedom is larger: its cube root is nearly normal (Wilson & Hilferty
+/// 1931).
+fn chi2_exceeds(chi2: f64, freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    cumulative((1.0 - spread - (chi2 / freedom).cbrt()) / spread.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// Table values of the chi2 distribution.
+    #[test]
+    fn known_quantiles() {
+        for (chi2, freedom, p) in
+            [(18.307, 10.0, 0.05), (43.773, 30.0, 0.05), (50.892, 30.0, 0.01), (124.342, 100.0, 0.05)]
+        {
+            assert!((chi2_exceeds(chi2, freedom) / p - 1.0_f64).abs() < 0.01, "{chi2} {freedom}");
+        }
+    }
+
+    fn noise(change: impl Fn(usize, usize, f64) -> f64) -> Checks {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut profile = |k: usize| {
+            let residual = |j: usize, noise: f64| {
+                let depth = if (20..40).contains(&j) { 0.3 } else { 0.01 };
+                Residual { depth, difference: 0.0, scaled: change(k, j, noise) }
+            };
+            let residuals = (0..60).map(|j| residual(j, rng.sample(StandardNormal))).collect();
+            (k as f64, residuals)
+        };
+        Checks::of(&(0..40).map(&mut profile).collect::<Vec<_>>(), 1.0)
+    }
+
+    #[test]
+    fn noise_passes_and_what_is_wrong_is_named() {
+        let fair = noise(|_, _, noise| 0.8 * noise);
+        assert!(fair.warnings.is_empty(), "{:?}", fair.warnings);
+        // p-values of noise are uniform: their mean is 1/2, with an error of 0.29 / sqrt(40)
+        let p = mean(fair.profiles.iter().map(|profile| profile.p_value));
+        assert!((p - 0.5).abs() < 0.15, "{p}");
+        let one = noise(|k, _, noise| if k == 7 { 2.0 * noise } else { noise });
+        assert!(one.warnings.len() == 1 && one.warnings[0].starts_with("profile 8 (7.0000 d)"), "{:?}", one.warnings);
+        let core = noise(|_, j, noise| if (20..40).contains(&j) { 1.5 * noise } else { noise });
+        assert!(core.warnings.iter().any(|w| w.contains("core of the line")), "{:?}", core.warnings);
+        let wave = noise(|_, j, noise| noise + (0.5 * j as f64).sin());
+        assert!(wave.warnings.iter().any(|w| w.contains("neighbouring bins")), "{:?}", wave.warnings);
+    }
+}

@@ -1,0 +1,300 @@
+//! Star and maximum entropy meet: the misfit of a map to observed profiles, and the Doppler image.
+//!
+//! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is `D =
+//! line(B) / continuum(B)` (`docs/method.md` section 1), whose second derivative is kept, so that the solver's Newton
+//! steps are exact.
+
+mod data;
+mod profile;
+
+use crate::maxent::entropy::Entropy;
+use crate::maxent::{Curvature, Problem};
+use crate::numerics::vector::linear::combine;
+use crate::numerics::vector::{self, Number};
+use crate::posterior::nuisances::{LineAndContinuum, Nuisances};
+use crate::star::observation::Observations;
+use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use profile::{Bend, Misfit, Pull};
+
+pub use data::Data;
+
+/// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
+#[derive(Clone, Debug)]
+pub struct Imager {
+    /// Pixels of the map.
+    pub grid: SurfaceGrid,
+    /// The star, but for the parameters.
+    pub star: StarSettings,
+    /// Times and velocity bins.
+    pub sampling: Sampling,
+    /// Observed depths and their weights.
+    pub data: Data,
+    /// Entropy of a map.
+    pub entropy: Entropy,
+}
+
+impl Imager {
+    /// For `observations` of `star`, on about `pixels` pixels, with maps of the given `entropy`.
+    pub fn new(star: StarSettings, observations: &Observations, pixels: usize, entropy: Entropy) -> Self {
+        Imager {
+            grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
+            star,
+            sampling: Sampling::of(observations),
+            data: Data::of(observations),
+            entropy,
+        }
+    }
+
+    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard
+    /// deviations.
+    pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
+        self.data.nuisances = Nuisances::new(priors, observations);
+        self
+    }
+
+    /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
+    /// depths change with velocity by `slopes`; in place of those that there were.
+    pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64]) -> Self {
+        let sigma: Vec<f64> = self.data.inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
+        let nuisances = std::mem::take(&mut self.data.nuisances);
+        self.data.nuisances = nuisances.with_zero_points(sd_kms, slopes, &self.bins(), &sigma);
+        self
+    }
+
+    /// The same without some of the profiles.
+    pub fn without(&self, profiles: &[usize]) -> Self {
+        let (mut rest, mut kept) = (Vec::new(), Vec::new());
+        for (k, (profile, bins)) in self.sampling.profiles.iter().zip(self.bins()).enumerate() {
+            if !profiles.contains(&k) {
+                rest.push(*profile);
+                kept.push(bins);
+            }
+        }
+        let sampling = Sampling { profiles: rest, ..self.sampling };
+        Imager { sampling, data: self.data.of_profiles(&kept), ..self.clone() }
+    }
+
+    /// Bins of every profile within the data.
+    fn bins(&self) -> Vec<std::ops::Range<usize>> {
+        let mut end = 0;
+        let next = |profile: &(f64, f64, usize)| {
+            end += profile.2;
+            end - profile.2..end
+        };
+        self.sampling.profiles.iter().map(next).collect()
+    }
+
+    /// The response at one state of star and planet.
+    pub fn response(&self, state: &StarState) -> Response {
+        Response::new(&self.grid, &self.star, state, &self.sampling)
+    }
+
+    /// What responses close to a state have in common.
+    pub fn nearby(&self, state: &StarState) -> Nearby {
+        Nearby::new(&self.grid, &self.star, state, &self.sampling)
+    }
+
+    /// The response at a state, in half the time if it is close to another.
+    pub fn response_near(&self, nearby: &Nearby, state: &StarState) -> Response {
+        nearby.response(&self.grid, &self.star, state, &self.sampling).unwrap_or_else(|| self.response(state))
+    }
+
+    /// The misfit of maps seen through `response`.
+    pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
+        let brightness = match self.entropy {
+            Entropy::Spots { .. } => Brightness::of_spots(response.contrast()),
+            Entropy::BrightAndDark => Brightness::ITSELF,
+        };
+        ImagingProblem::of_brightness(&self.grid.area, &self.data, response, brightness)
+    }
+
+    /// Rotation cycle of each profile.
+    pub fn cycles(&self) -> Vec<f64> {
+        self.sampling.profiles.iter().map(|profile| self.star.cycle(profile.0)).collect()
+    }
+
+    /// Middle of the time base in rotation cycles.
+    pub fn mid_cycle(&self) -> f64 {
+        let (first, last) = self.span();
+        0.5 * (first + last)
+    }
+
+    /// Length of the time base in rotation cycles.
+    pub fn time_base_cycles(&self) -> f64 {
+        let (first, last) = self.span();
+        last - first
+    }
+
+    /// First and last rotation cycle.
+    fn span(&self) -> (f64, f64) {
+        self.cycles().into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), e| (lo.min(e), hi.max(e)))
+    }
+}
+
+/// The misfit of maps to profiles, for one response.
+pub struct ImagingProblem<'a> {
+    area: &'a [f64],
+    data: &'a Data,
+    response: Response,
+    brightness_of: Brightness,
+    passes: u32,
+    single_passes: u32,
+    /// Model depth of every bin at the current map.
+    model: Vec<f64>,
+    /// `W (model - data)`, without nuisances `(model - data) / sigma^2`.
+    weighted_residual: Vec<f64>,
+    continuum: Vec<f64>,
+    brightness: Vec<f64>,
+    bins: Vec<f64>,
+    /// Residuals or changes of the model, before they are weighed.
+    differences: Vec<f64>,
+    constants: Vec<f64>,
+}
+
+impl<'a> ImagingProblem<'a> {
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness
+    /// `contrast`.
+    pub fn new(area: &'a [f64], data: &'a Data, response: Response, contrast: f64) -> Self {
+        ImagingProblem::of_brightness(area, data, response, Brightness::of_spots(contrast))
+    }
+
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the
+    /// `brightness`.
+    fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Brightness) -> Self {
+        let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
+        ImagingProblem {
+            area,
+            data,
+            response,
+            brightness_of,
+            passes: 0,
+            single_passes: 0,
+            model: vec![0.0; bins],
+            weighted_residual: vec![0.0; bins],
+            continuum: vec![0.0; profiles],
+            brightness: vec![0.0; pixels],
+            bins: vec![0.0; bins],
+            differences: vec![0.0; bins],
+            constants: vec![0.0; profiles],
+        }
+    }
+
+    /// How many of its passes were in single precision.
+    pub fn single_passes(&self) -> u32 {
+        self.single_passes
+    }
+
+    /// Model depth `1 - I` of every bin at the current map.
+    pub fn model(&self) -> &[f64] {
+        &self.model
+    }
+
+    /// Weights times what the model is above the data, at the current map.
+    pub fn weighted_residual(&self) -> &[f64] {
+        &self.weighted_residual
+    }
+
+    /// The response that the problem was made with.
+    pub fn response(&self) -> &Response {
+        &self.response
+    }
+
+    /// Gradient of the part of chi2 / 2 that the given profiles make, with respect to the map, at the current map.
+    pub fn gradient_of(&self, profiles: std::ops::Range<usize>, out: &mut [f64]) {
+        self.pulled(profiles, &self.weighted_residual, out);
+    }
+
+    /// `J^T x` of what stands in the bins of the given profiles, J the derivative of the model with respect to the map.
+    pub fn pulled(&self, profiles: std::ops::Range<usize>, x: &[f64], out: &mut [f64]) {
+        let (mut bins, mut constants) = (vec![0.0; self.bins.len()], vec![0.0; self.constants.len()]);
+        for k in profiles {
+            constants[k] = self.pull(k, x, &mut bins);
+        }
+        self.response.apply_transpose(&bins, &constants, out);
+    }
+
+    /// What profile `k` hands to the transpose for such a residual: its bins, and the constant that comes with them.
+    fn pull(&self, k: usize, weighted_residual: &[f64], back: &mut [f64]) -> f64 {
+        let (bins, scale) = (self.response.bins(k), self.brightness_of.slope / self.continuum[k]);
+        let (model, weighted_residual) = (&self.model[bins.clone()], &weighted_residual[bins.clone()]);
+        vector::run(Pull { scale, model, weighted_residual, back: &mut back[bins] })
+    }
+
+    /// Change of every bin's model depth to first order in the change `v` of the map, at the current map.
+    pub fn model_change(&mut self, v: &[f64], out: &mut [f64]) {
+        self.passes += 1;
+        self.response.apply(v, out, &mut self.constants);
+        for k in 0..self.response.profiles() {
+            let scale = self.brightness_of.slope / self.continuum[k];
+            for j in self.response.bins(k) {
+                out[j] = scale * (out[j] - self.model[j] * self.constants[k]);
+            }
+        }
+    }
+
+    /// Derivative of chi2 / 2 along the image direction `v` at the current map.
+    pub fn slope(&mut self, v: &[f64]) -> f64 {
+        let mut change = std::mem::take(&mut self.bins);
+        self.model_change(v, &mut change);
+        let slope = change.iter().zip(&self.weighted_residual).map(|(change, residual)| change * residual).sum();
+        self.bins = change;
+        slope
+    }
+}
+
+impl Problem for ImagingProblem<'_> {
+    fn area(&self) -> &[f64] {
+        self.area
+    }
+
+    fn linearise(&mut self, s: &[f64]) -> f64 {
+        self.passes += 1;
+        let brightness_of = self.brightness_of;
+        combine(&mut self.brightness, s, |_, s| brightness_of.at(s));
+        self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
+        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
+        let chi2_of = |(k, continuum): (usize, &f64)| {
+            let (bins, continuum) = (response.bins(k), *continuum);
+            vector::run(Misfit { data, bins, continuum, model, differences, weighted_residual })
+        };
+        continuum.iter().enumerate().map(chi2_of).sum()
+    }
+
+    fn gradient(&mut self, out: &mut [f64]) {
+        self.passes += 1;
+        let mut bins = std::mem::take(&mut self.bins);
+        for k in 0..self.response.profiles() {
+            self.constants[k] = self.pull(k, &self.weighted_residual, &mut bins);
+        }
+        self.bins = bins;
+        self.response.apply_transpose(&self.bins, &self.constants, out);
+    }
+
+    fn curvature<N: Number>(&mut self, which: Curvature, v: &[N], out: &mut [N]) {
+        self.passes += 2;
+        self.single_passes += if N::SINGLE { 2 } else { 0 };
+        let exact = which == Curvature::Exact;
+        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, bins: weighed, .. } =
+            self;
+        let slope = self.brightness_of.slope;
+        response.apply_and_back(v, out, |k, line, d_continuum| {
+            let (bins, scale) = (response.bins(k), slope / continuum[k]);
+            vector::run(Bend {
+                data,
+                bins,
+                scale,
+                exact,
+                model,
+                weighted_residual,
+                differences,
+                weighed,
+                d_continuum,
+                line,
+            })
+        });
+    }
+
+    fn passes(&self) -> u32 {
+        self.passes
+    }
+}

@@ -1,0 +1,23 @@
+//! What a point of parameter space is worth: parameters, priors, trade-off curve, objectives (`docs/method.md` section
+//! 3).
+
+pub mod coordinates;
+pub mod kind;
+mod likelihood;
+pub mod orbital;
+pub mod parameters;
+pub mod posterior;
+mod prediction;
+pub mod prior;
+pub mod reference;
+pub mod target;
+pub mod tradeoff;
+mod warm_start;
+
+pub use coordinates::{FreeParameter, ParameterSpace};
+pub use kind::{ObjectiveKind, UnresolvedSpots};
+pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
+pub use parameters::{Parameter, ParameterValues};
+pub use posterior::Posterior;
+pub use prior::Prior;
+pub use reference::{Reference, ReferenceError};

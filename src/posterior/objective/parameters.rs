@@ -1,0 +1,191 @@
+//! The parameters that may be sampled: their names, units, and values at one point of parameter space.
+
+use crate::star::{Orbit, Rotation, StarState, Surface};
+use serde::{Deserialize, Serialize, Serializer};
+
+/// One of the parameters that may be free. The order is that of every table and chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Parameter {
+    /// Semi-amplitude of the planet's orbit (km/s).
+    K,
+    /// Orbital period over rotation period.
+    PorbOverProt,
+    /// Orbital phase (cycles).
+    Phi,
+    /// Angular velocity of the equator (rad/d).
+    OmegaEq,
+    /// Equator-to-pole shear (rad/d).
+    DOmega,
+    /// Inclination (degrees).
+    Inclination,
+    /// Projected equatorial velocity (km/s).
+    Vsini,
+    /// Systemic velocity (km/s).
+    Vsys,
+    /// First coefficient of the limb darkening.
+    LimbDarkening,
+    /// Standard deviation of the local line (km/s), before the spectrograph.
+    LineSigma,
+    /// Equivalent width of the local line (km/s).
+    EquivalentWidth,
+    /// Brightness of a spot over that of the photosphere.
+    Contrast,
+}
+
+impl Parameter {
+    /// All of them, in order.
+    pub const ALL: [Parameter; 12] = [
+        Parameter::K,
+        Parameter::PorbOverProt,
+        Parameter::Phi,
+        Parameter::OmegaEq,
+        Parameter::DOmega,
+        Parameter::Inclination,
+        Parameter::Vsini,
+        Parameter::Vsys,
+        Parameter::LimbDarkening,
+        Parameter::LineSigma,
+        Parameter::EquivalentWidth,
+        Parameter::Contrast,
+    ];
+
+    /// The name used in config, chain, tables and plots.
+    pub fn name(self) -> &'static str {
+        match self {
+            Parameter::K => "k_kms",
+            Parameter::PorbOverProt => "porb_over_prot",
+            Parameter::Phi => "phi",
+            Parameter::OmegaEq => "omega_eq_rad_d",
+            Parameter::DOmega => "domega_rad_d",
+            Parameter::Inclination => "inclination_deg",
+            Parameter::Vsini => "vsini_kms",
+            Parameter::Vsys => "vsys_kms",
+            Parameter::LimbDarkening => "limb_darkening",
+            Parameter::LineSigma => "line_sigma_kms",
+            Parameter::EquivalentWidth => "equivalent_width_kms",
+            Parameter::Contrast => "contrast",
+        }
+    }
+
+    /// Unit of its values; `1` for a ratio.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Parameter::K | Parameter::Vsini | Parameter::Vsys => "km/s",
+            Parameter::LineSigma | Parameter::EquivalentWidth => "km/s",
+            Parameter::PorbOverProt | Parameter::LimbDarkening | Parameter::Contrast => "1",
+            Parameter::Phi => "cycles",
+            Parameter::OmegaEq | Parameter::DOmega => "rad/d",
+            Parameter::Inclination => "deg",
+        }
+    }
+
+    /// Its symbol, in LaTeX without dollars.
+    pub fn latex(self) -> &'static str {
+        match self {
+            Parameter::K => "K",
+            Parameter::PorbOverProt => r"P_\mathrm{orb}/P_\mathrm{rot}",
+            Parameter::Phi => r"\phi",
+            Parameter::OmegaEq => r"\Omega_\mathrm{eq}",
+            Parameter::DOmega => r"\mathrm{d}\Omega",
+            Parameter::Inclination => "i",
+            Parameter::Vsini => r"v \sin i",
+            Parameter::Vsys => r"v_\mathrm{sys}",
+            Parameter::LimbDarkening => "u",
+            Parameter::LineSigma => r"\sigma_\mathrm{line}",
+            Parameter::EquivalentWidth => r"W_\mathrm{line}",
+            Parameter::Contrast => "c",
+        }
+    }
+
+    /// Whether it belongs to the planet's orbit.
+    pub fn is_orbital(self) -> bool {
+        matches!(self, Parameter::K | Parameter::PorbOverProt | Parameter::Phi)
+    }
+
+    /// Whether it stands in place of one of the star's settings, and need not be given.
+    pub fn is_surface(self) -> bool {
+        self >= Parameter::LimbDarkening
+    }
+
+    /// Whether it only shifts whole profiles, so that what a pixel looks like does not depend on it.
+    pub fn only_shifts(self) -> bool {
+        self.is_orbital() || self == Parameter::Vsys
+    }
+
+    /// The parameter of that name.
+    pub fn from_name(name: &str) -> Option<Parameter> {
+        Parameter::ALL.into_iter().find(|p| p.name() == name)
+    }
+}
+
+/// Values of all parameters in the units of their names, free or not; index by [`Parameter`]. Those of the surface are
+/// NaN where they are not given: they are those of the star's settings then.
+#[derive(Clone, Copy, Debug)]
+pub struct ParameterValues(pub [f64; 12]);
+
+impl std::ops::Index<Parameter> for ParameterValues {
+    type Output = f64;
+    fn index(&self, p: Parameter) -> &f64 {
+        &self.0[p as usize]
+    }
+}
+
+impl std::ops::IndexMut<Parameter> for ParameterValues {
+    fn index_mut(&mut self, p: Parameter) -> &mut f64 {
+        &mut self.0[p as usize]
+    }
+}
+
+/// NaN, not given, is the same as NaN.
+impl PartialEq for ParameterValues {
+    fn eq(&self, other: &Self) -> bool {
+        Parameter::ALL.into_iter().all(|p| self.agrees(other, p))
+    }
+}
+
+impl ParameterValues {
+    /// Of the eight parameters of orbit, rotation and systemic velocity; the surface is that of the star's settings.
+    pub fn of_eight(eight: [f64; 8]) -> Self {
+        let mut values = [f64::NAN; 12];
+        values[..8].copy_from_slice(&eight);
+        ParameterValues(values)
+    }
+
+    /// The value, if it is given.
+    pub fn given(&self, p: Parameter) -> Option<f64> {
+        (!p.is_surface() || !self[p].is_nan()).then_some(self[p])
+    }
+
+    /// Whether both have the same value of a parameter, or both none.
+    pub fn agrees(&self, other: &Self, p: Parameter) -> bool {
+        self.given(p) == other.given(p)
+    }
+
+    /// The physical state of star and planet they stand for.
+    pub fn state(&self) -> StarState {
+        StarState {
+            rotation: Rotation { omega_eq_rad_d: self[Parameter::OmegaEq], domega_rad_d: self[Parameter::DOmega] },
+            inclination: self[Parameter::Inclination].to_radians(),
+            vsini_kms: self[Parameter::Vsini],
+            vsys_kms: self[Parameter::Vsys],
+            orbit: Orbit {
+                k_kms: self[Parameter::K],
+                porb_over_prot: self[Parameter::PorbOverProt],
+                phi: self[Parameter::Phi],
+            },
+            surface: Surface {
+                limb_darkening: self.given(Parameter::LimbDarkening),
+                line_sigma_kms: self.given(Parameter::LineSigma),
+                equivalent_width_kms: self.given(Parameter::EquivalentWidth),
+                contrast: self.given(Parameter::Contrast),
+            },
+        }
+    }
+}
+
+/// An object of name and value of those that are given, in the order of [`Parameter::ALL`].
+impl Serialize for ParameterValues {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(Parameter::ALL.iter().filter_map(|&p| Some((p.name(), self.given(p)?))))
+    }
+}

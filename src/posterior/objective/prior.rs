@@ -1,0 +1,289 @@
+//! Priors of single parameters: densities, bounds and draws, in the units of the parameter's name.
+//!
+//! Every density is normalised over its own bounds.
+
+use rand::Rng;
+use serde::Serialize;
+
+/// The prior of one free parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "prior", rename_all = "kebab-case")]
+pub enum Prior {
+    /// Constant density.
+    Uniform {
+        /// Lower bound.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+    /// Density proportional to `1/x`.
+    LogUniform {
+        /// Lower bound, above 0.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+    /// A Gaussian cut off at the bounds, which may be infinite.
+    Normal {
+        /// Mean of the Gaussian before the cut.
+        mean: f64,
+        /// Standard deviation of the Gaussian before the cut.
+        sd: f64,
+        /// Lower bound.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+    /// An angle in degrees with density proportional to its sine: an axis that may point anywhere.
+    Isotropic {
+        /// Lower bound (degrees).
+        min: f64,
+        /// Upper bound (degrees).
+        max: f64,
+    },
+    /// Constant density on the circle `[0, 1)`; any real number stands for its fractional part.
+    Periodic,
+}
+
+impl Prior {
+    /// Bounds of the support. That of [`Prior::Periodic`] is `[0, 1)`, of the others closed.
+    pub fn bounds(&self) -> (f64, f64) {
+        match *self {
+            Prior::Uniform { min, max }
+            | Prior::LogUniform { min, max }
+            | Prior::Normal { min, max, .. }
+            | Prior::Isotropic { min, max } => (min, max),
+            Prior::Periodic => (0.0, 1.0),
+        }
+    }
+
+    /// Whether `x` has a density above zero (as far as the bounds go).
+    pub fn contains(&self, x: f64) -> bool {
+        let (min, max) = self.bounds();
+        x.is_finite() && (matches!(self, Prior::Periodic) || (min <= x && x <= max))
+    }
+
+    /// `x` itself, or its representative in `[0, 1)` if the prior is periodic.
+    pub fn wrap(&self, x: f64) -> f64 {
+        if !matches!(self, Prior::Periodic) {
+            return x;
+        }
+        // A tiny negative number has remainder 1 after rounding.
+        let remainder = x.rem_euclid(1.0);
+        if remainder >= 1.0 { 0.0 } else { remainder }
+    }
+
+    /// Natural logarithm of the density at `x`; minus infinity outside the bounds and for NaN.
+    pub fn log_density(&self, x: f64) -> f64 {
+        if !self.contains(x) {
+            return f64::NEG_INFINITY;
+        }
+        match *self {
+            Prior::Uniform { min, max } => -(max - min).ln(),
+            Prior::LogUniform { min, max } => -x.ln() - (max / min).ln().ln(),
+            Prior::Normal { mean, sd, min, max } => {
+                let z = (x - mean) / sd;
+                -0.5 * z * z - sd.ln() - Truncated::new((min - mean) / sd, (max - mean) / sd).log_integral()
+            }
+            Prior::Isotropic { min, max } => {
+                let (a, b) = (min.to_radians(), max.to_radians());
+                x.to_radians().sin().ln() + 1f64.to_radians().ln() - (a.cos() - b.cos()).ln()
+            }
+            Prior::Periodic => 0.0,
+        }
+    }
+
+    /// Mean and standard deviation, by the midpoint rule; those of a circle are those of its interval.
+    pub fn mean_and_sd(&self) -> (f64, f64) {
+        const CELLS: usize = 4000;
+        let (lo, hi) = match *self {
+            Prior::Normal { mean, sd, min, max } => {
+                // beyond there is nothing
+                let reach = 10.0 * sd + (mean.clamp(min, max) - mean).abs();
+                (min.max(mean - reach), max.min(mean + reach))
+            }
+            _ => self.bounds(),
+        };
+        let width = (hi - lo) / CELLS as f64;
+        let at = |k: usize| lo + (k as f64 + 0.5) * width;
+        let weight = |k: usize| self.log_density(at(k)).exp() * width;
+        let total: f64 = (0..CELLS).map(weight).sum();
+        let mean = (0..CELLS).map(|k| weight(k) * at(k)).sum::<f64>() / total;
+        let variance = (0..CELLS).map(|k| weight(k) * (at(k) - mean).powi(2)).sum::<f64>() / total;
+        (mean, variance.sqrt())
+    }
+
+    /// A random draw, always within the bounds.
+    pub fn sample(&self, rng: &mut impl Rng) -> f64 {
+        let (lower, upper) = self.bounds();
+        let draw = match *self {
+            Prior::Uniform { min, max } => min + rng.random::<f64>() * (max - min),
+            Prior::LogUniform { min, max } => min * (rng.random::<f64>() * (max / min).ln()).exp(),
+            Prior::Normal { mean, sd, min, max } => {
+                mean + sd * Truncated::new((min - mean) / sd, (max - mean) / sd).sample(rng)
+            }
+            Prior::Isotropic { min, max } => {
+                let (a, b) = (min.to_radians().cos(), max.to_radians().cos());
+                (a + rng.random::<f64>() * (b - a)).acos().to_degrees()
+            }
+            Prior::Periodic => return rng.random::<f64>(),
+        };
+        draw.clamp(lower, upper)
+    }
+}
+
+/// A standard normal between two bounds, relative to its density at the mode `peak`, on the interval `[lo, hi]` outside
+/// which that relative density is below `exp(-40)`.
+struct Truncated {
+    lo: f64,
+    hi: f64,
+    peak: f64,
+}
+
+impl Truncated {
+    fn new(min: f64, max: f64) -> Self {
+        let peak = 0f64.clamp(min, max);
+        let reach = (peak * peak + 80.0).sqrt();
+        Truncated { lo: min.max(-reach), hi: max.min(reach), peak }
+    }
+
+    /// `exp(-(z^2 - peak^2) / 2)`, at most 1.
+    fn relative_density(&self, z: f64) -> f64 {
+        (-0.5 * (z - self.peak) * (z + self.peak)).exp()
+    }
+
+    /// Logarithm of the integral of `exp(-z^2/2)` between the bounds: three-point Gauss-Legendre on 400 panels, none
+    /// wider than 0.05, which leaves errors of 1e-12.
+    fn log_integral(&self) -> f64 {
+        const PANELS: usize = 400;
+        let half = 0.5 * (self.hi - self.lo) / PANELS as f64;
+        let offset = 0.6f64.sqrt() * half;
+        let sum: f64 = (0..PANELS)
+            .map(|k| {
+                let middle = self.lo + (2 * k + 1) as f64 * half;
+                let sides = self.relative_density(middle - offset) + self.relative_density(middle + offset);
+                (5.0 * sides + 8.0 * self.relative_density(middle)) / 9.0
+            })
+            .sum();
+        (half * sum).ln() - 0.5 * self.peak * self.peak
+    }
+
+    /// Rejection from a uniform envelope: one draw in 40 or better is kept, wherever the bounds are.
+    fn sample(&self, rng: &mut impl Rng) -> f64 {
+        loop {
+            let z = self.lo + rng.random::<f64>() * (self.hi - self.lo);
+            if rng.random::<f64>() <= self.relative_density(z) {
+                return z;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use std::f64::consts::TAU;
+
+    fn examples() -> Vec<Prior> {
+        vec![
+            Prior::Uniform { min: -1.5, max: 0.3 },
+            Prior::LogUniform { min: 0.01, max: 4.0 },
+            Prior::Normal { mean: 40.0, sd: 0.5, min: f64::NEG_INFINITY, max: f64::INFINITY },
+            Prior::Normal { mean: 0.05, sd: 0.1, min: 0.0, max: 0.3 },
+            Prior::Normal { mean: -2.0, sd: 0.1, min: 0.0, max: f64::INFINITY },
+            Prior::Isotropic { min: 0.0, max: 90.0 },
+            Prior::Isotropic { min: 20.0, max: 55.0 },
+            Prior::Periodic,
+        ]
+    }
+
+    /// A finite interval that holds all but 1e-20 of the density.
+    fn interval(prior: &Prior) -> (f64, f64) {
+        match *prior {
+            Prior::Normal { mean, sd, min, max } => {
+                let reach = 10.0 * sd + (mean.clamp(min, max) - mean).abs();
+                (min.max(mean - reach), max.min(mean + reach))
+            }
+            _ => prior.bounds(),
+        }
+    }
+
+    /// Cumulative distribution at the right edges of `n` equal cells, by the midpoint rule.
+    fn cumulative(prior: &Prior, n: usize) -> (f64, f64, Vec<f64>) {
+        let (lo, hi) = interval(prior);
+        let width = (hi - lo) / n as f64;
+        let mut sum = 0.0;
+        let cells = (0..n).map(|k| {
+            sum += width * prior.log_density(lo + (k as f64 + 0.5) * width).exp();
+            sum
+        });
+        (lo, hi, cells.collect())
+    }
+
+    #[test]
+    fn densities_integrate_to_one() {
+        for prior in examples() {
+            let total = *cumulative(&prior, 20_000).2.last().unwrap();
+            // The midpoint rule on 1/x over these cells is good to 3e-6.
+            assert!((total - 1.0).abs() < 1e-5, "{prior:?}: {total}");
+        }
+    }
+
+    #[test]
+    fn samples_follow_the_density() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        const DRAWS: usize = 20_000;
+        for prior in examples() {
+            let (lo, hi, cdf) = cumulative(&prior, 20_000);
+            let mut draws: Vec<f64> = (0..DRAWS).map(|_| prior.sample(&mut rng)).collect();
+            draws.sort_by(f64::total_cmp);
+            let distance = draws.iter().enumerate().map(|(k, x)| {
+                assert!(prior.contains(*x), "{prior:?}: {x}");
+                let position = (x - lo) / (hi - lo) * cdf.len() as f64;
+                let cell = (position as usize).min(cdf.len() - 1);
+                let before = if cell == 0 { 0.0 } else { cdf[cell - 1] };
+                let expected = before + (position - cell as f64) * (cdf[cell] - before);
+                (expected - k as f64 / DRAWS as f64).abs().max((expected - (k + 1) as f64 / DRAWS as f64).abs())
+            });
+            // Kolmogorov-Smirnov: sqrt(n) D exceeds 1.95 once in a thousand.
+            let distance = distance.fold(0.0, f64::max) * (DRAWS as f64).sqrt();
+            assert!(distance < 1.95, "{prior:?}: {distance}");
+        }
+    }
+
+    #[test]
+    fn outside_the_bounds_is_impossible() {
+        for prior in examples() {
+            assert_eq!(prior.log_density(f64::NAN), f64::NEG_INFINITY);
+            if !matches!(prior, Prior::Periodic) {
+                let (min, max) = prior.bounds();
+                assert_eq!(prior.log_density(min - 1e-9), f64::NEG_INFINITY);
+                assert_eq!(prior.log_density(max + 1e-9), f64::NEG_INFINITY);
+            }
+        }
+    }
+
+    #[test]
+    fn an_untruncated_normal_is_the_textbook_one() {
+        let prior = Prior::Normal { mean: 1.0, sd: 2.0, min: f64::NEG_INFINITY, max: f64::INFINITY };
+        let expected = -0.5 - 2f64.ln() - 0.5 * TAU.ln();
+        assert!((prior.log_density(3.0) - expected).abs() < 1e-11);
+    }
+
+    #[test]
+    fn a_far_tail_stays_finite() {
+        // The far tail of a normal is exponential with rate 30.
+        let prior = Prior::Normal { mean: 0.0, sd: 1.0, min: 30.0, max: f64::INFINITY };
+        assert!((prior.log_density(30.0) - 30f64.ln()).abs() < 2e-3);
+    }
+
+    #[test]
+    fn wrapping_lands_in_the_unit_interval() {
+        for (x, expected) in [(0.25, 0.25), (1.0, 0.0), (-0.25, 0.75), (7.5, 0.5), (-1e-300, 0.0)] {
+            assert_eq!(Prior::Periodic.wrap(x), expected);
+        }
+        assert_eq!(Prior::Uniform { min: 0.0, max: 1.0 }.wrap(1.5), 1.5);
+    }
+}

@@ -1,0 +1,165 @@
+//! Synthetic observations: a spotted star with its planet through the forward model, and photon noise (Petit et al.
+//! 2015, section 2).
+//!
+//! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of
+//! filling factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the
+//! largest s and the largest excess e of the discs that overlap. The same simulation gives the same numbers on every
+//! machine and with any number of threads.
+
+use crate::posterior::nuisances::{LineAndContinuum, templates};
+use crate::posterior::objective::ParameterValues;
+use crate::star::observation::{Observations, Profile};
+use crate::star::spots::{excess_at, filling_at};
+use crate::star::{Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Standard error that observations without noise are given: that of a signal-to-noise ratio of 1000.
+pub const SIGMA_WITHOUT_NOISE: f64 = 1e-3;
+
+/// Points along each side of a pixel at which it is asked whether a spot covers them.
+const COVERAGE_POINTS: usize = 8;
+
+/// Observations to be simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation {
+    /// The spots (radians).
+    pub spots: Vec<Spot>,
+    /// The faculae (radians).
+    pub faculae: Vec<Facula>,
+    /// All parameters as simulated: those of the config, but for `truth`.
+    pub truth: ParameterValues,
+    /// Times of the profiles (d).
+    pub times_d: Vec<f64>,
+    /// Velocity of the first bin (km/s).
+    pub first_velocity_kms: f64,
+    /// Width of a bin (km/s).
+    pub step_kms: f64,
+    /// Number of bins.
+    pub bins: usize,
+    /// Signal-to-noise ratio of each bin; no noise if `None`.
+    pub snr: Option<f64>,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Pixels of the star.
+    pub pixels: usize,
+    /// Standard deviations of what is wrong with each profile by itself, in line and continuum.
+    pub continuum: LineAndContinuum,
+    /// Standard deviation of the velocity zero points of the profiles (km/s).
+    pub velocity_jitter_kms: f64,
+    /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for
+    /// white noise.
+    pub correlated_bins: f64,
+}
+
+/// Stream of the random numbers of line and continuum; noise is drawn from stream 0.
+const CONTINUUM_STREAM: u64 = 1;
+
+/// Stream of the random numbers of the velocity zero points.
+const ZERO_POINT_STREAM: u64 = 2;
+
+impl Simulation {
+    /// Standard error of each bin, in units of the continuum.
+    pub fn sigma(&self) -> f64 {
+        self.snr.map_or(SIGMA_WITHOUT_NOISE, |snr| 1.0 / snr)
+    }
+
+    /// The observations of `star`.
+    pub fn observe(&self, star: &StarSettings) -> Observations {
+        let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
+        let state = self.truth.state();
+        let brightness = self.brightness(&grid, self.contrast(star));
+        let zero_points = self.zero_points_kms();
+        // a line that is farther to the red by its zero point is the line seen from bins that are farther to the blue
+        let first = |k: usize| zero_points.get(k).map_or(self.first_velocity_kms, |v| self.first_velocity_kms - v);
+        let profiles = self.times_d.iter().enumerate().map(|(k, time)| (*time, first(k), self.bins)).collect();
+        let sampling = Sampling { step_kms: self.step_kms, profiles };
+        let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
+        for (depths, nuisances) in depths.chunks_exact_mut(self.bins).zip(self.nuisances()) {
+            for (j, depth) in depths.iter_mut().enumerate() {
+                let changes = templates(j, self.bins, *depth).into_iter().zip(nuisances.numbers());
+                *depth += changes.map(|(template, number)| template * number).sum::<f64>();
+            }
+        }
+        let noise = self.noise(depths.len());
+        let intensity: Vec<f64> = depths.iter().zip(noise).map(|(depth, noise)| 1.0 - depth + noise).collect();
+        let profile = |(intensity, time_d): (&[f64], &f64)| Profile {
+            time_d: *time_d,
+            first_velocity_kms: self.first_velocity_kms,
+            intensity: intensity.to_vec(),
+            sigma: vec![self.sigma(); self.bins],
+        };
+        let profiles = intensity.chunks_exact(self.bins).zip(&self.times_d).map(profile).collect();
+        Observations { step_kms: self.step_kms, profiles }
+    }
+
+    /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own
+    /// filling.
+    pub fn spot_filling(&self, grid: &SurfaceGrid) -> Vec<f64> {
+        grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
+    }
+
+    /// What is wrong with each profile by itself; empty if nothing is.
+    pub fn nuisances(&self) -> Vec<LineAndContinuum> {
+        if self.continuum == LineAndContinuum::default() {
+            return Vec::new();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(CONTINUUM_STREAM);
+        let mut draw = || {
+            LineAndContinuum::of_numbers(self.continuum.numbers().map(|sd| {
+                let normal: f64 = StandardNormal.sample(&mut rng);
+                sd * normal
+            }))
+        };
+        self.times_d.iter().map(|_| draw()).collect()
+    }
+
+    /// The velocity zero point of each profile (km/s), which is added to its own velocity; empty if there is none.
+    pub fn zero_points_kms(&self) -> Vec<f64> {
+        if self.velocity_jitter_kms == 0.0 {
+            return Vec::new();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(ZERO_POINT_STREAM);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        self.times_d.iter().map(|_| self.velocity_jitter_kms * draw()).collect()
+    }
+
+    /// Brightness of spots on `star` over that of the photosphere.
+    pub fn contrast(&self, star: &StarSettings) -> f64 {
+        star.with(&self.truth.state().surface).contrast
+    }
+
+    /// The true brightness of each pixel of `grid`, that of the photosphere being 1 and that of spots `contrast`.
+    pub fn brightness(&self, grid: &SurfaceGrid, contrast: f64) -> Vec<f64> {
+        let of_spots = Brightness::of_spots(contrast);
+        let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
+        if !self.faculae.is_empty() {
+            let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);
+            brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
+        }
+        brightness
+    }
+
+    /// Gaussian noise of `n` bins, all profiles one after the other. Neighbours in a profile have the correlation
+    /// `rho = (c - 1) / (c + 1)`, bins m apart rho^m, so that the correlations add up to the c `correlated_bins`.
+    fn noise(&self, n: usize) -> Vec<f64> {
+        if self.snr.is_none() {
+            return vec![0.0; n];
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut noise: Vec<f64> = (0..n).map(|_| self.sigma() * draw()).collect();
+        let rho = (self.correlated_bins - 1.0) / (self.correlated_bins + 1.0);
+        if rho > 0.0 {
+            for profile in noise.chunks_mut(self.bins) {
+                for j in 1..profile.len() {
+                    profile[j] = rho * profile[j - 1] + (1.0 - rho * rho).sqrt() * profile[j];
+                }
+            }
+        }
+        noise
+    }
+}

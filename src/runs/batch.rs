@@ -1,0 +1,230 @@
+//! Many stars: the chain of every config of a list, each in a folder of its own, several at once.
+//!
+//! A star that is done is left alone, one that was stopped goes on, and one that fails stops no other.
+
+use crate::data::io::atomic::write_json;
+use crate::data::scene::Scene;
+use crate::data::search::{self, SearchSettings};
+use crate::planets::verdict::Verdict;
+use crate::runs::manifest::{self, Manifest};
+#[cfg(feature = "mpi")]
+use crate::runs::pool::orbit_from_bytes;
+use crate::runs::pool::{Answer, Brief, Pool, Question};
+use crate::runs::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
+use crate::sampling::chain::{ParameterSummary, Summary};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+/// Name of the file with what came of all of them.
+pub const FILE: &str = "batch.json";
+
+/// A star of a list.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Star {
+    /// The config's name without its extension, which is that of its folder.
+    pub name: String,
+    /// Its config.
+    pub config: PathBuf,
+    /// Where its run is kept.
+    pub folder: PathBuf,
+}
+
+/// What came of a star.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum End {
+    /// It has a chain, as long as its config asks for, and a summary.
+    Sampled,
+    /// It was stopped; the same command goes on.
+    Interrupted,
+    /// It has no chain, and this is why.
+    Failed(String),
+}
+
+/// What is wrong with a list: one line that names it.
+#[derive(Debug, thiserror::Error)]
+pub enum ListError {
+    /// It cannot be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The list.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A line makes no sense.
+    #[error("{}:{line}: {problem}", path.display())]
+    Line {
+        /// The list.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// It has no star.
+    #[error("{}: names no config", .0.display())]
+    Empty(PathBuf),
+}
+
+/// Reads a list: the path of a config in each line, from the list's folder; `#` begins a comment. Runs go into `out`.
+///
+/// # Errors
+/// [`ListError`].
+pub fn read_list(path: &Path, out: &Path) -> Result<Vec<Star>, ListError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ListError::Read { path: path.into(), source })?;
+    let mut stars: Vec<Star> = Vec::new();
+    for (k, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
+        let wrong = |problem: String| ListError::Line { path: path.into(), line: k + 1, problem };
+        let config = path.parent().unwrap_or(Path::new("")).join(line);
+        let Some(name) = config.file_stem().map(|name| name.to_string_lossy().into_owned()) else {
+            return Err(wrong(format!("{line} is no file")));
+        };
+        if let Some(other) = stars.iter().find(|star| star.name == name) {
+            let problem = format!("{line} would share the folder {name} with {}; rename one", other.config.display());
+            return Err(wrong(problem));
+        }
+        stars.push(Star { folder: out.join(&name), name, config });
+    }
+    if stars.is_empty() { Err(ListError::Empty(path.into())) } else { Ok(stars) }
+}
+
+/// Samples all stars, as many at once as the pool is large; `done` is told of each that ends on this machine. What came
+/// of them, in order; of those that were not begun when the pool was told to stop, that they were interrupted.
+pub fn sample_all(stars: &[Star], pool: &Pool, done: &(dyn Fn() + Sync)) -> Vec<End> {
+    let stop = pool.shared_stop();
+    let here = |star: &Star| {
+        let end = sample(star, &Pool::threads(stop.clone()));
+        done();
+        end
+    };
+    let mut ends = pool.answers_apart(&Brief::Stars.to_bytes(), stars, here);
+    ends.resize(stars.len(), End::Interrupted);
+    ends
+}
+
+/// Samples a star, or goes on with it.
+pub fn sample(star: &Star, pool: &Pool) -> End {
+    match tried(star, pool) {
+        Ok(end) => end,
+        Err(error) => match error.downcast_ref::<RunError>() {
+            Some(RunError::Interrupted) => End::Interrupted,
+            _ => End::Failed(error.to_string()),
+        },
+    }
+}
+
+fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
+    let scene = Scene::load(&star.config)?;
+    scene.settings.require_free()?;
+    let folder = &star.folder;
+    // a chain without a line is one that was killed as it began
+    let has_lines = std::fs::metadata(folder.join(CHAIN)).is_ok_and(|chain| chain.len() > 0);
+    let is_begun = folder.join(manifest::FILE).exists() || has_lines;
+    let mut run = if is_begun {
+        let manifest = Manifest::read(folder)?;
+        manifest.origin.check(&scene, folder)?;
+        if folder.join(SUMMARY).exists() && manifest.origin.config == scene.settings.resolved {
+            return Ok(End::Sampled);
+        }
+        Run::resume(&scene, folder, None, pool)?
+    } else {
+        let settings = SearchSettings::new(&scene.settings);
+        let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
+        Run::begin(&scene, folder, found, StartFrom::Optimum, true, pool)?
+    };
+    if run.go(pool, |_, _| ())? == crate::sampling::ensemble::StopReason::Interrupted {
+        return Ok(End::Interrupted);
+    }
+    let (summary, _) = run.manifest.summarise(&scene.settings, &run.chain)?;
+    write_json(&folder.join(SUMMARY), &summary)?;
+    Ok(End::Sampled)
+}
+
+/// A star in [`FILE`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Its name.
+    pub name: String,
+    /// Its config.
+    pub config: PathBuf,
+    /// What came of it.
+    pub end: End,
+    /// Whether its chain has converged.
+    pub converged: Option<bool>,
+    /// What is said of a planet.
+    #[serde(default)]
+    pub verdict: Option<Verdict>,
+    /// Evaluations of its chain.
+    pub evaluations: Option<usize>,
+    /// The parameters by name.
+    pub parameters: BTreeMap<String, ParameterSummary>,
+}
+
+/// What came of the stars, with the numbers in their summaries.
+pub fn rows(stars: &[Star], ends: &[End]) -> Vec<Row> {
+    let row = |(star, end): (&Star, &End)| {
+        let summary =
+            || -> Option<Summary> { serde_json::from_slice(&std::fs::read(star.folder.join(SUMMARY)).ok()?).ok() };
+        let summary = if *end == End::Sampled { summary() } else { None };
+        Row {
+            name: star.name.clone(),
+            config: star.config.clone(),
+            end: end.clone(),
+            converged: summary.as_ref().map(|summary| summary.converged),
+            verdict: summary.as_ref().and_then(|summary| summary.verdict.clone()),
+            evaluations: summary.as_ref().map(|summary| summary.evaluations),
+            parameters: summary.map(|summary| summary.parameters).unwrap_or_default(),
+        }
+    };
+    stars.iter().zip(ends).map(row).collect()
+}
+
+impl Question for Star {
+    fn to_bytes(&self) -> Vec<u8> {
+        serde_json::to_vec(self).expect("plain data")
+    }
+}
+
+impl Answer for End {
+    fn to_bytes(&self) -> Vec<u8> {
+        serde_json::to_vec(self).expect("plain data")
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        serde_json::from_slice(bytes).ok()
+    }
+}
+
+/// How a rank answers what a brief is about.
+///
+/// # Errors
+/// A density that cannot be had there.
+#[cfg(feature = "mpi")]
+pub fn learn(brief: &[u8]) -> Result<crate::runs::cluster::Answer<'static>, crate::runs::pool::TaskError> {
+    Ok(match Brief::from_bytes(brief).expect("a rank of this very program asks") {
+        Brief::Density(task) => {
+            let answer = task.answerer()?;
+            Box::new(move |question, _| answer(question))
+        }
+        Brief::Injections(way) => {
+            let search = way.searcher()?;
+            Box::new(move |question, _| {
+                search(&orbit_from_bytes(question).expect("a rank of this very program asks")).to_bytes()
+            })
+        }
+        Brief::Stars => Box::new(|question, stop| {
+            if stop.load(std::sync::atomic::Ordering::Relaxed) {
+                return End::Interrupted.to_bytes();
+            }
+            let star: Star = serde_json::from_slice(question).expect("a rank of this very program asks");
+            sample(&star, &Pool::threads(stop.clone())).to_bytes()
+        }),
+    })
+}

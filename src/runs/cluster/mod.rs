@@ -1,0 +1,102 @@
+//! Ranks of MPI: rank 0 asks, the others answer, in bytes. One queue: every question goes to whoever is free, and the
+//! answers come in the order of the questions.
+//!
+//! A panic on any rank, on any thread, ends them all: without that the others would wait for it forever. Nobody burns a
+//! processor while waiting (`nap`).
+
+mod hands;
+mod message;
+mod nap;
+mod queue;
+mod worker;
+
+pub use queue::Queue;
+pub use worker::{Answer, Worker};
+
+use mpi::environment::Universe;
+use mpi::topology::{Process, SimpleCommunicator};
+use mpi::traits::Communicator as _;
+use std::process::ExitCode;
+
+/// Exit code of a job that a panic ended, as that of a program that panics.
+const PANICKED: i32 = 101;
+
+/// Variables that launchers of MPI set for every rank.
+const LAUNCHED: [&str; 5] = ["OMPI_COMM_WORLD_SIZE", "PMI_RANK", "PMIX_RANK", "MPI_LOCALRANKID", "PALS_RANKID"];
+
+/// One process among others.
+pub enum Rank {
+    /// The only one.
+    Only,
+    /// The first, which asks.
+    First(Queue),
+    /// One of the others, which answer.
+    Other(Worker),
+}
+
+/// Why there are no ranks.
+#[derive(Debug, thiserror::Error)]
+pub enum ClusterError {
+    /// MPI does not begin, or has begun before.
+    #[error("MPI does not start")]
+    Start,
+    /// Panics could not end the job from the thread that they happen on.
+    #[error("this MPI does not allow calls from several threads (MPI_THREAD_MULTIPLE)")]
+    Threads,
+}
+
+/// Joins the ranks that a launcher has started, this one answering so many questions at once if it is not the first;
+/// without a launcher there is nobody to join, and MPI is left alone.
+///
+/// # Errors
+/// [`ClusterError`].
+pub fn join(at_once: usize) -> Result<Rank, ClusterError> {
+    if !LAUNCHED.iter().any(|name| std::env::var_os(name).is_some()) {
+        return Ok(Rank::Only);
+    }
+    let threading = mpi::Threading::Multiple;
+    let (universe, provided) = mpi::initialize_with_threading(threading).ok_or(ClusterError::Start)?;
+    if provided < threading {
+        return Err(ClusterError::Threads);
+    }
+    let world = universe.world();
+    if world.size() == 1 {
+        return Ok(Rank::Only);
+    }
+    abort_on_panic();
+    Ok(match world.rank() {
+        0 => Rank::First(Queue::new(universe)),
+        _ => Rank::Other(Worker::new(universe, at_once)),
+    })
+}
+
+/// Ends all ranks at once.
+pub fn abort(code: i32) -> ExitCode {
+    SimpleCommunicator::world().abort(code)
+}
+
+/// After the message of a panic, ends all ranks.
+fn abort_on_panic() {
+    let message = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        message(panic);
+        abort(PANICKED);
+    }));
+}
+
+/// Rank 0.
+fn first(world: &SimpleCommunicator) -> Process<'_> {
+    world.process_at_rank(0)
+}
+
+/// The ranks, and MPI itself until this is dropped.
+struct Ranks {
+    world: SimpleCommunicator,
+    _universe: Universe,
+}
+
+impl Ranks {
+    fn new(universe: Universe) -> Self {
+        Ranks { world: universe.world(), _universe: universe }
+    }
+}

@@ -1,0 +1,56 @@
+//! What to bear in mind when chain and landscape are compared, a sentence each.
+
+use super::{Compared, Comparison};
+use crate::sampling::chain::Summary;
+
+/// Share of draws outside the grid that matters.
+const OUTSIDE: f64 = 0.01;
+
+/// Spacing of an axis, in error bars, above which the trapezoid of a Gaussian is off by more than a part in a thousand.
+const COARSE: f64 = 1.6;
+
+/// The notes on `comparison`, whose chain says `summary`.
+pub(super) fn notes(comparison: &Comparison, summary: &Summary) -> Vec<String> {
+    let named = |is: &dyn Fn(&Compared) -> Option<f64>, text: &dyn Fn(&str, f64) -> String| -> Vec<String> {
+        let value = |name: &String| is(&comparison.parameters[name]).map(|value| text(name, value));
+        comparison.names.iter().filter_map(value).collect()
+    };
+    let mut notes = Vec::new();
+    if !comparison.converged {
+        notes.push(format!("the chain has not converged: {}", summary.advice.join("; ")));
+    }
+    if !comparison.fixed_in_landscape.is_empty() {
+        let missing = comparison.fixed_in_landscape.join(", ");
+        notes.push(format!(
+            "{missing} fixed in the landscape and sampled in the chain: a conditional against a marginal posterior, \
+            whose \
+             intervals are wider and may lie elsewhere"
+        ));
+    }
+    if comparison.outside > OUTSIDE {
+        let percent = |name: &str, share: f64| format!("{name} {:.1} %", 100.0 * share);
+        let axes = named(&|one| Some(one.outside).filter(|share| *share > 0.0), &percent).join(", ");
+        notes.push(format!(
+            "the grid does not hold the posterior: {:.1} % of the draws are outside ({axes}), and the landscape's \
+            intervals \
+             are of what is inside",
+            100.0 * comparison.outside
+        ));
+    }
+    let coarse = named(&|one| one.spacing.filter(|s| *s > COARSE), &|name, s| format!("{name} {s:.1}"));
+    if !coarse.is_empty() {
+        notes.push(format!(
+            "the grid is coarse for integrals over it: spacing in error bars of the chain: {}",
+            coarse.join(", ")
+        ));
+    }
+    if comparison.cost.landscape.failed > 0 {
+        let failed = comparison.cost.landscape.failed;
+        notes.push(format!("{failed} nodes without a value count as impossible in the landscape's intervals"));
+    }
+    let [run, grid] = &comparison.versions;
+    if run != grid {
+        notes.push(format!("the chain was made by version {run} of the program, the landscape by {grid}"));
+    }
+    notes
+}

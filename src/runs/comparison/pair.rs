@@ -1,0 +1,144 @@
+//! A run and a landscape that belong together: the same data, star, image and objective, and axes that the chain
+//! samples.
+
+use crate::data::config::{self, Difference, Settings};
+use crate::data::io::effort::Effort;
+use crate::data::io::journal;
+use crate::data::io::landscape;
+use crate::data::io::lines::JournalError;
+use crate::posterior::objective::Parameter;
+use crate::runs::grid_scan::{HEADER, Header, NODES};
+use crate::runs::manifest::Manifest;
+use crate::runs::origin::{Origin, OriginError};
+use crate::runs::run::CHAIN;
+use crate::sampling::chain::Chain;
+use crate::sampling::landscape::Landscape;
+use std::path::{Path, PathBuf};
+
+/// A run and a landscape, read and found to belong together.
+#[derive(Debug)]
+pub struct Pair {
+    /// What the run was begun with.
+    pub manifest: Manifest,
+    /// Its settings.
+    pub settings: Settings,
+    /// Its chain so far.
+    pub chain: Chain,
+    /// What the landscape was begun with.
+    pub header: Header,
+    /// All its nodes.
+    pub landscape: Landscape,
+    /// How long the run took, and the landscape, where that is recorded.
+    pub efforts: [Option<Effort>; 2],
+}
+
+/// Why they cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum PairError {
+    /// One of them is not there, or cannot be read.
+    #[error(transparent)]
+    Origin(#[from] OriginError),
+    /// Chain or nodes cannot be read.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// The landscape is not whole.
+    #[error("{}: {found} of {total} nodes: finish the landscape first, with --resume", folder.display())]
+    Unfinished {
+        /// Folder of the landscape.
+        folder: PathBuf,
+        /// Nodes there are.
+        found: usize,
+        /// Nodes of the grid.
+        total: usize,
+    },
+    /// They are of different things.
+    #[error("{} and {} do not belong together: {what}", run.display(), grid.display())]
+    Different {
+        /// Folder of the run.
+        run: PathBuf,
+        /// Folder of the landscape.
+        grid: PathBuf,
+        /// What differs.
+        what: String,
+    },
+}
+
+impl Pair {
+    /// Reads the run in folder `run` and the landscape in folder `grid`.
+    ///
+    /// # Errors
+    /// [`PairError`]: files that are not there or wrong, a landscape that is not whole, or of something else.
+    pub fn read(run: &Path, grid: &Path) -> Result<Self, PairError> {
+        let manifest = Manifest::read(run)?;
+        let header = Header::read(grid)?;
+        let settings = manifest.settings(run)?;
+        let source = grid.join(HEADER);
+        let grid_settings = config::from_json(header.origin.config.to_string().as_bytes(), &source);
+        let grid_settings = grid_settings.map_err(OriginError::Config)?;
+        if let Some(what) = what_differs(&manifest, &settings, &header, &grid_settings) {
+            return Err(PairError::Different { run: run.into(), grid: grid.into(), what });
+        }
+        let landscape = landscape::read(&grid.join(NODES), header.grid.clone())?;
+        if !landscape.is_whole() {
+            let (found, total) = (landscape.nodes().len(), header.grid.len());
+            return Err(PairError::Unfinished { folder: grid.into(), found, total });
+        }
+        let chain = journal::read(&run.join(CHAIN), &manifest.shape())?;
+        let efforts = [run, grid].map(Effort::read);
+        Ok(Pair { manifest, settings, chain, header, landscape, efforts })
+    }
+
+    /// Number of a sampled parameter among the axes.
+    pub fn axis(&self, name: &str) -> Option<usize> {
+        self.header.grid.names().position(|axis| axis == name)
+    }
+
+    /// Density of the run's prior for the parameter on axis `axis`.
+    pub fn prior(&self, axis: usize, x: f64) -> f64 {
+        let axis = &self.header.grid.axes[axis];
+        let free = self.settings.free.iter().find(|f| f.parameter.name() == axis.name);
+        free.map_or(0.0, |f| match axis.periodic {
+            // the interval of a prior of phi may be in any turn
+            true => (-TURNS..=TURNS).map(|turn| f.prior.log_density(x + f64::from(turn)).exp()).sum::<f64>(),
+            false => f.prior.log_density(x).exp(),
+        })
+    }
+}
+
+/// Turns of a periodic parameter from its prior to [0, 1), at most.
+const TURNS: i32 = 10;
+
+/// The first thing that keeps a run from being of the same posterior as a landscape.
+fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_settings: &Settings) -> Option<String> {
+    let (run, grid) = (&manifest.origin, &header.origin);
+    let both = |d: Difference| format!("{} ({} in the run, {} in the landscape)", d.key, d.first, d.second);
+    if let Some(key) = config::model_difference(&run.config, &grid.config) {
+        return Some(both(key));
+    }
+    // data of other zero points are the same data
+    if let Some(key) = config::jitter_difference(&run.config, &grid.config) {
+        return Some(both(key));
+    }
+    if let Some(name) = header.grid.names().find(|name| !manifest.names.iter().any(|sampled| sampled == name)) {
+        return Some(format!("{name} is an axis of the landscape and not sampled in the run"));
+    }
+    let fixed = |p: &Parameter| !manifest.names.iter().any(|name| name == p.name());
+    let differ = |p: &Parameter| !settings.values.agrees(&grid_settings.values, *p);
+    if let Some(p) = Parameter::ALL.into_iter().filter(fixed).find(differ) {
+        let (first, second) = (settings.values[p], grid_settings.values[p]);
+        return Some(format!("{} is fixed at {first} in the run and at {second} in the landscape", p.name()));
+    }
+    (run.data_sha256 != grid.data_sha256).then(|| {
+        let key = config::section_difference("observations", &run.config, &grid.config).map(both);
+        let why = key.or_else(|| injected(run, grid)).map_or_else(String::new, |why| format!(": {why}"));
+        format!("the observations are not the same{why}")
+    })
+}
+
+/// The first parameter that two simulations have another value of.
+fn injected(run: &Origin, grid: &Origin) -> Option<String> {
+    let (first, second) = (run.truth.as_ref()?, grid.truth.as_ref()?);
+    let differs = |(name, value): &(&String, &f64)| second.get(*name) != Some(*value);
+    let (name, value) = first.iter().find(differs)?;
+    Some(format!("injected {name} {value} in the run and {} in the landscape", second.get(name)?))
+}

@@ -1,0 +1,116 @@
+//! What a case came to: three estimates of the same orbit, and what each of them took.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A value with its 68 % interval; that of a periodic parameter may leave [0, 1).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Its interval.
+    pub ci68: [f64; 2],
+    /// Its 95 % interval; of an estimate with an error bar, two of them to each side.
+    pub ci95: [f64; 2],
+}
+
+/// One way to the orbit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Route {
+    /// The parameters by name; empty where the route came to nothing.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Reconstructions that it took, the search for the reference left out.
+    pub reconstructions: usize,
+    /// Seconds that it took; NaN (null) where it was stopped and gone on with.
+    #[serde(deserialize_with = "number_or_null")]
+    pub seconds: f64,
+    /// What is to be said of it: why it came to nothing, or that a chain did not converge.
+    pub note: Option<String>,
+}
+
+/// A case with its results.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// The config that it was run with.
+    pub config: serde_json::Value,
+    /// Version of the program.
+    pub version: String,
+    /// Why there is no result at all.
+    pub failed: Option<String>,
+    /// What was injected, all parameters by name.
+    pub truth: BTreeMap<String, f64>,
+    /// Target chi2 per datum (null, as the next two, where there is no result); above the config's where that could not
+    /// be reached.
+    #[serde(deserialize_with = "number_or_null")]
+    pub chi2_target: f64,
+    /// Multiplier of chi2 / 2 in the image at the best orbit, times the number of data.
+    #[serde(deserialize_with = "number_or_null")]
+    pub lambda_data: f64,
+    /// Spot coverage of that image.
+    #[serde(deserialize_with = "number_or_null")]
+    pub spottedness: f64,
+    /// Reconstructions of the search for it, which grid and chain share.
+    pub search_reconstructions: usize,
+    /// Seconds of that search.
+    pub search_seconds: f64,
+    /// Grid and paraboloid.
+    pub grid: Option<Route>,
+    /// Chain.
+    pub chain: Option<Route>,
+    /// The 95 % upper limit of K by the chain, where K is compatible with 0 (km/s).
+    pub k_upper95_kms: Option<f64>,
+    /// Periodogram: its best orbit.
+    pub periodogram: Option<Route>,
+    /// Its false-alarm probability.
+    pub false_alarm: Option<f64>,
+}
+
+/// A number; NaN, which is written as null, comes back.
+fn number_or_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// Share of `of` and its binomial error: that of the share with one more of either kind, which is not nothing where all
+/// are alike.
+pub fn share(count: usize, of: usize) -> [f64; 2] {
+    let n = of.max(1) as f64;
+    let p = (count as f64 + 1.0) / (n + 2.0);
+    [count as f64 / n, (p * (1.0 - p) / n).sqrt()].map(|x| (1000.0 * x).round() / 1000.0)
+}
+
+impl Estimate {
+    /// A value with a Gaussian error bar.
+    pub fn gaussian(value: f64, sigma: f64) -> Self {
+        let around = |n: f64| [value - n * sigma, value + n * sigma];
+        Estimate { value, ci68: around(1.0), ci95: around(2.0) }
+    }
+
+    /// Half the width of the 68 % interval.
+    pub fn error(&self) -> f64 {
+        0.5 * (self.ci68[1] - self.ci68[0])
+    }
+}
+
+impl Outcome {
+    /// The routes that were taken, by name.
+    pub fn routes(&self) -> impl Iterator<Item = (&'static str, &Route)> {
+        let all = [("grid", &self.grid), ("chain", &self.chain), ("periodogram", &self.periodogram)];
+        all.into_iter().filter_map(|(name, route)| Some((name, route.as_ref()?)))
+    }
+
+    /// Whether the injected value is inside the chain's interval of 68 (level 0) or 95 % (1); a phase in any turn. A
+    /// star without a result counts as one that is missed.
+    pub fn is_covered(&self, name: &str, level: usize) -> bool {
+        let estimate = self.chain.as_ref().and_then(|chain| chain.parameters.get(name));
+        let (Some(one), Some(truth)) = (estimate, self.truth.get(name)) else { return false };
+        let [low, high] = [one.ci68, one.ci95][level];
+        let turns: &[f64] = if name == "phi" { &[-1.0, 0.0, 1.0] } else { &[0.0] };
+        turns.iter().any(|turn| (low..=high).contains(&(truth + turn)))
+    }
+
+    /// Value minus the injected one; of a phase, the shorter way round.
+    pub fn deviation(&self, name: &str, estimate: &Estimate) -> Option<f64> {
+        let apart = estimate.value - self.truth.get(name)?;
+        Some(if name == "phi" { apart - apart.round() } else { apart })
+    }
+}

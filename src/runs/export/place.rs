@@ -1,0 +1,65 @@
+//! Where an export goes: nothing that is there is lost unless it is an earlier export and the user insists.
+
+use super::ExportError;
+use crate::data::io::atomic::WriteError;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+const TAKEN: &str = "is there already; give another --out, or --force to replace it";
+
+const FOREIGN: &str = "is there already, and no earlier export: it is not replaced";
+
+fn wrong(path: &Path, problem: impl Into<String>) -> Result<(), ExportError> {
+    Err(ExportError::Place { path: path.to_owned(), problem: problem.into() })
+}
+
+/// Whether the path ends in a name, in a folder or where one can be made.
+pub fn check_name(out: &Path) -> Result<(), ExportError> {
+    if out.file_name().is_none() {
+        return wrong(out, "is no name for an export");
+    }
+    match out.ancestors().skip(1).find(|parent| parent.exists()) {
+        Some(file) if !file.is_dir() => wrong(out, format!("{} is not a folder", file.display())),
+        _ => Ok(()),
+    }
+}
+
+/// Whether these files can be written: none is there yet, or each that is there `is_own` and `replace`. Another file is
+/// not replaced, whatever the user says.
+pub fn check_files(files: &[PathBuf], replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
+    for file in files {
+        match file.symlink_metadata() {
+            Err(_) => {}
+            Ok(_) if file.is_dir() => return wrong(file, "is a folder; give the name of a file"),
+            Ok(_) if !is_own(file) => return wrong(file, FOREIGN),
+            Ok(_) if replace => {}
+            Ok(_) => return wrong(file, TAKEN),
+        }
+    }
+    Ok(())
+}
+
+/// Whether the folder can be written: it is not there yet, or it `is_own` and `replace`. Another folder is not
+/// replaced, whatever the user says.
+pub fn check_folder(folder: &Path, replace: bool, is_own: &dyn Fn(&Path) -> bool) -> Result<(), ExportError> {
+    match folder.symlink_metadata() {
+        Err(_) => Ok(()),
+        Ok(_) if !is_own(folder) => wrong(folder, FOREIGN),
+        Ok(_) if replace => Ok(()),
+        Ok(_) => wrong(folder, TAKEN),
+    }
+}
+
+/// Makes the folder that the export goes into.
+pub fn create_parent(out: &Path) -> Result<(), ExportError> {
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let made = folder.map_or(Ok(()), std::fs::create_dir_all);
+    made.map_err(|source| WriteError { path: out.to_owned(), source }.into())
+}
+
+/// Whether the file begins so.
+pub fn begins_with(file: &Path, beginning: &[u8]) -> bool {
+    let mut found = vec![0; beginning.len()];
+    let read = std::fs::File::open(file).and_then(|mut file| file.read_exact(&mut found));
+    read.is_ok() && found == beginning
+}

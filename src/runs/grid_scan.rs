@@ -1,0 +1,193 @@
+//! A landscape on disk: begun afresh, or gone on with to the same bytes (`docs/method.md` section 6).
+//!
+//! The reference is that of `sample`: the best parameters by `search` over the axes. Nodes are reconstructed in
+//! batches, in the order of the grid, so that the file does not depend on the number of threads, and a kill loses the
+//! batch under way.
+
+use crate::data::config::{GridSettings, MOST_NODES};
+use crate::data::io::atomic::{WriteError, write_json};
+use crate::data::io::landscape;
+use crate::data::io::lines::{self, JournalError, LineFile};
+use crate::data::scene::Scene;
+use crate::data::search::Found;
+use crate::posterior::objective::Posterior;
+use crate::runs::origin::{self, Origin, OriginError};
+use crate::runs::pool::{Asked, Brief, Pool, Task};
+use crate::sampling::landscape::{Grid, Landscape, LandscapeError, Node};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Name of the file that says what a landscape was begun with.
+pub const HEADER: &str = "landscape.json";
+
+/// Name of the file with its nodes.
+pub const NODES: &str = "landscape.jsonl";
+
+/// Name of the file with its paraboloid, where the landscape is whole.
+pub const PARABOLOID: &str = "paraboloid.json";
+
+/// Nodes of a batch for each reconstruction under way: enough that threads or ranks seldom wait for the slowest node.
+const BATCH_EACH: usize = 8;
+
+/// Whether nothing but an empty file of nodes is in `folder`, and with `header` perhaps that: such a landscape may
+/// begin again.
+pub fn is_false_start(folder: &Path, header: bool) -> bool {
+    lines::is_false_start(folder, header.then_some(HEADER), NODES)
+}
+
+/// The content of `landscape.json`, written before the first node and never changed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Config, data, program and reference.
+    #[serde(flatten)]
+    pub origin: Origin,
+    /// Where the nodes are.
+    pub grid: Grid,
+}
+
+impl Header {
+    /// What it was begun with, and the names of its parameters.
+    fn parts(&self) -> (&Origin, Vec<String>) {
+        (&self.origin, self.grid.names().map(str::to_owned).collect())
+    }
+
+    /// Reads that of the landscape in `folder`.
+    ///
+    /// # Errors
+    /// A folder without one, one that cannot be read, or says what does not belong together.
+    pub fn read(folder: &Path) -> Result<Self, OriginError> {
+        let header: Header = origin::read_header(folder, HEADER, Header::parts)?;
+        let nodes = header.grid.axes.iter().try_fold(1usize, |all, axis| all.checked_mul(axis.nodes));
+        let is_sound = (1..=3).contains(&header.grid.axes.len())
+            && header.grid.axes.iter().all(|axis| axis.nodes >= 2 && axis.min < axis.max)
+            && nodes.is_some_and(|nodes| nodes <= MOST_NODES);
+        match is_sound {
+            true => Ok(header),
+            false => {
+                let problem = format!("grid: must have 1 to 3 axes, each rising, and at most {MOST_NODES} nodes");
+                Err(OriginError::Content { path: folder.join(HEADER), problem })
+            }
+        }
+    }
+}
+
+/// A landscape with its nodes so far.
+pub struct GridScan {
+    /// What it was begun with.
+    pub header: Header,
+    /// What is evaluated at the nodes, without its prior; of a whole landscape without its warm starts.
+    posterior: Posterior,
+    /// The nodes so far.
+    pub landscape: Landscape,
+    task: Task,
+    file: LineFile,
+}
+
+/// Why a landscape cannot begin, or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum GridScanError {
+    /// What it was begun with is missing, wrong, or not what is there now.
+    #[error(transparent)]
+    Origin(#[from] OriginError),
+    /// The nodes on disk are wrong or locked, or cannot be written.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// The header cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The landscape refused a node: a fault of the program.
+    #[error(transparent)]
+    Landscape(#[from] LandscapeError),
+}
+
+impl GridScan {
+    /// Begins the landscape of `plan` in `folder`, which must be there, with the reference that a search over its axes
+    /// `found`. A landscape that is there already is replaced if `replace`, and refused otherwise.
+    ///
+    /// # Errors
+    /// [`GridScanError`]: files that are there already, or cannot be written.
+    pub fn begin(
+        scene: &Scene,
+        plan: &GridSettings,
+        found: Found,
+        folder: &Path,
+        replace: bool,
+    ) -> Result<Self, GridScanError> {
+        let grid = &plan.grid;
+        let header = Header { origin: Origin::of(scene, &found), grid: grid.clone() };
+        // the nodes first: whoever holds them may write the header
+        let file = LineFile::create(&folder.join(NODES), replace)?;
+        let path = folder.join(PARABOLOID);
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(WriteError { path, source })?,
+            _ => {}
+        }
+        write_json(&folder.join(HEADER), &header)?;
+        Ok(GridScan::new(scene, header, found.posterior, Landscape::new(grid.clone()), file))
+    }
+
+    /// Goes on with the landscape of `plan` in `folder`.
+    ///
+    /// # Errors
+    /// [`GridScanError`]: no landscape there, changed config, grid or data, broken lines.
+    pub fn resume(scene: &Scene, plan: &GridSettings, folder: &Path) -> Result<Self, GridScanError> {
+        let header = Header::read(folder)?;
+        header.origin.check(scene, folder)?;
+        if let Some(what) = change(&header.grid, &plan.grid) {
+            return Err(OriginError::Changed { folder: folder.into(), what }.into());
+        }
+        let (file, landscape) = landscape::recover(&folder.join(NODES), plan.grid.clone())?;
+        let posterior = header.origin.posterior(scene, scene.space_of(&plan.free), folder)?;
+        Ok(GridScan::new(scene, header, posterior, landscape, file))
+    }
+
+    /// With warm starts where nodes far from the reference are worth them.
+    fn new(scene: &Scene, header: Header, posterior: Posterior, landscape: Landscape, file: LineFile) -> Self {
+        let grid = landscape.grid();
+        // all nodes, whatever is left of them: a landscape that goes on has the warm starts that it began with
+        let nodes = if landscape.is_whole() { 0 } else { grid.len() };
+        let thetas: Vec<Vec<f64>> = (0..nodes).map(|index| grid.theta(index)).collect();
+        let posterior = posterior.with_warm_starts_for(&thetas, nodes);
+        let warm_starts = posterior.warm_starts().map(<[f64]>::to_vec).collect();
+        let names = posterior.space().names();
+        let task = Task::new(scene, &header.origin, names, Asked::Likelihood { warm_starts });
+        GridScan { header, posterior, landscape, task, file }
+    }
+
+    /// Images, besides the reference, that nodes start from; none where no node is left.
+    pub fn warm_starts(&self) -> usize {
+        self.posterior.warm_starts().count()
+    }
+
+    /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one,
+    /// and of the last what was finished in time. Returns whether the landscape is whole.
+    ///
+    /// # Errors
+    /// Nodes that cannot be written.
+    pub fn go(&mut self, pool: &Pool, mut on_batch: impl FnMut(&Landscape)) -> Result<bool, GridScanError> {
+        let GridScan { header: Header { grid, .. }, posterior, landscape, task, file } = self;
+        let brief = Brief::Density(Box::new(task.clone())).to_bytes();
+        while !landscape.is_whole() {
+            if pool.stopped() {
+                return Ok(false);
+            }
+            let first = landscape.nodes().len();
+            let after = (first + BATCH_EACH * pool.size()).min(grid.len());
+            let thetas: Vec<Vec<f64>> = (first..after).map(|index| grid.theta(index)).collect();
+            let found = pool.answers(&brief, &thetas, |theta| posterior.likelihood(theta));
+            let node = |(index, (theta, reconstruction))| Node { index, theta, reconstruction };
+            let batch: Vec<Node> = (first..).zip(thetas.into_iter().zip(found)).map(node).collect();
+            landscape::append(file, grid, &batch)?;
+            batch.into_iter().try_for_each(|node| landscape.push(node))?;
+            on_batch(landscape);
+        }
+        Ok(true)
+    }
+}
+
+/// The first axis that is not the same.
+fn change(then: &Grid, now: &Grid) -> Option<String> {
+    let axis = |grid: &Grid, name: &str| grid.axes.iter().find(|axis| axis.name == name).cloned();
+    let name = now.names().chain(then.names()).find(|name| axis(then, name) != axis(now, name))?;
+    Some(format!("grid.axes.{name} of the config changed"))
+}

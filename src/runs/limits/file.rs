@@ -1,0 +1,219 @@
+//! The files of a survey of limits: `limits.csv`, a line for each period and semi-amplitude, and `limits.json`; and a
+//! table.
+
+use super::full::Agreement;
+use super::{Cell, Comparison, Limit, Orbits, Outcome, Shortcut};
+use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::csv::Table;
+use crate::data::io::provenance::Provenance;
+use crate::numerics::text::aligned;
+use crate::planets::verdict::CANDIDATE_FAP;
+use crate::star::Orbit;
+use serde::Serialize;
+use std::path::Path;
+
+/// Names of the files.
+pub const CSV: &str = "limits.csv";
+/// See [`CSV`].
+pub const JSON: &str = "limits.json";
+
+/// Periods shown in the table, at most.
+const SHOWN: usize = 12;
+
+/// The content of `limits.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct LimitsFile {
+    /// False-alarm probability of a detection.
+    pub false_alarm_probability: f64,
+    /// Delta ln L of that.
+    pub level: f64,
+    /// The orbit that was taken out of the profiles first, its K negative.
+    pub removed: Option<Orbit>,
+    /// The search before anything was put in.
+    pub before: BeforeRecord,
+    /// Semi-amplitudes put in (km/s).
+    pub k_kms: Vec<f64>,
+    /// Number of phases.
+    pub phases: usize,
+    /// Limits at the periods put in.
+    pub limits: Vec<LimitRecord>,
+    /// How often the whole way agrees; null where it was not gone.
+    pub agreement: Option<Agreement>,
+    /// Orbits that were tried both ways.
+    pub comparisons: Vec<ComparisonRecord>,
+    /// What may be wrong.
+    pub warnings: Vec<String>,
+    /// Config, data and program.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+}
+
+/// The highest peak of the profiles as they are.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct BeforeRecord {
+    /// Its period (d).
+    pub period_d: f64,
+    /// Its height.
+    pub delta_ln_l: f64,
+    /// Its false-alarm probability.
+    pub false_alarm_probability: f64,
+}
+
+/// The limit at one period.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LimitRecord {
+    /// The period (d).
+    pub period_d: f64,
+    /// The same over the rotation period.
+    pub porb_over_prot: f64,
+    /// K recovered at half of the phases (km/s); null beyond what was tried.
+    pub k50_kms: Option<f64>,
+    /// The same at 95 %.
+    pub k95_kms: Option<f64>,
+}
+
+/// An orbit tried both ways.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ComparisonRecord {
+    /// Semi-amplitude (km/s).
+    pub k_kms: f64,
+    /// Period over the rotation period.
+    pub porb_over_prot: f64,
+    /// Phase (cycles).
+    pub phi: f64,
+    /// What the shortcut makes of it.
+    pub shortcut: OutcomeRecord,
+    /// What the whole way does; null where there is no image.
+    pub full: Option<OutcomeRecord>,
+}
+
+/// The highest peak.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct OutcomeRecord {
+    delta_ln_l: f64,
+    porb_over_prot: f64,
+    k_kms: f64,
+    detected: bool,
+    recovered: bool,
+}
+
+impl OutcomeRecord {
+    fn of(outcome: &Outcome) -> Self {
+        let Outcome { delta_ln_l, porb_over_prot, k_kms, detected, recovered } = *outcome;
+        OutcomeRecord { delta_ln_l, porb_over_prot, k_kms, detected, recovered }
+    }
+}
+
+impl LimitsFile {
+    /// Of the `limits` that a survey came to.
+    pub fn new(
+        shortcut: &Shortcut,
+        orbits: &Orbits,
+        limits: &[Limit],
+        comparisons: &[Comparison],
+        rotation_period_d: f64,
+        provenance: Provenance,
+    ) -> Self {
+        let best = shortcut.before.best();
+        let false_alarm = shortcut.before.false_alarm.probability(best.orbit.delta_ln_l).value();
+        let record = |limit: &Limit| LimitRecord {
+            period_d: rotation_period_d * limit.porb_over_prot,
+            porb_over_prot: limit.porb_over_prot,
+            k50_kms: limit.k50_kms,
+            k95_kms: limit.k95_kms,
+        };
+        let comparison = |c: &Comparison| ComparisonRecord {
+            k_kms: c.orbit.k_kms,
+            porb_over_prot: c.orbit.porb_over_prot,
+            phi: c.orbit.phi,
+            shortcut: OutcomeRecord::of(&c.shortcut),
+            full: c.full.as_ref().map(OutcomeRecord::of),
+        };
+        let mut file = LimitsFile {
+            false_alarm_probability: CANDIDATE_FAP,
+            level: shortcut.level,
+            removed: shortcut.removed,
+            before: BeforeRecord {
+                period_d: rotation_period_d * best.porb_over_prot,
+                delta_ln_l: best.orbit.delta_ln_l,
+                false_alarm_probability: false_alarm,
+            },
+            k_kms: orbits.k_kms.clone(),
+            phases: orbits.phases,
+            limits: limits.iter().map(record).collect(),
+            agreement: (!comparisons.is_empty()).then(|| Agreement::of(comparisons)),
+            comparisons: comparisons.iter().map(comparison).collect(),
+            warnings: Vec::new(),
+            provenance,
+        };
+        file.warnings = file.doubts(shortcut);
+        file
+    }
+
+    fn doubts(&self, shortcut: &Shortcut) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if self.before.false_alarm_probability < CANDIDATE_FAP {
+            doubts.push(format!(
+                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: \
+                --without-best takes it \
+                 out first",
+                self.before.period_d
+            ));
+        }
+        if !shortcut.view.on_target {
+            doubts.push("no map reaches the target chi2 without turning noise into spots".into());
+        }
+        if let Some(Agreement { orbits, agree, by_shortcut, by_full }) =
+            self.agreement.filter(|a| a.by_shortcut.abs_diff(a.by_full) as f64 > (a.orbits as f64).sqrt())
+        {
+            doubts.push(format!(
+                "the shortcut recovers {by_shortcut}, the whole way {by_full} of {orbits} orbits ({agree} alike): \
+                trust the whole \
+                 way"
+            ));
+        }
+        doubts
+    }
+
+    /// Writes both files into `folder`, which must exist.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, cells: &[Cell], rotation_period_d: f64, folder: &Path) -> Result<(), WriteError> {
+        let mut table = Table::new(&["period_d", "porb_over_prot", "k_kms", "phases", "detected", "recovered"]);
+        for cell in cells {
+            let period_d = rotation_period_d * cell.porb_over_prot;
+            let counts = [cell.phases, cell.detected, cell.recovered].map(|n| n as f64);
+            table.row(&[&[period_d, cell.porb_over_prot, cell.k_kms][..], &counts].concat());
+        }
+        write(&folder.join(CSV), &table.into_bytes())?;
+        write_json(&folder.join(JSON), self)
+    }
+
+    /// A table of some of the periods, and what may be wrong.
+    pub fn table(&self) -> String {
+        let mut rows = vec![["period_d", "porb_over_prot", "K 50 %", "K 95 %"].map(str::to_owned).to_vec()];
+        let step = self.limits.len().div_ceil(SHOWN).max(1);
+        let shown = |k: Option<f64>| k.map_or_else(|| "-".to_owned(), |k| format!("{k:.4}"));
+        for limit in self.limits.iter().step_by(step) {
+            let LimitRecord { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
+            rows.push(vec![format!("{period_d:.4}"), format!("{porb_over_prot:.4}"), shown(k50_kms), shown(k95_kms)]);
+        }
+        let mut text = aligned(&rows);
+        text += &format!(
+            "K (km/s) recovered, false alarms below {} % and the right period, at 50 and 95 % of {} phases\n",
+            100.0 * self.false_alarm_probability,
+            self.phases
+        );
+        if let Some(Agreement { orbits, agree, by_shortcut, by_full }) = self.agreement {
+            text += &format!(
+                "the whole way: {by_full} of {orbits} orbits near the limit recovered, by the shortcut {by_shortcut}; \
+                {agree} alike\n"
+            );
+        }
+        for warning in &self.warnings {
+            text += &format!("warning: {warning}\n");
+        }
+        text
+    }
+}

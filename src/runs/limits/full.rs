@@ -1,0 +1,136 @@
+//! The whole way, for a few orbits: profiles resampled with the orbit in them, imaged without a planet, and searched.
+
+use super::shortcut::{Outcome, Shortcut};
+use super::{Limit, LimitSettings};
+use crate::data::scene::{Scene, SceneError};
+use crate::planets::periodogram::Search;
+use crate::planets::verdict::CANDIDATE_FAP;
+use crate::posterior::detection::View;
+use crate::posterior::objective::Parameter;
+use crate::star::Orbit;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// One orbit, both ways.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// The orbit.
+    pub orbit: Orbit,
+    /// By the shortcut.
+    pub shortcut: Outcome,
+    /// By the whole way; `None` where the star with the orbit cannot be imaged without it.
+    pub full: Option<Outcome>,
+}
+
+/// How often both ways agree.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Agreement {
+    /// Orbits tried both ways.
+    pub orbits: usize,
+    /// Orbits that both recover or both miss.
+    pub agree: usize,
+    /// Orbits recovered by the shortcut.
+    pub by_shortcut: usize,
+    /// Orbits recovered by the whole way.
+    pub by_full: usize,
+}
+
+impl Agreement {
+    /// Of some comparisons.
+    pub fn of(comparisons: &[Comparison]) -> Self {
+        let full = |c: &Comparison| c.full.is_some_and(|full| full.recovered);
+        let count = |f: &dyn Fn(&Comparison) -> bool| comparisons.iter().filter(|c| f(c)).count();
+        Agreement {
+            orbits: comparisons.len(),
+            agree: count(&|c| c.shortcut.recovered == full(c)),
+            by_shortcut: count(&|c| c.shortcut.recovered),
+            by_full: count(&full),
+        }
+    }
+}
+
+/// How far from the limit orbits are drawn, in powers of 2 of K.
+const REACH: f64 = 1.0;
+
+/// `count` orbits around the `limits`, where both ways are most likely to differ.
+pub fn drawn(shortcut: &Shortcut, limits: &[Limit], count: usize) -> Vec<Orbit> {
+    let mut rng = ChaCha8Rng::seed_from_u64(shortcut.settings.detection.search.seed);
+    let (_, largest) = shortcut.k_range_kms().unwrap_or_default();
+    let mut orbit = || {
+        let limit = limits[rng.random_range(0..limits.len())];
+        let factor = rng.random_range(-REACH..REACH).exp2();
+        Orbit {
+            k_kms: limit.k50_kms.map_or(largest, |k| k * factor),
+            porb_over_prot: limit.porb_over_prot,
+            phi: rng.random_range(0.0..1.0),
+        }
+    };
+    (0..count).map(|_| orbit()).collect()
+}
+
+/// The whole way, by what another process must know to go it: it costs seconds an orbit.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct WholeWay {
+    /// The config file, which paths in the config start from.
+    pub config: PathBuf,
+    /// The config, resolved.
+    pub resolved: Value,
+    /// SHA-256 (hex) of the observations.
+    pub data_sha256: String,
+    /// How orbits are looked for.
+    pub settings: LimitSettings,
+    /// What was taken out of the profiles.
+    pub removed: Option<Orbit>,
+}
+
+/// Why it cannot be gone.
+#[derive(Debug, thiserror::Error)]
+pub enum WholeWayError {
+    /// The config or the observations are not to be had.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The observations are others.
+    #[error("{}: the observations are not those that the search began with", .0.display())]
+    Changed(PathBuf),
+}
+
+impl WholeWay {
+    /// That of the star in `scene`, searched as the `shortcut` is.
+    pub fn new(scene: &Scene, shortcut: &Shortcut) -> Self {
+        WholeWay {
+            config: scene.settings.path.clone(),
+            resolved: scene.settings.resolved.clone(),
+            data_sha256: scene.data_sha256.clone(),
+            settings: shortcut.settings.clone(),
+            removed: shortcut.removed,
+        }
+    }
+
+    /// The blind search of profiles with an orbit in them; `None` where they or their image make no sense any more.
+    ///
+    /// # Errors
+    /// A config or profiles that are no longer what they were.
+    pub fn searcher(&self) -> Result<impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<>, WholeWayError> {
+        let scene = Scene::of_config(&self.resolved, &self.config)?;
+        if scene.data_sha256 != self.data_sha256 {
+            return Err(WholeWayError::Changed(self.config.clone()));
+        }
+        let (whole, _) = scene.whole().map_err(SceneError::from)?;
+        let WholeWay { settings, removed, .. } = self.clone();
+        Ok(move |orbit: &Orbit| {
+            let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();
+            let star = scene.injected(&whole, &orbits).ok()?;
+            let mut values = star.settings.values;
+            values[Parameter::K] = 0.0;
+            let view = View::new(&star.imager, values, &settings.detection).ok()?;
+            let search = Search::new(&view.quadratic, &settings.frequencies, settings.detection.search).ok()?;
+            let best = search.best();
+            let peak = (1.0 / best.porb_over_prot, best.orbit.delta_ln_l, best.orbit.k_kms);
+            let level = search.false_alarm.level(CANDIDATE_FAP);
+            Some(Outcome::of(peak, level, orbit, settings.frequencies.time_base_cycles))
+        })
+    }
+}

@@ -1,0 +1,124 @@
+//! The blind search after an orbit has been put in, to second order around the image without a planet.
+
+use crate::planets::periodogram::orbits::scan;
+use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
+use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::CANDIDATE_FAP;
+use crate::posterior::detection::{DetectionError, View};
+use crate::posterior::expansion::{Expansion, Nuisance};
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::{Parameter, ParameterValues};
+use crate::runs::limits::LimitSettings;
+use crate::star::Orbit;
+
+/// A period is right when its frequency is off by less than this many inverse time bases.
+const RIGHT: f64 = 0.5;
+
+/// What a blind search makes of an orbit that was put in.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// ln L of the highest peak above no planet.
+    pub delta_ln_l: f64,
+    /// Its period over the rotation period.
+    pub porb_over_prot: f64,
+    /// Its semi-amplitude (km/s).
+    pub k_kms: f64,
+    /// Whether its false-alarm probability is that of a detection.
+    pub detected: bool,
+    /// Whether it has the period of the orbit, too.
+    pub recovered: bool,
+}
+
+impl Outcome {
+    /// Of a peak when an orbit of `injected` was put in; a detection is above `level`.
+    pub(super) fn of(peak: (f64, f64, f64), level: f64, injected: &Orbit, time_base_cycles: f64) -> Self {
+        let (frequency, delta_ln_l, k_kms) = peak;
+        let detected = delta_ln_l > level;
+        let apart = (frequency - 1.0 / injected.porb_over_prot).abs() * time_base_cycles;
+        Outcome { delta_ln_l, porb_over_prot: 1.0 / frequency, k_kms, detected, recovered: detected && apart < RIGHT }
+    }
+}
+
+/// The star without a planet, and how it is searched.
+pub struct Shortcut<'a> {
+    /// How it is searched.
+    pub settings: &'a LimitSettings,
+    /// Image and expansion.
+    pub view: View,
+    /// What was taken out of the profiles: the orbit found, with the opposite sign.
+    pub removed: Option<Orbit>,
+    /// The search before anything is put in.
+    pub before: Search,
+    /// Delta ln L of a detection.
+    pub level: f64,
+}
+
+impl<'a> Shortcut<'a> {
+    /// Images the star in `imager`, all but the orbit as in `values`, without a planet.
+    ///
+    /// # Errors
+    /// [`DetectionError`].
+    pub fn new(
+        imager: &Imager,
+        mut values: ParameterValues,
+        settings: &'a LimitSettings,
+    ) -> Result<Self, DetectionError> {
+        values[Parameter::K] = 0.0;
+        let mut view = View::new(imager, values, &settings.detection)?;
+        let search = |view: &View| Search::new(&view.quadratic, &settings.frequencies, settings.detection.search);
+        let mut before = search(&view)?;
+        let mut removed = None;
+        if settings.without_best {
+            let CircularOrbit { k_kms, phi, .. } = before.best().orbit;
+            let orbit = Orbit { k_kms: -k_kms, porb_over_prot: before.best().porb_over_prot, phi };
+            let nuisances = &settings.detection.nuisances;
+            view.expansion = with(&view.expansion, &orbit);
+            view.quadratic = counted(&view.expansion, nuisances).ok_or(Unbounded)?;
+            before = search(&view)?;
+            removed = Some(orbit);
+        }
+        let level = before.false_alarm.level(CANDIDATE_FAP);
+        Ok(Shortcut { settings, view, removed, before, level })
+    }
+
+    /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half
+    /// the time at any period to four times the K that is found for certain at nine periods of ten. `None` where
+    /// nothing is bounded.
+    pub fn k_range_kms(&self) -> Option<(f64, f64)> {
+        let rows = &self.before.rows;
+        let lowest = rows.iter().filter_map(|row| row.k_limit50_kms).fold(f64::INFINITY, f64::min);
+        let mut highest: Vec<f64> = rows.iter().filter_map(|row| row.k_limit95_kms).collect();
+        highest.sort_by(f64::total_cmp);
+        let most = highest.get(9 * highest.len() / 10)?;
+        Some((lowest / 3.0, 4.0 * most))
+    }
+
+    /// The search with `orbit` in the profiles. Nothing is found where no orbit is bounded.
+    pub fn search(&self, orbit: &Orbit) -> Outcome {
+        let frequencies = &self.settings.frequencies;
+        let nuisances = &self.settings.detection.nuisances;
+        let Some(quadratic) = counted(&with(&self.view.expansion, orbit), nuisances) else { return Outcome::default() };
+        let trials = scan(&quadratic, &frequencies.per_cycle).into_iter();
+        let peaks = trials.filter_map(|trial| Some((trial.frequency, trial.orbit?)));
+        let highest = peaks.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
+        highest.map_or_else(Outcome::default, |(frequency, found)| {
+            let peak = (frequency, found.delta_ln_l, found.k_kms);
+            Outcome::of(peak, self.level, orbit, frequencies.time_base_cycles)
+        })
+    }
+}
+
+/// `expansion` with `orbit` in the profiles: `ln L(x)` becomes `ln L(x - V)`, whose gradient is `g + I V`.
+fn with(expansion: &Expansion, orbit: &Orbit) -> Expansion {
+    let mut moved = expansion.clone();
+    for (k, velocity) in orbit.velocities_kms(&expansion.cycles).enumerate() {
+        moved.gradient.axpy(velocity, &expansion.information.column(k), 1.0);
+    }
+    moved
+}
+
+/// The quadratic of the orbit's velocities, unresolved spots counted as noise of the size that the gradient says.
+fn counted(expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
+    let unresolved_spots = expansion.unresolved_spots(nuisances)?;
+    Some(expansion.with_unresolved_spots(unresolved_spots)?.velocities(nuisances))
+}

@@ -1,0 +1,232 @@
+//! What a run was begun with: `manifest.json`, beside the chain it belongs to.
+//!
+//! Written before the first step; afterwards only length and goals of the run change (`--extend`, or `steps`, `rhat`
+//! and `ess` of the config). Everything that a chain is a function of is in it or checked against it.
+
+mod conclusions;
+
+use crate::data::config::{self, Settings};
+use crate::data::io::atomic::{WriteError, write_json};
+use crate::posterior::objective::{
+    FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, definition, in_earths,
+};
+use crate::runs::blind_search::BlindSearch;
+use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
+use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
+use crate::sampling::ensemble::Positions;
+use crate::star::Orbit;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Name of the file in a run's folder.
+pub const FILE: &str = "manifest.json";
+
+/// Share of the rotation period, or of a fraction of it, within which spots imitate an orbit
+/// (`results/calibration.md`).
+const NEAR_ROTATION: f64 = 0.15;
+
+/// The content of `manifest.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Config, data, program and reference.
+    #[serde(flatten)]
+    pub origin: Origin,
+    /// Names of the sampled parameters, in the order of the chain.
+    pub names: Vec<String>,
+    /// Their priors.
+    pub priors: BTreeMap<String, serde_json::Value>,
+    /// Number of independent ensembles.
+    pub ensembles: usize,
+    /// Walkers of each.
+    pub walkers: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Step that the chain goes on to in any case, where it was extended.
+    pub extend_to: Option<usize>,
+    /// Seeds of the runs that were joined, where this is several joined ones, which cannot go on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub merged_seeds: Vec<u64>,
+    /// The blind search that the verdict rests on; absent where no orbit was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blind_search: Option<BlindSearch>,
+    /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
+    pub start: Positions,
+}
+
+impl Manifest {
+    /// What a reader of the chain must know beside it, one line each.
+    pub fn warnings(&self) -> Vec<String> {
+        let place = |rival: &OptimumRecord| {
+            let values: Vec<String> = self.names.iter().map(|n| format!("{n} {:.4}", rival.parameters[n])).collect();
+            values.join(", ")
+        };
+        let line = |rival: &OptimumRecord| {
+            format!("another maximum, not much lower, where walkers started too: {}", place(rival))
+        };
+        let measured = self.origin.measured.lines().into_iter().map(|(label, text)| format!("{label}: {text}"));
+        self.origin.rivals.iter().map(line).chain(self.origin.reference.warning()).chain(measured).collect()
+    }
+
+    /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an
+    /// orbit there, and the posterior does not know of them.
+    pub fn co_rotation(&self, summary: &Summary) -> Option<String> {
+        let counted = self.origin.config.pointer("/imaging/unresolved_spots").is_some_and(|value| value != "entropy");
+        let period = summary.parameters.get(Parameter::PorbOverProt.name()).filter(|_| !counted)?;
+        let [low, high] = period.ci68;
+        // a period that may be anything says nothing
+        if high > low * (1.0 + 2.0 * NEAR_ROTATION) {
+            return None;
+        }
+        let fraction = (1..=4).find(|&n| {
+            let here = 1.0 / f64::from(n);
+            low < here * (1.0 + NEAR_ROTATION) && high > here * (1.0 - NEAR_ROTATION)
+        })?;
+        let rotation = if fraction == 1 { "Prot".to_owned() } else { format!("Prot/{fraction}") };
+        Some(format!(
+            "the period is within {:.0} % of {rotation}, where spots imitate an orbit: K is less certain than its \
+            interval \
+             says; see what `dimcmc periodogram` or imaging.unresolved_spots \"fitted\" makes of it",
+            100.0 * NEAR_ROTATION
+        ))
+    }
+
+    /// Star and data, for what is usually quoted of an orbit.
+    pub fn orbit_quantities(&self, settings: &Settings) -> OrbitQuantities {
+        OrbitQuantities::new(&settings.star, settings.mass_msun, self.origin.time_span_d)
+    }
+
+    /// The summary of the run's chain with its verdict, and with what is usually quoted of the orbit, draw by draw,
+    /// also apart.
+    ///
+    /// # Errors
+    /// A chain without a step.
+    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(Summary, Vec<Settled>), ChainError> {
+        let (kinds, goals) = kinds_and_goals(settings);
+        let mut summary = summarise(chain, &kinds, &goals)?;
+        let quantities = self.orbit_quantities(settings).of_draws(&settings.free, &settings.values);
+        let settled = summary.derive(chain, quantities);
+        self.conclude(settings, chain, &mut summary);
+        let mass = summary.derived.get(OrbitQuantity::MinimumMass.name());
+        if let Some(earths) = mass.and_then(|mass| in_earths(mass.upper95.unwrap_or(mass.median))) {
+            let meaning = summary.definitions.entry(OrbitQuantity::MinimumMass.name().to_owned()).or_default();
+            meaning.push_str(&format!("; {earths}"));
+        }
+        for name in &summary.names {
+            if let Some(meaning) = definition(name) {
+                summary.definitions.insert(name.clone(), meaning.to_owned());
+            }
+        }
+        Ok((summary, settled))
+    }
+
+    /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was
+    /// injected.
+    pub fn true_quantity(&self, settings: &Settings, name: &str, estimate: f64) -> Option<f64> {
+        let truth = self.origin.truth.as_ref()?;
+        let value = |p: Parameter| truth.get(p.name()).copied();
+        let orbit = Orbit {
+            k_kms: value(Parameter::K).filter(|k| *k != 0.0)?,
+            porb_over_prot: value(Parameter::PorbOverProt)?,
+            phi: value(Parameter::Phi)?,
+        };
+        self.orbit_quantities(settings).value(OrbitQuantity::from_name(name)?, &orbit, Some(estimate))
+    }
+
+    /// Injected values of the parameters and of what `summary` derives from them, for its table; `None` for observed
+    /// data.
+    pub fn truth(&self, settings: &Settings, summary: &Summary) -> Option<BTreeMap<String, f64>> {
+        let mut truth = self.origin.truth.clone()?;
+        for (name, one) in &summary.derived {
+            truth.extend(self.true_quantity(settings, name, one.median).map(|value| (name.clone(), value)));
+        }
+        Some(truth)
+    }
+
+    /// Reads the manifest in a run's folder.
+    ///
+    /// # Errors
+    /// A folder without one, or one that cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, OriginError> {
+        let manifest: Manifest = origin::read_header(folder, FILE, Manifest::parts)?;
+        let wrong = |problem| Err(OriginError::Content { path: folder.join(FILE), problem });
+        if let Some(name) = manifest.names.iter().find(|name| Parameter::from_name(name).is_none()) {
+            return wrong(format!("names: unknown parameter {name}"));
+        }
+        if let Some(name) = manifest.priors.keys().find(|name| !manifest.names.contains(name)) {
+            return wrong(format!("priors: unknown key {name}"));
+        }
+        let free = manifest.origin.config.get("parameters").and_then(serde_json::Value::as_object);
+        let is_free = |name: &String| free.is_some_and(|free| free.get(name).is_some_and(|prior| !prior.is_null()));
+        let count = free.map_or(0, |free| free.values().filter(|prior| !prior.is_null()).count());
+        if count != manifest.names.len() || !manifest.names.iter().all(is_free) {
+            return wrong("names: are not the parameters of the config".into());
+        }
+        match manifest.has_shape() {
+            true => Ok(manifest),
+            false => wrong("start: is not of as many ensembles, walkers and parameters as the rest says".into()),
+        }
+    }
+
+    /// What it was begun with, and the names of its parameters.
+    fn parts(&self) -> (&Origin, Vec<String>) {
+        (&self.origin, self.names.clone())
+    }
+
+    /// Whether the start is of the chain's shape.
+    fn has_shape(&self) -> bool {
+        let walker = |theta: &Vec<f64>| theta.len() == self.names.len();
+        let ensemble = |walkers: &Vec<Vec<f64>>| walkers.len() == self.walkers && walkers.iter().all(walker);
+        self.start.len() == self.ensembles && self.start.iter().all(ensemble)
+    }
+
+    /// Writes it into a run's folder.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_json(&folder.join(FILE), self)
+    }
+
+    /// Takes over settings that may change between the parts of a run (its length and goals), and the step that it goes
+    /// on to in any case. A new step limit ends an extension. Returns whether anything changed.
+    pub fn update(&mut self, settings: &Settings, extend_to: Option<usize>) -> bool {
+        let before = (self.extend_to, self.origin.config.clone());
+        let steps = |config: &serde_json::Value| config.pointer("/sampler/steps").cloned();
+        if extend_to.is_some() || steps(&self.origin.config) != steps(&settings.resolved) {
+            self.extend_to = extend_to;
+        }
+        self.origin.config = settings.resolved.clone();
+        before != (self.extend_to, self.origin.config.clone())
+    }
+
+    /// Seeds of all random numbers in it.
+    pub fn seeds(&self) -> Vec<u64> {
+        if self.merged_seeds.is_empty() { vec![self.seed] } else { self.merged_seeds.clone() }
+    }
+
+    /// Shape of the chain.
+    pub fn shape(&self) -> Shape {
+        Shape { names: self.names.clone(), ensembles: self.ensembles, walkers: self.walkers }
+    }
+
+    /// The settings that the run was begun with.
+    ///
+    /// # Errors
+    /// A config that this version does not understand.
+    pub fn settings(&self, folder: &Path) -> Result<Settings, OriginError> {
+        Ok(config::from_json(self.origin.config.to_string().as_bytes(), &folder.join(FILE))?)
+    }
+}
+
+/// What sort of number each free parameter is, and the goals of the chain.
+pub fn kinds_and_goals(settings: &Settings) -> (Vec<ParameterKind>, Goals) {
+    let kind = |f: &FreeParameter| match (f.parameter, f.prior) {
+        (_, Prior::Periodic) => ParameterKind::Periodic,
+        (Parameter::Phi, prior) if prior.bounds().1 - prior.bounds().0 >= 1.0 => ParameterKind::Periodic,
+        (Parameter::K, _) => ParameterKind::Amplitude,
+        _ => ParameterKind::Linear,
+    };
+    let goals = Goals { rhat: settings.sampler.rhat, ess: settings.sampler.ess };
+    (settings.free.iter().map(kind).collect(), goals)
+}

@@ -1,0 +1,182 @@
+//! Runs of independent ensembles joined into one: what an array of jobs has sampled, as if it were one chain.
+//!
+//! Runs belong together if they are of the same program, config and data, start every evaluation from the same
+//! reference, and have different seeds. What is beyond the shortest of them is left out, for a step is one of all
+//! ensembles.
+
+use crate::data::config::{self, ConfigError};
+use crate::data::io::atomic::WriteError;
+use crate::data::io::journal::{self, Journal, JournalError};
+use crate::runs::manifest::Manifest;
+use crate::runs::origin::OriginError;
+use crate::runs::run::CHAIN;
+use crate::sampling::chain::{Chain, ChainError, Record};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// Runs that belong together, joined.
+#[derive(Debug)]
+pub struct Merged {
+    /// What they were begun with, as one run of all their ensembles.
+    pub manifest: Manifest,
+    /// The first steps of all of them.
+    pub chain: Chain,
+    /// Steps of each run that are left out.
+    pub beyond: Vec<usize>,
+}
+
+/// Why runs are not joined: one line naming folders.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    /// There is nothing to join.
+    #[error("one run alone is not joined: give two or more folders")]
+    One,
+    /// A run cannot be read.
+    #[error(transparent)]
+    Origin(#[from] OriginError),
+    /// Its chain cannot be read, or the joined one not be written.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// Its config does not resolve.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The steps of a run do not fit: a fault of the program.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// The joined manifest cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A chain without a step.
+    #[error("{}: no complete step to join", .0.display())]
+    Empty(PathBuf),
+    /// Two runs are the same chain.
+    #[error("{} and {}: both have the seed {seed} (sampler.seed): they are the same \
+    chain", first.display(), second.display())]
+    Same {
+        /// One folder.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+        /// The seed.
+        seed: u64,
+    },
+    /// Two runs do not belong together.
+    #[error("{} and {}: {what}", first.display(), second.display())]
+    Apart {
+        /// One folder.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+        /// What is not the same.
+        what: String,
+    },
+}
+
+/// Joins the runs in `folders`, in this order.
+///
+/// # Errors
+/// [`MergeError`]: runs that cannot be read, or do not belong together.
+pub fn merge(folders: &[PathBuf]) -> Result<Merged, MergeError> {
+    if folders.len() < 2 {
+        return Err(MergeError::One);
+    }
+    let manifests: Vec<Manifest> = folders.iter().map(|folder| Manifest::read(folder)).collect::<Result<_, _>>()?;
+    for (k, other) in manifests.iter().enumerate() {
+        for (first, before) in folders.iter().zip(&manifests[..k]) {
+            let (first, second) = (first.clone(), folders[k].clone());
+            if let Some(what) = difference(before, other) {
+                return Err(MergeError::Apart { first, second, what });
+            }
+            if let Some(seed) = before.seeds().into_iter().find(|seed| other.seeds().contains(seed)) {
+                return Err(MergeError::Same { first, second, seed });
+            }
+        }
+    }
+    let read = |(folder, manifest): (&PathBuf, &Manifest)| journal::read(&folder.join(CHAIN), &manifest.shape());
+    let chains: Vec<Chain> = folders.iter().zip(&manifests).map(read).collect::<Result<_, _>>()?;
+    let steps = chains.iter().map(Chain::steps).min().unwrap_or(0);
+    if let Some(k) = chains.iter().position(|chain| chain.steps() == 0) {
+        return Err(MergeError::Empty(folders[k].clone()));
+    }
+    let manifest = joined(&manifests, &folders[0])?;
+    let mut chain = Chain::new(manifest.shape());
+    for step in 0..steps {
+        chain.push_step(&all_of(&chains, step))?;
+    }
+    Ok(Merged { manifest, chain, beyond: chains.iter().map(|chain| chain.steps() - steps).collect() })
+}
+
+impl Merged {
+    /// Writes it as a run into `folder`, which is there; one that is there already is replaced if `replace`, and
+    /// refused otherwise.
+    ///
+    /// # Errors
+    /// [`MergeError`].
+    pub fn write(&self, folder: &Path, replace: bool) -> Result<(), MergeError> {
+        let mut journal = Journal::create(&folder.join(CHAIN), self.manifest.shape(), replace)?;
+        self.manifest.write(folder)?;
+        for step in self.chain.records().chunks(self.chain.shape().size()) {
+            journal.append(step)?;
+        }
+        Ok(())
+    }
+}
+
+/// The first thing in which two runs do not belong together.
+fn difference(first: &Manifest, second: &Manifest) -> Option<String> {
+    let (a, b) = (&first.origin, &second.origin);
+    // what may differ is taken from the first
+    let mut alike = b.config.clone();
+    for key in ["seed", "ensembles"] {
+        if let (Some(to), Some(from)) = (alike.pointer_mut("/sampler"), a.config.pointer(&format!("/sampler/{key}"))) {
+            to[key] = from.clone();
+        }
+    }
+    if let Some(key) = config::first_difference(&a.config, &alike) {
+        return Some(format!(
+            "{} of the config is not the same",
+            key.replace(" then, ", " and ").replace(" now)", ")")
+        ));
+    }
+    let what = match () {
+        _ if a.data_sha256 != b.data_sha256 => "the observations are not the same".to_owned(),
+        _ if a.version != b.version => format!("they are of versions {} and {} of the program", a.version, b.version),
+        _ if a.reference != b.reference => format!(
+            "the reference images are not the same (lambda {:e} and {:e}): the search found another maximum, or the \
+            processors \
+             are of another kind",
+            a.reference.lambda, b.reference.lambda
+        ),
+        _ => return None,
+    };
+    Some(what)
+}
+
+/// What all runs together were begun with.
+fn joined(manifests: &[Manifest], folder: &Path) -> Result<Manifest, MergeError> {
+    let first = &manifests[0];
+    let ensembles = manifests.iter().map(|manifest| manifest.ensembles).sum();
+    let mut config = first.origin.config.clone();
+    if let Some(sampler) = config.get_mut("sampler").and_then(Value::as_object_mut) {
+        sampler.insert("ensembles".into(), json!(ensembles));
+    }
+    let settings = config::from_json(config.to_string().as_bytes(), &folder.join(crate::runs::manifest::FILE))?;
+    let mut manifest = Manifest { ensembles, extend_to: None, ..first.clone() };
+    (manifest.origin.config, manifest.origin.config_sha256) = (settings.resolved, settings.sha256);
+    manifest.start = manifests.iter().flat_map(|one| one.start.clone()).collect();
+    manifest.merged_seeds = manifests.iter().flat_map(Manifest::seeds).collect();
+    Ok(manifest)
+}
+
+/// A step of all runs, the ensembles numbered through.
+fn all_of(chains: &[Chain], step: usize) -> Vec<Record> {
+    let mut before = 0;
+    let mut records = Vec::new();
+    for chain in chains {
+        let size = chain.shape().size();
+        let one = &chain.records()[step * size..(step + 1) * size];
+        records.extend(one.iter().map(|record| Record { ensemble: before + record.ensemble, ..record.clone() }));
+        before += chain.shape().ensembles;
+    }
+    records
+}

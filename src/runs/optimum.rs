@@ -1,0 +1,195 @@
+//! What `optimise` found: `optimum.json`, and the same as a table.
+
+use crate::data::io::provenance::Provenance;
+use crate::data::scene::Scene;
+use crate::data::search::{Attempt, Found};
+use crate::posterior::objective::{Estimate, OrbitQuantities, OrbitQuantity, Parameter, definition, in_earths};
+use crate::runs::blind_search::BlindSearch;
+use crate::runs::origin::{OptimumRecord, ReferenceRecord, by_name};
+use crate::sampling::optimise::Optimum;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// The content of `optimum.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct OptimumFile {
+    /// Names of the free parameters, in the order of the matrices.
+    pub names: Vec<String>,
+    /// Best value and standard deviation of each, and the log-probability there.
+    #[serde(flatten)]
+    pub optimum: OptimumRecord,
+    /// chi2 of the reconstruction at the optimum.
+    pub chi2: f64,
+    /// Spottedness there.
+    pub spottedness: f64,
+    /// Whether the curvature is positive definite: without that the standard deviations mean nothing.
+    pub well_defined: bool,
+    /// Whether the search met its tolerance.
+    pub converged: bool,
+    /// Covariance of the parameters from the curvature.
+    pub covariance: Vec<Vec<f64>>,
+    /// Minus the Hessian of the log-probability in sampling coordinates, where K and phi (if both are free) are K cos
+    /// and K sin of the orbital phase at mid-time.
+    pub internal_curvature: Vec<Vec<f64>>,
+    /// The blind search that the verdict rests on; absent where no orbit was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind_search: Option<BlindSearch>,
+    /// What is usually quoted of the orbit, with standard deviations by the same covariance.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived: BTreeMap<&'static str, Estimate>,
+    /// Injected values, for simulated data.
+    pub truth: Option<BTreeMap<String, f64>>,
+    /// The same of what is usually quoted of the orbit, times nearest to those found.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived_truth: BTreeMap<&'static str, f64>,
+    /// The reference image.
+    pub reference: ReferenceRecord,
+    /// Where the climbs started and ended, by regularised likelihood.
+    pub starts: Vec<StartRecord>,
+    /// Number of profiles.
+    pub profiles: usize,
+    /// First and last time of the data (d).
+    pub time_span_d: Option<[f64; 2]>,
+    /// Where all this came from.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+}
+
+/// One climb.
+#[derive(Clone, Debug, Serialize)]
+pub struct StartRecord {
+    /// Where it started.
+    pub start: Vec<f64>,
+    /// Where it ended; null if it failed.
+    pub end: Option<Vec<f64>>,
+    /// The regularised log-probability there.
+    pub log_prob: Option<f64>,
+    /// Whether the climb met its tolerance.
+    pub converged: bool,
+    /// Evaluations it took.
+    pub evaluations: usize,
+}
+
+impl OptimumFile {
+    /// The file for what a search in `scene` found.
+    pub fn new(scene: &Scene, found: &Found) -> Self {
+        let optimum = &found.optimum;
+        let (derived, derived_truth) = derived(scene, optimum);
+        let prot = scene.imager.star.rotation_period_d;
+        let porb_over_prot = scene.space.values_at(&optimum.theta)[Parameter::PorbOverProt];
+        let rows = |m: &nalgebra::DMatrix<f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect();
+        OptimumFile {
+            names: scene.space.names().to_vec(),
+            optimum: OptimumRecord::of(scene.space.names(), optimum),
+            chi2: optimum.evaluation.chi2,
+            spottedness: optimum.evaluation.spottedness,
+            well_defined: optimum.well_defined,
+            converged: optimum.converged,
+            covariance: rows(&optimum.written_covariance),
+            internal_curvature: rows(&optimum.curvature),
+            blind_search: BlindSearch::of(scene).map(|search| search.beside(porb_over_prot, prot)),
+            derived,
+            truth: scene.truth.map(|values| by_name(&values)),
+            derived_truth,
+            reference: ReferenceRecord::of(found.posterior.reference()),
+            starts: found.attempts.iter().map(StartRecord::of).collect(),
+            profiles: scene.observations.profiles.len(),
+            time_span_d: scene.observations.time_span_d(),
+            provenance: scene.provenance(),
+        }
+    }
+
+    /// A table of the parameters and a verdict.
+    pub fn table(&self) -> String {
+        let width = self.names.iter().map(String::len).max().unwrap_or(0).max("parameter".len());
+        let sentence = self.blind_search.as_ref().map(|search| format!("{}\n\n", search.verdict.sentence));
+        let mut table = sentence.unwrap_or_default();
+        let _ = write!(table, "{:width$}  {:>12}  {:>10}", "parameter", "best", "sd");
+        if self.truth.is_some() {
+            let _ = write!(table, "  {:>12}", "injected");
+        }
+        table.push('\n');
+        for name in &self.names {
+            let (best, sd) = (self.optimum.parameters[name], self.optimum.sd[name]);
+            let _ = write!(table, "{name:width$}  {best:>12.6}  {sd:>10.6}");
+            if let Some(truth) = self.truth.as_ref().and_then(|truth| truth.get(name)) {
+                let _ = write!(table, "  {truth:>12.6}");
+            }
+            table.push('\n');
+        }
+        table += &self.derived_table();
+        let maximum = match (self.well_defined, self.converged) {
+            (true, true) => "a well-defined maximum",
+            (true, false) => "the search ran out of steps; the values may be improved from there",
+            (false, _) => "no well-defined maximum: on the edge of a prior, or the data leave some direction open",
+        };
+        let _ = writeln!(table, "{maximum}; ln P = {:.3}, spottedness {:.5}", self.optimum.log_prob, self.spottedness);
+        let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
+        for note in remarks.chain(self.reference.warning()) {
+            let _ = writeln!(table, "note: {note}");
+        }
+        table
+    }
+
+    /// What is usually quoted of the orbit, and what names mean.
+    fn derived_table(&self) -> String {
+        let of = OrbitQuantity::ALL.map(OrbitQuantity::name);
+        let rows: Vec<(&str, &Estimate)> =
+            of.into_iter().filter_map(|name| Some((name, self.derived.get(name)?))).collect();
+        let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        let mut text = String::new();
+        for (name, Estimate { value, sd }) in &rows {
+            let _ = write!(text, "{name:width$}  {value:>14.6}  {sd:>10.6}");
+            if let Some(truth) = self.derived_truth.get(name) {
+                let _ = write!(text, "  {truth:>14.6}");
+            }
+            text.push('\n');
+        }
+        let names = self.names.iter().map(String::as_str).chain(rows.iter().map(|(name, _)| *name));
+        for (name, meaning) in names.filter_map(|name| Some((name, definition(name)?))) {
+            let _ = writeln!(text, "{name}: {meaning}");
+        }
+        let mass = self.derived.get(OrbitQuantity::MinimumMass.name());
+        if let Some(earths) = mass.and_then(|mass| in_earths(mass.value)) {
+            let _ = writeln!(text, "{earths}");
+        }
+        text
+    }
+}
+
+/// What is usually quoted of the orbit at the optimum, and the injected values of the same.
+fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<&'static str, Estimate>, BTreeMap<&'static str, f64>) {
+    let settings = &scene.settings;
+    let quantities = OrbitQuantities::new(&settings.star, settings.mass_msun, scene.observations.time_span_d());
+    let free: Vec<Parameter> = scene.space.free().iter().map(|one| one.parameter).collect();
+    let mut values = settings.values;
+    free.iter().zip(&optimum.theta).for_each(|(parameter, value)| values[*parameter] = *value);
+    let place = |p: Parameter| free.iter().position(|one| *one == p);
+    let covariance =
+        |p: Parameter, q: Parameter| place(p).zip(place(q)).map_or(0.0, |(i, j)| optimum.written_covariance[(i, j)]);
+    let orbital = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
+    let covariance = orbital.map(|p| orbital.map(|q| covariance(p, q)));
+    let (mut derived, mut truth) = (BTreeMap::new(), BTreeMap::new());
+    for quantity in quantities.of_free(&free) {
+        let Some(found) = quantities.estimate(quantity, &values.state().orbit, &covariance) else { continue };
+        derived.insert(quantity.name(), found);
+        let injected = scene.truth.map(|truth| truth.state().orbit).filter(|orbit| orbit.k_kms != 0.0);
+        let injected = injected.and_then(|orbit| quantities.value(quantity, &orbit, Some(found.value)));
+        truth.extend(injected.map(|value| (quantity.name(), value)));
+    }
+    (derived, truth)
+}
+
+impl StartRecord {
+    fn of(attempt: &Attempt) -> Self {
+        let end = attempt.end.as_ref().ok();
+        StartRecord {
+            start: attempt.start.clone(),
+            end: end.map(|o| o.theta.clone()),
+            log_prob: end.map(|o| o.evaluation.log_prob),
+            converged: end.is_some_and(|o| o.converged),
+            evaluations: end.map_or(0, |o| o.evaluations),
+        }
+    }
+}

@@ -1,0 +1,307 @@
+//! What a long computation was begun with: config, data, program and the reference that every evaluation starts from.
+//!
+//! It is written beside the results, and whoever goes on with them checks it: nothing is continued with another config
+//! or other data, and the reference is rebuilt to the same bits.
+
+use crate::data::config::{self, ConfigError};
+use crate::data::io::provenance::{Measured, Provenance};
+use crate::data::scene::Scene;
+use crate::data::search::Found;
+use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues, Posterior, Reference, ReferenceError};
+use crate::sampling::optimise::Optimum;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What a computation was begun with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Version of the program.
+    pub version: String,
+    /// SHA-256 (hex) of the part of the config that decides the posterior and the chain.
+    pub config_sha256: String,
+    /// SHA-256 (hex) of the observations.
+    pub data_sha256: String,
+    /// The config with all defaults filled in.
+    pub config: serde_json::Value,
+    /// What the config leaves to the observations.
+    #[serde(default, skip_serializing_if = "Measured::is_empty")]
+    pub measured: Measured,
+    /// Number of profiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profiles: Option<usize>,
+    /// First and last time of the data (d).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_span_d: Option<[f64; 2]>,
+    /// Injected values of all parameters, for simulated data.
+    pub truth: Option<BTreeMap<String, f64>>,
+    /// The image that every evaluation starts from.
+    pub reference: ReferenceRecord,
+    /// The best parameters that the search found.
+    pub optimum: OptimumRecord,
+    /// Other maxima that it found, by regularised likelihood, not much lower than the best.
+    pub rivals: Vec<OptimumRecord>,
+}
+
+/// The reference solution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReferenceRecord {
+    /// All eight parameters.
+    pub parameters: BTreeMap<String, f64>,
+    /// Target of chi2.
+    pub chi2_target: f64,
+    /// chi2 of the image.
+    pub chi2: f64,
+    /// Lagrange multiplier.
+    pub lambda: f64,
+    /// Entropy.
+    pub entropy: f64,
+    /// Spottedness.
+    pub spottedness: f64,
+    /// chi2 at the end of the trade-off curve, where lambda is three times as large.
+    pub chi2_reach: f64,
+    /// Number of data.
+    pub data: usize,
+}
+
+/// The optimum and its error bars.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OptimumRecord {
+    /// Value of each sampled parameter.
+    pub parameters: BTreeMap<String, f64>,
+    /// Standard deviation of each from the curvature.
+    pub sd: BTreeMap<String, f64>,
+    /// Log-probability.
+    pub log_prob: f64,
+}
+
+/// What was begun cannot be used, or not be gone on with: one line naming file or folder.
+#[derive(Debug, thiserror::Error)]
+pub enum OriginError {
+    /// Nothing was begun there.
+    #[error("{}: no {file}: nothing was begun in this folder, or it ended before its first result", folder.display())]
+    Missing {
+        /// The folder.
+        folder: PathBuf,
+        /// The file that should be there.
+        file: &'static str,
+    },
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is not what it should be.
+    #[error("{}: {source}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// What it says does not belong together.
+    #[error("{}: {problem}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The config in it does not resolve.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Config or data are not those that it was begun with.
+    #[error("{}: {what} since this run began; begin another run for it", .folder.display())]
+    Changed {
+        /// The folder.
+        folder: PathBuf,
+        /// What changed.
+        what: String,
+    },
+    /// The reference comes out differently: another version of the program, or another kind of processor.
+    #[error("{}: the reference image comes out differently here (lambda {now:e} instead of {then:e}): resume with the \
+    version and on the kind of machine it was begun with", folder.display())]
+    Irreproducible {
+        /// The folder.
+        folder: PathBuf,
+        /// lambda then.
+        then: f64,
+        /// lambda now.
+        now: f64,
+    },
+    /// No reference at the recorded parameters.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+}
+
+impl Origin {
+    /// What begins in `scene` with what the search `found`.
+    pub fn of(scene: &Scene, found: &Found) -> Self {
+        let Provenance { version, data_sha256, config_sha256, config, measured } = scene.provenance();
+        let names = found.posterior.space().names();
+        Origin {
+            version: version.to_string(),
+            config_sha256,
+            data_sha256,
+            config,
+            measured,
+            profiles: Some(scene.observations.profiles.len()),
+            time_span_d: scene.observations.time_span_d(),
+            truth: scene.truth.map(|values| by_name(&values)),
+            reference: ReferenceRecord::of(found.posterior.reference()),
+            optimum: OptimumRecord::of(names, &found.optimum),
+            rivals: found.rivals().into_iter().map(|rival| OptimumRecord::of(names, rival)).collect(),
+        }
+    }
+
+    /// Whether what began in `folder` can go on in `scene`.
+    ///
+    /// # Errors
+    /// [`OriginError::Changed`].
+    pub fn check(&self, scene: &Scene, folder: &Path) -> Result<(), OriginError> {
+        let now = scene.provenance();
+        let what = if self.config_sha256 != now.config_sha256 {
+            let key = config::first_difference(&self.config, &now.config);
+            format!("{} of the config changed", key.as_deref().unwrap_or("something"))
+        } else if self.data_sha256 != now.data_sha256 {
+            "the observations changed".to_string()
+        } else {
+            return Ok(());
+        };
+        Err(OriginError::Changed { folder: folder.into(), what })
+    }
+
+    /// The posterior of `space` that it began with, its reference rebuilt to the same bits.
+    ///
+    /// # Errors
+    /// [`OriginError::Irreproducible`], [`OriginError::Reference`].
+    pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Posterior, OriginError> {
+        let values = self.reference.values(&scene.settings.values);
+        let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target.value())?;
+        let (then, now) = (self.reference.lambda, reference.solution.image.lambda);
+        if then.to_bits() != now.to_bits() {
+            return Err(OriginError::Irreproducible { folder: folder.into(), then, now });
+        }
+        Ok(Posterior::new(scene.imager.clone(), space, scene.settings.imaging.objective, reference))
+    }
+}
+
+/// Reads the `file` that says what a computation in `folder` was begun with: what `T` does not know is refused, and so
+/// are parameters with other names than `names` finds in it.
+///
+/// # Errors
+/// As [`read`]; unknown keys, and records of other parameters.
+pub fn read_header<T: DeserializeOwned + Serialize>(
+    folder: &Path,
+    file: &'static str,
+    parts: impl Fn(&T) -> (&Origin, Vec<String>),
+) -> Result<T, OriginError> {
+    let whole: serde_json::Map<String, serde_json::Value> = read(folder, file)?;
+    let header: T = read(folder, file)?;
+    let wrong = |problem| OriginError::Content { path: folder.join(file), problem };
+    let known =
+        serde_json::to_value(&header).map_err(|source| OriginError::Json { path: folder.join(file), source })?;
+    let is_known = |key: &str| OPTIONAL.contains(&key) || known.get(key).is_some();
+    if let Some(key) = whole.keys().find(|key| !is_known(key)) {
+        return Err(wrong(format!("unknown key {key}")));
+    }
+    let (origin, names) = parts(&header);
+    let optima =
+        std::iter::once(("optimum", &origin.optimum)).chain(origin.rivals.iter().map(|rival| ("rivals", rival)));
+    for (key, optimum) in optima {
+        for (part, values) in [("parameters", &optimum.parameters), ("sd", &optimum.sd)] {
+            if let Some(name) = values.keys().find(|name| !names.contains(name)) {
+                return Err(wrong(format!(
+                    "{key}.{part}: unknown key {name}, the parameters are {}",
+                    names.join(", ")
+                )));
+            }
+            if let Some(name) = names.iter().find(|name| !values.contains_key(*name)) {
+                return Err(wrong(format!("{key}.{part}: missing {name}")));
+            }
+        }
+    }
+    Ok(header)
+}
+
+/// Keys of such files that are left out where there is nothing to say.
+const OPTIONAL: [&str; 2] = ["measured", "merged_seeds"];
+
+/// Reads `file`, which a computation that began in `folder` has written there.
+///
+/// # Errors
+/// A folder without it, or a file that cannot be read or is not what it should be.
+pub fn read<T: DeserializeOwned>(folder: &Path, file: &'static str) -> Result<T, OriginError> {
+    let path = folder.join(file);
+    let text = std::fs::read(&path).map_err(|source| match source.kind() {
+        std::io::ErrorKind::NotFound => OriginError::Missing { folder: folder.into(), file },
+        _ => OriginError::Read { path: path.clone(), source },
+    })?;
+    serde_json::from_slice(&text).map_err(|source| OriginError::Json { path, source })
+}
+
+impl ReferenceRecord {
+    /// The record of a reference.
+    pub fn of(reference: &Reference) -> Self {
+        let solution = &reference.solution;
+        ReferenceRecord {
+            parameters: by_name(&reference.values),
+            chi2_target: reference.chi2_target,
+            chi2: solution.chi2,
+            lambda: solution.image.lambda,
+            entropy: solution.entropy,
+            spottedness: solution.spottedness,
+            chi2_reach: reference.tradeoff.nodes().last().map_or(solution.chi2, |node| node.chi2),
+            data: reference.response.data_len(),
+        }
+    }
+
+    /// A target that a noise realisation, which moves the attainable chi2 by sqrt(2/N), may put out of reach: there
+    /// spottedness explodes, and the answer hangs on the target (`docs/method.md` section 3).
+    pub fn warning(&self) -> Option<String> {
+        let noise = (2.0 / self.data as f64).sqrt() * self.chi2_target;
+        (self.chi2_target - self.chi2_reach < noise).then(|| {
+            let per_datum = |chi2: f64| chi2 / self.data as f64;
+            format!(
+                "the target chi2 of {:.3} per datum is close to the floor (three times its lambda comes down to \
+                {:.3}): see \
+                 whether the answer stays when imaging.chi2_target is raised by {:.3}",
+                per_datum(self.chi2_target),
+                per_datum(self.chi2_reach),
+                per_datum(noise)
+            )
+        })
+    }
+
+    /// All parameters; those missing in the record are taken from `others`.
+    pub fn values(&self, others: &ParameterValues) -> ParameterValues {
+        let mut values = *others;
+        for p in Parameter::ALL {
+            values[p] = self.parameters.get(p.name()).copied().unwrap_or(values[p]);
+        }
+        values
+    }
+}
+
+impl OptimumRecord {
+    /// The record of an optimum of the named parameters.
+    pub fn of(names: &[String], optimum: &Optimum) -> Self {
+        let sd = |i: usize| optimum.written_covariance[(i, i)].max(0.0).sqrt();
+        OptimumRecord {
+            parameters: names.iter().cloned().zip(optimum.theta.iter().copied()).collect(),
+            sd: names.iter().cloned().enumerate().map(|(i, name)| (name, sd(i))).collect(),
+            log_prob: optimum.evaluation.log_prob,
+        }
+    }
+}
+
+/// The values that are given, by name.
+pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
+    Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.given(p)?))).collect()
+}

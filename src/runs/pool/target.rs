@@ -1,0 +1,91 @@
+//! What a run samples: the posterior, with unresolved spots counted as noise or not.
+
+use crate::posterior::expansion::SpotsCounted;
+use crate::posterior::objective::{Posterior, UnresolvedSpots};
+use crate::posterior::surrogate::Surrogate;
+use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// The density that is sampled.
+pub struct Target {
+    posterior: Posterior,
+    counted: Option<SpotsCounted>,
+    /// Of the surrogates' kind, before it is fitted; none where there is none.
+    surrogate: Option<Surrogate>,
+}
+
+/// Draws of the surrogate that stand for where a chain goes.
+const DRAWS: usize = 200;
+
+/// Evaluations that a chain is expected to take at least.
+const EVALUATIONS: usize = 3000;
+
+/// The unresolved spots have no size that fits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "imaging.unresolved_spots: no size of the unresolved spots fits the data; \"entropy\" takes them as the entropy \
+    has them"
+)]
+pub struct UnresolvedSpotsError;
+
+impl Target {
+    /// Of `posterior`, unresolved spots taken as the config says, with warm starts where the surrogate says that a
+    /// chain goes: a function of posterior and config alone, so that a resumed run, or another process, has the same.
+    ///
+    /// # Errors
+    /// [`UnresolvedSpotsError`].
+    pub fn new(posterior: Posterior, unresolved_spots: UnresolvedSpots) -> Result<Self, UnresolvedSpotsError> {
+        let counted = match unresolved_spots {
+            UnresolvedSpots::Entropy => None,
+            UnresolvedSpots::Fitted => Some(SpotsCounted::new(&posterior).ok_or(UnresolvedSpotsError)?),
+        };
+        let (imager, space) = (posterior.imager(), posterior.space());
+        let surrogate = match &counted {
+            Some(counted) => Surrogate::of_expansion(counted.expansion(), space, imager),
+            None => Surrogate::new(imager, space, posterior.reference()),
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let draws = (0..DRAWS).filter_map(|_| surrogate.as_ref()?.draw(&mut rng));
+        let draws: Vec<Vec<f64>> = draws.map(|position| space.to_physical(&position)).collect();
+        let posterior = posterior.with_warm_starts_for(&draws, EVALUATIONS);
+        Ok(Target { posterior, counted, surrogate })
+    }
+
+    /// The posterior.
+    pub fn posterior(&self) -> &Posterior {
+        &self.posterior
+    }
+
+    /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density
+    /// alone, so that a resumed run has the same.
+    pub fn surrogate(&self, evaluator: &dyn Evaluator) -> Option<(Surrogate, f64)> {
+        Some(self.surrogate.clone()?.fitted(self, evaluator))
+    }
+}
+
+impl LogDensity for Target {
+    fn names(&self) -> &[String] {
+        self.posterior.names()
+    }
+
+    fn evaluate(&self, theta: &[f64]) -> Evaluation {
+        let evaluation = self.posterior.evaluate(theta);
+        match &self.counted {
+            Some(counted) => counted.recount(self.posterior.space(), theta, evaluation),
+            None => evaluation,
+        }
+    }
+
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
+        self.posterior.to_sampling(theta)
+    }
+
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
+        self.posterior.to_physical(internal)
+    }
+
+    fn log_jacobian(&self, theta: &[f64]) -> f64 {
+        self.posterior.log_jacobian(theta)
+    }
+}

@@ -1,0 +1,52 @@
+//! Why a run cannot begin, or go on.
+
+use super::start;
+use crate::data::io::atomic::WriteError;
+use crate::data::io::journal::JournalError;
+use crate::runs::origin::OriginError;
+use crate::runs::pool::UnresolvedSpotsError;
+use crate::sampling::ensemble::EnsembleError;
+use std::path::PathBuf;
+
+/// Why a run cannot begin, or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The start is no start, or the sampler's settings are wrong.
+    #[error(transparent)]
+    Ensemble(#[from] EnsembleError),
+    /// A walker found no place in the prior where a reconstruction succeeds.
+    #[error(
+        "start from the prior: no reconstruction succeeds at {} draws; narrow the priors under `parameters`",
+        start::PRIOR_TRIES
+    )]
+    PriorStart,
+    /// The unresolved spots have no size that fits.
+    #[error(transparent)]
+    UnresolvedSpots(#[from] UnresolvedSpotsError),
+    /// Several runs joined have no common random numbers to go on with.
+    #[error("{}: several runs joined; go on with each of them, and join them again", .0.display())]
+    Merged(PathBuf),
+    /// It was stopped before there was anything to write.
+    #[error("interrupted before the first step; nothing was written")]
+    Interrupted,
+    /// What the run was begun with is missing, wrong, or not what is there now.
+    #[error(transparent)]
+    Origin(#[from] OriginError),
+    /// The chain on disk is wrong or locked.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The folder cannot be made, or not cleared.
+    #[error("{}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The chain refused a step: a fault of the program.
+    #[error(transparent)]
+    Chain(#[from] crate::sampling::chain::ChainError),
+}

@@ -1,0 +1,248 @@
+//! A sampling run: start, chain on disk; begun afresh or resumed to the same bytes.
+//!
+//! `start` is where the walkers begin.
+
+mod error;
+mod start;
+
+pub use error::RunError;
+
+use crate::data::io::journal::{Journal, JournalError};
+use crate::data::io::lines;
+use crate::data::scene::Scene;
+use crate::data::search::Found;
+use crate::posterior::surrogate::{Surrogate, SurrogateMove};
+use crate::runs::blind_search::BlindSearch;
+use crate::runs::manifest::{self, Manifest, kinds_and_goals};
+use crate::runs::origin::Origin;
+use crate::runs::pool::{Asked, Evaluations, Pool, Target, Task};
+use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record};
+use crate::sampling::ensemble::{
+    self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason,
+};
+use std::path::{Path, PathBuf};
+
+/// Name of the chain in a run's folder.
+pub const CHAIN: &str = "chain.jsonl";
+
+/// Name of its analysis.
+pub const SUMMARY: &str = "summary.json";
+
+/// Whether nothing but an empty chain is in `folder`, and with `manifest` perhaps that: such a run may begin again.
+pub fn is_false_start(folder: &Path, manifest: bool) -> bool {
+    lines::is_false_start(folder, manifest.then_some(manifest::FILE), CHAIN)
+}
+
+/// Where the walkers start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartFrom {
+    /// From the quadratic posterior around the optimum, widened: all its peaks get walkers in proportion. Where there
+    /// is no such quadratic, around the maxima that the search found.
+    #[default]
+    Optimum,
+    /// All over the prior.
+    Prior,
+}
+
+/// A run with its chain so far.
+pub struct Run {
+    /// Where it is kept.
+    pub folder: PathBuf,
+    /// What it was begun with.
+    pub manifest: Manifest,
+    /// The chain so far.
+    pub chain: Chain,
+    /// Reconstructions before its first step: to fit and try the surrogate, and for the start.
+    pub preparation: usize,
+    target: Target,
+    task: Task,
+    kinds: Vec<ParameterKind>,
+    policy: StopPolicy,
+    settings: ensemble::SamplerSettings,
+    /// With the share of its proposals accepted on trial.
+    surrogate: Option<(Surrogate, f64)>,
+    journal: Journal,
+}
+
+impl Run {
+    /// Begins a run at what a search `found`: draws the start, makes the folder with chain, manifest and step 0. A run
+    /// that is in the folder already is replaced if `replace`, and refused otherwise.
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is written where there is no start.
+    pub fn begin(
+        scene: &Scene,
+        folder: &Path,
+        found: Found,
+        from: StartFrom,
+        replace: bool,
+        pool: &Pool,
+    ) -> Result<Self, RunError> {
+        scene.settings.sampler.validate(scene.space.dimension())?;
+        let needed = from == StartFrom::Optimum || scene.settings.sampler.moves.surrogate > 0.0;
+        let target = Target::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots)?;
+        let origin = Origin::of(scene, &found);
+        let task = Task::new(scene, &origin, scene.space.names(), Asked::LogProbability);
+        let evaluator = Evaluations::new(pool, &target, &task);
+        let surrogate = if needed { target.surrogate(&evaluator) } else { None };
+        let start = match from {
+            StartFrom::Optimum => {
+                let drawn = surrogate.as_ref().and_then(|(s, _)| start::from_surrogate(s, &target, &evaluator, scene));
+                drawn.map_or_else(|| start::around_maxima(&found, &target, &evaluator, scene), Ok)
+            }
+            StartFrom::Prior => start::over_prior(&evaluator, scene),
+        };
+        let preparation = evaluator.count();
+        let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
+        // what was not evaluated looks like a start that is none
+        let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
+        let manifest = new_manifest(scene, origin, BlindSearch::of(scene), start);
+        std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
+        // the chain first: whoever holds it may write the manifest
+        let mut journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
+        match std::fs::remove_file(folder.join(SUMMARY)) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(RunError::Folder { path: folder.join(SUMMARY), source });
+            }
+            _ => manifest.write(folder)?,
+        }
+        let mut chain = Chain::new(manifest.shape());
+        journal.append(&first)?;
+        chain.push_step(&first)?;
+        let run = Run::new(scene, folder, manifest, (target, task), surrogate, (journal, chain));
+        Ok(Run { preparation, ..run })
+    }
+
+    /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
+    ///
+    /// # Errors
+    /// [`RunError`]: no run there, changed config or data, a broken chain.
+    pub fn resume(scene: &Scene, folder: &Path, extend: Option<usize>, pool: &Pool) -> Result<Self, RunError> {
+        let mut manifest = Manifest::read(folder)?;
+        if !manifest.merged_seeds.is_empty() {
+            return Err(RunError::Merged(folder.into()));
+        }
+        manifest.origin.check(scene, folder)?;
+        let (mut journal, mut chain) = Journal::recover(&folder.join(CHAIN), manifest.shape())?;
+        let posterior = manifest.origin.posterior(scene, scene.space.clone(), folder)?;
+        let target = Target::new(posterior, scene.settings.imaging.unresolved_spots)?;
+        let task = Task::new(scene, &manifest.origin, scene.space.names(), Asked::LogProbability);
+        let evaluator = Evaluations::new(pool, &target, &task);
+        if chain.steps() == 0 {
+            let first = first_step(scene, &target, &evaluator, &manifest.start)?;
+            journal.append(&first)?;
+            chain.push_step(&first)?;
+        }
+        let last_step = chain.steps() - 1;
+        if manifest.update(&scene.settings, extend.map(|steps| last_step + steps)) {
+            manifest.write(folder)?;
+        }
+        let wanted = scene.settings.sampler.moves.surrogate > 0.0;
+        let surrogate = if wanted { target.surrogate(&evaluator) } else { None };
+        let preparation = evaluator.count();
+        let run = Run::new(scene, folder, manifest, (target, task), surrogate, (journal, chain));
+        Ok(Run { preparation, ..run })
+    }
+
+    /// The run with its chain so far.
+    fn new(
+        scene: &Scene,
+        folder: &Path,
+        manifest: Manifest,
+        (target, task): (Target, Task),
+        surrogate: Option<(Surrogate, f64)>,
+        (journal, chain): (Journal, Chain),
+    ) -> Self {
+        let settings = scene.settings.sampler.clone();
+        let (kinds, _) = kinds_and_goals(&scene.settings);
+        let policy = StopPolicy::new(&settings);
+        let policy = match manifest.extend_to {
+            Some(step) => StopPolicy { steps: step, least: step, ..policy },
+            None => policy,
+        };
+        Run {
+            folder: folder.into(),
+            policy,
+            manifest,
+            target,
+            task,
+            chain,
+            preparation: 0,
+            kinds,
+            settings,
+            surrogate,
+            journal,
+        }
+    }
+
+    /// The step at which the run ends if its goals are not reached before.
+    pub fn last_step(&self) -> usize {
+        self.policy.steps
+    }
+
+    /// What every parameter must reach.
+    pub fn goals(&self) -> &Goals {
+        &self.policy.goals
+    }
+
+    /// Steps until the goals are reached, the step limit, or `pool` is told to stop; every step is on disk before the
+    /// next begins.
+    ///
+    /// # Errors
+    /// A chain that cannot be written.
+    pub fn go(
+        &mut self,
+        pool: &Pool,
+        mut on_step: impl FnMut(&[Record], Option<&Convergence>),
+    ) -> Result<StopReason, RunError> {
+        let Run { target, task, chain, kinds, policy, settings, surrogate, journal, .. } = self;
+        let evaluator = Evaluations::new(pool, target, task);
+        let mut sampler = Sampler::new(&*target, &evaluator, settings)?;
+        if let Some((surrogate, acceptance)) = surrogate {
+            let weight = settings.moves.surrogate * acceptance.powi(2);
+            sampler = sampler.with_move(weight, Box::new(SurrogateMove(surrogate.clone())));
+        }
+        let result = ensemble::run(&sampler, chain, kinds, policy, pool.stop(), &mut |records, convergence| {
+            journal.append(records)?;
+            on_step(records, convergence);
+            Ok::<(), JournalError>(())
+        });
+        result.map_err(|error| match error {
+            StepError::Ensemble(error) => error.into(),
+            StepError::Chain(error) => error.into(),
+            StepError::Callback(error) => error.into(),
+        })
+    }
+}
+
+fn new_manifest(scene: &Scene, origin: Origin, blind_search: Option<BlindSearch>, start: Positions) -> Manifest {
+    let prior = |f: &crate::posterior::objective::FreeParameter| {
+        (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
+    };
+    Manifest {
+        origin,
+        names: scene.space.names().to_vec(),
+        priors: scene.space.free().iter().map(prior).collect(),
+        ensembles: scene.settings.sampler.ensembles,
+        walkers: scene.settings.sampler.walkers,
+        seed: scene.settings.sampler.seed,
+        extend_to: None,
+        merged_seeds: Vec::new(),
+        blind_search,
+        start,
+    }
+}
+
+/// The walkers at step 0, evaluated; refused here, before anything is written, if they are no start.
+fn first_step(
+    scene: &Scene,
+    target: &Target,
+    evaluator: &Evaluations,
+    start: &Positions,
+) -> Result<Vec<Record>, RunError> {
+    let first = Sampler::new(target, evaluator, &scene.settings.sampler)?.start(start);
+    first.map(|(_, records)| records).map_err(|error| match error {
+        EnsembleError::Stopped => RunError::Interrupted,
+        error => error.into(),
+    })
+}

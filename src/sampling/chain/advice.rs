@@ -1,0 +1,84 @@
+//! What to do about a chain that has not converged, or in which something looks wrong.
+//!
+//! Steps still needed are an estimate: ESS grows with the number of steps, and `R-hat^2 - 1` falls with it.
+
+use crate::sampling::chain::{Chain, Convergence, Diagnostic, Goals};
+
+/// Share of failed evaluations that is worth a remark.
+const MANY_FAILURES: f64 = 0.05;
+/// Most that is advised to be added at once, in lengths of what there is: beyond, an estimate is worth nothing.
+const MOST: f64 = 10.0;
+
+/// Advice, most important first; empty for a converged chain without failures to speak of.
+pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<String> {
+    let mut advice = Vec::new();
+    if chain.shape().ensembles < 2 {
+        advice.push(
+            "one ensemble alone cannot be judged, R-hat only compares its two halves: set `sampler.ensembles` \
+            to 2 or more"
+                .to_owned(),
+        );
+    }
+    let diagnostics = chain.names().iter().zip(&convergence.diagnostics);
+    advice.extend(diagnostics.filter_map(|(name, one)| parameter_advice(name, one, convergence.kept, goals)));
+    if !convergence.stuck.is_empty() {
+        let which = convergence.stuck.iter().take(5).map(|(e, w)| format!("ensemble {e} walker {w}"));
+        let which = which.collect::<Vec<_>>().join(", ");
+        let count = convergence.stuck.len();
+        advice.push(format!(
+            "{count} stuck walker(s), not moved since half of the steps kept: {which}; look at their log_prob, and \
+            start anew \
+             closer to the optimum if they sit in a minor mode"
+        ));
+    }
+    let (failures, evaluations) = (chain.failures(), chain.evaluations());
+    if failures as f64 > MANY_FAILURES * evaluations as f64 {
+        let share = 100.0 * failures as f64 / evaluations as f64;
+        advice.push(format!(
+            "{failures} of {evaluations} evaluations failed ({share:.1} %): the posterior may be cut where they did; \
+            narrow \
+             the priors or loosen the chi2 target"
+        ));
+    }
+    advice
+}
+
+/// What one parameter lacks.
+fn parameter_advice(name: &str, one: &Diagnostic, kept: usize, goals: &Goals) -> Option<String> {
+    let (Some(rhat), Some(ess)) = (one.rhat, one.ess) else {
+        return Some(format!(
+            "{name}: too few steps to tell, or it never moved: run `--extend {}`",
+            round_up(kept as f64)
+        ));
+    };
+    let mut lacks = Vec::new();
+    if rhat > goals.rhat {
+        lacks.push(format!("R-hat {rhat:.3} > {}", goals.rhat));
+    }
+    if ess < goals.ess {
+        lacks.push(format!("ESS {ess:.0} < {}", goals.ess));
+    }
+    if lacks.is_empty() {
+        return None;
+    }
+    let growth = growth(one, goals)?;
+    let more = round_up(kept as f64 * (growth - 1.0).min(MOST));
+    let bound = if growth - 1.0 > MOST { "at least" } else { "about" };
+    Some(format!("{name}: {}: run `--extend {more}` ({bound} {more} steps more needed)", lacks.join(", ")))
+}
+
+/// Factor by which the chain must still grow for every parameter to reach the goals; `None` if one cannot tell yet.
+pub fn growth_needed(convergence: &Convergence, goals: &Goals) -> Option<f64> {
+    convergence.diagnostics.iter().map(|one| growth(one, goals)).try_fold(1.0, |most: f64, one| Some(most.max(one?)))
+}
+
+/// The same for one parameter.
+fn growth(one: &Diagnostic, goals: &Goals) -> Option<f64> {
+    let (rhat, ess) = (one.rhat?, one.ess?);
+    Some(((rhat * rhat - 1.0) / (goals.rhat * goals.rhat - 1.0)).max(goals.ess / ess).max(1.0))
+}
+
+/// Up to a multiple of 50, the interval at which goals are looked at.
+fn round_up(steps: f64) -> usize {
+    ((steps / 50.0).ceil() as usize).max(1) * 50
+}

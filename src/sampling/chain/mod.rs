@@ -1,0 +1,81 @@
+//! Chains: what was sampled, how far it can be trusted, and what it says.
+//!
+//! [`Record`] is one line, [`Chain`] holds whole steps; `autocorrelation` and `convergence` say how many independent
+//! draws that amounts to, `summary` and `table` say what came out, `derived` of what follows from the parameters too.
+//! All of it is a function of the chain's content alone.
+
+pub mod advice;
+pub mod autocorrelation;
+pub mod convergence;
+pub mod derived;
+pub mod modes;
+pub mod moves;
+pub mod record;
+pub mod statistics;
+pub mod store;
+pub mod summary;
+pub mod table;
+
+pub use convergence::{Convergence, Diagnostic, Goals, ParameterKind};
+pub use derived::{Derived, Settled};
+pub use modes::PeriodMode;
+pub use moves::MoveSummary;
+pub use record::{MoveKind, Record, Shape};
+pub use store::{Chain, Series};
+pub use summary::{ParameterSummary, Summary, summarise};
+pub use table::table;
+
+/// What can be wrong with a chain.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ChainError {
+    /// A line is not the one that comes next.
+    #[error(
+        "expected step {}, ensemble {}, walker {} but found step {}, ensemble {}, walker {}",
+        expected[0], expected[1], expected[2], found[0], found[1], found[2]
+    )]
+    Order {
+        /// Step, ensemble and walker that come next.
+        expected: [usize; 3],
+        /// Step, ensemble and walker found.
+        found: [usize; 3],
+    },
+    /// A position has the wrong number of parameters.
+    #[error("expected {expected} parameters but found {found}")]
+    Dimension {
+        /// Number of parameters of the chain.
+        expected: usize,
+        /// Number found.
+        found: usize,
+    },
+    /// A value is not finite.
+    #[error("`{name}` is not finite at step {step}, ensemble {ensemble}, walker {walker}")]
+    NotFinite {
+        /// The quantity.
+        name: String,
+        /// The step.
+        step: usize,
+        /// The ensemble.
+        ensemble: usize,
+        /// The walker.
+        walker: usize,
+    },
+    /// A step has the wrong number of lines.
+    #[error("a step has {expected} lines (ensembles x walkers), not {found}")]
+    StepSize {
+        /// Ensembles x walkers.
+        expected: usize,
+        /// Number found.
+        found: usize,
+    },
+    /// There is nothing to summarise.
+    #[error("the chain has no complete step")]
+    Empty,
+    /// A parameter kind is needed for every parameter.
+    #[error("the chain has {expected} parameters but {found} parameter kinds were given")]
+    Kinds {
+        /// Number of parameters of the chain.
+        expected: usize,
+        /// Number of kinds given.
+        found: usize,
+    },
+}

@@ -1,0 +1,234 @@
+//! The summary of a chain: point estimates, intervals and trust in them, per parameter; costs and failures of the
+//! whole.
+//!
+//! - `ci68`, `ci95`: equal tails (16 to 84 %, 2.5 to 97.5 %); `hdi68`, `hdi95`: the shortest intervals.
+//! - A periodic parameter is unwrapped around its mode (cut opposite to it) before anything is computed. Point
+//! estimates are written in [0, 1); intervals stay contiguous (lo < hi) and around the median, so lo may be below 0 or
+//! hi above 1.
+//! - `upper95`, the 95 % quantile, is there for an amplitude whose posterior touches zero: the lower end of its 95 %
+//! HDI is within a tenth of a standard deviation of 0.
+//! - Statistics are of the steps kept after the burn-in (`convergence`); `evaluations`, `failures`, `passes_median` and
+//!   `best` are of the whole chain, the start included.
+//!
+//! What is said of a planet, and which parameters are constrained, is not the chain's to know: whoever knows the priors
+//! and the blind search fills it in (`manifest::conclusions`).
+
+use crate::planets::verdict::Verdict;
+use crate::sampling::chain::autocorrelation::mean;
+use crate::sampling::chain::statistics::{mode, periodic_mode, quantile, shortest_interval, unwrap_around, wrap};
+use crate::sampling::chain::{
+    Chain, ChainError, Convergence, Derived, Diagnostic, Goals, MoveSummary, ParameterKind, PeriodMode,
+};
+use crate::sampling::chain::{Settled, advice, derived, moves};
+use crate::sampling::log_density::Status;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
+/// Share of a standard deviation within which an amplitude touches zero.
+const TOUCH: f64 = 0.1;
+
+/// Summary of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParameterSummary {
+    /// Median.
+    pub median: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub sd: f64,
+    /// Mode of a kernel density estimate.
+    pub mode: f64,
+    /// 16 % and 84 % quantiles.
+    pub ci68: [f64; 2],
+    /// 2.5 % and 97.5 % quantiles.
+    pub ci95: [f64; 2],
+    /// Shortest interval of 68 %.
+    pub hdi68: [f64; 2],
+    /// Shortest interval of 95 %.
+    pub hdi95: [f64; 2],
+    /// R-hat between ensembles; null where the chain is too short.
+    pub rhat: Option<f64>,
+    /// Effective sample size; null where the chain is too short.
+    pub ess: Option<f64>,
+    /// Integrated autocorrelation time (steps); null where the chain is too short.
+    pub tau: Option<f64>,
+    /// Whether the data hardly say more of it than its prior, so that its median means nothing.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub unconstrained: bool,
+    /// Upper limit (95 %), for an amplitude that touches zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper95: Option<f64>,
+}
+
+/// The place of the highest log-probability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Best {
+    /// Its log-probability.
+    pub log_prob: f64,
+    /// The parameters.
+    #[serde(flatten)]
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// Summary of a chain; serialised, it is `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Names of the parameters, in order.
+    pub names: Vec<String>,
+    /// Summary of each parameter, by name.
+    pub parameters: BTreeMap<String, ParameterSummary>,
+    /// Names of the quantities that follow from the parameters, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub derived_names: Vec<String>,
+    /// Summary of each of them, by name, from its values at the draws.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived: BTreeMap<String, ParameterSummary>,
+    /// What names of parameters and derived quantities mean, where they do not say it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub definitions: BTreeMap<String, String>,
+    /// Accepted share of the proposals, of the steps kept.
+    pub acceptance_fraction: f64,
+    /// What each kind of move is worth; empty for a chain that does not name its moves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moves: Vec<MoveSummary>,
+    /// Effective samples an evaluation, of the steps kept: that of the parameter where it is least; null where unknown.
+    #[serde(default)]
+    pub ess_per_evaluation: Option<f64>,
+    /// Whether every parameter has reached the goals and no walker is stuck.
+    pub converged: bool,
+    /// Number of the last step (0 is the start).
+    pub steps: usize,
+    /// Steps left out at the beginning.
+    pub discarded_steps: usize,
+    /// Number of evaluations, the start included.
+    pub evaluations: usize,
+    /// How many of them failed.
+    pub failures: usize,
+    /// Median number of applications of the response that an evaluation took.
+    pub passes_median: f64,
+    /// The place of the highest log-probability.
+    pub best: Best,
+    /// What to do, where the chain has not converged or something looks wrong.
+    pub advice: Vec<String>,
+    /// What is said of a planet; absent where no orbit was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+    /// The modes of the period, from the heaviest on; empty where it was not sampled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub period_modes: Vec<PeriodMode>,
+    /// What has to be known beside the verdict.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+}
+
+/// Summarises a chain; `kinds` has one entry a parameter.
+///
+/// # Errors
+/// [`ChainError::Empty`] or [`ChainError::Kinds`].
+pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Result<Summary, ChainError> {
+    let convergence = Convergence::of(chain, kinds)?;
+    let best = chain.best().ok_or(ChainError::Empty)?;
+    let names = chain.names().to_vec();
+    let discarded = convergence.discarded;
+    let parameters: Vec<ParameterSummary> = (0..names.len())
+        .into_par_iter()
+        .map(|i| {
+            let values = chain.series(i, discarded).into_iter().flatten().flatten().collect();
+            parameter_summary(values, kinds[i], &convergence.diagnostics[i])
+        })
+        .collect();
+    let accepted = chain.series_of(discarded.max(1), |record| if record.accepted { 1.0 } else { 0.0 });
+    let kept = chain.records().iter().skip(discarded * chain.shape().size());
+    let evaluated = kept.filter(|record| record.proposed != Status::OutsidePrior).count();
+    let least = parameters.iter().map(|one| one.ess).try_fold(f64::INFINITY, |least, ess| Some(least.min(ess?)));
+    let sd: Vec<f64> = parameters.iter().map(|one| one.sd).collect();
+    Ok(Summary {
+        moves: moves::summarise_moves(chain, discarded, kinds, &sd),
+        derived_names: Vec::new(),
+        derived: BTreeMap::new(),
+        definitions: BTreeMap::new(),
+        ess_per_evaluation: least.map(|ess| ess / evaluated.max(1) as f64),
+        parameters: names.iter().cloned().zip(parameters).collect(),
+        acceptance_fraction: mean(accepted.iter().flatten().flatten()),
+        converged: convergence.reached(goals),
+        steps: chain.steps() - 1,
+        discarded_steps: discarded,
+        evaluations: chain.evaluations(),
+        failures: chain.failures(),
+        passes_median: passes_median(chain),
+        best: Best { log_prob: best.log_prob, parameters: names.iter().cloned().zip(best.theta.clone()).collect() },
+        advice: advice::advice(chain, &convergence, goals),
+        verdict: None,
+        period_modes: Vec::new(),
+        remarks: Vec::new(),
+        names,
+    })
+}
+
+impl Summary {
+    /// Adds what `chain`, of which it is the summary, says of quantities that follow from the parameters.
+    pub fn derive(&mut self, chain: &Chain, quantities: Vec<Derived>) -> Vec<Settled> {
+        let has_limit = |name: &str| self.parameters.get(name).is_some_and(|one| one.upper95.is_some());
+        let settled = derived::settle(chain, self.discarded_steps, quantities, &has_limit);
+        for Settled { quantity: Derived { name, definition, .. }, summary, .. } in &settled {
+            self.derived_names.push(name.clone());
+            self.derived.insert(name.clone(), summary.clone());
+            self.definitions.extend(definition.clone().map(|text| (name.clone(), text)));
+        }
+        settled
+    }
+}
+
+/// Statistics of the pooled draws of one parameter.
+pub(super) fn parameter_summary(
+    mut values: Vec<f64>,
+    kind: ParameterKind,
+    diagnostic: &Diagnostic,
+) -> ParameterSummary {
+    let effective = diagnostic.ess.unwrap_or(1.0);
+    let periodic = kind == ParameterKind::Periodic;
+    let around = periodic.then(|| periodic_mode(&values, effective));
+    if let Some(centre) = around {
+        unwrap_around(&mut values, centre);
+    }
+    values.sort_unstable_by(f64::total_cmp);
+    let median = quantile(&values, 0.5);
+    // Whole periods that bring the median, and the intervals with it, to [0, 1).
+    let turns = if periodic { (median - wrap(median)).round() } else { 0.0 };
+    let point = |x: f64| if periodic { wrap(x) } else { x };
+    let shift = |[low, high]: [f64; 2]| [low - turns, high - turns];
+    let centre = mean(values.iter());
+    let squares = values.iter().map(|x| (x - centre).powi(2)).sum::<f64>();
+    let sd = (squares / (values.len() as f64 - 1.0).max(1.0)).sqrt();
+    let tails = |share: f64| [quantile(&values, 0.5 - 0.5 * share), quantile(&values, 0.5 + 0.5 * share)];
+    let hdi95 = shortest_interval(&values, 0.95);
+    let touches_zero = kind == ParameterKind::Amplitude && hdi95[0] <= TOUCH * sd;
+    ParameterSummary {
+        median: point(median),
+        mean: point(centre),
+        sd,
+        mode: around.unwrap_or_else(|| mode(&values, effective)),
+        ci68: shift(tails(0.68)),
+        ci95: shift(tails(0.95)),
+        hdi68: shift(shortest_interval(&values, 0.68)),
+        hdi95: shift(hdi95),
+        rhat: diagnostic.rhat,
+        ess: diagnostic.ess,
+        tau: diagnostic.tau,
+        unconstrained: false,
+        upper95: touches_zero.then(|| quantile(&values, 0.95)),
+    }
+}
+
+/// Median passes of the evaluations; 0 when there are none.
+fn passes_median(chain: &Chain) -> f64 {
+    let evaluated = chain.records().iter().filter(|record| record.proposed != Status::OutsidePrior);
+    let mut passes: Vec<f64> = evaluated.map(|record| f64::from(record.passes)).collect();
+    passes.sort_unstable_by(f64::total_cmp);
+    if passes.is_empty() { 0.0 } else { quantile(&passes, 0.5) }
+}

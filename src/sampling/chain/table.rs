@@ -1,0 +1,158 @@
+//! The summary as text, aligned, one line a parameter, and a last line that says plainly whether it can be trusted.
+
+use crate::numerics::text::aligned;
+use crate::sampling::chain::{MoveSummary, ParameterSummary, Summary};
+use std::collections::BTreeMap;
+
+/// Modes of the period that are shown.
+const MODES_SHOWN: usize = 6;
+
+/// The table. With `truth` (injected values by name) there is a column for it.
+pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
+    let mut head = vec!["parameter", "median", "- 68%", "+ 68%", "95% interval", "95% HDI", "R-hat", "ESS", "tau"];
+    if truth.is_some() {
+        head.insert(1, "truth");
+    }
+    let mut rows: Vec<Vec<String>> = vec![head.into_iter().map(str::to_owned).collect()];
+    for name in &summary.names {
+        let Some(one) = summary.parameters.get(name) else { continue };
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let text = truth.get(name).map_or_else(|| "-".to_owned(), |value| number(*value, decimals(one)));
+            row.insert(1, text);
+        }
+        rows.push(row);
+    }
+    let head = summary.verdict.as_ref().map(|verdict| format!("{}\n\n", verdict.sentence)).unwrap_or_default();
+    let mut text = head + &aligned(&rows);
+    text += &period_modes(summary);
+    for name in &summary.names {
+        if let Some((one, upper)) = summary.parameters.get(name).and_then(|one| Some((one, one.upper95?))) {
+            text += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
+        }
+    }
+    text += &derived(summary, truth);
+    text += &format!(
+        "{} steps ({} discarded), acceptance {:.2}, {} evaluations ({} failed), {:.0} model applications each, best \
+        log_prob {:.3}\n",
+        summary.steps,
+        summary.discarded_steps,
+        summary.acceptance_fraction,
+        summary.evaluations,
+        summary.failures,
+        summary.passes_median,
+        summary.best.log_prob
+    );
+    text + &moves(summary) + &convergence(summary) + "\n"
+}
+
+/// What follows from the parameters, and what names mean; `truth` has it too.
+fn derived(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
+    let mut head = vec!["derived", "median", "- 68%", "+ 68%", "95% interval", "95% HDI"];
+    if truth.is_some() {
+        head.insert(1, "truth");
+    }
+    let mut rows: Vec<Vec<String>> = vec![head.iter().map(|&text| text.to_owned()).collect()];
+    let mut limits = String::new();
+    for (name, one) in summary.derived_names.iter().filter_map(|name| summary.derived.get_key_value(name)) {
+        let mut row = cells(name, one);
+        if let Some(truth) = truth {
+            let text = truth.get(name).map_or_else(|| "-".to_owned(), |value| number(*value, decimals(one)));
+            row.insert(1, text);
+        }
+        row.truncate(head.len());
+        rows.push(row);
+        if let Some(upper) = one.upper95 {
+            limits += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
+        }
+    }
+    let table = if rows.len() > 1 { aligned(&rows) } else { String::new() };
+    let names = summary.names.iter().chain(&summary.derived_names);
+    let meanings = names.filter_map(|name| summary.definitions.get_key_value(name));
+    table + &limits + &meanings.map(|(name, meaning)| format!("{name}: {meaning}\n")).collect::<String>()
+}
+
+/// A line on the moves, where the chain names them.
+fn moves(summary: &Summary) -> String {
+    if summary.moves.is_empty() {
+        return String::new();
+    }
+    let share = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.2}"));
+    let one = |m: &MoveSummary| {
+        let (name, worth) = (m.kind.name(), share(m.ess_per_evaluation));
+        format!("{name} {:.2} (worth {worth}) of {}", m.acceptance_fraction, m.proposals)
+    };
+    let each: Vec<String> = summary.moves.iter().map(one).collect();
+    format!("{} effective samples per evaluation; accepted: {}\n", share(summary.ess_per_evaluation), each.join(", "))
+}
+
+fn convergence(summary: &Summary) -> String {
+    let advice = summary.advice.join("; ");
+    match (summary.converged, advice.is_empty()) {
+        (true, true) => "the chain has converged".to_owned(),
+        (true, false) => format!("the chain has converged, but {advice}"),
+        (false, _) => format!("the chain has NOT converged: {advice}"),
+    }
+}
+
+/// The period where it has several modes, or one that spots may make.
+fn period_modes(summary: &Summary) -> String {
+    let mut text = String::new();
+    for (name, one) in summary.parameters.iter().filter(|(_, one)| one.unconstrained) {
+        let [low, high] = one.ci95;
+        let digits = decimals(one);
+        text += &format!(
+            "{name} is not constrained: anything from {low:.digits$} to {high:.digits$}, as its prior has it\n"
+        );
+    }
+    if summary.period_modes.len() < 2 && summary.period_modes.iter().all(|mode| mode.rotation.is_none()) {
+        return text;
+    }
+    let mut rows = vec![
+        ["mode of the period", "weight", "porb_over_prot", "68% interval", "k_kms", ""].map(str::to_owned).to_vec(),
+    ];
+    for (k, mode) in summary.period_modes.iter().enumerate().take(MODES_SHOWN) {
+        let [low, high] = mode.ci68;
+        let digits = (1.0 - (high - low).log10().floor()).clamp(2.0, 9.0) as usize;
+        rows.push(vec![
+            (k + 1).to_string(),
+            format!("{:.2}", mode.weight),
+            number(mode.porb_over_prot, digits),
+            format!("[{low:.digits$}, {high:.digits$}]"),
+            format!("{:.3}", mode.k_kms),
+            mode.rotation.clone().unwrap_or_default(),
+        ]);
+    }
+    text + &aligned(&rows)
+}
+
+fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
+    let digits = decimals(one);
+    let interval = |[low, high]: [f64; 2]| format!("[{}, {}]", number(low, digits), number(high, digits));
+    let optional =
+        |value: Option<f64>, digits: usize| value.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
+    let median = if one.unconstrained { "any".to_owned() } else { number(one.median, digits) };
+    let side = |width: f64| if one.unconstrained { "-".to_owned() } else { number(width, digits) };
+    // Differences from the median as the interval has it: a periodic one may be in another turn than a wrapped
+    // estimate.
+    vec![
+        name.to_owned(),
+        median,
+        side(one.median - one.ci68[0]),
+        side(one.ci68[1] - one.median),
+        interval(one.ci95),
+        interval(one.hdi95),
+        optional(one.rhat, 3),
+        optional(one.ess, 0),
+        optional(one.tau, 1),
+    ]
+}
+
+/// Decimals that show two digits of the standard deviation.
+fn decimals(one: &ParameterSummary) -> usize {
+    if one.sd > 0.0 && one.sd.is_finite() { (1.0 - one.sd.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 }
+}
+
+fn number(value: f64, digits: usize) -> String {
+    format!("{value:.digits$}")
+}

@@ -1,0 +1,122 @@
+//! The values at the nodes, in the order of the grid.
+
+use super::grid::Grid;
+use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
+
+/// A node with what was found there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Which node of the grid.
+    pub index: usize,
+    /// Its coordinates, in the order of the axes.
+    pub theta: Vec<f64>,
+    /// What became of the reconstruction there.
+    pub reconstruction: Reconstruction,
+}
+
+/// A landscape, perhaps not finished: the values at the first nodes of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Landscape {
+    grid: Grid,
+    nodes: Vec<Node>,
+}
+
+/// A node that is not the next one of a landscape.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LandscapeError {
+    /// The grid has no more nodes.
+    #[error("the grid has no more than {0} nodes")]
+    Full(usize),
+    /// It is another node.
+    #[error("expected node {expected} but found node {found}")]
+    Order {
+        /// The node that comes next.
+        expected: usize,
+        /// The node found.
+        found: usize,
+    },
+    /// It is in another place.
+    #[error("node {index} is at {expected:?}, not at {found:?}")]
+    Place {
+        /// The node.
+        index: usize,
+        /// Its coordinates by the grid.
+        expected: Vec<f64>,
+        /// The coordinates found.
+        found: Vec<f64>,
+    },
+    /// Its status and its values contradict each other.
+    #[error("node {index} has the status {status:?}, which does not go with its values")]
+    Values {
+        /// The node.
+        index: usize,
+        /// The status.
+        status: Status,
+    },
+}
+
+impl Landscape {
+    /// A landscape without values.
+    pub fn new(grid: Grid) -> Self {
+        Landscape { grid, nodes: Vec::new() }
+    }
+
+    /// Adds the next node.
+    ///
+    /// # Errors
+    /// [`LandscapeError`] when it is not the next one, or its values are not whole.
+    pub fn push(&mut self, node: Node) -> Result<(), LandscapeError> {
+        let expected = self.nodes.len();
+        if expected == self.grid.len() {
+            return Err(LandscapeError::Full(expected));
+        }
+        if node.index != expected {
+            return Err(LandscapeError::Order { expected, found: node.index });
+        }
+        let theta = self.grid.theta(expected);
+        if node.theta != theta {
+            return Err(LandscapeError::Place { index: expected, expected: theta, found: node.theta });
+        }
+        let Reconstruction { likelihood, status, .. } = node.reconstruction;
+        let failed = status.is_failure() || status == Status::OutsidePrior;
+        if likelihood.is_none_or(|likelihood| !likelihood.is_finite()) != failed {
+            return Err(LandscapeError::Values { index: expected, status });
+        }
+        self.nodes.push(node);
+        Ok(())
+    }
+
+    /// Where the nodes are.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The nodes so far, in order.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// Whether every node of the grid is there.
+    pub fn is_whole(&self) -> bool {
+        self.nodes.len() == self.grid.len()
+    }
+
+    /// The node of the largest ln L (the first of equals) with its values; `None` if there is none with a value.
+    pub fn best(&self) -> Option<(&Node, Likelihood)> {
+        let valued = self.nodes.iter().filter_map(|node| Some((node, node.reconstruction.likelihood?)));
+        valued.reduce(|best, node| if node.1.log_likelihood > best.1.log_likelihood { node } else { best })
+    }
+
+    /// Number of nodes whose reconstruction ended like that.
+    pub fn count(&self, is: impl Fn(Status) -> bool) -> usize {
+        self.nodes.iter().filter(|node| is(node.reconstruction.status)).count()
+    }
+
+    /// Median number of passes of those reconstructions that were begun (the upper one of two); 0 without any.
+    pub fn passes_median(&self) -> u32 {
+        let all = self.nodes.iter().map(|node| node.reconstruction.passes);
+        let mut passes: Vec<u32> = all.filter(|passes| *passes > 0).collect();
+        passes.sort_unstable();
+        passes.get(passes.len() / 2).copied().unwrap_or(0)
+    }
+}

@@ -1,0 +1,142 @@
+//! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few derived numbers
+//! out.
+//!
+//! The ensemble, the optimiser and the landscape know only this file; the objective implements it. Batches go through
+//! [`Evaluator`], behind which are the threads of one machine or the ranks of a cluster.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How one evaluation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// The reconstruction met its tolerances.
+    Converged,
+    /// The target chi2 is out of reach at these parameters; the log-probability is the monotone continuation.
+    Unreachable,
+    /// Outside the prior: nothing was reconstructed and the log-probability is minus infinity.
+    OutsidePrior,
+    /// The reconstruction stopped short of its tolerances; rejected and counted as a failure.
+    StoppedShort,
+    /// A number that is not finite appeared; rejected and counted as a failure.
+    NonFinite,
+}
+
+impl Status {
+    /// Whether the evaluation failed (as opposed to having given a log-probability, or being outside the prior).
+    pub fn is_failure(self) -> bool {
+        matches!(self, Status::StoppedShort | Status::NonFinite)
+    }
+}
+
+/// What one evaluation returns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evaluation {
+    /// ln(likelihood) + ln(prior) in the coordinates of the parameters as named; minus infinity where not allowed.
+    pub log_prob: f64,
+    /// Spottedness of the reconstruction, as [`Likelihood::spottedness`].
+    pub spottedness: f64,
+    /// chi2 of the reconstruction, as [`Likelihood::chi2`].
+    pub chi2: f64,
+    /// Applications of the response or its transpose that this evaluation took.
+    pub passes: u32,
+    /// How it ended.
+    pub status: Status,
+}
+
+impl Evaluation {
+    /// An evaluation without a reconstruction: log-probability minus infinity, derived numbers zero.
+    pub fn rejected(status: Status) -> Self {
+        Evaluation { log_prob: f64::NEG_INFINITY, spottedness: 0.0, chi2: 0.0, passes: 0, status }
+    }
+}
+
+/// What a reconstruction is worth without the prior, and the numbers of its image: the values of a landscape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Likelihood {
+    /// ln(likelihood); only differences mean something.
+    pub log_likelihood: f64,
+    /// Spottedness of the image, such as its fractional spot coverage; where the target chi2 is reached, what a
+    /// first-order forecast says that it is at the target, of which the log-likelihood is made.
+    pub spottedness: f64,
+    /// Entropy of the image at which the solver stopped.
+    pub entropy: f64,
+    /// chi2 of that image: near the target, where that is reached, as far as the forecast is good enough.
+    pub chi2: f64,
+    /// Lagrange multiplier of chi2/2 in `S - lambda chi2/2`, which the image maximises.
+    pub lambda: f64,
+}
+
+impl Likelihood {
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        let Likelihood { log_likelihood, spottedness, entropy, chi2, lambda } = *self;
+        [log_likelihood, spottedness, entropy, chi2, lambda].iter().all(|x| x.is_finite())
+    }
+}
+
+/// What became of a reconstruction, whatever the prior says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reconstruction {
+    /// Its values; `None` if it failed.
+    pub likelihood: Option<Likelihood>,
+    /// Applications of the response or its transpose that it took.
+    pub passes: u32,
+    /// How it ended; never [`Status::OutsidePrior`].
+    pub status: Status,
+}
+
+/// A posterior density over named parameters.
+///
+/// `theta` is always in the coordinates of [`LogDensity::names`] (the *written* coordinates). Samplers may move in
+/// *internal* coordinates, a one-to-one map of the written ones given by `to_sampling` and `to_physical`.
+pub trait LogDensity: Sync {
+    /// Names of the parameters, in the order of every vector.
+    fn names(&self) -> &[String];
+
+    /// The log-posterior at `theta`. A pure function: the same bytes for the same `theta`, whatever was evaluated
+    /// before.
+    fn evaluate(&self, theta: &[f64]) -> Evaluation;
+
+    /// Internal coordinates of `theta`.
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
+        theta.to_vec()
+    }
+
+    /// Written coordinates of `internal`, periodic ones wrapped into their range.
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
+        internal.to_vec()
+    }
+
+    /// ln |d(written) / d(internal)| at `theta`: what turns a density in physical coordinates into one in internal
+    /// ones.
+    fn log_jacobian(&self, _theta: &[f64]) -> f64 {
+        0.0
+    }
+}
+
+/// A density whose gradient comes at the price of a few forward models.
+pub trait Gradient: LogDensity {
+    /// The evaluation at `theta`, and the gradient of its log-probability with respect to the sampling coordinates
+    /// (empty where the log-probability is minus infinity).
+    fn evaluate_with_gradient(&self, theta: &[f64]) -> (Evaluation, Vec<f64>);
+
+    /// Natural steps of the sampling coordinates: what a search is scaled with.
+    fn scales(&self) -> Vec<f64>;
+}
+
+/// Evaluates a batch of parameter vectors; the order of the answers is the order of the questions.
+pub trait Evaluator {
+    /// One evaluation a vector; or fewer, those of the first vectors, where it was told to stop meanwhile.
+    fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation>;
+}
+
+/// Threads of this machine: one reconstruction is serial, a batch is spread over rayon's current pool.
+pub struct Threads<'a, D: LogDensity + ?Sized>(pub &'a D);
+
+impl<D: LogDensity + ?Sized> Evaluator for Threads<'_, D> {
+    fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation> {
+        batch.par_iter().with_max_len(1).map(|theta| self.0.evaluate(theta)).collect()
+    }
+}

@@ -1,0 +1,123 @@
+//! Observed (or simulated) line profiles: times, velocity bins, intensities and their errors.
+//!
+//! Also what they measure by themselves: areas and first-moment velocities.
+
+/// One line profile on a uniform velocity axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    /// Time (d), on the same scale as the star's epoch.
+    pub time_d: f64,
+    /// Velocity of the centre of the first bin (km/s), after subtraction of the profile's own `VRAD`.
+    pub first_velocity_kms: f64,
+    /// Intensity in units of the continuum, one number a bin.
+    pub intensity: Vec<f64>,
+    /// Standard error of each intensity (positive).
+    pub sigma: Vec<f64>,
+}
+
+/// A radial velocity with its standard error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadialVelocity {
+    /// Velocity (km/s, positive receding).
+    pub value_kms: f64,
+    /// Standard error (km/s).
+    pub sigma_kms: f64,
+}
+
+/// A set of line profiles that share the width of their velocity bins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observations {
+    /// Width of a velocity bin (km/s).
+    pub step_kms: f64,
+    /// The profiles in the order of the list.
+    pub profiles: Vec<Profile>,
+}
+
+impl Observations {
+    /// Number of data (bins of all profiles together).
+    pub fn len(&self) -> usize {
+        self.profiles.iter().map(|p| p.intensity.len()).sum()
+    }
+
+    /// Whether there is no datum at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Times of all profiles (d).
+    pub fn times_d(&self) -> Vec<f64> {
+        self.profiles.iter().map(|p| p.time_d).collect()
+    }
+
+    /// First and last time (d); `None` where there is no profile.
+    pub fn time_span_d(&self) -> Option<[f64; 2]> {
+        let span = |span: Option<[f64; 2]>, profile: &Profile| {
+            let [first, last] = span.unwrap_or([profile.time_d; 2]);
+            Some([first.min(profile.time_d), last.max(profile.time_d)])
+        };
+        self.profiles.iter().fold(None, span)
+    }
+
+    /// The middle of the time base (d), half way between the first and the last profile.
+    pub fn mid_time_d(&self) -> f64 {
+        let (lo, hi) = self
+            .profiles
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| (lo.min(p.time_d), hi.max(p.time_d)));
+        0.5 * (lo + hi)
+    }
+
+    /// Radial velocity of every profile by its first moment, see [`Profile::first_moment`].
+    pub fn first_moments(&self) -> Vec<RadialVelocity> {
+        self.profiles.iter().map(|p| p.first_moment(self.step_kms)).collect()
+    }
+
+    /// The same in units of a continuum that is at `level` here.
+    pub fn over_continuum(mut self, level: f64) -> Self {
+        for profile in &mut self.profiles {
+            profile.intensity.iter_mut().chain(&mut profile.sigma).for_each(|x| *x /= level);
+        }
+        self
+    }
+
+    /// Mean area of the line `sum (1 - I) dv` over all profiles (km/s): the equivalent width of a line that the
+    /// velocity range holds whole, whatever the spots, because every pixel's line has the same one (`docs/method.md`
+    /// section 1).
+    pub fn mean_equivalent_width_kms(&self) -> f64 {
+        let area = |p: &Profile| p.intensity.iter().map(|i| 1.0 - i).sum::<f64>() * self.step_kms;
+        self.profiles.iter().map(area).sum::<f64>() / self.profiles.len() as f64
+    }
+}
+
+impl Profile {
+    /// Velocity of bin `j` (km/s).
+    pub fn velocity_kms(&self, j: usize, step_kms: f64) -> f64 {
+        self.first_velocity_kms + j as f64 * step_kms
+    }
+
+    /// Intensity (linear between bins) at a velocity (km/s) within the profile, which has two bins or more.
+    pub fn intensity_at(&self, velocity_kms: f64, step_kms: f64) -> f64 {
+        let position = (velocity_kms - self.first_velocity_kms) / step_kms;
+        let below = (position.floor().max(0.0) as usize).min(self.intensity.len() - 2);
+        let part = (position - below as f64).clamp(0.0, 1.0);
+        // rounding of VRAD does not mix neighbours
+        let part = if part < 1e-6 { 0.0 } else { part };
+        self.intensity[below] + part * (self.intensity[below + 1] - self.intensity[below])
+    }
+
+    /// Radial velocity `sum v (1-I) / sum (1-I)` over all bins, and its error from those of the bins,
+    /// `sqrt(sum sigma^2 (v - RV)^2) / |sum (1-I)|`. Not finite where the profile has no area.
+    pub fn first_moment(&self, step_kms: f64) -> RadialVelocity {
+        let depth: Vec<f64> = self.intensity.iter().map(|i| 1.0 - i).collect();
+        let value_kms = self.first_moment_of(&depth, step_kms);
+        let arm = |(j, sigma): (usize, &f64)| (sigma * (self.velocity_kms(j, step_kms) - value_kms)).powi(2);
+        let variance: f64 = self.sigma.iter().enumerate().map(arm).sum();
+        RadialVelocity { value_kms, sigma_kms: variance.sqrt() / depth.iter().sum::<f64>().abs() }
+    }
+
+    /// First moment (km/s) of other depths `1 - I`, a model's say, in the bins of this profile.
+    pub fn first_moment_of(&self, depth: &[f64], step_kms: f64) -> f64 {
+        let moment = |(j, depth): (usize, &f64)| self.velocity_kms(j, step_kms) * depth;
+        depth.iter().enumerate().map(moment).sum::<f64>() / depth.iter().sum::<f64>()
+    }
+}
