@@ -14,6 +14,7 @@
 //! | `numerics` | vector instructions, units |
 //! | `star` | geometry, rotation, local line, spots, orbit, and the response: a brightness map to line profiles |
 //! | `maxent` | entropies and the maximum-entropy solver (Skilling & Bryan 1984) |
+//! | `field` | Gaussian fields on the sphere and in time, integrated out |
 //! | `planets` | periodograms, false alarms, limits, verdicts: planets in the velocities of the profiles |
 //! | `sampling` | log-densities, the affine-invariant ensemble, chains, optimiser, landscapes |
 //! | `posterior` | parameters and priors, images, objectives, fits, what profiles say by themselves |
@@ -42,6 +43,7 @@
 
 mod cli;
 mod data;
+mod field;
 mod figures;
 mod maxent;
 mod numerics;
@@ -57,6 +59,9 @@ pub mod internals {
     #![allow(missing_docs)]
     pub mod data {
         pub use crate::data::*;
+    }
+    pub mod field {
+        pub use crate::field::*;
     }
     pub mod figures {
         pub use crate::figures::*;

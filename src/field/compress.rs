@@ -1,10 +1,10 @@
 //! From the data of an epoch to the few numbers that hold what they say of the field.
 //!
-//! In units of the noise, `N^(-1/2) J S^(1/2)` has some dozen singular values that count: a profile has so many resolution
-//! elements. Along all other directions of the data there is white noise and nothing else; what residual and slopes have
-//! there enters the evidence as it is (`marginal.md` section 4). The variance of the field that is left out is at most
-//! [`Compression::left_out`] an epoch, in units of that of the noise: ln Z changes by less than half of it for the determinant, and
-//! by half of it times the mean square of the residual, about 1.
+//! In units of the noise, `N^(-1/2) J S^(1/2)` has some dozen singular values that count: a profile has so many
+//! resolution elements. Along all other directions of the data there is white noise and nothing else; what residual and
+//! slopes have there enters the evidence as it is (`docs/method.md` section 9). The variance of the field that is left
+//! out is at most [`Compression::left_out`] an epoch, in units of that of the noise: ln Z changes by less than half of
+//! it for the determinant, and by half of it times the mean square of the residual, about 1.
 
 use super::epoch::Epoch;
 use nalgebra::{DMatrix, DVector, DVectorView};
@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Compression {
-    /// Variance of the field along the directions of an epoch's data that are left out, over that of the noise; 0 keeps all.
+    /// Variance of the field along the directions of an epoch's data that are left out, over that of the noise; 0 keeps
+    /// all.
     pub left_out: f64,
 }
 
@@ -53,8 +54,8 @@ pub struct Beside {
 }
 
 impl Compressed {
-    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`. `None`
-    /// where the covariance of the noise has no Cholesky factor.
+    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`.
+    /// `None` where the covariance of the noise has no Cholesky factor.
     pub fn new(epoch: &Epoch, around: DVectorView<f64>, sd: &[f64], how: Compression) -> Option<Self> {
         let factor = epoch.noise().cholesky()?.unpack();
         let whiten = factor.solve_lower_triangular(&DMatrix::identity(epoch.len(), epoch.len()))?;
@@ -77,7 +78,8 @@ impl Compressed {
     }
 }
 
-/// Orthonormal directions Q (data, kept) that hold all of `N^(-1/2) J S^(1/2)` but what may be lost; `None` if that is not finite.
+/// Orthonormal directions Q (data, kept) that hold all of `N^(-1/2) J S^(1/2)` but what may be lost; `None` if that is
+/// not finite.
 fn directions(whiten: &DMatrix<f64>, scaled: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
     let n = whiten.nrows();
     if how.left_out == 0.0 {

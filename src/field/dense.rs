@@ -1,6 +1,6 @@
-//! Products and Cholesky factors of large symmetric matrices, in blocks of columns: nearly all of the work is in products of
-//! blocks, which nalgebra does with the best instructions of the processor (some 40 Gflop/s on one core; its own Cholesky
-//! factor, column by column, 1.5 to 4). One thread, and always the same order of sums.
+//! Products and Cholesky factors of large symmetric matrices, in blocks of columns: nearly all of the work is in
+//! products of blocks, which nalgebra does with the best instructions of the processor (some 40 Gflop/s on one core;
+//! its own Cholesky factor, column by column, 1.5 to 4). One thread, and always the same order of sums.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -14,8 +14,8 @@ pub struct Epoch {
     pub misfit: DVector<f64>,
     /// Variance of the noise of each datum (positive).
     pub variance: DVector<f64>,
-    /// Change of the model by each nuisance of this epoch, per standard deviation of its prior (data, nuisances): they are
-    /// integrated out. No columns: no nuisances.
+    /// Change of the model by each nuisance of this epoch, per standard deviation of its prior (data, nuisances): they
+    /// are integrated out. No columns: no nuisances.
     pub nuisances: DMatrix<f64>,
     /// D' (data, columns): change of the model by each number whose gradient and information are asked for, for example
     /// the velocity. The same number of columns, perhaps none, in every epoch.

@@ -1,9 +1,10 @@
-//! The evidence of data that are linear in a Gaussian field, and what follows from it (`marginal.md` section 2).
+//! The evidence of data that are linear in a Gaussian field, and what follows from it (`docs/method.md` section 9).
 //!
-//! With `C = J K J^T + N` over all epochs, `K = S_h k(t - t')`, and residual `r = misfit + J c0`:
-//! `ln Z = -1/2 r^T C^-1 r - 1/2 ln |C| - n/2 ln 2 pi` (n data), the density of the data with all fields and nuisances integrated
-//! out. The most probable coefficients are `c(t) = sum_k S k(t - t_k) J_k^T (C^-1 r)_k`; gradient and information of numbers that change
-//! the model by D' are `D'^T C^-1 r` and `D'^T C^-1 D'`. All of it in units of the noise and compressed, where N is 1.
+//! With `C = J K J^T + N` over all epochs, `K = S_h k(t - t')`, and residual `r = misfit + J c0`: `ln Z = -1/2 r^T C^-1
+//! r - 1/2 ln |C| - n/2 ln 2 pi` (n data), the density of the data with all fields and nuisances integrated out. The
+//! most probable coefficients are `c(t) = sum_k S k(t - t_k) J_k^T (C^-1 r)_k`; gradient and information of numbers
+//! that change the model by D' are `D'^T C^-1 r` and `D'^T C^-1 D'`. All of it in units of the noise and compressed,
+//! where N is 1.
 
 use super::compress::{Compressed, Compression};
 use super::dense::{self, Factor};
@@ -52,10 +53,12 @@ pub struct Derivatives {
 }
 
 impl Evidence {
-    /// Of epochs that are linear around the coefficients `around` (H, epochs), for a field of harmonics of these `degrees` (H).
+    /// Of epochs that are linear around the coefficients `around` (H, epochs), for a field of harmonics of these
+    /// `degrees` (H).
     ///
     /// # Errors
-    /// [`FieldError::NoSuchField`], [`FieldError::NotFinite`] and [`FieldError::NotPositive`]. Shapes that do not go together panic.
+    /// [`FieldError::NoSuchField`], [`FieldError::NotFinite`] and [`FieldError::NotPositive`]. Shapes that do not go
+    /// together panic.
     pub fn new(
         field: Field,
         degrees: &[usize],
@@ -142,8 +145,8 @@ impl Evidence {
         pulls * delays.map(|delay| self.field.kernel.at(delay))
     }
 
-    /// Gradient `g = D'^T C^-1 r` and information `I = D'^T C^-1 D'` of ln Z in the numbers whose slopes the epochs have; those of
-    /// one epoch stand together.
+    /// Gradient `g = D'^T C^-1 r` and information `I = D'^T C^-1 D'` of ln Z in the numbers whose slopes the epochs
+    /// have; those of one epoch stand together.
     pub fn gradient_and_information(&self) -> (DVector<f64>, DMatrix<f64>) {
         let gradient = self.slopes.tr_mul(&self.dual) + &self.beside_gradient;
         let mut forward = self.slopes.clone();

@@ -1,9 +1,10 @@
 //! Real spherical harmonics of degree 1 to L, of unit mean square over the sphere.
 //!
-//! `Y_l0 = P_l0(sin b)`, and for m > 0 the pair `P_lm(sin b) cos(m l)`, `P_lm(sin b) sin(m l)` at longitude l and latitude b, with
-//! Legendre functions normalised so that the mean of every Y^2 over the sphere is 1 (no Condon-Shortley phase). Order: by
-//! degree; within one m = 0, then cosine and sine of m = 1, 2, ... Degree 0 is left out: profiles do not tell the mean level
-//! (`marginal.md` section 2). The Legendre part is that of a whole ring of points of one latitude.
+//! `Y_l0 = P_l0(sin b)`, and for m > 0 the pair `P_lm(sin b) cos(m l)`, `P_lm(sin b) sin(m l)` at longitude l and
+//! latitude b, with Legendre functions normalised so that the mean of every Y^2 over the sphere is 1 (no
+//! Condon-Shortley phase). Order: by degree; within one m = 0, then cosine and sine of m = 1, 2, ... Degree 0 is left
+//! out: profiles do not tell the mean level (`docs/method.md` section 9). The Legendre part is that of a whole ring of
+//! points of one latitude.
 
 use nalgebra::DMatrix;
 
@@ -87,8 +88,8 @@ impl Harmonics {
         }
     }
 
-    /// The harmonics (rows, H) at points (columns) of these longitudes and latitudes (rad). Neighbours of one latitude share
-    /// their Legendre functions.
+    /// The harmonics (rows, H) at points (columns) of these longitudes and latitudes (rad). Neighbours of one latitude
+    /// share their Legendre functions.
     pub fn at(&self, longitudes: &[f64], latitudes: &[f64]) -> DMatrix<f64> {
         assert_eq!(longitudes.len(), latitudes.len());
         let mut values = DMatrix::zeros(self.len(), longitudes.len());
@@ -115,7 +116,8 @@ mod tests {
     use super::*;
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-    /// Points and weights that integrate polynomials exactly enough: midpoints in longitude, Gauss-Legendre in latitude.
+    /// Points and weights that integrate polynomials exactly enough: midpoints in longitude, Gauss-Legendre in
+    /// latitude.
     fn sphere(n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let (mut longitudes, mut latitudes, mut weights) = (vec![], vec![], vec![]);
         for i in 0..n {

@@ -1,5 +1,6 @@
-//! How the field forgets: the correlation of a coefficient with itself a time later (`marginal.md` sections 2 and 5),
-//! `k = f + (1 - f) (1 + a) exp(-a)` with `a = sqrt(3) |t - t'| / lifetime`: Matern 3/2 beside a share f that never changes.
+//! How the field forgets: the correlation of a coefficient with itself a time later (`docs/method.md` section 9),
+//! `k = f + (1 - f) (1 + a) exp(-a)` with `a = sqrt(3) |t - t'| / lifetime`: Matern 3/2 beside a share f that never
+//! changes.
 
 use serde::{Deserialize, Serialize};
 

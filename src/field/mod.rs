@@ -1,17 +1,20 @@
 //! Gaussian fields on the sphere and in time, integrated out of data that are linear, or nearly so, in them.
 //!
-//! A field `x(p, t) = sum_h c_h(t) Y_h(p)`: real spherical harmonics ([`harmonics`]) whose coefficients are independent Gaussian
-//! processes, `<c_h(t) c_h(t')> = S_h k(t - t')`, with a [`spectrum`] S over degrees and a [`kernel`] k in time. In come epochs
-//! ([`Epoch`]): at a time, data `r = J c + noise` with J made linear around some coefficients, noise with nuisances, and slopes
-//! `D'` of numbers whose gradient is asked for. Out come ln Z with all fields integrated out, the most probable field at
-//! any time with its standard deviation, and gradient and information of those numbers.
+//! A field `x(p, t) = sum_h c_h(t) Y_h(p)`: real spherical harmonics ([`harmonics`]) whose coefficients are independent
+//! Gaussian processes, `<c_h(t) c_h(t')> = S_h k(t - t')`, with a [`spectrum`] S over degrees and a [`kernel`] k in
+//! time. In come epochs ([`Epoch`]): at a time, data `r = J c + noise` with J made linear around some coefficients,
+//! noise with nuisances, and slopes `D'` of numbers whose gradient is asked for. Out come ln Z with all fields
+//! integrated out, the most probable field at any time with its standard deviation, and gradient and information of
+//! those numbers.
 //!
 //! Steps, in this order:
-//! 1. [`settle`]: where data are not linear, Gauss-Newton to the most probable coefficients, which linearises at each step and asks
+//! 1. [`settle`]: where data are not linear, Gauss-Newton to the most probable coefficients, which
+//!    linearises at each step and asks
 //! 2. [`compress`] for the few combinations of an epoch's data that say something of the field, of which
 //! 3. [`evidence`] makes covariance, ln Z and all that follows from it, with the means of `dense`.
 //!
-//! Source: `docs/method.md`, the marginal likelihood. Units of the field and of the data are the caller's; times are days.
+//! Units of the field and of the data are the caller's; times are
+//! days.
 
 pub mod compress;
 mod dense;
@@ -45,7 +48,10 @@ pub struct Field {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FieldError {
     /// Hyperparameters that no field has.
-    #[error("no field has amplitude {amplitude}, slope {slope}, lifetime {lifetime_d} d and persistent share {persistent}")]
+    #[error(
+        "no field has amplitude {amplitude}, slope {slope}, lifetime {lifetime_d} d and persistent share \
+    {persistent}"
+    )]
     NoSuchField {
         /// Standard deviation of the field.
         amplitude: f64,
@@ -79,8 +85,8 @@ impl Field {
     /// Whether there can be such a field.
     ///
     /// # Errors
-    /// [`FieldError::NoSuchField`] for a number that is not finite, a negative amplitude, a lifetime that is not positive or
-    /// a share outside [0, 1].
+    /// [`FieldError::NoSuchField`] for a number that is not finite, a negative amplitude, a lifetime that is not
+    /// positive or a share outside [0, 1].
     pub fn check(&self) -> Result<(), FieldError> {
         let (Spectrum { amplitude, slope }, Kernel { lifetime, persistent }) = (self.spectrum, self.kernel);
         let lifetime_d = match lifetime {

@@ -1,8 +1,9 @@
 //! The most probable field of data that are not linear in it: Gauss-Newton, of which every step is the linear answer
-//! (`marginal.md` section 2).
+//! (`docs/method.md` section 9).
 //!
-//! The largest change of the field in a step is limited: far from the answer the linear model promises too much. Start from
-//! no field at all or from the answer of the same hyperparameters nearby; from that of others it may not come back.
+//! The largest change of the field in a step is limited: far from the answer the linear model promises too much. Start
+//! from no field at all or from the answer of the same hyperparameters nearby; from that of others it may not come
+//! back.
 
 use super::{Compression, Epoch, Evidence, Field, FieldError};
 use nalgebra::DMatrix;
@@ -10,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// What is observed of a field.
 pub trait Model {
-    /// All epochs, made linear around coefficients (H, epochs), one column an epoch: always the same epochs in the same order.
-    /// Numbers that are not finite, where there is no model, are noticed.
+    /// All epochs, made linear around coefficients (H, epochs), one column an epoch: always the same epochs in the same
+    /// order. Numbers that are not finite, where there is no model, are noticed.
     fn linearise(&mut self, coefficients: &DMatrix<f64>) -> Vec<Epoch>;
 }
 
@@ -46,8 +47,8 @@ pub struct Settled {
     pub steps: usize,
 }
 
-/// Finds the most probable field from the coefficients `start` (H, epochs), zeros for no field. The change of the field is
-/// watched at points, given their harmonics (H, points).
+/// Finds the most probable field from the coefficients `start` (H, epochs), zeros for no field. The change of the field
+/// is watched at points, given their harmonics (H, points).
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].

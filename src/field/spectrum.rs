@@ -1,4 +1,4 @@
-//! How much of the field each degree of its spherical harmonics holds (`marginal.md` section 2):
+//! How much of the field each degree of its spherical harmonics holds (`docs/method.md` section 9):
 //! `S_l = amplitude^2 [l(l+1)]^-slope / norm`, the norm such that the variances of all coefficients sum to amplitude^2.
 //!
 //! With harmonics of unit mean square that sum is the variance of the field, the same at every point of the sphere.

@@ -11,6 +11,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("numerics", &[], &[]),
     ("star", &[], &["numerics"]),
     ("maxent", &[], &["numerics"]),
+    ("field", &[], &["numerics"]),
     ("planets", &["velocities", "verdict", "periodogram"], &["numerics"]),
     ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics", "planets::verdict"]),
     (

@@ -52,7 +52,8 @@ fn every_example_works() {
     let placeless: Vec<&String> = commands.iter().filter(|command| place(command).is_none()).collect();
     assert!(
         placeless.is_empty(),
-        "{placeless:?}: no place in ORDER of tests/house/examples.rs: put the command after those whose results its example reads"
+        "{placeless:?}: no place in ORDER of tests/house/examples.rs: put the command after those whose results its \
+        example reads"
     );
     commands.sort_by_key(place);
     let desk = desk();

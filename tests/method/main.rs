@@ -5,6 +5,7 @@ mod common;
 mod chain;
 mod ensemble;
 mod expansion;
+mod field;
 mod figure;
 mod first_look;
 mod forward;

@@ -4,8 +4,8 @@
 //! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the
 //! profiles, between the core of the line and what lies outside, and whether neighbouring bins are correlated. In
 //! replicated data every profile has the same chi2 per datum, but for the scatter of a chi2 distribution, and
-//! neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many fewer. What
-//! the map itself takes up is spread evenly here.
+//! neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many fewer.
+//! What the map itself takes up is spread evenly here.
 
 use super::Residual;
 use crate::planets::periodogram::normal::cumulative;
@@ -50,7 +50,8 @@ pub struct ProfileCheck {
 }
 
 impl Checks {
-    /// Of the `residuals` of every profile at its time, where noise is correlated over so many bins: they count for one.
+    /// Of the `residuals` of every profile at its time, where noise is correlated over so many bins: they count for
+    /// one.
     pub(super) fn of(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64) -> Self {
         let all = || profiles.iter().flat_map(|(_, residuals)| residuals);
         let per_datum = mean(all().map(|r| r.scaled * r.scaled));
