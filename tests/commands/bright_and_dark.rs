@@ -109,8 +109,8 @@ fn the_solution_meets_its_optimality_conditions_and_shows_what_is_there() {
 
 /// Of faint features both entropies are quadratic: with a default filling factor of one half, `-S` of spots is `2 a (s
 /// - 1/2)^2`, and that of brightnesses `a (B/B0 - 1)^2 / 2` with `B0` the brightness at one half. Images and ln L are
-/// the same then, and lambda differs by the factor `4 (B0 / (1 - c))^2`. What is left is of third order: the features,
-/// 1e-3.
+///   the same then, and lambda differs by the factor `4 (B0 / (1 - c))^2`. What is left is of third order: the
+///   features, 1e-3.
 #[test]
 fn faint_features_look_the_same_to_both_models() {
     let Scene { mut imager, settings, space, .. } = scene();

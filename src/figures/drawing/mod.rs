@@ -9,7 +9,7 @@
 //! Recovered against injected K, with error bars and the line where they agree:
 //!
 //! ```
-//! use dimcmc::figures::drawing::{Errors, Reference, ScatterPanel, Series, scatter};
+//! use dimcmc::internals::figures::drawing::{Errors, Reference, ScatterPanel, Series, scatter};
 //!
 //! let panel = ScatterPanel {
 //!     x_label: "injected *K* (km/s)".into(),

@@ -2,14 +2,15 @@
 //! each, then the late half.
 //!
 //! - R-hat and ESS of other programs compare chains, and take the draws of one to be a series in time. An ensemble is
-//! what is independent of the others, so it is the chain.
+//!   what is independent of the others, so it is the chain.
 //! - Within it a walker's steps stay together: what a step has in common with the next shows at lag 1, 2, ..., and ESS
-//! comes out as ensembles x walkers x steps / tau. With the walkers of a step side by side it would be at lags of 16,
-//! 32, ... (for 16 walkers), where nobody looks: sums over lags stop at the first that is negative, and ESS would be
-//! ten times too high for a tau of 12.
+//!   comes out as ensembles x walkers x steps / tau. With the walkers of a step side by side it would be at lags of 16,
+//!   32, ... (for 16 walkers), where nobody looks: sums over lags stop at the first that is negative, and ESS would be
+//!   ten times too high for a tau of 12.
 //! - Programs cut a chain into two halves, so as to see a drift. With the early half of every walker first, that cut
-//! divides early steps from late ones, as `summary.json` does: R-hat of the two is the same. Of an odd number of steps
-//! the middle one is early for the first half of the walkers and late for the second; `summary.json` leaves it out.
+//!   divides early steps from late ones, as `summary.json` does: R-hat of the two is the same. Of an odd number of
+//!   steps the middle one is early for the first half of the walkers and late for the second; `summary.json` leaves it
+//!   out.
 //!
 //! What is lost: where one walker ends and another begins there are neighbours that have nothing to do with each other.
 //! That takes a share of tau / (steps / 2) from the correlation. And correlations between walkers of an ensemble at

@@ -1,13 +1,13 @@
 //! Convergence of a chain: R-hat and effective sample size between independent ensembles, and the burn-in.
 //!
 //! - **R-hat** (Gelman & Rubin 1992; Vehtari et al. 2021): each ensemble is cut into an early and a late half, each
-//! half being one group with all its walkers pooled. Values are replaced by the normal scores of their ranks, and
-//! `R-hat = sqrt(((N - 1)/N W + B) / W)` with N draws a group, W the mean variance within groups and B the variance of
-//! the group means. The larger of the values' own and that of their distances from the median (folded) is taken.
+//!   half being one group with all its walkers pooled. Values are replaced by the normal scores of their ranks, and
+//!   `R-hat = sqrt(((N - 1)/N W + B) / W)` with N draws a group, W the mean variance within groups and B the variance
+//!   of the group means. The larger of the values' own and that of their distances from the median (folded) is taken.
 //! - **ESS** = V / Var(grand mean), V the variance of all draws pooled. Walkers of one ensemble are not independent, so
-//! Var(grand mean) comes from the series of ensemble means: `C(0) tau / (E n)`, C the autocovariance *around the grand
-//! mean* averaged over ensembles, tau its integrated time (at least 1). It is not let below what the scatter between
-//! ensemble means supports: `B_E / (E q)`, with q such that chance alone exceeds it once in a hundred times.
+//!   Var(grand mean) comes from the series of ensemble means: `C(0) tau / (E n)`, C the autocovariance *around the
+//!   grand mean* averaged over ensembles, tau its integrated time (at least 1). It is not let below what the scatter
+//!   between ensemble means supports: `B_E / (E q)`, with q such that chance alone exceeds it once in a hundred times.
 //! - **Periodic** parameters are judged by cosine and sine, and the worse of the two counts.
 //! - **Burn-in**: the smaller of half the chain and 5 times the largest autocorrelation time of its second half.
 

@@ -3,10 +3,10 @@
 //!
 //! - `ci68`, `ci95`: equal tails (16 to 84 %, 2.5 to 97.5 %); `hdi68`, `hdi95`: the shortest intervals.
 //! - A periodic parameter is unwrapped around its mode (cut opposite to it) before anything is computed. Point
-//! estimates are written in [0, 1); intervals stay contiguous (lo < hi) and around the median, so lo may be below 0 or
-//! hi above 1.
+//!   estimates are written in [0, 1); intervals stay contiguous (lo < hi) and around the median, so lo may be below 0
+//!   or hi above 1.
 //! - `upper95`, the 95 % quantile, is there for an amplitude whose posterior touches zero: the lower end of its 95 %
-//! HDI is within a tenth of a standard deviation of 0.
+//!   HDI is within a tenth of a standard deviation of 0.
 //! - Statistics are of the steps kept after the burn-in (`convergence`); `evaluations`, `failures`, `passes_median` and
 //!   `best` are of the whole chain, the start included.
 //!
