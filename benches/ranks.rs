@@ -9,7 +9,7 @@ mod common;
 use common::paper::{Free, Size, scene};
 use common::stopwatch::{Candidate, fastest, in_turn, quantile, seconds};
 use common::table::{Table, Target, thousands};
-use dimcmc::internals::data::config::{self, Settings};
+use dimcmc::internals::data::config::{Config, Settings};
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::data::search::{self, SearchSettings};
 use dimcmc::internals::posterior::objective::Posterior;
@@ -131,7 +131,7 @@ impl Case {
     fn new(free: Free, pixels: usize) -> Self {
         // of the config as it is written, which is what ranks know: not with the start moved to the truth
         let Settings { resolved, path, .. } = scene(free, Size::pixels(pixels)).settings;
-        let scene = Scene::new(config::from_json(resolved.to_string().as_bytes(), &path).unwrap()).unwrap();
+        let scene = Scene::new(&Config::at(resolved.clone(), &path)).unwrap();
         let settings = SearchSettings { other_starts: 0, ..SearchSettings::new(&scene.settings) };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let task = Task::new(&scene, &Origin::of(&scene, &found), scene.space.names(), Asked::LogProbability);

@@ -5,12 +5,8 @@
 //! prints the table of `results/moves.md`. Every case is `configs/demo.json` with another planet (on 5,000 pixels where
 //! there is one), or `configs/paper_7d.json`; a part of a name after `--` runs that case alone.
 
-use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::data::search::{SearchSettings, find};
-use dimcmc::internals::runs::manifest::kinds_and_goals;
-use dimcmc::internals::runs::pool::Pool;
-use dimcmc::internals::runs::run::{Run, StartFrom};
-use dimcmc::internals::sampling::chain::{MoveKind, Summary, summarise};
+use dimcmc::internals::sampling::chain::{MoveKind, Summary};
+use dimcmc::{Config, Run, Scene};
 use serde_json::{Value, json};
 
 type Failure = Box<dyn std::error::Error>;
@@ -62,15 +58,10 @@ fn chain(config: &Value, surrogate: f64, ess: f64) -> Result<Summary, Failure> {
     let mut config = config.clone();
     let seed = if surrogate > 0.0 { 1 } else { 2 };
     merge(&mut config, &json!({ "sampler": { "ess": ess, "seed": seed, "moves": { "surrogate": surrogate } } }));
-    let folder = tempfile::tempdir()?;
-    let file = folder.path().join("config.json");
-    std::fs::write(&file, config.to_string())?;
-    let scene = Scene::load(&file)?;
-    let found = find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ())?;
-    let mut run = Run::begin(&scene, &folder.path().join("run"), found, StartFrom::default(), false, &Pool::default())?;
-    run.go(&Pool::default(), |_, _| ())?;
-    let (kinds, goals) = kinds_and_goals(&scene.settings);
-    Ok(summarise(&run.chain, &kinds, &goals)?)
+    let scene = Scene::new(&Config::at(config, "config".as_ref()))?;
+    let mut run = Run::new(&scene)?;
+    run.finish()?;
+    Ok(run.summary()?)
 }
 
 fn row(summary: &Summary) -> String {

@@ -23,17 +23,74 @@
 //! | `figures` | figures of a folder, a page of them |
 //! | `cli` | the commands |
 //!
-//! # A map in a few lines
+//! # A star in code
 //!
-//! ```no_run
-//! use dimcmc::{Fit, Reference, Scene};
+//! A config has the keys of `docs/reference/config.md`, whether it is read from a file ([`Config::load`]) or built here.
+//! A [`Scene`] is a config with its observations, a [`Run`] the chain of its posterior.
+//!
+//! ```
+//! use dimcmc::{Config, Parameter, Prior, Run, Scene};
+//! use serde_json::json;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scene = Scene::load("configs/demo.json".as_ref())?;
-//! let settings = &scene.settings;
-//! let reference = Reference::build(&scene.imager, settings.values, settings.imaging.chi2_target.value())?;
-//! let fit = Fit::new(&scene.imager, &scene.observations, &reference);
-//! println!("spots cover {:.1} %", 100.0 * fit.summary.spottedness);
+//! let cycles: Vec<f64> = (0..12).map(|k| 0.27 * k as f64).collect();
+//! let config = Config::default()
+//!     .with("star.rotation_period_d", 3.0)
+//!     .with("star.inclination_deg", 60.0)
+//!     .with("star.vsini_kms", 25.0)
+//!     .with("star.line", json!({ "sigma_kms": 4.0, "equivalent_width_kms": 6.0 }))
+//!     .with("star.contrast", 0.3)
+//!     .with("planet", json!({ "k_kms": 0.3, "porb_over_prot": 1.7, "phi": 0.5 }))
+//!     .with("observations.simulate.spots", json!([[40.0, 30.0, 15.0, 0.9], [200.0, 60.0, 12.0, 0.8]]))
+//!     .with("observations.simulate.cycles", cycles)
+//!     .with("observations.simulate.velocity_kms", json!({ "min": -40.0, "max": 40.0, "step": 2.0 }))
+//!     .with("observations.simulate.snr", 1000.0)
+//!     .with("imaging.pixels", 500)
+//!     .with("sampler", json!({ "ensembles": 2, "walkers": 8, "steps": 50, "ess": 100.0, "rhat": 1.1 }))
+//!     .free(Parameter::K, Prior::Uniform { min: 0.0, max: 1.0 })
+//!     .free(Parameter::Phi, Prior::Periodic);
+//! let scene = Scene::new(&config)?;
+//! println!("spots cover {:.1} % of the map", 100.0 * scene.map()?.summary.spottedness);
+//!
+//! let mut run = Run::new(&scene)?;
+//! run.finish()?;
+//! let summary = run.summary()?;
+//! println!("{summary}");
+//! let k = &summary.parameters["k_kms"];
+//! assert!(k.ci95[0] < 0.3 && 0.3 < k.ci95[1]);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Profiles that are at hand as numbers take the place of files by [`Scene::with_profiles`]; [`Run::new_in`] keeps the
+//! chain in a folder, where `dimcmc` goes on with it.
+//!
+//! # Any density
+//!
+//! The sampler knows nothing of stars. What it samples is a [`LogDensity`].
+//!
+//! ```
+//! use dimcmc::{Evaluation, LogDensity, SamplerSettings, sample};
+//!
+//! /// A Gaussian of two parameters, correlated by 0.8.
+//! struct Gaussian([String; 2]);
+//!
+//! impl LogDensity for Gaussian {
+//!     fn names(&self) -> &[String] {
+//!         &self.0
+//!     }
+//!     fn evaluate(&self, x: &[f64]) -> Evaluation {
+//!         Evaluation::of(-0.5 * (x[0].powi(2) - 1.6 * x[0] * x[1] + x[1].powi(2)) / 0.36)
+//!     }
+//! }
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let settings = SamplerSettings { ensembles: 2, walkers: 10, rhat: 1.05, ess: 500.0, ..SamplerSettings::default() };
+//! let walker = |k: usize| vec![(1.7 * k as f64).sin(), (2.3 * k as f64).cos()];
+//! let start: Vec<Vec<Vec<f64>>> = (0..2).map(|e| (10 * e..10 * e + 10).map(walker).collect()).collect();
+//! let (chain, summary) = sample(&Gaussian(["x".into(), "y".into()]), &settings, &start)?;
+//! assert!(summary.converged && chain.steps() > 20);
+//! assert!((summary.parameters["y"].sd - 1.0).abs() < 0.2);
 //! # Ok(())
 //! # }
 //! ```
@@ -90,8 +147,18 @@ pub mod internals {
 }
 
 pub use cli::main as command_line;
-pub use data::scene::Scene;
-pub use posterior::fit::Fit;
-pub use posterior::objective::{Posterior, Reference};
-pub use runs::run::Run;
-pub use sampling::log_density::LogDensity;
+pub use data::config::{Config, ConfigError};
+pub use data::scene::{Scene, SceneError};
+pub use data::search::Found;
+pub use planets::verdict::{Finding, Remark, Signal, Verdict};
+pub use posterior::fit::{Fit, FitSummary};
+pub use posterior::imaging::Imager;
+pub use posterior::objective::{Parameter, ParameterValues, Posterior, Prior, Reference};
+pub use runs::blind_search::BlindSearch;
+pub use runs::run::{Run, RunError};
+pub use sampling::chain::{Chain, ParameterSummary, Record, Summary};
+pub use sampling::ensemble::{EnsembleError, SamplerSettings, StopReason, sample};
+pub use sampling::log_density::{Evaluation, LogDensity, Status};
+pub use sampling::optimise::Optimum;
+pub use star::Orbit;
+pub use star::observation::{Observations, Profile};

@@ -93,6 +93,8 @@ impl Failure {
     /// A run of the config at `path` that cannot begin or go on.
     pub fn run(path: &Path, error: RunError) -> Self {
         match error {
+            RunError::Config(error) => error.into(),
+            RunError::Search(error) => Failure::search(path, error),
             RunError::Origin(error) => Failure::origin(path, error),
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),

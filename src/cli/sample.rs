@@ -4,7 +4,7 @@ use super::output::{Output, remarks};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
-use crate::data::config;
+use crate::data::config::Config;
 use crate::data::io::effort::{EFFORT, Effort};
 use crate::data::scene::Scene;
 use crate::runs::manifest;
@@ -63,7 +63,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     if let Some(steps) = args.extend.filter(|steps| *steps > MOST_STEPS) {
         return Err(Failure::input(format!("--extend: must be at most {MOST_STEPS}, not {steps}")));
     }
-    let scene = Scene::new(config::load_with_seed(&args.config, args.seed)?)?;
+    let config = Config::load(&args.config)?;
+    let scene = Scene::new(&match args.seed {
+        Some(seed) => config.with("sampler.seed", seed),
+        None => config,
+    })?;
     args.output.spare(&scene.files(), |name| [manifest::FILE, CHAIN, SUMMARY, EFFORT].contains(&name))?;
     remarks(&scene);
     scene.settings.require_free()?;
@@ -88,7 +92,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         let spinner = progress::bar(global, None, "start of the walkers");
         args.output.check()?;
         signals.defer();
-        let run = Run::begin(&scene, folder, found, from, args.output.replaces(), &pool);
+        let run =
+            Run::in_memory(&scene, found, from, &pool).and_then(|run| run.kept_in(folder, args.output.replaces()));
         spinner.finish_and_clear();
         run.map_err(failed)?
     };

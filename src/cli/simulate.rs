@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
-use crate::data::config::{self, ObservationSource};
+use crate::data::config::{Config, ObservationSource};
 use crate::data::io::{lsd, truth};
 use crate::data::scene::Scene;
 use std::path::PathBuf;
@@ -24,12 +24,12 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
-    let settings = config::load(&args.config)?;
-    let ObservationSource::Simulate(simulation) = settings.source.clone() else {
+    let config = Config::load(&args.config)?;
+    let ObservationSource::Simulate(simulation) = config.settings()?.source else {
         let problem = "missing, a simulation needs its spots, cycles and velocities";
         return Err(Failure::input(format!("{}: observations.simulate: {problem}", args.config.display())));
     };
-    let scene = Scene::new(settings)?;
+    let scene = Scene::new(&config)?;
     args.output.spare(&scene.files(), |name| lsd::is_written(name) || name == truth::FILE)?;
     let truth = scene.truth_of(&simulation);
     let folder = args.output.create()?;

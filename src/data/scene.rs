@@ -1,21 +1,25 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
-use crate::data::config::{self, Automatic, ConfigError, ObservationSource, Settings, VelocityJitter};
+use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;
+use crate::data::search::{self, Found, SearchError, SearchSettings};
+use crate::posterior::fit::Fit;
 use crate::posterior::imaging::Imager;
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
-use crate::posterior::objective::{FreeParameter, ParameterSpace, ParameterValues, ReferenceError, target};
+use crate::posterior::objective::{FreeParameter, ParameterSpace, ParameterValues, Reference, ReferenceError, target};
 use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
 use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
-use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
+
+/// What stands for the list of profiles in the config of profiles that are in no file.
+const IN_MEMORY: &str = "profiles in memory";
 
 /// A config with its observations.
 #[derive(Clone, Debug)]
@@ -54,22 +58,45 @@ impl Scene {
     /// # Errors
     /// A config or observations that cannot be read or make no sense.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        Scene::new(config::load(path)?)
+        Scene::new(&Config::load(path)?)
     }
 
-    /// Of a config at hand as if it were read from `path`.
+    /// Reads or simulates the observations of `config`.
     ///
     /// # Errors
-    /// A config or observations that cannot be read or make no sense.
-    pub fn of_config(config: &Value, path: &Path) -> Result<Self, SceneError> {
-        Scene::new(config::from_json(config.to_string().as_bytes(), path)?)
+    /// A config or observations that make no sense.
+    pub fn new(config: &Config) -> Result<Self, SceneError> {
+        Scene::read(config.settings()?)
+    }
+
+    /// The scene of `config` with these profiles in place of its own: cut, scaled and judged as profiles from files
+    /// would be.
+    ///
+    /// # Errors
+    /// A config or profiles that make no sense.
+    pub fn with_profiles(config: &Config, profiles: Observations) -> Result<Self, SceneError> {
+        let config = match config.get("observations.path") {
+            Some(_) => config.clone(),
+            None => config.clone().with("observations.path", IN_MEMORY),
+        };
+        let settings = config.settings()?;
+        let fault = |problem: String| settings.fault("observations", &problem);
+        profiles.check().map_err(fault)?;
+        let ObservationSource::Files { options, continuum_level, .. } = &settings.source else {
+            return Err(fault("profiles are given and simulated: leave out `simulate`".into()).into());
+        };
+        let whole = profiles.over_continuum(*continuum_level);
+        let cut = match options.velocity_range_kms {
+            Some(range) => {
+                whole.within(range).map_err(|problem| settings.fault("observations.velocity_range_kms", &problem))?
+            }
+            None => whole.clone(),
+        };
+        Ok(Scene::of_whole(settings, &whole, &cut)?)
     }
 
     /// Reads or simulates the observations of `settings`.
-    ///
-    /// # Errors
-    /// Observations that cannot be read or make no sense.
-    pub fn new(settings: Settings) -> Result<Self, SceneError> {
+    fn read(settings: Settings) -> Result<Self, SceneError> {
         let (mut errors, mut remarks) = (None, Vec::new());
         let (observations, data_sha256, truth) = match &settings.source {
             ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
@@ -160,6 +187,24 @@ impl Scene {
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
+    }
+
+    /// The star reconstructed at the config's values: map, model profiles, and whether they fit.
+    ///
+    /// # Errors
+    /// A target chi2 that no map reaches.
+    pub fn map(&self) -> Result<Fit, ReferenceError> {
+        let target = self.settings.imaging.chi2_target.value();
+        let reference = Reference::build(&self.imager, self.settings.values, target)?;
+        Ok(Fit::new(&self.imager, &self.observations, &reference))
+    }
+
+    /// The best parameters, and the posterior with its reference there.
+    ///
+    /// # Errors
+    /// No map, or no start that leads anywhere.
+    pub fn optimise(&self) -> Result<Found, SearchError> {
+        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), &|_| ())
     }
 
     /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected

@@ -137,7 +137,7 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
     } else {
         let settings = SearchSettings::new(&scene.settings);
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
-        Run::begin(&scene, folder, found, StartFrom::Optimum, true, pool)?
+        Run::in_memory(&scene, found, StartFrom::Optimum, pool)?.kept_in(folder, true)?
     };
     if run.go(pool, |_, _| ())? == crate::sampling::ensemble::StopReason::Interrupted {
         return Ok(End::Interrupted);

@@ -5,7 +5,7 @@
 
 mod conclusions;
 
-use crate::data::config::{self, Settings};
+use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::posterior::objective::{
     FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, definition, in_earths,
@@ -215,7 +215,7 @@ impl Manifest {
     /// # Errors
     /// A config that this version does not understand.
     pub fn settings(&self, folder: &Path) -> Result<Settings, OriginError> {
-        Ok(config::from_json(self.origin.config.to_string().as_bytes(), &folder.join(FILE))?)
+        Ok(Config::at(self.origin.config.clone(), &folder.join(FILE)).settings()?)
     }
 }
 

@@ -4,7 +4,7 @@
 //! reference, and have different seeds. What is beyond the shortest of them is left out, for a step is one of all
 //! ensembles.
 
-use crate::data::config::{self, ConfigError};
+use crate::data::config::{self, Config, ConfigError};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::{self, Journal, JournalError};
 use crate::runs::manifest::Manifest;
@@ -160,7 +160,7 @@ fn joined(manifests: &[Manifest], folder: &Path) -> Result<Manifest, MergeError>
     if let Some(sampler) = config.get_mut("sampler").and_then(Value::as_object_mut) {
         sampler.insert("ensembles".into(), json!(ensembles));
     }
-    let settings = config::from_json(config.to_string().as_bytes(), &folder.join(crate::runs::manifest::FILE))?;
+    let settings = Config::at(config.clone(), &folder.join(crate::runs::manifest::FILE)).settings()?;
     let mut manifest = Manifest { ensembles, extend_to: None, ..first.clone() };
     (manifest.origin.config, manifest.origin.config_sha256) = (settings.resolved, settings.sha256);
     manifest.start = manifests.iter().flat_map(|one| one.start.clone()).collect();

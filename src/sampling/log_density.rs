@@ -46,6 +46,12 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
+    /// A log-probability alone.
+    pub fn of(log_prob: f64) -> Self {
+        let status = if log_prob.is_nan() { Status::NonFinite } else { Status::Converged };
+        Evaluation { log_prob, ..Evaluation::rejected(status) }
+    }
+
     /// An evaluation without a reconstruction: log-probability minus infinity, derived numbers zero.
     pub fn rejected(status: Status) -> Self {
         Evaluation { log_prob: f64::NEG_INFINITY, spottedness: 0.0, chi2: 0.0, passes: 0, status }

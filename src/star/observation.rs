@@ -34,6 +34,58 @@ pub struct Observations {
 }
 
 impl Observations {
+    /// Whether these can be the profiles of a star: two at least, in bins of a positive width, with as many errors as
+    /// intensities, all finite and the errors positive.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, in words.
+    pub fn check(&self) -> Result<(), String> {
+        if !(self.step_kms > 0.0 && self.step_kms.is_finite()) {
+            return Err(format!("velocity bins of {} km/s: must be above 0", self.step_kms));
+        }
+        if self.profiles.len() < 2 {
+            return Err(format!("{} profile: spots and a planet are told apart by two at least", self.profiles.len()));
+        }
+        for (k, profile) in self.profiles.iter().enumerate() {
+            let Profile { time_d, first_velocity_kms, intensity, sigma } = profile;
+            let problem = match (intensity.len(), sigma.len()) {
+                (0, _) => "has no bin".to_owned(),
+                (bins, errors) if bins != errors => format!("has {bins} intensities and {errors} errors"),
+                _ if !(time_d.is_finite() && first_velocity_kms.is_finite()) => {
+                    format!("is at {time_d} d and begins at {first_velocity_kms} km/s: must be finite")
+                }
+                _ => match intensity.iter().zip(sigma).position(|(i, s)| !(i.is_finite() && s.is_finite() && *s > 0.0))
+                {
+                    Some(j) => format!("bin {j}: {} +- {}: must be finite, the error above 0", intensity[j], sigma[j]),
+                    None => continue,
+                },
+            };
+            return Err(format!("profile {k} {problem}"));
+        }
+        Ok(())
+    }
+
+    /// The bins whose centres lie between two velocities (km/s), both included.
+    ///
+    /// # Errors
+    /// A profile that has none there, in words.
+    pub fn within(&self, (low, high): (f64, f64)) -> Result<Self, String> {
+        let cut = |(k, profile): (usize, &Profile)| {
+            let inside = |j: &usize| (low..=high).contains(&profile.velocity_kms(*j, self.step_kms));
+            let mut bins = (0..profile.intensity.len()).filter(inside);
+            let first = bins.next().ok_or_else(|| format!("profile {k} has no bin from {low} to {high} km/s"))?;
+            let bins = first..bins.last().unwrap_or(first) + 1;
+            Ok(Profile {
+                time_d: profile.time_d,
+                first_velocity_kms: profile.velocity_kms(first, self.step_kms),
+                intensity: profile.intensity[bins.clone()].to_vec(),
+                sigma: profile.sigma[bins].to_vec(),
+            })
+        };
+        let profiles = self.profiles.iter().enumerate().map(cut).collect::<Result<_, String>>()?;
+        Ok(Observations { step_kms: self.step_kms, profiles })
+    }
+
     /// Number of data (bins of all profiles together).
     pub fn len(&self) -> usize {
         self.profiles.iter().map(|p| p.intensity.len()).sum()

@@ -2,7 +2,7 @@
 //! they were put, and every command with them.
 
 use crate::desk::{Desk, says, two_spots};
-use dimcmc::internals::data::config;
+use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
@@ -25,7 +25,7 @@ fn scene() -> Scene {
     config["observations"]["simulate"]["faculae"] = json!(FACULAE);
     config["imaging"]["brightness"] = json!("bright-and-dark");
     config["imaging"]["pixels"] = json!(1500);
-    Scene::new(config::from_json(config.to_string().as_bytes(), &path).unwrap()).unwrap()
+    Scene::new(&Config::at(config.clone(), &path)).unwrap()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

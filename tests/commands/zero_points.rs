@@ -1,7 +1,7 @@
 //! Velocity zero points: what they make of the information, how they are found, and what is said of them.
 
 use crate::desk::{Desk, dimcmc, says, star, text};
-use dimcmc::internals::data::config;
+use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::posterior::expansion::Expansion;
 use dimcmc::internals::posterior::imaging::Imager;
@@ -21,7 +21,7 @@ fn zero_points_add_their_variance_to_that_of_the_velocities() {
     let mut json: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
     json["observations"]["simulate"]["pixels"] = 5000.into();
     json["imaging"]["pixels"] = 800.into();
-    let scene = Scene::new(config::from_json(json.to_string().as_bytes(), &path).unwrap()).unwrap();
+    let scene = Scene::new(&Config::at(json.clone(), &path)).unwrap();
     let mut values = scene.settings.values;
     values[Parameter::K] = 0.0;
     let information = |imager: &Imager| {

@@ -33,7 +33,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ),
     (
         "data",
-        &["io", "config", "scene", "search", "diagnosis", "init", "import"],
+        &["io", "config", "search", "scene", "diagnosis", "init", "import"],
         &["numerics", "star", "maxent", "planets", "sampling", "posterior"],
     ),
     (

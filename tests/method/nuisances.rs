@@ -1,7 +1,7 @@
 //! Nuisances of line and continuum against dense algebra, differences and simulated stars whose continua wander.
 
 use crate::common::{imager, oracle, truth};
-use dimcmc::internals::data::config;
+use dimcmc::internals::data::config::{Config, ObservationSource};
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
 use dimcmc::internals::posterior::expansion::{Expansion, STELLAR};
@@ -159,7 +159,7 @@ fn wandering(nuisances: bool) -> Scene {
     if nuisances {
         json["imaging"]["nuisances"] = serde_json::to_value(PRIORS).unwrap();
     }
-    Scene::new(config::from_json(json.to_string().as_bytes(), &path).unwrap()).unwrap()
+    Scene::new(&Config::at(json.clone(), &path)).unwrap()
 }
 
 /// `K cos` and `K sin` of the orbit at its true period, from the planet-free image, with their errors.
@@ -191,7 +191,7 @@ fn an_orbit_is_found_under_wandering_continua() {
     assert!(fit.summary.residual_rms < 1.05e-3, "{}", fit.summary.residual_rms);
     // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth
     // of the prior
-    let config::ObservationSource::Simulate(simulation) = &scene.settings.source else { panic!() };
+    let ObservationSource::Simulate(simulation) = &scene.settings.source else { panic!() };
     for i in 0..3 {
         let (found, injected): (Vec<f64>, Vec<f64>) =
             fit.nuisances.iter().zip(simulation.nuisances()).map(|(a, b)| (a.numbers()[i], b.numbers()[i])).unzip();

@@ -1,7 +1,7 @@
 //! Parameters of the star's surface as free parameters: a star simulated with others than the config's is found again,
 //! and what does not free them does not know of them.
 
-use dimcmc::internals::data::config;
+use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::data::search::{self, SearchSettings};
 use dimcmc::internals::posterior::objective::{ObjectiveKind, Parameter, Posterior, Reference};
@@ -16,7 +16,7 @@ fn scene(change: impl Fn(&mut Value)) -> Scene {
     json["imaging"]["pixels"] = 800.into();
     json["parameters"] = json!({});
     change(&mut json);
-    Scene::new(config::from_json(json.to_string().as_bytes(), &path).unwrap()).unwrap()
+    Scene::new(&Config::at(json.clone(), &path)).unwrap()
 }
 
 /// Line and limb darkening of a star simulated with others than the config's. Its spots are faint: the map of highest

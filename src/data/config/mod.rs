@@ -1,4 +1,5 @@
-//! The config file: JSON as users write it -> checked, resolved [`Settings`]; and its JSON Schema.
+//! The config: JSON as users write it, or a [`Config`] built in code -> checked, resolved [`Settings`]; and its JSON
+//! Schema.
 //!
 //! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for),
 //! and every error names the file and the key.
@@ -17,6 +18,7 @@ mod resolve_observations;
 mod resolve_star;
 mod settings;
 mod suggest;
+mod written;
 
 pub use crate::sampling::ensemble::SamplerSettings;
 pub use automatic::Automatic;
@@ -26,6 +28,7 @@ pub use identity::{Difference, first_difference, jitter_difference, model_differ
 pub use jitter::VelocityJitter;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
+pub use written::Config;
 
 use std::path::Path;
 
@@ -41,29 +44,20 @@ pub fn load(path: &Path) -> Result<Settings, ConfigError> {
     from_json(&bytes, path)
 }
 
-/// As [`load`], the sampler's seed replaced if another one is given.
-///
-/// # Errors
-/// As [`load`].
-pub fn load_with_seed(path: &Path, seed: Option<u64>) -> Result<Settings, ConfigError> {
-    let settings = load(path)?;
-    let Some(seed) = seed else { return Ok(settings) };
-    let mut config = settings.resolved;
-    config["sampler"]["seed"] = seed.into();
-    from_json(config.to_string().as_bytes(), path)
-}
-
 /// Resolves a config already read; `path` is what errors name and whose folder paths start from.
 ///
 /// # Errors
 /// As [`load`], but for reading.
 pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
-    // Editors on Windows put a byte-order mark first.
-    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-    let mut deserializer = serde_json::Deserializer::from_slice(json);
+    let mut deserializer = serde_json::Deserializer::from_slice(without_mark(json));
     let raw = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
     deserializer.end().map_err(|e| ConfigError::json(path, &e))?;
     resolve::resolve(raw, path).map_err(|fault| fault.within(path))
+}
+
+/// Editors on Windows put a byte-order mark first.
+fn without_mark(json: &[u8]) -> &[u8] {
+    json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)
 }
 
 /// A config as text, laid out for people.

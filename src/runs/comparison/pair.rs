@@ -1,7 +1,7 @@
 //! A run and a landscape that belong together: the same data, star, image and objective, and axes that the chain
 //! samples.
 
-use crate::data::config::{self, Difference, Settings};
+use crate::data::config::{self, Config, Difference, Settings};
 use crate::data::io::effort::Effort;
 use crate::data::io::journal;
 use crate::data::io::landscape;
@@ -73,7 +73,7 @@ impl Pair {
         let header = Header::read(grid)?;
         let settings = manifest.settings(run)?;
         let source = grid.join(HEADER);
-        let grid_settings = config::from_json(header.origin.config.to_string().as_bytes(), &source);
+        let grid_settings = Config::at(header.origin.config.clone(), &source).settings();
         let grid_settings = grid_settings.map_err(OriginError::Config)?;
         if let Some(what) = what_differs(&manifest, &settings, &header, &grid_settings) {
             return Err(PairError::Different { run: run.into(), grid: grid.into(), what });

@@ -7,7 +7,7 @@
 use super::laboratory::ExperimentError;
 use super::outcome::{Estimate, Outcome, Route};
 use super::star::with;
-use crate::data::config::GridSettings;
+use crate::data::config::{Config, GridSettings};
 use crate::data::io::atomic::write_json;
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::scene::Scene;
@@ -163,14 +163,14 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
             Err(SearchError::Reference(error)) => Ok(Err(error)),
             Err(error) => Err(error),
         };
-    let mut last = match found(Scene::of_config(config, path)?)? {
+    let mut last = match found(Scene::new(&Config::at(config.clone(), path))?)? {
         Ok(found) => return Ok(found),
         Err(error) => error,
     };
     if matches!(last, ReferenceError::NothingToFit { .. }) {
         return Err(last.into());
     }
-    let first = Scene::of_config(config, path)?;
+    let first = Scene::new(&Config::at(config.clone(), path))?;
     let target = first.settings.imaging.chi2_target.value();
     let reached = Reference::provisional(&first.imager, first.settings.values, target)?.solution.chi2;
     let reached = reached / first.imager.data.depth.len() as f64;
@@ -179,7 +179,7 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
             return Err(ExperimentError::Interrupted);
         }
         let target = json!((1e4 * factor * reached).round() / 1e4);
-        match found(Scene::of_config(&with(config.clone(), &[("/imaging/chi2_target", target)]), path)?)? {
+        match found(Scene::new(&Config::at(with(config.clone(), &[("/imaging/chi2_target", target)]), path))?)? {
             Ok(found) => return Ok(found),
             Err(error) => last = error,
         }
@@ -233,7 +233,7 @@ pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<
     let began = Instant::now();
     let resumed = folder.join(CHAIN).exists();
     let mut run = match Run::resume(scene, folder, None, pool) {
-        Err(RunError::Origin(_)) => Run::begin(scene, folder, found, StartFrom::Optimum, true, pool)?,
+        Err(RunError::Origin(_)) => Run::in_memory(scene, found, StartFrom::Optimum, pool)?.kept_in(folder, true)?,
         resumed => resumed?,
     };
     if run.go(pool, |_, _| ())? == StopReason::Interrupted {

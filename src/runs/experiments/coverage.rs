@@ -8,6 +8,7 @@ use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::{Estimate, Outcome, share};
 use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
+use crate::data::config::Config;
 use crate::data::scene::Scene;
 use crate::posterior::objective::Reference;
 use rand::{Rng, SeedableRng};
@@ -170,7 +171,7 @@ const LAMBDA: f64 = 3.0;
 /// data. How far down a noise realisation lets chi2 come is up to it, and a target near the floor would make noise of
 /// the spots.
 pub(super) fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, ExperimentError> {
-    let scene = Scene::of_config(&config, &laboratory.folder.join("config.json"))?;
+    let scene = Scene::new(&Config::at(config.clone(), &laboratory.folder.join("config.json")))?;
     let image = Reference::at_lambda(&scene.imager, scene.settings.values, LAMBDA)?;
     let chi2 = (1e4 * image.solution.chi2 / scene.imager.data.depth.len() as f64).round() / 1e4;
     Ok(with(config, &[("/imaging/chi2_target", json!(chi2))]))

@@ -3,7 +3,7 @@
 use super::laboratory::{ExperimentError, Laboratory};
 use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
-use crate::data::config;
+use crate::data::config::Config;
 use crate::data::scene::Scene;
 use crate::posterior::fit::Fit;
 use crate::posterior::objective::Reference;
@@ -17,7 +17,7 @@ fn scene(laboratory: &Laboratory, changes: &[(&str, Value)]) -> Result<Scene, Ex
     let pixels = [("/imaging/pixels", json!(laboratory.full_or_quick(20_000, 2000)))];
     let config = with(with(paper(), &pixels), changes);
     let path = laboratory.folder.join("config.json");
-    Ok(Scene::new(config::from_json(config.to_string().as_bytes(), &path)?)?)
+    Ok(Scene::new(&Config::at(config, &path))?)
 }
 
 fn first_moments(scene: &Scene) -> Vec<f64> {

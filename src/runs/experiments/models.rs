@@ -10,6 +10,7 @@ use super::laboratory::{ExperimentError, Laboratory};
 use super::outcome::{Outcome, share};
 use super::report::Report;
 use super::star::{paper, with};
+use crate::data::config::Config;
 use crate::data::io::lsd;
 use crate::data::scene::{Scene, SceneError};
 use rand::{Rng, SeedableRng};
@@ -159,7 +160,7 @@ fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64),
     let seeded = [("/observations/simulate/spots", spots), ("/observations/simulate/seed", json!(1 + seed))];
     let simulated = with(with(plain.clone(), &seeded), &more);
     let folder = laboratory.folder(&format!("models/{}_data_{seed}", kind.name))?;
-    let observations = Scene::of_config(&simulated, &folder.join("config.json"))?.observations;
+    let observations = Scene::new(&Config::at(simulated, &folder.join("config.json")))?.observations;
     lsd::write(&folder, &observations).map_err(SceneError::from)?;
     // the same file for whoever reads the config from elsewhere
     let path = std::path::absolute(folder.join("observations.txt")).unwrap_or_else(|_| folder.join("observations.txt"));

@@ -2,6 +2,7 @@
 
 use super::shortcut::{Outcome, Shortcut};
 use super::{Limit, LimitSettings};
+use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
 use crate::planets::periodogram::Search;
 use crate::planets::verdict::CANDIDATE_FAP;
@@ -114,7 +115,7 @@ impl WholeWay {
     /// # Errors
     /// A config or profiles that are no longer what they were.
     pub fn searcher(&self) -> Result<impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<>, WholeWayError> {
-        let scene = Scene::of_config(&self.resolved, &self.config)?;
+        let scene = Scene::new(&Config::at(self.resolved.clone(), &self.config))?;
         if scene.data_sha256 != self.data_sha256 {
             return Err(WholeWayError::Changed(self.config.clone()));
         }

@@ -4,6 +4,7 @@
 
 use super::message::{Answer as _, numbers_from_bytes};
 use super::target::{Target, UnresolvedSpotsError};
+use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
 use crate::posterior::objective::FreeParameter;
 use crate::runs::limits::{WholeWay, WholeWayError};
@@ -91,7 +92,7 @@ impl Task {
     /// # Errors
     /// [`TaskError`]: data that are missing or others here, a reference that comes out differently.
     pub fn answerer(&self) -> Result<Answerer, TaskError> {
-        let scene = Scene::of_config(&self.origin.config, &self.config)?;
+        let scene = Scene::new(&Config::at(self.origin.config.clone(), &self.config))?;
         let place = self.config.as_path();
         self.origin.check(&scene, place)?;
         let settings = &scene.settings;

@@ -1,8 +1,10 @@
 //! Why a run cannot begin, or go on.
 
 use super::start;
+use crate::data::config::ConfigError;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::JournalError;
+use crate::data::search::SearchError;
 use crate::runs::origin::OriginError;
 use crate::runs::pool::UnresolvedSpotsError;
 use crate::sampling::ensemble::EnsembleError;
@@ -10,7 +12,14 @@ use std::path::PathBuf;
 
 /// Why a run cannot begin, or go on.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RunError {
+    /// The config does not ask for a chain, or makes no sense.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The search for the best parameters led nowhere.
+    #[error(transparent)]
+    Search(#[from] SearchError),
     /// The start is no start, or the sampler's settings are wrong.
     #[error(transparent)]
     Ensemble(#[from] EnsembleError),

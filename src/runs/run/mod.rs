@@ -1,4 +1,4 @@
-//! A sampling run: start, chain on disk; begun afresh or resumed to the same bytes.
+//! A sampling run: search, start, chain, in memory or on disk; begun afresh or resumed to the same bytes.
 //!
 //! `start` is where the walkers begin.
 
@@ -7,7 +7,8 @@ mod start;
 
 pub use error::RunError;
 
-use crate::data::io::journal::{Journal, JournalError};
+use crate::data::config::Settings;
+use crate::data::io::journal::{self, Journal, JournalError};
 use crate::data::io::lines;
 use crate::data::scene::Scene;
 use crate::data::search::Found;
@@ -16,11 +17,11 @@ use crate::runs::blind_search::BlindSearch;
 use crate::runs::manifest::{self, Manifest, kinds_and_goals};
 use crate::runs::origin::Origin;
 use crate::runs::pool::{Asked, Evaluations, Pool, Target, Task};
-use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record};
+use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record, Summary};
 use crate::sampling::ensemble::{
     self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason,
 };
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Name of the chain in a run's folder.
 pub const CHAIN: &str = "chain.jsonl";
@@ -44,40 +45,78 @@ pub enum StartFrom {
     Prior,
 }
 
-/// A run with its chain so far.
+/// A chain of the posterior of a [`Scene`], with what it was begun with.
 pub struct Run {
-    /// Where it is kept.
-    pub folder: PathBuf,
     /// What it was begun with.
+    #[doc(hidden)]
     pub manifest: Manifest,
     /// The chain so far.
     pub chain: Chain,
     /// Reconstructions before its first step: to fit and try the surrogate, and for the start.
+    #[doc(hidden)]
     pub preparation: usize,
     target: Target,
     task: Task,
     kinds: Vec<ParameterKind>,
     policy: StopPolicy,
-    settings: ensemble::SamplerSettings,
+    settings: Settings,
     /// With the share of its proposals accepted on trial.
     surrogate: Option<(Surrogate, f64)>,
-    journal: Journal,
+    /// Where every step is written before the next begins; none in memory.
+    journal: Option<Journal>,
 }
 
 impl Run {
-    /// Begins a run at what a search `found`: draws the start, makes the folder with chain, manifest and step 0. A run
-    /// that is in the folder already is replaced if `replace`, and refused otherwise.
+    /// Searches for the best parameters of `scene` and draws the start around them; the run is kept in memory.
     ///
     /// # Errors
-    /// [`RunError`]; nothing is written where there is no start.
-    pub fn begin(
-        scene: &Scene,
-        folder: &Path,
-        found: Found,
-        from: StartFrom,
-        replace: bool,
-        pool: &Pool,
-    ) -> Result<Self, RunError> {
+    /// [`RunError`]: nothing is free, the search leads nowhere, the sampler's settings are wrong.
+    pub fn new(scene: &Scene) -> Result<Self, RunError> {
+        scene.settings.require_free()?;
+        Run::in_memory(scene, scene.optimise()?, StartFrom::Optimum, &Pool::default())
+    }
+
+    /// The same, kept in `folder`: `manifest.json` and `chain.jsonl`, a line for each walker and step.
+    ///
+    /// # Errors
+    /// As [`Run::new`], and a folder that holds a run already or cannot be written.
+    pub fn new_in(folder: &Path, scene: &Scene) -> Result<Self, RunError> {
+        Run::new(scene)?.kept_in(folder, false)
+    }
+
+    /// Steps until the goals of the config, or its step limit, are reached, on all threads.
+    ///
+    /// # Errors
+    /// A chain that cannot be written.
+    pub fn finish(&mut self) -> Result<StopReason, RunError> {
+        self.go(&Pool::default(), |_, _| ())
+    }
+
+    /// What the chain says of each parameter, whether it has converged, and the verdict on a planet.
+    ///
+    /// # Errors
+    /// A chain of another kind than its manifest: a fault of the program.
+    pub fn summary(&self) -> Result<Summary, RunError> {
+        Ok(self.manifest.summarise(&self.settings, &self.chain)?.0)
+    }
+
+    /// Reads the chain and the summary of the run in `folder`, whether or not it is finished.
+    ///
+    /// # Errors
+    /// No run there, or one that is broken.
+    pub fn read(folder: &Path) -> Result<(Chain, Summary), RunError> {
+        let manifest = Manifest::read(folder)?;
+        let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
+        let (summary, _) = manifest.summarise(&manifest.settings(folder)?, &chain)?;
+        Ok((chain, summary))
+    }
+
+    /// Begins a run at what a search `found`: draws the start and evaluates it.
+    ///
+    /// # Errors
+    /// [`RunError`], where there is no start.
+    #[doc(hidden)]
+    pub fn in_memory(scene: &Scene, found: Found, from: StartFrom, pool: &Pool) -> Result<Self, RunError> {
         scene.settings.sampler.validate(scene.space.dimension())?;
         let needed = from == StartFrom::Optimum || scene.settings.sampler.moves.surrogate > 0.0;
         let target = Target::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots)?;
@@ -97,26 +136,39 @@ impl Run {
         // what was not evaluated looks like a start that is none
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
         let manifest = new_manifest(scene, origin, BlindSearch::of(scene), start);
+        let mut chain = Chain::new(manifest.shape());
+        chain.push_step(&first)?;
+        let run = Run::of(scene, manifest, (target, task), surrogate, (None, chain));
+        Ok(Run { preparation, ..run })
+    }
+
+    /// The same in `folder`, which is made: its steps so far are written with the manifest. A run that is there already
+    /// is replaced if `replace`, and refused otherwise.
+    ///
+    /// # Errors
+    /// A folder that holds a run already or cannot be written.
+    #[doc(hidden)]
+    pub fn kept_in(self, folder: &Path, replace: bool) -> Result<Self, RunError> {
         std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { path: folder.into(), source })?;
         // the chain first: whoever holds it may write the manifest
-        let mut journal = Journal::create(&folder.join(CHAIN), manifest.shape(), replace)?;
+        let mut journal = Journal::create(&folder.join(CHAIN), self.manifest.shape(), replace)?;
         match std::fs::remove_file(folder.join(SUMMARY)) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(RunError::Folder { path: folder.join(SUMMARY), source });
             }
-            _ => manifest.write(folder)?,
+            _ => self.manifest.write(folder)?,
         }
-        let mut chain = Chain::new(manifest.shape());
-        journal.append(&first)?;
-        chain.push_step(&first)?;
-        let run = Run::new(scene, folder, manifest, (target, task), surrogate, (journal, chain));
-        Ok(Run { preparation, ..run })
+        for step in (0..self.chain.steps()).filter_map(|step| self.chain.step(step)) {
+            journal.append(step)?;
+        }
+        Ok(Run { journal: Some(journal), ..self })
     }
 
     /// Goes on with the run in `folder`, `extend` steps beyond its last one if given.
     ///
     /// # Errors
     /// [`RunError`]: no run there, changed config or data, a broken chain.
+    #[doc(hidden)]
     pub fn resume(scene: &Scene, folder: &Path, extend: Option<usize>, pool: &Pool) -> Result<Self, RunError> {
         let mut manifest = Manifest::read(folder)?;
         if !manifest.merged_seeds.is_empty() {
@@ -140,56 +192,46 @@ impl Run {
         let wanted = scene.settings.sampler.moves.surrogate > 0.0;
         let surrogate = if wanted { target.surrogate(&evaluator) } else { None };
         let preparation = evaluator.count();
-        let run = Run::new(scene, folder, manifest, (target, task), surrogate, (journal, chain));
+        let run = Run::of(scene, manifest, (target, task), surrogate, (Some(journal), chain));
         Ok(Run { preparation, ..run })
     }
 
     /// The run with its chain so far.
-    fn new(
+    fn of(
         scene: &Scene,
-        folder: &Path,
         manifest: Manifest,
         (target, task): (Target, Task),
         surrogate: Option<(Surrogate, f64)>,
-        (journal, chain): (Journal, Chain),
+        (journal, chain): (Option<Journal>, Chain),
     ) -> Self {
-        let settings = scene.settings.sampler.clone();
-        let (kinds, _) = kinds_and_goals(&scene.settings);
-        let policy = StopPolicy::new(&settings);
+        let settings = scene.settings.clone();
+        let (kinds, _) = kinds_and_goals(&settings);
+        let policy = StopPolicy::new(&settings.sampler);
         let policy = match manifest.extend_to {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        Run {
-            folder: folder.into(),
-            policy,
-            manifest,
-            target,
-            task,
-            chain,
-            preparation: 0,
-            kinds,
-            settings,
-            surrogate,
-            journal,
-        }
+        Run { policy, manifest, target, task, chain, preparation: 0, kinds, settings, surrogate, journal }
     }
 
     /// The step at which the run ends if its goals are not reached before.
+    #[doc(hidden)]
     pub fn last_step(&self) -> usize {
         self.policy.steps
     }
 
     /// What every parameter must reach.
+    #[doc(hidden)]
     pub fn goals(&self) -> &Goals {
         &self.policy.goals
     }
 
-    /// Steps until the goals are reached, the step limit, or `pool` is told to stop; every step is on disk before the
-    /// next begins.
+    /// Steps until the goals are reached, the step limit, or `pool` is told to stop; every step of a run in a folder is
+    /// on disk before the next begins.
     ///
     /// # Errors
     /// A chain that cannot be written.
+    #[doc(hidden)]
     pub fn go(
         &mut self,
         pool: &Pool,
@@ -197,13 +239,15 @@ impl Run {
     ) -> Result<StopReason, RunError> {
         let Run { target, task, chain, kinds, policy, settings, surrogate, journal, .. } = self;
         let evaluator = Evaluations::new(pool, target, task);
-        let mut sampler = Sampler::new(&*target, &evaluator, settings)?;
+        let mut sampler = Sampler::new(&*target, &evaluator, &settings.sampler)?;
         if let Some((surrogate, acceptance)) = surrogate {
-            let weight = settings.moves.surrogate * acceptance.powi(2);
+            let weight = settings.sampler.moves.surrogate * acceptance.powi(2);
             sampler = sampler.with_move(weight, Box::new(SurrogateMove(surrogate.clone())));
         }
         let result = ensemble::run(&sampler, chain, kinds, policy, pool.stop(), &mut |records, convergence| {
-            journal.append(records)?;
+            if let Some(journal) = journal {
+                journal.append(records)?;
+            }
             on_step(records, convergence);
             Ok::<(), JournalError>(())
         });

@@ -19,7 +19,7 @@ use crate::sampling::chain::statistics::{mode, periodic_mode, quantile, shortest
 use crate::sampling::chain::{
     Chain, ChainError, Convergence, Derived, Diagnostic, Goals, MoveSummary, ParameterKind, PeriodMode,
 };
-use crate::sampling::chain::{Settled, advice, derived, moves};
+use crate::sampling::chain::{Settled, advice, derived, moves, table};
 use crate::sampling::log_density::Status;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -168,6 +168,13 @@ pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Resul
         remarks: Vec::new(),
         names,
     })
+}
+
+/// The table that `dimcmc analyse` prints.
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(table(self, None).trim_end())
+    }
 }
 
 impl Summary {

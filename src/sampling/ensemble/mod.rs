@@ -13,7 +13,7 @@ pub use moves::{Mix, Move, MoveWeights, Proposal};
 pub use sampler::{Sampler, State, Walker};
 pub use settings::{MOST_STEPS, SamplerSettings};
 pub use start::{Positions, StartDraw, draw_start, start_numbers};
-pub use stop::{OnStep, RunError, StopPolicy, StopReason, run};
+pub use stop::{OnStep, RunError, StopPolicy, StopReason, run, sample};
 
 use crate::sampling::log_density::Status;
 

@@ -3,8 +3,10 @@
 //! The goals are looked at every so many steps and depend on the chain's content alone, so a chain that was interrupted
 //! and resumed ends at the same step as one that was not.
 
-use crate::sampling::chain::{Chain, ChainError, Convergence, Goals, ParameterKind, Record};
+use crate::sampling::chain::{Chain, ChainError, Convergence, Goals, ParameterKind, Record, Shape, Summary, summarise};
 use crate::sampling::ensemble::{EnsembleError, Sampler, SamplerSettings, State};
+use crate::sampling::log_density::{LogDensity, Threads};
+use std::convert::Infallible;
 use std::sync::atomic::AtomicBool;
 
 /// When to end.
@@ -119,3 +121,37 @@ pub fn run<E>(
         }
     }
 }
+
+/// A chain of `density` in memory, on all threads, and its summary: from `start`, positions
+/// `[ensemble][walker][parameter]`, until the goals or the step limit of `settings`. The surrogate among its moves has
+/// no part in it. The same seed gives the same chain, whatever the number of threads.
+///
+/// # Errors
+/// [`EnsembleError`]: settings that are impossible for this density, or a start that is none.
+pub fn sample(
+    density: &dyn LogDensity,
+    settings: &SamplerSettings,
+    start: &[Vec<Vec<f64>>],
+) -> Result<(Chain, Summary), EnsembleError> {
+    let evaluator = Threads(density);
+    let sampler = Sampler::new(density, &evaluator, settings)?;
+    let (_, first) = sampler.start(start)?;
+    let shape = Shape { names: density.names().to_vec(), ensembles: settings.ensembles, walkers: settings.walkers };
+    let kinds = vec![ParameterKind::Linear; shape.names.len()];
+    let mut chain = Chain::new(shape);
+    chain.push_step(&first).expect(OURS);
+    let policy = StopPolicy::new(settings);
+    let nothing = &mut |_: &[Record], _: Option<&Convergence>| Ok::<(), Infallible>(());
+    match run(&sampler, &mut chain, &kinds, &policy, &AtomicBool::new(false), nothing) {
+        Ok(_) => {
+            let summary = summarise(&chain, &kinds, &policy.goals).expect(OURS);
+            Ok((chain, summary))
+        }
+        Err(RunError::Ensemble(error)) => Err(error),
+        Err(RunError::Chain(error)) => panic!("{OURS}: {error}"),
+        Err(RunError::Callback(never)) => match never {},
+    }
+}
+
+/// Why a chain takes what the sampler hands to it.
+const OURS: &str = "records are the sampler's own";
