@@ -25,19 +25,25 @@ const IN_MEMORY: &str = "profiles in memory";
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The config, resolved.
+    #[doc(hidden)]
     pub settings: Settings,
     /// The line profiles, read or simulated.
     pub observations: Observations,
     /// SHA-256 (hex) of the observations: of the bytes of their files, or of the numbers simulated.
+    #[doc(hidden)]
     pub data_sha256: String,
     /// The parameters that were simulated; `None` for observations from files.
+    #[doc(hidden)]
     pub truth: Option<ParameterValues>,
     /// What the config leaves to the observations: errors, velocity jitter, target chi2. In `settings` the last two are
     /// numbers.
+    #[doc(hidden)]
     pub measured: Measured,
     /// What the observations are imaged with.
+    #[doc(hidden)]
     pub imager: Imager,
     /// The free parameters, starting at the config's values; its dimension may be 0.
+    #[doc(hidden)]
     pub space: ParameterSpace,
 }
 
@@ -135,6 +141,7 @@ impl Scene {
     ///
     /// # Errors
     /// Settings that make no sense with these observations.
+    #[doc(hidden)]
     pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
         Scene::with_noise(settings, observations, None)
     }
@@ -144,6 +151,7 @@ impl Scene {
     ///
     /// # Errors
     /// Settings that make no sense with these observations, and errors that cannot be measured.
+    #[doc(hidden)]
     pub fn of_whole(settings: Settings, whole: &Observations, cut: &Observations) -> Result<Self, ConfigError> {
         let ObservationSource::Files { options, errors: wanted, .. } = &settings.source else {
             return Scene::of(settings, cut.clone());
@@ -212,6 +220,7 @@ impl Scene {
     ///
     /// # Errors
     /// Files that are no longer what they were.
+    #[doc(hidden)]
     pub fn whole(&self) -> Result<(Observations, Vec<Label>), LsdError> {
         match &self.settings.source {
             ObservationSource::Files { path, .. } => {
@@ -226,6 +235,7 @@ impl Scene {
     }
 
     /// The files that it was read from: config, list, profiles.
+    #[doc(hidden)]
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = vec![self.settings.path.clone()];
         if let ObservationSource::Files { path, .. } = &self.settings.source {
@@ -236,6 +246,7 @@ impl Scene {
 
     /// The profiles in their whole width and in units of their continuum, errors as quoted; `None` if they are no
     /// longer there.
+    #[doc(hidden)]
     pub fn whole_over_continuum(&self) -> Option<Observations> {
         self.whole().ok().map(|(whole, _)| whole.over_continuum(self.continuum_level()))
     }
@@ -245,6 +256,7 @@ impl Scene {
     ///
     /// # Errors
     /// Profiles that no longer make sense.
+    #[doc(hidden)]
     pub fn injected(&self, whole: &Observations, orbits: &[Orbit]) -> Result<Self, ConfigError> {
         let mut observations = self.observations.clone();
         let injected = inject(whole, &self.imager.star, orbits).over_continuum(self.continuum_level());
@@ -258,16 +270,19 @@ impl Scene {
     }
 
     /// The space of the parameters in `free`, starting at the config's values, all others fixed there.
+    #[doc(hidden)]
     pub fn space_of(&self, free: &[FreeParameter]) -> ParameterSpace {
         space(free, &self.settings, &self.imager)
     }
 
     /// The true spot map on the pixels of the image, if the observations are simulated.
+    #[doc(hidden)]
     pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
         self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
     }
 
     /// What the image should hold on its pixels, if the observations are simulated.
+    #[doc(hidden)]
     pub fn true_map(&self) -> Option<Vec<f64>> {
         match self.settings.imaging.brightness {
             BrightnessModel::Spots => self.true_spot_filling(),
@@ -292,6 +307,7 @@ impl Scene {
     }
 
     /// What the scene's `simulation` was made with.
+    #[doc(hidden)]
     pub fn truth_of(&self, simulation: &Simulation) -> Truth {
         let grid = SurfaceGrid::equal_area(simulation.pixels, Quadrature::Gauss2x2);
         let filling = simulation.spot_filling(&grid);
@@ -318,6 +334,7 @@ impl Scene {
     }
 
     /// What results say of where they came from.
+    #[doc(hidden)]
     pub fn provenance(&self) -> Provenance {
         Provenance {
             version: env!("CARGO_PKG_VERSION"),

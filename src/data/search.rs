@@ -70,6 +70,7 @@ pub struct Found {
     /// The optimum of the objective asked for.
     pub optimum: Optimum,
     /// All starts, by regularised likelihood at the first reference's lambda.
+    #[doc(hidden)]
     pub attempts: Vec<Attempt>,
 }
 
@@ -215,6 +216,7 @@ fn within(space: &ParameterSpace, mut theta: Vec<f64>) -> Vec<f64> {
 impl Found {
     /// Maxima other than the optimum, best first, that are lower by less than 7 in log-probability. A chain that
     /// starts around the optimum may never see them.
+    #[doc(hidden)]
     pub fn rivals(&self) -> Vec<&Optimum> {
         let mut ends: Vec<&Optimum> = self.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok()).collect();
         ends.sort_by(|a, b| b.evaluation.log_prob.total_cmp(&a.evaluation.log_prob));

@@ -24,16 +24,19 @@ pub struct Fit {
     /// are any.
     pub model: Vec<Vec<f64>>,
     /// Posterior mean of the nuisances of each profile, given the map; empty where none are integrated out.
+    #[doc(hidden)]
     pub nuisances: Vec<LineAndContinuum>,
     /// Posterior mean of each profile's velocity zero point (km/s), given the map; empty where none is integrated out.
     pub zero_points_kms: Vec<f64>,
     /// Radial velocities, one a profile.
     pub velocities: Vec<FilteredVelocity>,
     /// Nodes of the trade-off curve, in order of falling chi2.
+    #[doc(hidden)]
     pub tradeoff: Vec<Node>,
     /// The numbers.
     pub summary: FitSummary,
     /// Whether what is left over looks like noise.
+    #[doc(hidden)]
     pub checks: Checks,
 }
 
@@ -148,6 +151,7 @@ impl Deviation {
 
 impl Fit {
     /// Holds `reference` against the `observations` that `imager` was made for.
+    #[doc(hidden)]
     pub fn new(imager: &Imager, observations: &Observations, reference: &Reference) -> Self {
         let solution = &reference.solution;
         let map = imager.entropy.image(&solution.image.coordinates);

@@ -26,6 +26,7 @@ pub struct BlindSearch {
     /// What has to be known beside the verdict.
     pub remarks: Vec<Remark>,
     /// The star's own periods under this sampling; null where there was no search.
+    #[doc(hidden)]
     pub rotation: Option<RotationPeriods>,
 }
 
@@ -145,6 +146,7 @@ fn is_same_period(one: f64, other: f64, time_base_cycles: f64) -> bool {
 
 impl BlindSearch {
     /// The same beside an orbit that was found, of this `Porb/Prot`.
+    #[doc(hidden)]
     pub fn beside(mut self, porb_over_prot: f64, rotation_period_d: f64) -> Self {
         let is_found = matches!(self.verdict.finding, Finding::Candidate | Finding::Detection);
         if let Some(another) = self.of_another_orbit(porb_over_prot, rotation_period_d).filter(|_| is_found) {
@@ -156,6 +158,7 @@ impl BlindSearch {
 
     /// What speaks against a planet where the orbit that was found, of this `Porb/Prot`, is not the one that the
     /// verdict is on.
+    #[doc(hidden)]
     pub fn of_another_orbit(&self, porb_over_prot: f64, rotation_period_d: f64) -> Option<Remark> {
         let (signal, rotation) = (self.verdict.signal?, self.rotation.as_ref()?);
         let judged = signal.period_d / rotation_period_d;

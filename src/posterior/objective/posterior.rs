@@ -44,6 +44,7 @@ const BEND_TOLERANCE: f64 = 1e-6;
 
 impl Posterior {
     /// The posterior of `space` under `imager`'s data, judged by `kind` relative to `reference`.
+    #[doc(hidden)]
     pub fn new(imager: Imager, space: ParameterSpace, kind: ObjectiveKind, reference: Reference) -> Self {
         // the reference's pixels serve only if its fixed parameters are those of the space
         let here = space.values_at(&space.theta_of(&reference.values));
@@ -66,6 +67,7 @@ impl Posterior {
 
     /// The same posterior with warm starts at `thetas` (physical coordinates) besides the reference, and no others:
     /// evaluations start from the nearest. Places without an image get none.
+    #[doc(hidden)]
     pub fn with_warm_starts(mut self, thetas: &[Vec<f64>]) -> Self {
         self.warm_starts.truncate(1);
         let more = thetas.par_iter().with_max_len(1).filter_map(|theta| self.another_warm_start(theta));
@@ -75,11 +77,13 @@ impl Posterior {
     }
 
     /// Where its warm starts are, but for the reference (physical coordinates).
+    #[doc(hidden)]
     pub fn warm_starts(&self) -> impl Iterator<Item = &[f64]> {
         self.warm_starts[1..].iter().map(|warm_start| warm_start.theta.as_slice())
     }
 
     /// The same posterior with the warm starts that so many `evaluations`, spread like `thetas`, are worth.
+    #[doc(hidden)]
     pub fn with_warm_starts_for(self, thetas: &[Vec<f64>], evaluations: usize) -> Self {
         let thetas: Vec<&Vec<f64>> = sampled(thetas).into_iter().filter(|theta| self.is_physical(theta)).collect();
         let places: Vec<Vec<f64>> = thetas.iter().map(|theta| place(&self.imager, &self.space, theta)).collect();
@@ -147,26 +151,31 @@ impl Posterior {
     }
 
     /// The same posterior with other solver settings than those that a chain needs.
+    #[doc(hidden)]
     pub fn with_settings(self, settings: SolverSettings) -> Self {
         Posterior { settings, ..self }
     }
 
     /// The reference.
+    #[doc(hidden)]
     pub fn reference(&self) -> &Reference {
         &self.reference
     }
 
     /// What a reconstruction is judged by.
+    #[doc(hidden)]
     pub fn kind(&self) -> ObjectiveKind {
         self.kind
     }
 
     /// The parameter space.
+    #[doc(hidden)]
     pub fn space(&self) -> &ParameterSpace {
         &self.space
     }
 
     /// What the data are imaged with.
+    #[doc(hidden)]
     pub fn imager(&self) -> &Imager {
         &self.imager
     }
@@ -207,6 +216,7 @@ impl Posterior {
     }
 
     /// The reconstruction at `theta`, whatever the prior says.
+    #[doc(hidden)]
     pub fn reconstruct(&self, theta: &[f64]) -> (Solution, ImagingProblem<'_>) {
         let mut problem = self.imager.problem(self.response(theta));
         let solution = self.solve_near(self.nearest(theta), theta, self.settings, &mut problem);

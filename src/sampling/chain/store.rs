@@ -21,12 +21,14 @@ impl Chain {
     ///
     /// # Panics
     /// If the shape has no ensemble or no walker (a programmer's mistake: settings are validated before).
+    #[doc(hidden)]
     pub fn new(shape: Shape) -> Self {
         assert!(shape.size() > 0, "a chain needs at least one ensemble and one walker");
         Chain { shape, records: Vec::new() }
     }
 
     /// Names, number of ensembles and of walkers.
+    #[doc(hidden)]
     pub fn shape(&self) -> &Shape {
         &self.shape
     }
@@ -45,6 +47,7 @@ impl Chain {
     ///
     /// # Errors
     /// [`ChainError`] when the records are not exactly the next step in order, and whole; nothing is added then.
+    #[doc(hidden)]
     pub fn push_step(&mut self, step: &[Record]) -> Result<(), ChainError> {
         if step.len() != self.shape.size() {
             return Err(ChainError::StepSize { expected: self.shape.size(), found: step.len() });
@@ -68,11 +71,13 @@ impl Chain {
     }
 
     /// The records of the last step; `None` for an empty chain.
+    #[doc(hidden)]
     pub fn last_step(&self) -> Option<&[Record]> {
         self.steps().checked_sub(1).and_then(|last| self.step(last))
     }
 
     /// Values of any quantity from step `discard` on.
+    #[doc(hidden)]
     pub fn series_of(&self, discard: usize, quantity: impl Fn(&Record) -> f64) -> Series {
         let Shape { ensembles, walkers, .. } = self.shape;
         let kept = self.steps().saturating_sub(discard);
