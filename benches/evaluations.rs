@@ -4,11 +4,10 @@
 mod common;
 
 use common::paper::{Bulk, Free, Passes, Size, scene};
-use common::stopwatch::{Candidate, by_criterion, criterion, quantile, seconds};
+use common::stopwatch::{quantile, seconds};
 use common::table::{Table, Target, thousands};
 use dimcmc::internals::maxent::SolverSettings;
 use dimcmc::internals::sampling::log_density::{LogDensity, Status};
-use std::hint::black_box;
 
 /// An evaluation over its passes.
 const OVER_PASSES: Target = Target::AtMost(1.5);
@@ -31,7 +30,6 @@ fn main() {
     if !common::wanted() {
         return;
     }
-    let mut criterion = criterion();
     let over = format!("evaluation / its passes ({OVER_PASSES})");
     let error = format!("largest error / 1e-3 ({ERROR})");
     let columns = [
@@ -49,12 +47,9 @@ fn main() {
     for free in [Free::Three, Free::Seven] {
         for (pixels, points) in [(5000, 200), (20_000, 60)] {
             let bulk = Bulk::new(&scene(free, Size::pixels(pixels)), points);
-            let mut candidate = [Candidate::new(free.name(), || bulk.target.evaluate(black_box(&bulk.points[0])))];
-            by_criterion(&mut criterion, &format!("evaluation, {pixels} pixels"), &mut candidate);
             measure(&bulk, free, pixels, &mut table);
         }
     }
-    criterion.final_summary();
     let [three, seven] = [Free::Three, Free::Seven].map(|free| most_passes(free).map(|target| target.to_string()));
     table.print(&format!(
         "Objective spottedness; points drawn from a Gaussian around the maximum with the covariance found there: 200 \

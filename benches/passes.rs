@@ -5,9 +5,8 @@ mod common;
 mod plain_loop;
 
 use common::paper::{Free, Passes, Size, scene, truth, uneven_map};
-use common::stopwatch::{Candidate, by_criterion, criterion, fastest, in_turn};
+use common::stopwatch::{Candidate, fastest, in_turn};
 use common::table::{Table, Target, thousands};
-use criterion::Criterion;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::numerics::vector::{self, Instructions, Task};
 use plain_loop::PlainLoop;
@@ -34,7 +33,6 @@ fn main() {
     if !common::wanted() {
         return;
     }
-    let mut criterion = criterion();
     let fewer = format!("plain / response ({OVER_PLAIN})");
     let read = format!("response / read ({OVER_READ})");
     let mut table = Table::new(
@@ -43,10 +41,9 @@ fn main() {
     );
     for pixels in [5000, 20_000] {
         let scene = scene(Free::Three, Size::pixels(pixels));
-        passes(&scene, pixels, &mut criterion, &mut table);
-        others(&scene, pixels, &mut criterion, &mut table);
+        passes(&scene, pixels, &mut table);
+        others(&scene, pixels, &mut table);
     }
-    criterion.final_summary();
     table.print(&format!(
         "One thread; the fastest of {ROUNDS} rounds in which all take turns, {RUNS} runs in a row; of the rows \
         without ratios \
@@ -76,7 +73,7 @@ impl Task for Read<'_> {
 }
 
 /// Forward and transpose: response, plain loop, read.
-fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut Table) {
+fn passes(scene: &Scene, pixels: usize, table: &mut Table) {
     let imager = &scene.imager;
     let response = imager.response(&truth(scene));
     let plain = PlainLoop::<WINDOW>::new(&imager.grid, &imager.star, &truth(scene), &imager.sampling);
@@ -102,7 +99,6 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
         Candidate::new("read", read),
     ];
     for (name, candidates) in [("forward", &mut forward), ("transpose", &mut transpose)] {
-        by_criterion(criterion, &format!("{name}, {pixels} pixels"), candidates);
         let times = in_turn(candidates, ROUNDS, RUNS);
         let per_pair = |times: &[f64], pairs: usize| format!("{:.2}", 1e9 * fastest(times) / pairs as f64);
         table.row([
@@ -120,7 +116,7 @@ fn passes(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
 }
 
 /// Responses for new stellar parameters and for a new orbit, and a pass of those there and back in single precision.
-fn others(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut Table) {
+fn others(scene: &Scene, pixels: usize, table: &mut Table) {
     let (imager, state) = (&scene.imager, truth(scene));
     let response = imager.response(&state);
     let build = || imager.response(black_box(&state));
@@ -132,7 +128,6 @@ fn others(scene: &Scene, pixels: usize, criterion: &mut Criterion, table: &mut T
         Candidate::new("shift", shift),
         Candidate::new("there and back, single precision", single),
     ];
-    by_criterion(criterion, &format!("response, {pixels} pixels"), &mut candidates);
     let times = in_turn(&mut candidates, OTHER_ROUNDS, 1);
     for ((candidate, times), parts) in candidates.iter().zip(times).zip([1.0, 1.0, 2.0]) {
         let per_pair = format!("{:.2}", 1e9 * fastest(&times) / (parts * response.pairs() as f64));

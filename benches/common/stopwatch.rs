@@ -1,9 +1,8 @@
 //! Times of things that are compared with each other: in turn within one run, so that whatever else the machine is
 //! doing slows all of them alike.
 
-use criterion::Criterion;
 use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Something to be timed.
 pub struct Candidate<'a> {
@@ -35,24 +34,6 @@ pub fn in_turn(candidates: &mut [Candidate], rounds: usize, runs: usize) -> Vec<
         }
     }
     times
-}
-
-/// The same candidates by criterion, which compares them with its last run.
-pub fn by_criterion(criterion: &mut Criterion, group: &str, candidates: &mut [Candidate]) {
-    let mut group = criterion.benchmark_group(group);
-    for candidate in candidates {
-        group.bench_function(candidate.name, |bencher| bencher.iter(&mut candidate.run));
-    }
-}
-
-/// Criterion in a hurry.
-pub fn criterion() -> Criterion {
-    Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(200))
-        .measurement_time(Duration::from_millis(800))
-        .nresamples(2000)
-        .configure_from_args()
 }
 
 /// The value below which a share `p` of the values lies.

@@ -1,8 +1,10 @@
-//! Numbers, without a star in sight: vector instructions chosen at run time, units, and text in columns.
+//! Numbers, without a star in sight: vector instructions chosen at run time, units, the normal
+//! distribution, and text in columns.
 //!
 //! In: slices of numbers. Out: the same numbers on every machine ([`vector`]), radians and km/s from what people write
 //! ([`units`]), tables for a terminal ([`text`]).
 
+pub mod normal;
 pub mod text;
 pub mod units;
 pub mod vector;

@@ -99,7 +99,7 @@ fn the_planet_of_the_demo_is_found() {
     }
 }
 
-/// The example of the README, where there is a Python that can run it.
+/// The example of the guide, where there is a Python that can run it.
 fn python_fits_the_same(desk: &Desk, k_kms: f64) {
     let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
     if !numpy.is_ok_and(|output| output.status.success()) {

@@ -7,8 +7,9 @@
 //! the chance that its length exceeds `sqrt(2 level)` is taken along its mean direction, with what scatter across adds
 //! to the length on average.
 
-use super::normal::{cumulative, erfc};
 use super::orbits::{Trial, eigenvalues};
+use crate::numerics::normal::cumulative;
+use libm::erfc;
 use nalgebra::Vector2;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 

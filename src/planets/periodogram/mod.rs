@@ -10,7 +10,6 @@ pub mod false_alarm;
 pub mod frequencies;
 pub mod kepler;
 pub mod limits;
-pub mod normal;
 pub mod offset;
 pub mod orbits;
 pub mod peaks;

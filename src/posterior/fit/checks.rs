@@ -8,7 +8,7 @@
 //! What the map itself takes up is spread evenly here.
 
 use super::Residual;
-use crate::planets::periodogram::normal::cumulative;
+use crate::numerics::normal::cumulative;
 use serde::Serialize;
 
 /// A profile is worth a warning when chance makes one so bad among all of them as rarely as this.
