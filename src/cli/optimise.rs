@@ -5,11 +5,8 @@ use super::search::search;
 use super::{Failure, Global, console};
 use crate::data::io::atomic::write_json;
 use crate::data::scene::Scene;
-use crate::runs::optimum::OptimumFile;
+use crate::runs::optimum::{self, OptimumFile};
 use std::path::PathBuf;
-
-/// Name of the file.
-const OPTIMUM: &str = "optimum.json";
 
 /// Find the best parameters and their error bars
 ///
@@ -28,13 +25,13 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
-    args.output.spare(&scene.files(), |name| name == OPTIMUM)?;
+    args.output.spare(&scene.files(), |name| name == optimum::FILE)?;
     remarks(&scene);
     scene.settings.require_free()?;
     let found = search(global, &args.config, &scene, &scene.space)?;
     let file = OptimumFile::new(&scene, &found);
     let folder = args.output.create()?;
-    write_json(&folder.join(OPTIMUM), &file)?;
+    write_json(&folder.join(optimum::FILE), &file)?;
     console::print(file.table());
     Ok(())
 }

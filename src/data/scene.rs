@@ -337,7 +337,7 @@ impl Scene {
     #[doc(hidden)]
     pub fn provenance(&self) -> Provenance {
         Provenance {
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").into(),
             data_sha256: self.data_sha256.clone(),
             config_sha256: self.settings.sha256.clone(),
             config: self.settings.resolved.clone(),

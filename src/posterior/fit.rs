@@ -13,7 +13,7 @@ use crate::posterior::objective::tradeoff::Node;
 use crate::posterior::objective::{ParameterValues, Reference};
 use crate::sampling::log_density::Status;
 use crate::star::observation::{Observations, RadialVelocity};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A reconstruction and what it makes of the data.
 #[derive(Clone, Debug)]
@@ -74,7 +74,7 @@ impl FilteredVelocity {
 }
 
 /// How good the fit is.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FitSummary {
     /// How the reconstruction ended.
     pub status: Status,
@@ -93,7 +93,7 @@ pub struct FitSummary {
     /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
     pub spottedness: f64,
     /// Of an image of bright and dark pixels, what is darker and what is brighter than the photosphere.
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
     pub deviation: Option<Deviation>,
     /// Skilling & Bryan's TEST, 0 at a maximum-entropy image.
     pub test: f64,
@@ -128,7 +128,7 @@ pub struct FitSummary {
 }
 
 /// Deviation from the brightness of the photosphere, means over the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
     /// Mean of what pixels lack in brightness, 0 for bright ones.
     pub darkness: f64,

@@ -7,12 +7,15 @@ use crate::posterior::objective::{Estimate, OrbitQuantities, OrbitQuantity, Para
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{OptimumRecord, ReferenceRecord, by_name};
 use crate::sampling::optimise::Optimum;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+/// Name of the file.
+pub const FILE: &str = "optimum.json";
+
 /// The content of `optimum.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct OptimumFile {
     /// Names of the free parameters, in the order of the matrices.
     pub names: Vec<String>,
@@ -33,16 +36,16 @@ pub struct OptimumFile {
     /// and K sin of the orbital phase at mid-time.
     pub internal_curvature: Vec<Vec<f64>>,
     /// The blind search that the verdict rests on; absent where no orbit was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blind_search: Option<BlindSearch>,
     /// What is usually quoted of the orbit, with standard deviations by the same covariance.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub derived: BTreeMap<&'static str, Estimate>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived: BTreeMap<String, Estimate>,
     /// Injected values, for simulated data.
     pub truth: Option<BTreeMap<String, f64>>,
     /// The same of what is usually quoted of the orbit, times nearest to those found.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub derived_truth: BTreeMap<&'static str, f64>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived_truth: BTreeMap<String, f64>,
     /// The reference image.
     pub reference: ReferenceRecord,
     /// Where the climbs started and ended, by regularised likelihood.
@@ -57,7 +60,7 @@ pub struct OptimumFile {
 }
 
 /// One climb.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StartRecord {
     /// Where it started.
     pub start: Vec<f64>,
@@ -141,7 +144,7 @@ impl OptimumFile {
         let mut text = String::new();
         for (name, Estimate { value, sd }) in &rows {
             let _ = write!(text, "{name:width$}  {value:>14.6}  {sd:>10.6}");
-            if let Some(truth) = self.derived_truth.get(name) {
+            if let Some(truth) = self.derived_truth.get(*name) {
                 let _ = write!(text, "  {truth:>14.6}");
             }
             text.push('\n');
@@ -159,7 +162,7 @@ impl OptimumFile {
 }
 
 /// What is usually quoted of the orbit at the optimum, and the injected values of the same.
-fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<&'static str, Estimate>, BTreeMap<&'static str, f64>) {
+fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<String, Estimate>, BTreeMap<String, f64>) {
     let settings = &scene.settings;
     let quantities = OrbitQuantities::new(&settings.star, settings.mass_msun, scene.observations.time_span_d());
     let free: Vec<Parameter> = scene.space.free().iter().map(|one| one.parameter).collect();
@@ -173,10 +176,10 @@ fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<&'static str, Estimate
     let (mut derived, mut truth) = (BTreeMap::new(), BTreeMap::new());
     for quantity in quantities.of_free(&free) {
         let Some(found) = quantities.estimate(quantity, &values.state().orbit, &covariance) else { continue };
-        derived.insert(quantity.name(), found);
+        derived.insert(quantity.name().to_owned(), found);
         let injected = scene.truth.map(|truth| truth.state().orbit).filter(|orbit| orbit.k_kms != 0.0);
         let injected = injected.and_then(|orbit| quantities.value(quantity, &orbit, Some(found.value)));
-        truth.extend(injected.map(|value| (quantity.name(), value)));
+        truth.extend(injected.map(|value| (quantity.name().to_owned(), value)));
     }
     (derived, truth)
 }

@@ -10,7 +10,7 @@ use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::ParameterValues;
 use crate::star::SurfaceGrid;
 use crate::star::observation::Observations;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A reconstruction with all that its files say of it.
@@ -32,8 +32,14 @@ pub struct MapResult<'a> {
     pub provenance: &'a Provenance,
 }
 
+/// Name of the map.
+pub const MAP: &str = "map.json";
+
+/// Name of what says how good it is.
+pub const FIT: &str = "fit.json";
+
 /// Names of the files, in the order in which they are written.
-pub const FILES: [&str; 4] = ["map.json", "profiles.csv", "rv.csv", "fit.json"];
+pub const FILES: [&str; 4] = [MAP, "profiles.csv", "rv.csv", FIT];
 
 /// Where longitudes count from, for those who read the file without the manual.
 const CONVENTIONS: &str = "psi = longitude + Omega(latitude) (t - epoch_d) is the angle from the central meridian, \
@@ -47,66 +53,94 @@ growing \
                            longitude 360 j / n to 360 (j + 1) / n degrees.";
 
 /// The content of `map.json`.
-#[derive(Serialize)]
-struct MapFile<'a> {
-    conventions: &'static str,
-    rotation_period_d: f64,
-    epoch_d: f64,
-    parameters: ParameterValues,
-    contrast: f64,
-    spottedness: f64,
-    true_spottedness: Option<f64>,
-    pixels: usize,
-    ring_pixels: Vec<usize>,
-    longitude_deg: Vec<f64>,
-    latitude_deg: Vec<f64>,
-    area_fraction: &'a [f64],
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapFile {
+    /// Where longitudes count from, in words.
+    pub conventions: String,
+    /// Rotation period (d).
+    pub rotation_period_d: f64,
+    /// Time of rotation cycle 0 (d).
+    pub epoch_d: f64,
+    /// The parameters at which the star was reconstructed.
+    pub parameters: ParameterValues,
+    /// Brightness of a spot over that of the photosphere.
+    pub contrast: f64,
+    /// As [`FitSummary::spottedness`].
+    pub spottedness: f64,
+    /// The same of the star that was simulated.
+    pub true_spottedness: Option<f64>,
+    /// Number of pixels.
+    pub pixels: usize,
+    /// The same in each ring, from south to north.
+    pub ring_pixels: Vec<usize>,
+    /// Of the middle of each pixel.
+    pub longitude_deg: Vec<f64>,
+    /// Of the middle of each pixel.
+    pub latitude_deg: Vec<f64>,
+    /// Share of the surface of each pixel.
+    pub area_fraction: Vec<f64>,
+    /// What the pixels hold.
     #[serde(flatten)]
-    map: MapColumns<'a>,
+    pub map: MapColumns,
 }
 
-/// What the pixels hold.
-#[derive(Serialize)]
+/// What the pixels hold, and what those of the star that was simulated do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-enum MapColumns<'a> {
+pub enum MapColumns {
+    /// Spot filling factors.
     Spots {
-        spot_filling: &'a [f64],
-        true_spot_filling: Option<&'a [f64]>,
+        /// Of the map.
+        spot_filling: Vec<f64>,
+        /// Of the star that was simulated.
+        true_spot_filling: Option<Vec<f64>>,
     },
-    /// Relative to the photosphere. Profiles say nothing of the scale; the entropy has it near 1.
+    /// Brightness relative to the photosphere. Profiles say nothing of the scale; the entropy has it near 1.
     BrightAndDark {
-        brightness: &'a [f64],
-        true_brightness: Option<&'a [f64]>,
+        /// Of the map.
+        brightness: Vec<f64>,
+        /// Of the star that was simulated.
+        true_brightness: Option<Vec<f64>>,
     },
 }
 
 /// The content of `fit.json`.
-#[derive(Serialize)]
-struct FitFile<'a> {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitFile {
+    /// How good the fit is.
     #[serde(flatten)]
-    summary: &'a FitSummary,
+    pub summary: FitSummary,
     /// One entry a profile, in the order of the list.
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    nuisances: &'a [LineAndContinuum],
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub nuisances: Vec<LineAndContinuum>,
     /// The same for the zero point of its velocity.
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    zero_points_kms: &'a [f64],
-    truth: Option<ParameterValues>,
-    checks: &'a Checks,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    diagnosis: Option<&'a serde_json::Value>,
-    trade_off: Vec<TradeOffNode>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zero_points_kms: Vec<f64>,
+    /// The true parameters, for simulated data.
+    pub truth: Option<ParameterValues>,
+    /// Whether what is left over looks like noise.
+    pub checks: Checks,
+    /// Why the model does not fit as well as the errors promise, if it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub diagnosis: Option<serde_json::Value>,
+    /// Images of other chi2.
+    pub trade_off: Vec<TradeOffNode>,
+    /// Config, data and program.
     #[serde(flatten)]
-    provenance: &'a Provenance,
+    pub provenance: Provenance,
 }
 
 /// One image on the trade-off curve.
-#[derive(Serialize)]
-struct TradeOffNode {
-    lambda: f64,
-    chi2: f64,
-    spottedness: f64,
-    entropy: f64,
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TradeOffNode {
+    /// Lagrange multiplier of chi2 / 2.
+    pub lambda: f64,
+    /// chi2.
+    pub chi2: f64,
+    /// Spottedness.
+    pub spottedness: f64,
+    /// Entropy.
+    pub entropy: f64,
 }
 
 impl MapResult<'_> {
@@ -122,7 +156,7 @@ impl MapResult<'_> {
         write_json(&fit, &self.fit())
     }
 
-    fn map(&self) -> MapFile<'_> {
+    fn map(&self) -> MapFile {
         let SurfaceGrid { longitude, latitude, area, rings, .. } = &self.imager.grid;
         let degrees = |angles: &[f64]| angles.iter().map(|x| x.to_degrees()).collect();
         let (map, true_map) = (&self.fit.map[..], self.true_map);
@@ -130,15 +164,18 @@ impl MapResult<'_> {
         let entropy = self.imager.entropy;
         let (true_spottedness, map) = match entropy {
             Entropy::Spots { .. } => {
-                (true_map.map(coverage), MapColumns::Spots { spot_filling: map, true_spot_filling: true_map })
+                let columns =
+                    MapColumns::Spots { spot_filling: map.to_vec(), true_spot_filling: true_map.map(<[f64]>::to_vec) };
+                (true_map.map(coverage), columns)
             }
             Entropy::BrightAndDark => {
                 let deviation = true_map.map(|map| entropy.spottedness(map, area));
-                (deviation, MapColumns::BrightAndDark { brightness: map, true_brightness: true_map })
+                let true_brightness = true_map.map(<[f64]>::to_vec);
+                (deviation, MapColumns::BrightAndDark { brightness: map.to_vec(), true_brightness })
             }
         };
         MapFile {
-            conventions: CONVENTIONS,
+            conventions: CONVENTIONS.into(),
             rotation_period_d: self.imager.star.rotation_period_d,
             epoch_d: self.imager.star.epoch_d,
             parameters: self.fit.summary.parameters,
@@ -149,7 +186,7 @@ impl MapResult<'_> {
             ring_pixels: rings.iter().map(|ring| ring.pixels.len()).collect(),
             longitude_deg: degrees(longitude),
             latitude_deg: degrees(latitude),
-            area_fraction: area,
+            area_fraction: area.clone(),
             map,
         }
     }
@@ -180,7 +217,7 @@ impl MapResult<'_> {
         table
     }
 
-    fn fit(&self) -> FitFile<'_> {
+    fn fit(&self) -> FitFile {
         let node = |n: &crate::posterior::objective::tradeoff::Node| TradeOffNode {
             lambda: n.lambda,
             chi2: n.chi2,
@@ -188,14 +225,14 @@ impl MapResult<'_> {
             entropy: n.entropy,
         };
         FitFile {
-            summary: &self.fit.summary,
-            nuisances: &self.fit.nuisances,
-            zero_points_kms: &self.fit.zero_points_kms,
+            summary: self.fit.summary.clone(),
+            nuisances: self.fit.nuisances.clone(),
+            zero_points_kms: self.fit.zero_points_kms.clone(),
             truth: self.truth,
-            checks: &self.fit.checks,
-            diagnosis: self.diagnosis.as_ref(),
+            checks: self.fit.checks.clone(),
+            diagnosis: self.diagnosis.clone(),
             trade_off: self.fit.tradeoff.iter().map(node).collect(),
-            provenance: self.provenance,
+            provenance: self.provenance.clone(),
         }
     }
 }

@@ -7,31 +7,32 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The content of `paraboloid.json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ParaboloidFile<'a> {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParaboloidFile {
     /// Names of the parameters, in the order of the covariance.
-    pub names: Vec<&'a str>,
+    pub names: Vec<String>,
     /// Why there is no paraboloid; null where there is one.
     pub refused: Option<String>,
     /// The paraboloid.
     #[serde(flatten)]
-    pub paraboloid: Option<&'a Paraboloid>,
+    pub paraboloid: Option<Paraboloid>,
     /// Which nodes the user asked for.
     pub rule: Rule,
     /// Injected values, for simulated data.
-    pub truth: Option<&'a BTreeMap<String, f64>>,
+    pub truth: Option<BTreeMap<String, f64>>,
 }
 
-impl<'a> ParaboloidFile<'a> {
+impl ParaboloidFile {
     /// What was `found` around the highest node of a landscape on `grid`.
     pub fn new(
-        grid: &'a Grid,
+        grid: &Grid,
         rule: Rule,
-        truth: Option<&'a BTreeMap<String, f64>>,
-        found: &'a Result<Paraboloid, Undefined>,
+        truth: Option<&BTreeMap<String, f64>>,
+        found: &Result<Paraboloid, Undefined>,
     ) -> Self {
         let refused = found.as_ref().err().map(Undefined::to_string);
-        ParaboloidFile { names: grid.names().collect(), refused, paraboloid: found.as_ref().ok(), rule, truth }
+        let names = grid.names().map(str::to_owned).collect();
+        ParaboloidFile { names, refused, paraboloid: found.as_ref().ok().cloned(), rule, truth: truth.cloned() }
     }
 
     /// Writes it to `path`.
@@ -45,10 +46,6 @@ impl<'a> ParaboloidFile<'a> {
 
 /// What the user asked for when the file at `path` was written; the default where there is none.
 pub fn rule(path: &Path) -> Rule {
-    #[derive(Deserialize)]
-    struct Asked {
-        rule: Rule,
-    }
     let text = std::fs::read(path).ok();
-    text.and_then(|text| serde_json::from_slice(&text).ok()).map(|asked: Asked| asked.rule).unwrap_or_default()
+    text.and_then(|text| serde_json::from_slice(&text).ok()).map(|file: ParaboloidFile| file.rule).unwrap_or_default()
 }

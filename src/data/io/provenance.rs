@@ -6,10 +6,10 @@ use crate::posterior::zero_points::MeasuredJitter;
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Version of the program.
-    pub version: &'static str,
+    pub version: String,
     /// SHA-256 (hex) of the observations.
     pub data_sha256: String,
     /// SHA-256 (hex) of the part of the config that decides the posterior and the chain.
@@ -17,7 +17,7 @@ pub struct Provenance {
     /// The config with all defaults filled in.
     pub config: serde_json::Value,
     /// What the config leaves to the observations.
-    #[serde(skip_serializing_if = "Measured::is_empty")]
+    #[serde(default, skip_serializing_if = "Measured::is_empty")]
     pub measured: Measured,
 }
 

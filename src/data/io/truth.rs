@@ -5,33 +5,33 @@ use super::provenance::Provenance;
 use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::ParameterValues;
 use crate::star::Orbit;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Name of the file.
 pub const FILE: &str = "truth.json";
 
 /// The content of `truth.json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
     /// The parameters as simulated.
     pub parameters: ParameterValues,
     /// The spots: longitude, latitude and radius in degrees, filling factor.
     pub spots: serde_json::Value,
     /// The faculae, if there are any: longitude, latitude and radius in degrees, excess of brightness.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub faculae: Option<serde_json::Value>,
     /// Beside faculae: brightness of a spot over that of the photosphere.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contrast: Option<f64>,
     /// What is wrong with each profile by itself, in line and continuum.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub continuum: Vec<LineAndContinuum>,
     /// The velocity zero point of each profile (km/s), which is not part of `orbit_kms`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zero_points_kms: Vec<f64>,
     /// Over how many bins the noise is correlated, where it is not white.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correlated_bins: Option<f64>,
     /// Fractional spot coverage.
     pub spottedness: f64,
@@ -53,7 +53,7 @@ pub struct Truth {
 }
 
 /// The content of `truth.json` beside profiles that an orbit was put into.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InjectedTruth {
     /// The orbit, by the names of its parameters.
     pub injected: Orbit,
@@ -66,6 +66,34 @@ pub struct InjectedTruth {
     /// The observations and the config before.
     #[serde(flatten)]
     pub provenance: Provenance,
+}
+
+/// The content of a `truth.json`, whichever it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum TruthFile {
+    /// Of a simulation.
+    Simulated(Truth),
+    /// Of observed profiles that an orbit was put into.
+    Injected(InjectedTruth),
+}
+
+impl TruthFile {
+    /// Times of the profiles (d).
+    pub fn times_d(&self) -> &[f64] {
+        match self {
+            TruthFile::Simulated(truth) => &truth.times_d,
+            TruthFile::Injected(truth) => &truth.times_d,
+        }
+    }
+
+    /// Config, data and program.
+    pub fn provenance(&self) -> &Provenance {
+        match self {
+            TruthFile::Simulated(truth) => &truth.provenance,
+            TruthFile::Injected(truth) => &truth.provenance,
+        }
+    }
 }
 
 /// Writes `truth.json` into `folder`: a [`Truth`] or an [`InjectedTruth`].

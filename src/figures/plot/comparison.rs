@@ -6,43 +6,16 @@ use crate::figures::drawing::colour::{BLACK, BLUE, GREEN, GREY, VERMILION};
 use crate::figures::drawing::{
     Align, Axis, Colour, Figure, Font, Marker, PAGE_MM, Panel, Rect, Scale, Stroke, range_of,
 };
+use crate::runs::comparison::{Compared, Comparison, FILE, Interval};
 use crate::runs::origin;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::Path;
-
-/// The file.
-pub(super) const FILE: &str = crate::runs::comparison::FILE;
-
-/// What is used of it.
-#[derive(Deserialize)]
-struct ComparisonFile {
-    names: Vec<String>,
-    parameters: BTreeMap<String, Compared>,
-}
-
-#[derive(Deserialize)]
-struct Compared {
-    periodic: bool,
-    truth: Option<f64>,
-    chain: Interval,
-    paraboloid: Option<Interval>,
-    landscape: Option<Interval>,
-    fixed_at: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct Interval {
-    value: f64,
-    ci68: [f64; 2],
-}
 
 /// One line of a panel: what, value, interval, and how it is drawn.
 type Entry = (&'static str, f64, Option<[f64; 2]>, Marker, Colour);
 
 /// The figure.
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
-    let file: ComparisonFile = origin::read(folder, FILE)?;
+    let file: Comparison = origin::read(folder, FILE)?;
     let columns = file.names.len().clamp(1, 3);
     let rows = file.names.len().div_ceil(columns);
     let row_mm = 44.0;
@@ -71,8 +44,8 @@ fn entries(one: &Compared) -> Vec<Entry> {
         (what, value, Some(interval.ci68.map(|end| end + value - interval.value)), marker, colour)
     };
     let mut entries = vec![with("chain", &one.chain, Marker::Disc, BLUE)];
-    entries.extend(one.paraboloid.as_ref().map(|p| with("paraboloid", p, Marker::Square, VERMILION)));
-    entries.extend(one.landscape.as_ref().map(|l| with("landscape", l, Marker::Triangle, GREEN)));
+    entries.extend(one.paraboloid.as_ref().map(|p| with("paraboloid", &p.interval, Marker::Square, VERMILION)));
+    entries.extend(one.landscape.as_ref().map(|l| with("landscape", &l.interval, Marker::Triangle, GREEN)));
     entries.extend(one.fixed_at.map(|x| ("fixed at", turn(x), None, Marker::Ring, GREEN)));
     entries.extend(one.truth.map(|x| ("injected", turn(x), None, Marker::Diamond, BLACK)));
     entries

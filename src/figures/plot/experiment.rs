@@ -4,25 +4,17 @@ use super::PlotError;
 use super::symbols::label;
 use crate::data::io::csv::{Columns, CsvError};
 use crate::figures::drawing::{Errors, Figure, ScatterPanel, Series, scatter};
-use crate::runs::experiments::files::{SUMMARY, TABLE};
+use crate::runs::experiments::files::{SUMMARY, SummaryFile, TABLE};
 use crate::runs::experiments::report::{self, Panel};
 use crate::runs::origin;
-use serde::Deserialize;
 use std::path::Path;
 
 /// The file by which the folder is known.
 pub(super) const FILE: &str = TABLE;
 
-/// What the summary says of the figure.
-#[derive(Deserialize)]
-struct Summary {
-    row: String,
-    figure: Vec<Panel>,
-}
-
 /// The figure of the experiment in `folder`; none if its table is not for the eye.
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
-    let summary: Summary = origin::read(folder, SUMMARY)?;
+    let summary: SummaryFile = origin::read(folder, SUMMARY)?;
     let table = Columns::read(&folder.join(TABLE))?;
     let mut panels: Vec<ScatterPanel> =
         summary.figure.iter().map(|panel| drawn(panel, &table)).collect::<Result<_, _>>()?;

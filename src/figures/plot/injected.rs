@@ -1,24 +1,12 @@
 //! What was injected on the star: spots and faculae of `truth.json`, or of the config that made a map.
 
-use super::star_map::TRUTH;
-use super::{PlotError, velocities};
+use super::PlotError;
+use crate::data::io::map::{FIT, FitFile};
+use crate::data::io::truth::{self, TruthFile};
 use crate::runs::origin;
 use crate::star::{Disc, Facula, Spot};
-use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
-
-/// What is used of `truth.json`.
-#[derive(Deserialize)]
-pub(super) struct TruthFile {
-    spots: Option<Value>,
-    #[serde(default)]
-    faculae: Value,
-    pub contrast: Option<f64>,
-    spottedness: Option<f64>,
-    pub times_d: Vec<f64>,
-    pub config: Value,
-}
 
 /// What was injected.
 #[derive(Clone, Debug, Default)]
@@ -32,14 +20,14 @@ pub(super) struct Injected {
 impl Injected {
     /// Of the folder, if it knows.
     pub fn of(folder: &Path) -> Result<Option<Self>, PlotError> {
-        if folder.join(TRUTH).is_file() {
-            return Ok(Injected::of_truth(&origin::read(folder, TRUTH)?));
+        if folder.join(truth::FILE).is_file() {
+            return Ok(Injected::of_truth(&origin::read(folder, truth::FILE)?));
         }
-        if !folder.join(velocities::FIT).is_file() {
+        if !folder.join(FIT).is_file() {
             return Ok(None);
         }
-        let fit: Value = origin::read(folder, velocities::FIT)?;
-        let written = fit.pointer("/config/observations/simulate");
+        let fit: FitFile = origin::read(folder, FIT)?;
+        let written = fit.provenance.config.pointer("/observations/simulate");
         Ok(written.filter(|simulate| simulate.get("spots").is_some()).map(|simulate| Injected {
             spots: spots(&simulate["spots"]),
             faculae: faculae(&simulate["faculae"]),
@@ -49,8 +37,9 @@ impl Injected {
 
     /// Of a simulation; `None` of observed profiles that an orbit was put into.
     pub fn of_truth(truth: &TruthFile) -> Option<Self> {
-        let spots = spots(truth.spots.as_ref()?);
-        Some(Injected { spots, faculae: faculae(&truth.faculae), coverage: truth.spottedness })
+        let TruthFile::Simulated(truth) = truth else { return None };
+        let faculae = truth.faculae.as_ref().map(faculae).unwrap_or_default();
+        Some(Injected { spots: spots(&truth.spots), faculae, coverage: Some(truth.spottedness) })
     }
 }
 

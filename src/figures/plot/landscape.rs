@@ -2,11 +2,12 @@
 //! paraboloid and, where a run is given, the contours of its chain.
 
 use super::density::Density;
-use super::paraboloid::{self, Paraboloid, ParaboloidFile};
+use super::paraboloid::{self, Paraboloid};
 use super::symbols::{label, nearest_turn, symbol};
 use super::trace::Sampled;
 use super::{PlotError, corner::SHARES};
 use crate::data::io::landscape;
+use crate::data::io::paraboloid::ParaboloidFile;
 use crate::figures::drawing::colour::{BLACK, BLUE, Colour, ColourMap, VERMILION};
 use crate::figures::drawing::contour::contour;
 use crate::figures::drawing::panel::{Shade, Sides, Tile};
@@ -92,7 +93,7 @@ impl Scene {
         }
         Ok(Scene {
             truth: truth.collect(),
-            paraboloid: paraboloid.and_then(|file| Paraboloid::of(file, &header.grid, &nodes)),
+            paraboloid: paraboloid.and_then(|file| Paraboloid::of(file.paraboloid.as_ref()?, &header.grid, &nodes)),
             grid: header.grid,
             nodes,
             computed: landscape.nodes().len(),

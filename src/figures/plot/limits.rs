@@ -5,50 +5,19 @@ use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{ColourMap, GREY, VERMILION, WHITE};
 use crate::figures::drawing::panel::{Marker, Shade, Sides, Tile};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
+use crate::runs::limits::{ComparisonRecord, JSON, LimitRecord, LimitsFile};
 use crate::runs::origin;
-use serde::Deserialize;
 use std::path::Path;
-
-/// The file.
-pub(super) const FILE: &str = "limits.json";
 
 /// The table beside it.
 const TABLE: &str = "limits.csv";
 
-/// What is used of the file.
-#[derive(Deserialize)]
-struct LimitsFile {
-    k_kms: Vec<f64>,
-    limits: Vec<Limit>,
-    comparisons: Vec<Comparison>,
-}
-
-#[derive(Deserialize)]
-struct Limit {
-    period_d: f64,
-    porb_over_prot: f64,
-    k50_kms: Option<f64>,
-    k95_kms: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct Comparison {
-    k_kms: f64,
-    porb_over_prot: f64,
-    full: Option<Outcome>,
-}
-
-#[derive(Deserialize)]
-struct Outcome {
-    recovered: bool,
-}
-
 /// The figures.
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
-    let file: LimitsFile = origin::read(folder, FILE)?;
+    let file: LimitsFile = origin::read(folder, JSON)?;
     let table = Columns::read(&folder.join(TABLE))?;
     let tried = file.limits.len() * file.k_kms.len();
-    table.check_rows(tried, &format!("periods times semi-amplitudes, by {FILE}"))?;
+    table.check_rows(tried, &format!("periods times semi-amplitudes, by {JSON}"))?;
     Ok(vec![figure(&file, &table)?])
 }
 
@@ -69,7 +38,7 @@ fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
         value: 100.0 * recovered[j] / phases[j],
     };
     panel.tiles(&mut figure, (0..period.len()).map(tile), shade);
-    let curve = |of: fn(&Limit) -> Option<f64>| -> Vec<[f64; 2]> {
+    let curve = |of: fn(&LimitRecord) -> Option<f64>| -> Vec<[f64; 2]> {
         file.limits.iter().map(|limit| [limit.period_d, of(limit).unwrap_or(f64::NAN)]).collect()
     };
     let (half, nearly_all) = (Stroke::new(WHITE, 1.2).dashed(), Stroke::new(VERMILION, 1.2));
@@ -85,7 +54,7 @@ fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
         }
     }
     let whole = |found: bool| -> Vec<[f64; 2]> {
-        let of = |c: &&Comparison| c.full.as_ref().is_some_and(|full| full.recovered) == found;
+        let of = |c: &&ComparisonRecord| c.full.as_ref().is_some_and(|full| full.recovered) == found;
         file.comparisons.iter().filter(of).map(|c| [c.porb_over_prot * rotation, c.k_kms]).collect()
     };
     panel.points(&mut figure, "recovered", &whole(true), (Marker::Disc, 4.0, VERMILION));

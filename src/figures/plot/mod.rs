@@ -31,11 +31,12 @@ use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::csv::CsvError;
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
+use crate::data::io::map::MAP;
+use crate::data::io::{self, truth};
 use crate::figures::drawing::Figure;
-use crate::runs::grid_scan;
-use crate::runs::manifest;
 use crate::runs::origin::OriginError;
 use crate::runs::run::CHAIN;
+use crate::runs::{self, grid_scan, manifest};
 use std::path::{Path, PathBuf};
 
 /// Pixels to the inch of PNG files where nothing else is asked for.
@@ -86,15 +87,15 @@ type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 
 /// The files by which a folder is known, with what draws it.
 const KINDS: [(&str, Draw); 9] = [
-    (star_map::FILE, star_map_figures),
-    (periodogram::FILE, |folder, _| periodogram::figures(folder)),
-    (limits::FILE, |folder, _| limits::figures(folder)),
+    (MAP, star_map_figures),
+    (io::periodogram::FILE, |folder, _| periodogram::figures(folder)),
+    (runs::limits::JSON, |folder, _| limits::figures(folder)),
     (manifest::FILE, |folder, _| chain_figures(folder)),
     (grid_scan::HEADER, landscape::figures),
-    (optimum::FILE, |folder, _| optimum::figures(folder)),
-    (comparison::FILE, |folder, _| comparison::figures(folder)),
+    (runs::optimum::FILE, |folder, _| optimum::figures(folder)),
+    (runs::comparison::FILE, |folder, _| comparison::figures(folder)),
     (experiment::FILE, |folder, _| experiment::figures(folder)),
-    (star_map::TRUTH, |folder, _| simulation_figures(folder)),
+    (truth::FILE, |folder, _| simulation_figures(folder)),
 ];
 
 fn known_files() -> Vec<&'static str> {
@@ -116,7 +117,7 @@ pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotErr
     }
     let here = kinds(folder);
     // a simulation beside a map of it is drawn beside the map
-    let drawn = |file: &str| here.contains(&file) && (file != star_map::TRUTH || !here.contains(&star_map::FILE));
+    let drawn = |file: &str| here.contains(&file) && (file != truth::FILE || !here.contains(&MAP));
     let mut figures: Vec<Figure> = Vec::new();
     for (_, draw) in KINDS.into_iter().filter(|(file, _)| drawn(file)) {
         for mut figure in draw(folder, run)? {

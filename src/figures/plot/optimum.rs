@@ -7,24 +7,9 @@ use super::trace::TRUTH;
 use crate::figures::drawing::colour::BLUE;
 use crate::figures::drawing::{Axis, Figure, Key, Legend, Paint, Panel, Rect, Scale, Stroke, panel::gaussian_contour};
 use crate::posterior::objective::Parameter;
+use crate::runs::optimum::{FILE, OptimumFile};
 use crate::runs::origin;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::Path;
-
-/// The file.
-pub(super) const FILE: &str = "optimum.json";
-
-/// What is used of it.
-#[derive(Deserialize)]
-struct OptimumFile {
-    names: Vec<String>,
-    parameters: BTreeMap<String, f64>,
-    sd: BTreeMap<String, f64>,
-    covariance: Vec<Vec<f64>>,
-    truth: Option<BTreeMap<String, f64>>,
-    well_defined: bool,
-}
 
 /// Standard deviations that hold 95 and 68 % of a Gaussian of two parameters.
 const RADII: [f64; 2] = [2.448, 1.510];
@@ -35,15 +20,18 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let n = file.names.len();
     let whole = file.covariance.len() == n
         && file.covariance.iter().all(|row| row.len() == n)
-        && file.names.iter().all(|name| file.parameters.contains_key(name) && file.sd.contains_key(name));
+        && file
+            .names
+            .iter()
+            .all(|name| file.optimum.parameters.contains_key(name) && file.optimum.sd.contains_key(name));
     if !whole {
         return Err(PlotError::Content {
             path: folder.join(FILE),
             problem: "names and values do not belong together".into(),
         });
     }
-    let best: Vec<f64> = file.names.iter().map(|name| file.parameters[name]).collect();
-    let sd: Vec<f64> = file.names.iter().map(|name| file.sd[name]).collect();
+    let best: Vec<f64> = file.names.iter().map(|name| file.optimum.parameters[name]).collect();
+    let sd: Vec<f64> = file.names.iter().map(|name| file.optimum.sd[name]).collect();
     if !file.well_defined || sd.iter().any(|sd| !(*sd > 0.0 && sd.is_finite())) {
         let problem = "no well-defined maximum, so there are no error bars to draw".into();
         return Err(PlotError::Content { path: folder.join(FILE), problem });

@@ -4,26 +4,12 @@ use super::landscape::turned;
 use crate::figures::drawing::colour::VERMILION;
 use crate::figures::drawing::panel::gaussian_contour;
 use crate::figures::drawing::{Figure, Panel, Stroke};
+use crate::sampling::landscape;
 use crate::sampling::landscape::Grid;
 use nalgebra::DMatrix;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 
 /// The pen of its lines.
 pub(super) const PEN: Stroke = Stroke::new(VERMILION, 1.0);
-
-/// What is used of `paraboloid.json`.
-#[derive(Deserialize)]
-pub(super) struct ParaboloidFile {
-    parameters: Option<BTreeMap<String, Vertex>>,
-    covariance: Option<Vec<Vec<f64>>>,
-}
-
-#[derive(Deserialize)]
-struct Vertex {
-    vertex: f64,
-    error: f64,
-}
 
 /// A paraboloid, in the order of the axes and in their turns.
 pub(super) struct Paraboloid {
@@ -33,8 +19,8 @@ pub(super) struct Paraboloid {
 }
 
 impl Paraboloid {
-    pub fn of(file: ParaboloidFile, grid: &Grid, nodes: &[Vec<f64>]) -> Option<Self> {
-        let (parameters, rows) = (file.parameters?, file.covariance?);
+    pub fn of(found: &landscape::Paraboloid, grid: &Grid, nodes: &[Vec<f64>]) -> Option<Self> {
+        let (parameters, rows) = (&found.parameters, &found.covariance);
         let n = grid.axes.len();
         if rows.len() != n || rows.iter().any(|row| row.len() != n) {
             return None;

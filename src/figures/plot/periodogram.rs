@@ -4,77 +4,25 @@
 use super::symbols::PERIOD_DIGITS;
 use super::{POSITIVE, PlotError, velocities};
 use crate::data::io::csv::Columns;
+use crate::data::io::periodogram::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{
     Align, Axis, Colour, Figure, Font, Key, Legend, Marker, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of,
     width_pt,
 };
+use crate::posterior::objective::Parameter;
 use crate::runs::origin;
 use crate::star::Orbit;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::Path;
-
-/// The file.
-pub(super) const FILE: &str = "periodogram.json";
-
-/// What is used of it.
-#[derive(Deserialize)]
-struct SearchFile {
-    best: OrbitFile,
-    truth: Option<BTreeMap<String, f64>>,
-    false_alarm: FalseAlarm,
-    peaks: Vec<OrbitFile>,
-    search: SearchedFile,
-    offset: Option<Offset>,
-    second: Option<Second>,
-}
-
-#[derive(Deserialize)]
-struct SearchedFile {
-    periods: usize,
-}
-
-/// A search for a second planet, the first one's period kept.
-#[derive(Deserialize)]
-struct Second {
-    false_alarm: FalseAlarm,
-    peaks: Vec<OrbitFile>,
-}
 
 /// What is marked in a periodogram.
 struct Marks<'a> {
-    levels: &'a [Level],
+    levels: &'a [LevelRecord],
     /// From high to low.
-    peaks: &'a [OrbitFile],
+    peaks: &'a [PeakRecord],
     /// Injected period over rotation period.
     truth: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct OrbitFile {
-    k_kms: f64,
-    period_d: f64,
-    porb_over_prot: f64,
-    phi: f64,
-    delta_ln_l: f64,
-}
-
-#[derive(Deserialize)]
-struct FalseAlarm {
-    levels: Vec<Level>,
-}
-
-#[derive(Deserialize)]
-struct Level {
-    false_alarm_probability: f64,
-    delta_ln_l: f64,
-}
-
-#[derive(Deserialize)]
-struct Offset {
-    velocity_kms: f64,
 }
 
 /// Tables of a first and a second planet, with the names of their figures.
@@ -82,13 +30,13 @@ const TABLES: [(&str, &str); 2] = [("periodogram.csv", "periodogram"), ("periodo
 
 /// The figures.
 pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
-    let file: SearchFile = origin::read(folder, FILE)?;
+    let file: PeriodogramFile = origin::read(folder, FILE)?;
     let mut figures = Vec::new();
-    let injected = file.truth.as_ref().filter(|truth| truth.get("k_kms").is_some_and(|k| *k > 0.0));
+    let injected = file.truth.filter(|truth| truth[Parameter::K] > 0.0);
     let first = Marks {
         levels: &file.false_alarm.levels,
         peaks: &file.peaks,
-        truth: injected.and_then(|truth| truth.get("porb_over_prot")).copied(),
+        truth: injected.map(|truth| truth[Parameter::PorbOverProt]),
     };
     figures.push(figure(TABLES[0].1, &table(folder, TABLES[0].0, &file)?, &first)?);
     if let Some(second) = &file.second {
@@ -98,7 +46,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         figures.push(beside);
     }
     if folder.join(velocities::FILE).is_file() {
-        let OrbitFile { k_kms, porb_over_prot, phi, .. } = file.best;
+        let OrbitRecord { k_kms, porb_over_prot, phi, .. } = file.best;
         let offset = file.offset.as_ref().map_or(0.0, |offset| offset.velocity_kms);
         figures.push(velocities::of_search(folder, Orbit { k_kms, porb_over_prot, phi }, offset)?);
     }
@@ -106,7 +54,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
 }
 
 /// A table of the periods searched.
-fn table(folder: &Path, name: &str, file: &SearchFile) -> Result<Columns, PlotError> {
+fn table(folder: &Path, name: &str, file: &PeriodogramFile) -> Result<Columns, PlotError> {
     let table = Columns::read(&folder.join(name))?;
     table.check_rows(file.search.periods, &format!("the periods searched, by {FILE}"))?;
     Ok(table)
@@ -165,9 +113,9 @@ fn figure(name: &str, table: &Columns, found: &Marks) -> Result<Figure, PlotErro
 }
 
 /// The curve through its trial periods and, between them, the peaks, which are known more closely.
-fn with_peaks(mut curve: Vec<[f64; 2]>, peaks: &[OrbitFile]) -> Vec<[f64; 2]> {
+fn with_peaks(mut curve: Vec<[f64; 2]>, peaks: &[PeakRecord]) -> Vec<[f64; 2]> {
     for peak in peaks {
-        let at = [peak.period_d, peak.delta_ln_l];
+        let at = [peak.orbit.period_d, peak.orbit.delta_ln_l];
         let inside = |pair: &[[f64; 2]]| (at[0] - pair[0][0]) * (at[0] - pair[1][0]) < 0.0;
         if let Some(k) = curve.windows(2).position(inside) {
             // what is lower than the curve is none of its peaks
@@ -180,10 +128,10 @@ fn with_peaks(mut curve: Vec<[f64; 2]>, peaks: &[OrbitFile]) -> Vec<[f64; 2]> {
 }
 
 /// Lines that chance exceeds once in so many times, with their shares beside the panel, none over another.
-fn false_alarms(figure: &mut Figure, panel: &Panel, levels: &[Level]) {
+fn false_alarms(figure: &mut Figure, panel: &Panel, levels: &[LevelRecord]) {
     let right = panel.frame.right() + 4.0;
     let mut lowest = f64::NEG_INFINITY;
-    let mut falling: Vec<&Level> = levels.iter().collect();
+    let mut falling: Vec<&LevelRecord> = levels.iter().collect();
     falling.sort_by(|a, b| b.delta_ln_l.total_cmp(&a.delta_ln_l));
     for level in falling {
         panel.horizontal(figure, "false-alarm", level.delta_ln_l, Stroke::new(GREY, 0.7).dashed());
@@ -243,12 +191,12 @@ fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, found: &Marks)
         figure.text(mark.text, at, Font::SMALL.coloured(mark.colour), Align::Centre, 0.0);
     }
     if let Some(peak) = found.peaks.first() {
-        highest(figure, above, peak);
+        highest(figure, above, &peak.orbit);
     }
 }
 
 /// A marker on the highest peak, with its period beside it.
-fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitFile) {
+fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitRecord) {
     let text = format!("highest: {:.PERIOD_DIGITS$} d", peak.period_d);
     let [x, y] = panel.place(peak.period_d, peak.delta_ln_l);
     panel.points(figure, "highest", &[[peak.period_d, peak.delta_ln_l]], (Marker::Disc, 3.6, BLUE));

@@ -1,25 +1,18 @@
 //! Line profiles below each other in the order of their rotation phase, observed and modelled.
 
-use super::star_map::TRUTH;
-use super::velocities::FIT;
+use super::star_map::ephemeris;
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::lsd::{self, ReadOptions};
+use crate::data::io::map::{FIT, FitFile};
+use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, GREY, VERMILION};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
 use crate::runs::origin;
-use serde::Deserialize;
-use serde_json::Value;
 use std::path::Path;
 
 /// The table of profiles that `map` writes.
 pub(super) const FILE: &str = "profiles.csv";
-
-/// What is used of `fit.json`.
-#[derive(Deserialize)]
-struct FitFile {
-    data: usize,
-}
 
 /// A profile.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +37,7 @@ pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
     if folder.join(FIT).is_file() {
         let fit: FitFile = origin::read(folder, FIT)?;
-        table.check_rows(fit.data, &format!("the data, by {FIT}"))?;
+        table.check_rows(fit.summary.data, &format!("the data, by {FIT}"))?;
     }
     let numbers = table.column("profile")?;
     let [cycle, velocity] = [table.column_within("cycle", ANY)?, table.column_within("velocity_kms", ANY)?];
@@ -66,9 +59,8 @@ pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
 
 /// The profiles of a simulation, in the order of their phase.
 pub(super) fn simulated(folder: &Path) -> Result<Vec<Line>, PlotError> {
-    let truth: Value = origin::read(folder, TRUTH)?;
-    let number = |key: &str| truth.pointer(&format!("/config/star/{key}")).and_then(Value::as_f64);
-    let (period, epoch) = (number("rotation_period_d").unwrap_or(1.0), number("epoch_d").unwrap_or(0.0));
+    let truth: TruthFile = origin::read(folder, truth::FILE)?;
+    let (period, epoch) = ephemeris(&truth.provenance().config).unwrap_or((1.0, 0.0));
     let list = folder.join("observations.txt");
     let observations = lsd::read_written(&list, &ReadOptions::default())?.observations;
     let line = |profile: &crate::star::observation::Profile| Line {

@@ -1,36 +1,19 @@
 //! The map of the star: flattened polar projection and Mollweide's, beside it the injected map where it is known.
 
 use super::content::Content;
-use super::injected::{Injected, TruthFile};
+use super::injected::Injected;
 use super::projection::Projection;
 use super::surface::{PixelMap, Scale, graticule, outline, paint_discs, photosphere};
 use super::{PlotError, velocities};
 use crate::data::io::csv::Columns;
+use crate::data::io::map::{MAP, MapColumns, MapFile};
+use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, VERMILION, WHITE};
 use crate::figures::drawing::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, Stroke, open, width_pt};
 use crate::runs::origin;
 use crate::star::{Brightness, Disc};
-use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
-
-/// The file of a map.
-pub(super) const FILE: &str = "map.json";
-
-/// The file of a simulation.
-pub(super) const TRUTH: &str = "truth.json";
-
-/// What is used of `map.json`.
-#[derive(Deserialize)]
-struct MapFile {
-    ring_pixels: Vec<usize>,
-    /// One of the two.
-    spot_filling: Option<Vec<f64>>,
-    brightness: Option<Vec<f64>>,
-    contrast: f64,
-    spottedness: f64,
-    true_spottedness: Option<f64>,
-}
 
 /// One star on the page.
 struct Star {
@@ -49,16 +32,18 @@ enum Surface {
 
 /// The map in `folder`.
 pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
-    let map: MapFile = origin::read(folder, FILE)?;
-    let (content, values) = match (map.spot_filling, map.brightness) {
-        (None, Some(brightness)) => (Content::Brightness(Brightness::of_spots(map.contrast)), brightness),
-        (filling, _) => (Content::Spots, filling.unwrap_or_default()),
+    let map: MapFile = origin::read(folder, MAP)?;
+    let (content, values) = match map.map {
+        MapColumns::BrightAndDark { brightness, .. } => {
+            (Content::Brightness(Brightness::of_spots(map.contrast)), brightness)
+        }
+        MapColumns::Spots { spot_filling, .. } => (Content::Spots, spot_filling),
     };
     let pixels = PixelMap { ring_pixels: map.ring_pixels, values };
     if !pixels.is_whole() {
         let what = if content == Content::Spots { "spot_filling" } else { "brightness" };
         let problem = format!("ring_pixels and {what} do not belong together");
-        return Err(PlotError::Content { path: folder.join(FILE), problem });
+        return Err(PlotError::Content { path: folder.join(MAP), problem });
     }
     let known = Injected::of(folder)?;
     let cycles = match folder.join(velocities::FILE) {
@@ -88,10 +73,10 @@ pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
 ///
 /// `None` of observed profiles that an orbit was put into.
 pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
-    let truth: TruthFile = origin::read(folder, TRUTH)?;
-    let Some(injected) = Injected::of_truth(&truth) else { return Ok(None) };
-    let number = |key: &str| truth.config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
-    let (period, epoch) = (number("rotation_period_d").unwrap_or(f64::NAN), number("epoch_d").unwrap_or(0.0));
+    let file: TruthFile = origin::read(folder, truth::FILE)?;
+    let Some(injected) = Injected::of_truth(&file) else { return Ok(None) };
+    let TruthFile::Simulated(truth) = file else { return Ok(None) };
+    let (period, epoch) = ephemeris(&truth.provenance.config).unwrap_or((f64::NAN, 0.0));
     let cycles: Vec<f64> = truth.times_d.iter().map(|t| (t - epoch) / period).filter(|c| c.is_finite()).collect();
     let (content, what) = match (injected.faculae.is_empty(), truth.contrast) {
         (false, Some(contrast)) => (Content::Brightness(Brightness::of_spots(contrast)), "spots and faculae"),
@@ -100,6 +85,12 @@ pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     let mut star = Star::injected(content, None, &injected);
     star.title = Content::Spots.title("injected", injected.coverage);
     Ok(Some(draw(&[star], content, &cycles, format!("Map of the injected {what} at cycle 0. {HOW_TO_READ}"))))
+}
+
+/// Rotation period and time of cycle 0 (d) of a resolved config.
+pub(super) fn ephemeris(config: &Value) -> Option<(f64, f64)> {
+    let number = |key: &str| config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
+    Some((number("rotation_period_d")?, number("epoch_d").unwrap_or(0.0)))
 }
 
 /// How phases and longitudes are to be read.

@@ -3,13 +3,12 @@
 
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
+use crate::data::io::map::{FIT, FitFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, GREY, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Axis, COLUMN_MM, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
 use crate::runs::origin;
 use crate::star::Orbit;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The table of velocities that `map` and `periodogram` write.
@@ -17,16 +16,6 @@ pub(super) const FILE: &str = "rv.csv";
 
 /// The covariance of those of `periodogram`, a row a profile.
 const COVARIANCE: &str = "covariance.csv";
-
-/// How good the fit of `map` is.
-pub(super) const FIT: &str = "fit.json";
-
-/// What is used of `fit.json`.
-#[derive(Deserialize)]
-struct FitFile {
-    parameters: BTreeMap<String, f64>,
-    profiles: usize,
-}
 
 /// A velocity with its error bar, or without where that is 0.
 struct Series<'a> {
@@ -53,8 +42,8 @@ struct Curves<'a> {
 pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
     let fit: FitFile = origin::read(folder, FIT)?;
-    table.check_rows(fit.profiles, &format!("the profiles, by {FIT}"))?;
-    let value = |name: &str| fit.parameters.get(name).copied().unwrap_or(0.0);
+    table.check_rows(fit.summary.profiles, &format!("the profiles, by {FIT}"))?;
+    let state = fit.summary.parameters.state();
     let [observed, modelled, filtered] =
         [table.column("observed_kms")?, table.column("modelled_kms")?, table.column("filtered_kms")?];
     let (sigma, orbit_kms) = (table.column("sigma_kms")?, table.column("orbit_kms")?);
@@ -68,8 +57,8 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
             ("RV − spots (km/s)", vec![errors(clean, "")]),
             ("residual (km/s)", vec![errors(filtered.to_vec(), "")]),
         ],
-        orbit: Orbit { k_kms: value("k_kms"), porb_over_prot: value("porb_over_prot"), phi: value("phi") },
-        vsys_kms: value("vsys_kms"),
+        orbit: state.orbit,
+        vsys_kms: state.vsys_kms,
         orbit_is: "assumed orbit",
         orbital: 1,
     };

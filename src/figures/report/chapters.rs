@@ -1,47 +1,55 @@
 //! What is said of each kind of result, from its file.
 
 use super::{Chapter, NOTHING, Table, Tone, injection, is_empty, run, verdicts};
+use crate::data::io::map::{FIT, FitFile, MAP};
+use crate::data::io::paraboloid::ParaboloidFile;
+use crate::data::io::periodogram::{self, PeakRecord, PeriodogramFile};
+use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::planets::verdict::probability;
-use crate::posterior::objective::{OrbitQuantity, Parameter, definition};
-use crate::runs::grid_scan::PARABOLOID;
-use crate::runs::manifest;
-use crate::runs::origin;
-use serde_json::Value;
+use crate::posterior::fit::Deviation;
+use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterValues, definition};
+use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
+use crate::runs::grid_scan::{self, Header, PARABOLOID};
+use crate::runs::optimum::{self, OptimumFile};
+use crate::runs::{limits, manifest, origin};
+use crate::sampling::landscape::Axis;
+use crate::sampling::log_density::Status;
+use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The chapter of the result that is known by `file`, and the file that has its config.
-pub(super) fn of(folder: &Path, file: &'static str) -> Result<(Chapter, Value), PlotError> {
-    let whole: Value = origin::read(folder, file)?;
+/// The chapter of the result that is known by `file`.
+pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError> {
     Ok(match file {
-        manifest::FILE => (run::chapter(folder)?, whole),
-        "map.json" => {
-            let fit = if folder.join("fit.json").is_file() { origin::read(folder, "fit.json")? } else { whole };
-            (map(&fit), fit)
-        }
-        "periodogram.json" => (periodogram(&whole), whole),
-        "landscape.json" => {
+        manifest::FILE => run::chapter(folder)?,
+        MAP => map(&origin::read(folder, FIT)?),
+        periodogram::FILE => search(&origin::read(folder, file)?),
+        grid_scan::HEADER => {
             let present = folder.join(PARABOLOID).is_file();
-            let paraboloid = if present { origin::read(folder, PARABOLOID)? } else { Value::Null };
-            (landscape(&whole, &paraboloid), whole)
+            let paraboloid = if present { Some(origin::read(folder, PARABOLOID)?) } else { None };
+            landscape(&origin::read(folder, file)?, paraboloid.as_ref())
         }
-        "optimum.json" => (optimum(&whole), whole),
-        "comparison.json" => (comparison(&whole), whole),
-        "limits.json" => (injection::limits(&whole), whole),
-        _ if whole.get("injected").is_some() => (injection::injection(&whole), whole),
-        _ => (simulation(&whole), whole),
+        optimum::FILE => best(&origin::read(folder, file)?),
+        comparison::FILE => compared(&origin::read(folder, file)?),
+        limits::JSON => injection::limits(&origin::read(folder, file)?),
+        truth::FILE => match origin::read(folder, file)? {
+            TruthFile::Injected(truth) => injection::injection(&truth),
+            TruthFile::Simulated(truth) => simulation(&truth),
+        },
+        // experiments are figures and no more
+        _ => Chapter::default(),
     })
 }
 
-/// A number of a file with so many decimals; a dash where there is none.
-pub(super) fn number(file: &Value, pointer: &str, digits: usize) -> String {
-    file.pointer(pointer).and_then(Value::as_f64).map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"))
+/// A number with so many decimals; a dash where there is none.
+pub(super) fn number(value: impl Into<Option<f64>>, digits: usize) -> String {
+    value.into().filter(|x| x.is_finite()).map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"))
 }
 
-pub(super) fn texts(file: &Value, key: &str) -> Vec<String> {
-    let list = file.get(key).and_then(Value::as_array);
-    list.into_iter().flatten().filter_map(|text| text.as_str().map(str::to_owned)).collect()
+/// Decimals that show an error, where there is one.
+fn digits_of(sigma: Option<f64>, otherwise: usize) -> usize {
+    sigma.filter(|x| x.is_finite()).map_or(otherwise, decimals)
 }
 
 /// A table of names and values, those without one left out.
@@ -54,34 +62,39 @@ fn table(head: &[&str], rows: Vec<Vec<String>>) -> Table {
     Table { head: head.iter().map(|text| (*text).to_owned()).collect(), rows }
 }
 
-fn map(fit: &Value) -> Chapter {
-    let converged = fit.get("status").and_then(Value::as_str) == Some("converged");
+fn map(file: &FitFile) -> Chapter {
+    let fit = &file.summary;
+    let converged = fit.status == Status::Converged;
     let sentence = match converged {
         true => "The map reaches the target chi2 and is the one of greatest entropy that does.",
         false => {
             "The reconstruction stopped short of the target chi2: this map is not the one of greatest entropy there."
         }
     };
-    let spottedness = match fit.get("darkness") {
-        None => ("spot coverage", number(fit, "/spottedness", 4)),
-        Some(_) => ("brightness minus 1, rms (mean of dark, of bright parts)", deviation(fit)),
+    let spottedness = match fit.deviation {
+        None => ("spot coverage", number(fit.spottedness, 4)),
+        Some(Deviation { darkness, brightness_excess }) => (
+            "brightness minus 1, rms (mean of dark, of bright parts)",
+            format!("{:.4} ({darkness:.4}, {brightness_excess:.4})", fit.spottedness),
+        ),
     };
     let rows = [
-        ("chi2 per datum", number(fit, "/chi2_per_datum", 4)),
-        ("data in profiles", format!("{} in {}", number(fit, "/data", 0), number(fit, "/profiles", 0))),
+        ("chi2 per datum", number(fit.chi2_per_datum, 4)),
+        ("data in profiles", format!("{} in {}", fit.data, fit.profiles)),
         spottedness,
-        ("entropy", number(fit, "/entropy", 4)),
-        ("scatter of the radial velocities (km/s)", number(fit, "/observed_rv_rms_kms", 4)),
-        ("the same with the model taken out (km/s)", number(fit, "/filtered_rv_rms_kms", 4)),
-        ("photon noise of a radial velocity (km/s)", number(fit, "/photon_rv_error_kms", 4)),
-        ("residuals, rms", number(fit, "/residual_rms", 6)),
-        ("pixels", number(fit, "/pixels", 0)),
+        ("entropy", number(fit.entropy, 4)),
+        ("scatter of the radial velocities (km/s)", number(fit.observed_rv_rms_kms, 4)),
+        ("the same with the model taken out (km/s)", number(fit.filtered_rv_rms_kms, 4)),
+        ("photon noise of a radial velocity (km/s)", number(fit.photon_rv_error_kms, 4)),
+        ("residuals, rms", number(fit.residual_rms, 6)),
+        ("pixels", fit.pixels.to_string()),
     ];
+    let parameters = parameters(&fit.parameters, file.truth.as_ref());
     Chapter {
         heading: "Map".into(),
         verdicts: vec![(tone(converged), sentence.into())],
-        warnings: fit.get("checks").map(|checks| texts(checks, "warnings")).unwrap_or_default(),
-        tables: vec![("The fit.".into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters(fit))],
+        warnings: file.checks.warnings.clone(),
+        tables: vec![("The fit.".into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters)],
         ..Chapter::default()
     }
 }
@@ -90,197 +103,161 @@ fn tone(good: bool) -> Tone {
     if good { Tone::Good } else { Tone::Doubt }
 }
 
-/// How far the brightness is from that of the photosphere.
-fn deviation(fit: &Value) -> String {
-    let [rms, dark, bright] = ["/spottedness", "/darkness", "/brightness_excess"].map(|key| number(fit, key, 4));
-    format!("{rms} ({dark}, {bright})")
-}
-
-/// The parameters of a file, and the injected ones where it has them.
-fn parameters(file: &Value) -> Table {
-    let Some(all) = file.get("parameters").and_then(Value::as_object) else { return Table::default() };
-    let truth = file.get("truth").filter(|truth| truth.is_object());
-    let row = |name: &String| {
-        let mut row = vec![label(name), number(file, &format!("/parameters/{name}"), 4)];
-        row.extend(truth.map(|truth| number(truth, &format!("/{name}"), 4)));
-        row
+/// The parameters that are given, and the injected ones where they are known.
+fn parameters(values: &ParameterValues, truth: Option<&ParameterValues>) -> Table {
+    let row = |parameter: Parameter| {
+        let mut row = vec![label(parameter.name()), number(values.given(parameter)?, 4)];
+        row.extend(truth.map(|truth| number(truth.given(parameter), 4)));
+        Some(row)
     };
     let head: &[&str] = if truth.is_some() { &["parameter", "value", "injected"] } else { &["parameter", "value"] };
-    let known = Parameter::ALL.map(Parameter::name).map(str::to_owned);
-    table(head, known.iter().filter(|name| all.contains_key(*name)).map(row).collect())
+    table(head, Parameter::ALL.into_iter().filter_map(row).collect())
 }
 
-fn simulation(truth: &Value) -> Chapter {
-    let snr = truth.get("snr").and_then(Value::as_f64).map_or_else(|| "no noise".into(), |snr| format!("{snr}"));
-    let rows = [("spot coverage", number(truth, "/spottedness", 4)), ("signal-to-noise ratio of a bin", snr)];
+fn simulation(truth: &Truth) -> Chapter {
+    let snr = truth.snr.map_or_else(|| "no noise".into(), |snr| format!("{snr}"));
+    let rows = [("spot coverage", number(truth.spottedness, 4)), ("signal-to-noise ratio of a bin", snr)];
+    let parameters = parameters(&truth.parameters, None);
     Chapter {
         heading: "Simulation".into(),
-        tables: vec![("Simulated data.".into(), pairs(&rows)), ("Injected parameters.".into(), parameters(truth))],
+        tables: vec![("Simulated data.".into(), pairs(&rows)), ("Injected parameters.".into(), parameters)],
         ..Chapter::default()
     }
 }
 
-fn periodogram(file: &Value) -> Chapter {
-    let peaks = file.get("peaks").and_then(Value::as_array).cloned().unwrap_or_default();
-    let best = |key: &str, sigma: &str| {
-        let digits = file.pointer(&format!("/best/{sigma}")).and_then(Value::as_f64).map_or(3, decimals);
+fn search(file: &PeriodogramFile) -> Chapter {
+    let best = &file.best;
+    let injected = |parameter: Parameter| file.truth.as_ref().and_then(|truth| truth.given(parameter));
+    let row = |name: &str, value: f64, sigma: Option<f64>, truth: Option<f64>| {
+        let digits = digits_of(sigma, 3);
+        vec![label(name), number(value, digits), number(sigma, digits), number(truth, digits)]
+    };
+    let mut orbit = vec![
+        row("k_kms", best.k_kms, Some(best.sigma_k_kms), injected(Parameter::K)),
+        row("porb_over_prot", best.porb_over_prot, best.sigma_porb_over_prot, injected(Parameter::PorbOverProt)),
+        row("phi", best.phi, best.sigma_phi, injected(Parameter::Phi)),
+    ];
+    let period = row("", best.period_d, best.sigma_period_d, None);
+    orbit.insert(1, [vec!["*P*_{orb} (d)".into()], period[1..].to_vec()].concat());
+    let told = OrbitQuantity::ALL.into_iter().filter_map(|quantity| Some((quantity, best.quantities.of(quantity)?)));
+    let mut notes: Vec<String> = note("phi").into_iter().collect();
+    for (quantity, (value, sigma)) in told {
+        orbit.push(row(quantity.name(), value, sigma, file.derived_truth.get(quantity.name()).copied()));
+        notes.extend(note(quantity.name()));
+    }
+    notes.push(file.co_rotation.statement.clone());
+    let peak = |peak: &PeakRecord| {
+        let alias = peak.alias.as_ref().map(|alias| format!("of the first, by {:.3}/d", alias.window_frequency_per_d));
         vec![
-            number(file, &format!("/best/{key}"), digits),
-            number(file, &format!("/best/{sigma}"), digits),
-            number(file, &format!("/truth/{key}"), digits),
+            number(peak.orbit.period_d, PERIOD_DIGITS),
+            number(peak.orbit.k_kms, 3),
+            number(peak.orbit.sigma_k_kms, 3),
+            number(peak.orbit.delta_ln_l, 2),
+            probability(peak.false_alarm_probability),
+            alias.unwrap_or_else(|| NOTHING.into()),
+            peak.rotation.clone().unwrap_or_else(|| NOTHING.into()),
         ]
     };
-    let rows = [("k_kms", "sigma_k_kms"), ("porb_over_prot", "sigma_porb_over_prot"), ("phi", "sigma_phi")];
-    let mut orbit: Vec<Vec<String>> =
-        rows.into_iter().map(|(key, sigma)| [vec![label(key)], best(key, sigma)].concat()).collect();
-    orbit.insert(1, [vec!["*P*_{orb} (d)".into()], best("period_d", "sigma_period_d")].concat());
-    let quantities = ["t_max_rv_d", "t_conjunction_d", "msini_mjup"];
-    orbit.extend(
-        quantities.into_iter().filter(|name| file.pointer(&format!("/best/{name}")).is_some_and(Value::is_number)).map(
-            |name| {
-                let mut cells = best(name, &format!("sigma_{name}"));
-                let digits = file.pointer(&format!("/best/sigma_{name}")).and_then(Value::as_f64).map_or(3, decimals);
-                cells[2] = number(file, &format!("/derived_truth/{name}"), digits);
-                [vec![label(name)], cells].concat()
-            },
-        ),
-    );
-    let peak = |peak: &Value| {
-        let chance = peak.get("false_alarm_probability").and_then(Value::as_f64);
-        let chance = chance.map_or_else(|| NOTHING.into(), probability);
-        vec![
-            number(peak, "/period_d", PERIOD_DIGITS),
-            number(peak, "/k_kms", 3),
-            number(peak, "/sigma_k_kms", 3),
-            number(peak, "/delta_ln_l", 2),
-            chance,
-            alias(peak).unwrap_or_else(|| NOTHING.into()),
-            peak.get("rotation").and_then(Value::as_str).unwrap_or(NOTHING).to_owned(),
-        ]
-    };
-    let told = |name: &&str| file.pointer(&format!("/best/{name}")).is_some_and(Value::is_number);
-    let meaning = |name: &str| Some(format!("{}: {}.", symbol(name).0, definition(name)?));
-    let mut notes: Vec<String> = ["phi"].into_iter().chain(quantities).filter(told).filter_map(meaning).collect();
-    notes.extend(file.pointer("/co_rotation/statement").and_then(Value::as_str).map(str::to_owned));
     let head = ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias", "period of the star"];
     Chapter {
         heading: "Search for a planet".into(),
-        verdicts: verdicts::at(file, "/verdict").into_iter().collect(),
-        warnings: texts(file, "warnings"),
+        verdicts: vec![verdicts::of(&file.verdict)],
+        warnings: file.warnings.clone(),
         notes,
         tables: vec![
             ("The best orbit.".into(), table(&["parameter", "best", "error", "injected"], orbit)),
-            ("Peaks of the periodogram.".into(), table(&head, peaks.iter().map(peak).collect())),
+            ("Peaks of the periodogram.".into(), table(&head, file.peaks.iter().map(peak).collect())),
         ],
     }
 }
 
-/// How a peak is an alias of the highest.
-fn alias(peak: &Value) -> Option<String> {
-    let frequency = peak.pointer("/alias/window_frequency_per_d")?.as_f64()?;
-    Some(format!("of the first, by {frequency:.3}/d"))
+/// What a name means, where it has to be said.
+fn note(name: &str) -> Option<String> {
+    Some(format!("{}: {}.", symbol(name).0, definition(name)?))
 }
 
-fn landscape(header: &Value, paraboloid: &Value) -> Chapter {
-    let axes = header.pointer("/grid/axes").and_then(Value::as_array).cloned().unwrap_or_default();
-    let name = |axis: &Value| axis.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
-    let row = |axis: &Value| {
-        let name = name(axis);
-        let error = paraboloid.pointer(&format!("/parameters/{name}/error")).and_then(Value::as_f64);
-        let digits = error.map_or(4, decimals);
-        let range = format!("{} to {}", number(axis, "/min", 4), number(axis, "/max", 4));
-        let vertex = number(paraboloid, &format!("/parameters/{name}/vertex"), digits);
-        let truth = number(header, &format!("/truth/{name}"), digits);
-        let error = number(paraboloid, &format!("/parameters/{name}/error"), digits);
-        vec![label(&name), range, number(axis, "/nodes", 0), vertex, error, truth]
+fn landscape(header: &Header, file: Option<&ParaboloidFile>) -> Chapter {
+    let axes = &header.grid.axes;
+    let truth = header.origin.truth.as_ref();
+    let found = file.and_then(|file| file.paraboloid.as_ref());
+    let estimate = |axis: &Axis| found.and_then(|found| found.parameters.get(&axis.name));
+    let row = |axis: &Axis| {
+        let estimate = estimate(axis);
+        let digits = digits_of(estimate.map(|one| one.error), 4);
+        vec![
+            label(&axis.name),
+            format!("{} to {}", number(axis.min, 4), number(axis.max, 4)),
+            axis.nodes.to_string(),
+            number(estimate.map(|one| one.vertex), digits),
+            number(estimate.map(|one| one.error), digits),
+            number(truth.and_then(|truth| truth.get(&axis.name)).copied(), digits),
+        ]
     };
-    let refused = paraboloid.get("refused").and_then(Value::as_str);
-    let verdict = match (paraboloid, refused) {
-        (Value::Null, _) => (Tone::Doubt, "The landscape is not finished, or has no paraboloid.".to_owned()),
-        (_, Some(why)) => (Tone::Doubt, format!("There is no paraboloid: {why}.")),
-        _ => match unbounded(&axes, paraboloid) {
-            Some(name) => (
-                Tone::Doubt,
-                format!(
-                    "A paraboloid fits around the highest node, but the error bar of {} is more than half its axis: \
-                    the nodes \
-                     do not bound it.",
-                    label(&name)
-                ),
+    // an axis of a phase that goes once around is as long as that
+    let length = |axis: &Axis| if axis.max > axis.min { axis.max - axis.min } else { axis.max - axis.min + 1.0 };
+    let unbounded = axes.iter().find(|axis| estimate(axis).is_some_and(|one| one.error > 0.5 * length(axis)));
+    let verdict = match (file.map(|file| &file.refused), unbounded) {
+        (None, _) => (Tone::Doubt, "The landscape is not finished, or has no paraboloid.".to_owned()),
+        (Some(Some(why)), _) => (Tone::Doubt, format!("There is no paraboloid: {why}.")),
+        (_, Some(axis)) => (
+            Tone::Doubt,
+            format!(
+                "A paraboloid fits around the highest node, but the error bar of {} is more than half its axis: the \
+                 nodes do not bound it.",
+                label(&axis.name)
             ),
-            None => {
-                (Tone::Good, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned())
-            }
-        },
+        ),
+        _ => (Tone::Good, "The highest node lies within the landscape and a paraboloid fits around it.".to_owned()),
     };
-    let fit = [
-        ("nodes that it was fitted to", number(paraboloid, "/nodes", 0)),
-        ("residuals, rms (chi2)", number(paraboloid, "/rms_chi2", 3)),
-        ("nodes reach above the lowest chi2 by", number(paraboloid, "/delta_chi2", 2)),
-    ];
-    let fitted = if paraboloid.get("nodes").is_some() { pairs(&fit) } else { Table::default() };
+    let fit = found.map(|found| {
+        pairs(&[
+            ("nodes that it was fitted to", found.nodes.to_string()),
+            ("residuals, rms (chi2)", number(found.rms_chi2, 3)),
+            ("nodes reach above the lowest chi2 by", number(found.delta_chi2, 2)),
+        ])
+    });
     let head = ["parameter", "axis", "nodes", "vertex", "error", "injected"];
     Chapter {
         heading: "Landscape".into(),
         verdicts: vec![verdict],
         tables: vec![
             ("Axes and paraboloid.".into(), table(&head, axes.iter().map(row).collect())),
-            ("Fit of the paraboloid.".into(), fitted),
+            ("Fit of the paraboloid.".into(), fit.unwrap_or_default()),
         ],
         ..Chapter::default()
     }
 }
 
-/// The first axis that is shorter than two error bars.
-fn unbounded(axes: &[Value], paraboloid: &Value) -> Option<String> {
-    let is_short = |axis: &&Value| {
-        let end = |key: &str| axis.get(key).and_then(Value::as_f64);
-        let name = axis.get("name").and_then(Value::as_str).unwrap_or_default();
-        let error = paraboloid.pointer(&format!("/parameters/{name}/error")).and_then(Value::as_f64);
-        // an axis of a phase that goes once around is as long as that
-        let length = end("max").zip(end("min")).map(|(max, min)| if max > min { max - min } else { max - min + 1.0 });
-        error.zip(length).is_some_and(|(error, length)| error > 0.5 * length)
+fn best(file: &OptimumFile) -> Chapter {
+    let row = |name: &str, value: Option<f64>, sd: Option<f64>, truth: Option<f64>| {
+        let digits = digits_of(sd, 4);
+        vec![label(name), number(value, digits), number(sd, digits), number(truth, digits)]
     };
-    axes.iter().find(is_short).and_then(|axis| axis.get("name")?.as_str().map(str::to_owned))
-}
-
-fn optimum(file: &Value) -> Chapter {
-    let names = texts(file, "names");
-    let row = |name: &String| {
-        let digits = file.pointer(&format!("/sd/{name}")).and_then(Value::as_f64).map_or(4, decimals);
-        let value = |section: &str| number(file, &format!("/{section}/{name}"), digits);
-        vec![label(name), value("parameters"), value("sd"), value("truth")]
+    let of = |name: &String| {
+        let get = |values: &BTreeMap<String, f64>| values.get(name).copied();
+        row(name, get(&file.optimum.parameters), get(&file.optimum.sd), file.truth.as_ref().and_then(get))
     };
-    let derived = OrbitQuantity::ALL.map(OrbitQuantity::name);
-    let derived = derived.into_iter().filter(|name| file.pointer(&format!("/derived/{name}")).is_some());
-    let derived_row = |name: &str| {
-        let sd = format!("/derived/{name}/sd");
-        let digits = file.pointer(&sd).and_then(Value::as_f64).map_or(4, decimals);
-        let value = |pointer: &str| number(file, pointer, digits);
-        let [best, truth] = [format!("/derived/{name}/value"), format!("/derived_truth/{name}")];
-        vec![label(name), value(&best), value(&sd), value(&truth)]
-    };
-    let rows = names.iter().map(row).chain(derived.clone().map(derived_row)).collect();
-    let shown = names.iter().map(String::as_str).chain(derived);
-    let notes = shown.filter_map(|name| Some(format!("{}: {}.", symbol(name).0, definition(name)?))).collect();
-    let is = |key: &str| file.get(key).and_then(Value::as_bool).unwrap_or(false);
-    let (defined, converged) = (is("well_defined"), is("converged"));
-    let sentence = match (defined, converged) {
+    let mut rows: Vec<Vec<String>> = file.names.iter().map(of).collect();
+    let mut notes: Vec<String> = file.names.iter().filter_map(|name| note(name)).collect();
+    for name in OrbitQuantity::ALL.map(OrbitQuantity::name) {
+        if let Some(Estimate { value, sd }) = file.derived.get(name) {
+            rows.push(row(name, Some(*value), Some(*sd), file.derived_truth.get(name).copied()));
+            notes.extend(note(name));
+        }
+    }
+    let sentence = match (file.well_defined, file.converged) {
         (true, true) => "A well-defined maximum.",
         (true, false) => "The search ran out of steps; the values may be improved from there.",
         (false, _) => "No well-defined maximum: on the edge of a prior, or the data leave some direction open.",
     };
-    let mut verdicts: Vec<(Tone, String)> = verdicts::at(file, "/blind_search/verdict").into_iter().collect();
-    verdicts.push((tone(defined && converged), sentence.into()));
-    let remarks = file.pointer("/blind_search/remarks").and_then(Value::as_array).into_iter().flatten();
-    let remarks = remarks.filter_map(|remark| remark.get("text")?.as_str().map(str::to_owned));
-    let reference = file
-        .get("reference")
-        .and_then(|record| serde_json::from_value::<origin::ReferenceRecord>(record.clone()).ok()?.warning());
+    let search = file.blind_search.as_ref();
+    let mut verdicts: Vec<(Tone, String)> = search.map(|search| verdicts::of(&search.verdict)).into_iter().collect();
+    verdicts.push((tone(file.well_defined && file.converged), sentence.into()));
+    let remarks = search.into_iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
     Chapter {
         heading: "Optimum".into(),
         verdicts,
-        warnings: remarks.chain(reference).collect(),
+        warnings: remarks.chain(file.reference.warning()).collect(),
         notes,
         tables: vec![(
             "The best parameters, with errors from the curvature.".into(),
@@ -289,49 +266,39 @@ fn optimum(file: &Value) -> Chapter {
     }
 }
 
-fn comparison(file: &Value) -> Chapter {
+fn compared(file: &Comparison) -> Chapter {
+    let dash = || NOTHING.to_owned();
     let mut rows = Vec::new();
-    for name in texts(file, "names") {
-        let at = |rest: &str| format!("/parameters/{name}/{rest}");
-        let get = |rest: &str| file.pointer(&at(rest)).and_then(Value::as_f64);
-        let half = get("chain/ci68/1").zip(get("chain/ci68/0")).map(|(high, low)| 0.5 * (high - low));
-        let digits = half.map_or(4, decimals);
-        for by in ["chain", "paraboloid", "landscape"] {
-            if get(&format!("{by}/value")).is_some() {
-                let value = |rest: &str, digits| number(file, &at(&format!("{by}/{rest}")), digits);
-                let interval = format!("{} to {}", value("ci68/0", digits), value("ci68/1", digits));
-                rows.push(vec![
-                    label(&name),
-                    by.into(),
-                    value("value", digits),
-                    interval,
-                    value("difference", 2),
-                    value("width_ratio", 2),
-                ]);
+    for (name, one) in file.names.iter().filter_map(|name| file.parameters.get_key_value(name)) {
+        let digits = decimals(0.5 * (one.chain.ci68[1] - one.chain.ci68[0]));
+        let mut row = |by: &str, Interval { value, ci68: [low, high] }: Interval, against: Option<&AgainstChain>| {
+            rows.push(vec![
+                label(name),
+                by.into(),
+                number(value, digits),
+                format!("{} to {}", number(low, digits), number(high, digits)),
+                number(against.map(|one| one.difference), 2),
+                number(against.map(|one| one.width_ratio), 2),
+            ]);
+        };
+        row("chain", one.chain, None);
+        for (by, estimate) in [("paraboloid", &one.paraboloid), ("landscape", &one.landscape)] {
+            if let Some(against) = estimate {
+                row(by, against.interval, Some(against));
             }
         }
-        if get("truth").is_some() {
-            let dash = || NOTHING.to_owned();
-            rows.push(vec![
-                label(&name),
-                "injected".into(),
-                number(file, &at("truth"), digits),
-                dash(),
-                dash(),
-                dash(),
-            ]);
+        if let Some(truth) = one.truth {
+            rows.push(vec![label(name), "injected".into(), number(truth, digits), dash(), dash(), dash()]);
         }
     }
-    let converged = file.get("converged").and_then(Value::as_bool).unwrap_or(false);
-    let sentence = if converged {
-        "The chain has converged."
-    } else {
-        "The chain has not converged: the comparison is of its draws so far."
+    let sentence = match file.converged {
+        true => "The chain has converged.",
+        false => "The chain has not converged: the comparison is of its draws so far.",
     };
     Chapter {
         heading: "Chain against landscape".into(),
-        verdicts: vec![(tone(converged), sentence.into())],
-        warnings: texts(file, "notes"),
+        verdicts: vec![(tone(file.converged), sentence.into())],
+        warnings: file.notes.clone(),
         tables: vec![(
             "Estimates; differences and widths in error bars of the chain.".into(),
             table(&["parameter", "by", "value", "68 % interval", "difference", "width"], rows),
@@ -343,28 +310,67 @@ fn comparison(file: &Value) -> Chapter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
+    use serde::de::DeserializeOwned;
+    use serde_json::{Value, json};
+
+    /// A file of which all is in `parts`, but for where it came from.
+    fn file<T: DeserializeOwned>(parts: &[&Value]) -> T {
+        let provenance = json!({ "version": "1", "data_sha256": "", "config_sha256": "", "config": {} });
+        let all = parts.iter().copied().chain([&provenance]).flat_map(|part| part.as_object().unwrap().clone());
+        serde_json::from_value(Value::Object(all.collect())).unwrap()
+    }
+
+    fn verdict(finding: &str) -> Value {
+        json!({
+            "finding": finding, "sentence": "Said once.", "false_alarm_probability": 1e-5, "signal": null, "against": []
+        })
+    }
+
+    fn periodogram(finding: &str, warnings: &[&str]) -> Chapter {
+        let peak = |period: f64, alias: Value| {
+            json!({
+                "k_kms": 0.1, "sigma_k_kms": 0.01, "period_d": period, "sigma_period_d": 0.1, "porb_over_prot": 2.0,
+                "sigma_porb_over_prot": 0.1, "phi": 0.5, "sigma_phi": 0.02, "delta_ln_l": 20.0, "on_edge": false,
+                "t_max_rv_d": null, "sigma_t_max_rv_d": null, "t_conjunction_d": 3.2, "sigma_t_conjunction_d": 0.1,
+                "false_alarm_probability": 1e-5, "alias": alias, "rotation": null
+            })
+        };
+        let alias = json!({ "window_frequency_per_d": 1.003, "window": 0.7, "relation": "difference of frequencies" });
+        let level = |p: f64| json!({ "false_alarm_probability": p, "delta_ln_l": 5.0 });
+        let levels = [0.1, 0.01, 0.001].map(level);
+        let alarm = json!({
+            "delta_ln_l": 20.0, "probability": 1e-5, "by_draws": 0.0, "by_extreme_value": 1e-5, "used": "extreme value",
+            "draws": 1000, "w": 3.0, "independent_periods": 9.0,
+            "levels": levels
+        });
+        let none = json!({ "k_kms": null, "sigma_k_kms": null, "phi": null, "delta_ln_l": null });
+        let target = |target: f64| {
+            let mut one = none.clone();
+            (one["chi2_target"], one["reached"]) = (target.into(), true.into());
+            one
+        };
+        let targets = [0.9, 1.0, 1.1].map(target);
+        search(&file(&[
+            &json!({ "verdict": verdict(finding), "warnings": warnings, "truth": null, "false_alarm": alarm }),
+            &json!({ "best": peak(4.0, Value::Null), "peaks": [peak(4.0, Value::Null), peak(1.33, alias)] }),
+            &json!({ "keplerian": null, "second": null, "offset": null }),
+            &json!({ "search": {
+                "periods": 100, "min_period_d": 1.0, "max_period_d": 9.0, "time_base_d": 9.0, "seed": 1
+            } }),
+            &json!({ "expansion": {
+                "marginalised": [], "unresolved_spots": [1.0, 1.0], "regularised_delta_ln_l": 9.0, "rounds": 1,
+                "closed": true, "data": 900, "chi2_target": 0.97, "chi2_per_datum_planet_free": 0.97,
+                "chi2_per_datum": 0.97
+            } }),
+            &json!({ "co_rotation": { "sigma_k_over_median": null, "statement": "" } }),
+            &json!({ "robustness": { "targets": targets, "without_night": [] } }),
+        ]))
+    }
 
     #[test]
     fn a_search_is_headed_by_its_own_verdict_and_nothing_is_green_beside_a_warning() {
-        let search = |finding: &str, warnings: &[&str]| {
-            let alias = json!({ "window_frequency_per_d": 1.003, "window": 0.7 });
-            let peak = |period: f64, alias: Value| {
-                json!({
-                    "period_d": period, "delta_ln_l": 20.0, "false_alarm_probability": 1e-5, "alias": alias
-                })
-            };
-            let sentence = "Said once.";
-            periodogram(&json!({
-                "verdict": {
-                    "finding": finding, "sentence": sentence, "false_alarm_probability": 1e-5, "signal": null,
-                    "against": []
-                },
-                "peaks": [peak(4.0, Value::Null), peak(1.33, alias)], "warnings": warnings
-            }))
-        };
         let tone = |finding: &str, warnings: &[&str]| {
-            let chapter = search(finding, warnings);
+            let chapter = periodogram(finding, warnings);
             let (tone, sentence) = chapter.shown_verdicts().next().unwrap();
             assert_eq!(sentence, "Said once.");
             tone
@@ -373,50 +379,56 @@ mod tests {
         assert_eq!(tone("detection", &["one night decides"]), Tone::Neutral);
         assert_eq!(tone("candidate", &[]), Tone::Doubt);
         assert_eq!(tone("no-planet-needed", &[]), Tone::Neutral);
-        let chapter = search("detection", &[]);
-        // errors and spots are nowhere, aliases are
+        let chapter = periodogram("detection", &[]);
+        // of what is usually quoted, only what is known
+        assert_eq!(chapter.tables[0].1.rows.len(), 5);
+        // spots are nowhere, aliases are
         let peaks = chapter.tables[1].1.without_empty_columns();
-        assert_eq!(peaks.head, ["period (d)", "Δ ln *L*", "false alarm", "alias"]);
-        assert_eq!(peaks.rows[1], ["1.3300", "20.00", "1.0e-5", "of the first, by 1.003/d"]);
+        assert_eq!(peaks.head, ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias"]);
+        assert_eq!(peaks.rows[1], ["1.3300", "0.100", "0.010", "20.00", "1.0e-5", "of the first, by 1.003/d"]);
     }
 
     #[test]
     fn what_a_map_warns_of_is_told_and_it_does_not_converge() {
-        let fit = json!({ "status": "max-passes", "checks": { "warnings": ["neighbours are correlated"] } });
-        let chapter = map(&fit);
-        assert_eq!(chapter.warnings, ["neighbours are correlated"]);
-        let (tone, sentence) = chapter.shown_verdicts().next().unwrap();
+        let chapter = |status: &str| {
+            map(&file(&[
+                &json!({ "status": status, "chi2": 9.0, "chi2_per_datum": 0.97, "chi2_target": 9.0, "lambda": 1.0 }),
+                &json!({ "alpha": 1.0, "entropy": -1.0, "spottedness": 0.1, "test": 0.0, "passes": 9 }),
+                &json!({ "newton_steps": 3, "profiles": 2, "data": 9, "pixels": 100, "equivalent_width_kms": 5.0 }),
+                &json!({ "contrast": 0.3, "parameters": { "k_kms": 0.1 }, "truth": null, "trade_off": [] }),
+                &json!({ "observed_rv_rms_kms": 0.1, "filtered_rv_rms_kms": 0.1, "photon_rv_error_kms": 0.1 }),
+                &json!({ "residual_rms": 1e-3, "residual_rms_core": 1e-3, "sigma_rms": 1e-3 }),
+                &json!({ "checks": {
+                    "profiles": [], "chi2_per_datum_core": 1.0, "chi2_per_datum_outside": 1.0, "core_excess_sigma": 0.0,
+                    "neighbour_correlation": 0.5, "sigma_neighbour_correlation": 0.1,
+                    "warnings": ["neighbours are correlated"]
+                } }),
+            ]))
+        };
+        let short = chapter("stopped-short");
+        assert_eq!(short.warnings, ["neighbours are correlated"]);
+        let (tone, sentence) = short.shown_verdicts().next().unwrap();
         assert_eq!(tone, Tone::Doubt);
         assert!(sentence.contains("stopped short of the target chi2") && !sentence.contains("converge"), "{sentence}");
-        let fit = json!({ "status": "converged", "checks": { "warnings": ["neighbours are correlated"] } });
-        assert_eq!(map(&fit).shown_verdicts().next().unwrap().0, Tone::Neutral);
+        assert_eq!(chapter("converged").shown_verdicts().next().unwrap().0, Tone::Neutral);
     }
 
     #[test]
     fn an_optimum_is_headed_by_the_blind_search() {
-        let verdict = json!({
-            "finding": "no-planet-needed", "sentence": "No planet.", "false_alarm_probability": 0.7, "signal": null,
-            "against": []
+        let remarks = json!([{ "against": null, "text": "few profiles" }]);
+        let search = json!({ "verdict": verdict("no-planet-needed"), "remarks": remarks, "rotation": null });
+        let reference = json!({
+            "parameters": {}, "chi2_target": 9.0, "chi2": 9.0, "lambda": 1.0, "entropy": 0.0, "spottedness": 0.1,
+            "chi2_reach": 1.0, "data": 9
         });
-        let remarks = json!([{ "text": "few profiles" }]);
-        let chapter = optimum(&json!({
-            "names": [], "well_defined": true, "converged": true,
-            "blind_search": { "verdict": verdict, "remarks": remarks }
-        }));
+        let chapter = best(&file(&[
+            &json!({ "names": [], "parameters": {}, "sd": {}, "log_prob": 0.0, "chi2": 9.0, "spottedness": 0.1 }),
+            &json!({ "well_defined": true, "converged": true, "covariance": [], "internal_curvature": [] }),
+            &json!({ "blind_search": search, "truth": null, "reference": reference, "starts": [] }),
+            &json!({ "profiles": 2, "time_span_d": [0.0, 1.0] }),
+        ]));
         let said: Vec<(Tone, &str)> = chapter.shown_verdicts().collect();
-        assert_eq!(said, [(Tone::Neutral, "No planet."), (Tone::Neutral, "A well-defined maximum.")]);
+        assert_eq!(said, [(Tone::Neutral, "Said once."), (Tone::Neutral, "A well-defined maximum.")]);
         assert_eq!(chapter.warnings, ["few profiles"]);
-    }
-
-    #[test]
-    fn a_landscape_shorter_than_its_error_bars_is_doubtful() {
-        let good = |error: f64| {
-            let header = json!({ "grid": { "axes": [{ "name": "k_kms", "min": 0.1, "max": 0.3, "nodes": 9 }] } });
-            let estimate = json!({ "vertex": 0.2, "error": error });
-            landscape(&header, &json!({ "parameters": { "k_kms": estimate }, "nodes": 9, "rms_chi2": 0.01 })).verdicts
-                [0]
-            .0
-        };
-        assert_eq!((good(0.09), good(0.11)), (Tone::Good, Tone::Doubt));
     }
 }

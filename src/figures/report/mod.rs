@@ -109,15 +109,15 @@ pub fn report(folder: &Path) -> Result<String, PlotError> {
     let mut page =
         Page { title, subject: Vec::new(), chapters: Vec::new(), figures, config: None, provenance: Vec::new() };
     for file in plot::kinds(folder) {
-        let (chapter, whole) = chapters::of(folder, file)?;
-        page.chapters.push(chapter);
+        page.chapters.push(chapters::of(folder, file)?);
+        let about = subject::About::read(folder, file)?;
         if page.subject.is_empty() {
-            page.subject = subject::lines(folder, &page.title, &whole);
+            page.subject = subject::lines(folder, &page.title, &about);
         }
-        page.config = page.config.or_else(|| whole.get("config").cloned());
         if page.provenance.is_empty() {
-            page.provenance = provenance(&whole);
+            page.provenance = about.provenance();
         }
+        page.config = page.config.or(about.config);
     }
     Ok(html::page(&page))
 }
@@ -133,10 +133,4 @@ pub fn is_page(file: &Path) -> bool {
 fn title(folder: &Path) -> String {
     let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     escaped(&whole.file_name().unwrap_or(folder.as_os_str()).to_string_lossy()).into_owned()
-}
-
-fn provenance(file: &Value) -> Vec<(String, String)> {
-    let entries = [("version", "dimcmc"), ("data_sha256", "SHA-256 of the observations")];
-    let text = |(key, label): (&str, &str)| Some((label.to_owned(), file.get(key)?.as_str()?.to_owned()));
-    entries.into_iter().filter_map(text).collect()
 }

@@ -2,7 +2,6 @@
 
 use super::Tone;
 use crate::planets::verdict::{Finding, Verdict};
-use serde_json::Value;
 
 /// Of a verdict on a planet: a detection can be relied on, a candidate is to be doubted.
 pub(super) fn of(verdict: &Verdict) -> (Tone, String) {
@@ -12,10 +11,4 @@ pub(super) fn of(verdict: &Verdict) -> (Tone, String) {
         Finding::NoPlanetNeeded | Finding::NotJudged => Tone::Neutral,
     };
     (tone, verdict.sentence.clone())
-}
-
-/// The verdict at a place of a file; `None` where there is none.
-pub(super) fn at(file: &Value, pointer: &str) -> Option<(Tone, String)> {
-    let verdict: Verdict = serde_json::from_value(file.pointer(pointer)?.clone()).ok()?;
-    Some(of(&verdict))
 }

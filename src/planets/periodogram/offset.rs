@@ -7,10 +7,10 @@ use super::orbits::scan;
 use super::two_planets::{eliminated, without};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::DMatrix;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A constant velocity beside the orbit that is the best with it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Offset {
     /// The velocity (km/s).
     pub velocity_kms: f64,

@@ -9,7 +9,7 @@
 
 use super::Residual;
 use crate::numerics::normal::cumulative;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A profile is worth a warning when chance makes one so bad among all of them as rarely as this.
 const RARE: f64 = 0.01;
@@ -18,7 +18,7 @@ const RARE: f64 = 0.01;
 const FAR: f64 = 5.0;
 
 /// How the misfit is shared.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Checks {
     /// Profile by profile.
     pub profiles: Vec<ProfileCheck>,
@@ -37,7 +37,7 @@ pub struct Checks {
 }
 
 /// The misfit of one profile.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProfileCheck {
     /// Time (d).
     pub time_d: f64,

@@ -8,7 +8,7 @@ use crate::numerics::units::EARTHS_PER_JUPITER;
 use crate::sampling::chain::derived::{Derived, Formula, Rule};
 use crate::star::planet::{MAXIMUM_TO_CONJUNCTION, maximum_phase, minimum_mass};
 use crate::star::{Orbit, StarSettings};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Standard deviation of a phase of which nothing is known (cycles).
@@ -85,7 +85,7 @@ impl OrbitQuantity {
 }
 
 /// A value and its standard error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The value.
     pub value: f64,

@@ -1,7 +1,9 @@
 //! The parameters that may be sampled: their names, units, and values at one point of parameter space.
 
 use crate::star::{Orbit, Rotation, StarState, Surface};
-use serde::{Deserialize, Serialize, Serializer};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 
 /// One of the parameters that may be free. The order is that of every table and chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -187,5 +189,16 @@ impl ParameterValues {
 impl Serialize for ParameterValues {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(Parameter::ALL.iter().filter_map(|&p| Some((p.name(), self.given(p)?))))
+    }
+}
+
+impl<'de> Deserialize<'de> for ParameterValues {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut values = ParameterValues([f64::NAN; Parameter::ALL.len()]);
+        for (name, value) in BTreeMap::<String, f64>::deserialize(deserializer)? {
+            let parameter = Parameter::from_name(&name);
+            values[parameter.ok_or_else(|| D::Error::custom(format!("unknown parameter {name}")))?] = value;
+        }
+        Ok(values)
     }
 }

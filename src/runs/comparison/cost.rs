@@ -4,14 +4,14 @@ use super::{Compared, Pair};
 use crate::sampling::chain::Summary;
 use crate::sampling::landscape::Paraboloid;
 use crate::sampling::log_density::Status;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Error bars to either side of the chain's median that a grid covers along an axis that is missing.
 const REACH: f64 = 3.0;
 
 /// What both took.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// The chain.
     pub chain: ChainCost,
@@ -20,7 +20,7 @@ pub struct Cost {
 }
 
 /// What the chain took.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChainCost {
     /// Reconstructions, the start included.
     pub reconstructions: usize,
@@ -37,7 +37,7 @@ pub struct ChainCost {
 }
 
 /// What the landscape took.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LandscapeCost {
     /// Nodes.
     pub reconstructions: usize,

@@ -4,13 +4,13 @@
 use super::Pair;
 use crate::sampling::chain::{ParameterSummary, Summary};
 use crate::sampling::landscape::Marginal;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Kolmogorov's statistic, times the root of the number of draws, that chance exceeds once in twenty times.
 const KOLMOGOROV95: f64 = 1.358;
 
 /// How far apart two cumulative distributions are.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Distance {
     /// Largest difference at a node of the axis, among the draws that are inside the grid.
     pub largest: f64,

@@ -20,14 +20,14 @@ use crate::sampling::chain::statistics::wrap;
 use crate::sampling::chain::{ChainError, Summary};
 use crate::sampling::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
 use draws::Draws;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Name of the file.
 pub const FILE: &str = "comparison.json";
 
 /// The content of `comparison.json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// Names of the sampled parameters, in order.
     pub names: Vec<String>,
@@ -55,7 +55,7 @@ pub struct Comparison {
 }
 
 /// One sampled parameter.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compared {
     /// Whether it has period 1: differences are the shorter way round.
     pub periodic: bool,
@@ -78,7 +78,7 @@ pub struct Compared {
 }
 
 /// A value with its 68 % interval; that of a periodic parameter may leave [0, 1).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// The value.
     pub value: f64,
@@ -87,7 +87,7 @@ pub struct Interval {
 }
 
 /// Another estimate, and how it compares with the chain's.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AgainstChain {
     /// The estimate.
     #[serde(flatten)]

@@ -4,7 +4,7 @@ use super::report::Panel;
 use super::{Report, Row};
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -15,7 +15,7 @@ pub const TABLE: &str = "table.csv";
 pub const SUMMARY: &str = "summary.json";
 
 /// What `summary.json` says of where a row came from.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Made {
     /// The command that made it.
     pub command: String,
@@ -27,17 +27,26 @@ pub struct Made {
     pub threads: usize,
 }
 
-#[derive(Serialize)]
-struct SummaryFile<'a> {
-    row: &'a str,
-    title: &'a str,
-    paper: &'a str,
-    version: &'a str,
+/// The content of `summary.json`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SummaryFile {
+    /// Its name.
+    pub row: String,
+    /// What was done.
+    pub title: String,
+    /// What the paper found.
+    pub paper: String,
+    /// Version of the program.
+    pub version: String,
+    /// How it was made.
     #[serde(flatten)]
-    made: &'a Made,
-    seed: &'a str,
-    figure: &'a [Panel],
-    numbers: &'a Map<String, Value>,
+    pub made: Made,
+    /// Where the random numbers are from.
+    pub seed: String,
+    /// The columns that the figure shows.
+    pub figure: Vec<Panel>,
+    /// What sums it up.
+    pub numbers: Map<String, Value>,
 }
 
 impl Report {
@@ -51,14 +60,14 @@ impl Report {
         self.rows.iter().for_each(|numbers| table.row(numbers));
         write(&folder.join(TABLE), &table.into_bytes())?;
         let summary = SummaryFile {
-            row: row.name,
-            title: row.title,
-            paper: row.paper,
-            version: env!("CARGO_PKG_VERSION"),
-            made,
-            seed: "chains 1; noise 1, or what the column `seed` says",
-            figure: &self.figure,
-            numbers: &self.numbers,
+            row: row.name.into(),
+            title: row.title.into(),
+            paper: row.paper.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            made: made.clone(),
+            seed: "chains 1; noise 1, or what the column `seed` says".into(),
+            figure: self.figure.clone(),
+            numbers: self.numbers.clone(),
         };
         // the summary last: a row is done where it is there
         write_json(&folder.join(SUMMARY), &summary)

@@ -9,7 +9,7 @@ use crate::data::io::provenance::Provenance;
 use crate::numerics::text::aligned;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Names of the files.
@@ -21,7 +21,7 @@ pub const JSON: &str = "limits.json";
 const SHOWN: usize = 12;
 
 /// The content of `limits.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LimitsFile {
     /// False-alarm probability of a detection.
     pub false_alarm_probability: f64,
@@ -49,7 +49,7 @@ pub struct LimitsFile {
 }
 
 /// The highest peak of the profiles as they are.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct BeforeRecord {
     /// Its period (d).
     pub period_d: f64,
@@ -60,7 +60,7 @@ pub struct BeforeRecord {
 }
 
 /// The limit at one period.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct LimitRecord {
     /// The period (d).
     pub period_d: f64,
@@ -73,7 +73,7 @@ pub struct LimitRecord {
 }
 
 /// An orbit tried both ways.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct ComparisonRecord {
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
@@ -88,13 +88,18 @@ pub struct ComparisonRecord {
 }
 
 /// The highest peak.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct OutcomeRecord {
-    delta_ln_l: f64,
-    porb_over_prot: f64,
-    k_kms: f64,
-    detected: bool,
-    recovered: bool,
+    /// Its height.
+    pub delta_ln_l: f64,
+    /// Its period over the rotation period.
+    pub porb_over_prot: f64,
+    /// Its semi-amplitude (km/s).
+    pub k_kms: f64,
+    /// Whether chance hardly makes one as high.
+    pub detected: bool,
+    /// Whether that is so and it is the orbit that was put in.
+    pub recovered: bool,
 }
 
 impl OutcomeRecord {

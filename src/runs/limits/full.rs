@@ -27,7 +27,7 @@ pub struct Comparison {
 }
 
 /// How often both ways agree.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Agreement {
     /// Orbits tried both ways.
     pub orbits: usize,

@@ -11,7 +11,7 @@ mod file;
 mod full;
 mod shortcut;
 
-pub use file::{CSV, JSON, LimitsFile};
+pub use file::{CSV, ComparisonRecord, JSON, LimitRecord, LimitsFile};
 pub use full::{Comparison, WholeWay, WholeWayError, drawn};
 pub use shortcut::{Outcome, Shortcut};
 

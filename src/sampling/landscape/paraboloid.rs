@@ -10,7 +10,7 @@ use super::region::{Member, Rule, region};
 use super::{Axis, Grid, Landscape, Node};
 use crate::sampling::log_density::Status;
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
@@ -28,7 +28,7 @@ const INDEPENDENT: f64 = 1e-6;
 const FLAT: f64 = 4e-3;
 
 /// The paraboloid around the highest node.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Paraboloid {
     /// Estimate and error bar of each parameter.
     pub parameters: BTreeMap<String, Estimate>,
@@ -49,7 +49,7 @@ pub struct Paraboloid {
 }
 
 /// One parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Where the vertex is; in [0, 1) if periodic.
     pub vertex: f64,

@@ -1,27 +1,40 @@
 //! False alarms in `periodogram.json`.
 
 use crate::planets::periodogram::{FalseAlarm, Search};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// False-alarm probabilities whose levels are given.
 const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
 
-#[derive(Serialize)]
-pub(super) struct FalseAlarmRecord {
+/// How often a star without a planet shows as high a peak.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FalseAlarmRecord {
+    /// Height of the peak.
     pub delta_ln_l: f64,
+    /// The probability, by what is `used`.
     pub probability: f64,
+    /// The share of draws with as high a peak.
     pub by_draws: f64,
+    /// What the distribution of highest peaks says.
     pub by_extreme_value: f64,
-    pub used: &'static str,
+    /// `draws` or `extreme value`.
+    pub used: String,
+    /// Number of draws.
     pub draws: usize,
+    /// Effective bandwidth of the search (Baluev 2008).
     pub w: f64,
+    /// How many independent periods there are.
     pub independent_periods: f64,
+    /// Heights of usual probabilities.
     pub levels: [LevelRecord; 3],
 }
 
-#[derive(Serialize)]
-pub(super) struct LevelRecord {
+/// A height that chance reaches with some probability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LevelRecord {
+    /// The probability.
     pub false_alarm_probability: f64,
+    /// The height.
     pub delta_ln_l: f64,
 }
 
@@ -35,7 +48,7 @@ pub(super) fn false_alarm(search: &Search) -> FalseAlarmRecord {
         probability: found.value(),
         by_draws: found.by_draws,
         by_extreme_value: found.by_tail,
-        used: if found.draws_suffice { "draws" } else { "extreme value" },
+        used: if found.draws_suffice { "draws" } else { "extreme value" }.into(),
         draws: alarm.maxima.len(),
         w: alarm.tail.w,
         independent_periods: alarm.independent_periods(),

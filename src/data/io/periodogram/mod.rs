@@ -7,6 +7,10 @@ mod record;
 mod report;
 mod robustness;
 
+pub use alarm::{FalseAlarmRecord, LevelRecord};
+pub use quantities::QuantitiesRecord;
+pub use record::{AliasRecord, OrbitRecord, PeakRecord, PeriodogramFile};
+
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::provenance::Provenance;
@@ -61,14 +65,17 @@ const COLUMNS: [&str; 12] = [
     "k_limit95_kms",
 ];
 
+/// Name of what was found.
+pub const FILE: &str = "periodogram.json";
+
 /// Names of all files that a search may write.
-pub const FILES: [&str; 5] = ["rv.csv", "covariance.csv", "periodogram.csv", "periodogram_2.csv", "periodogram.json"];
+pub const FILES: [&str; 5] = ["rv.csv", "covariance.csv", "periodogram.csv", "periodogram_2.csv", FILE];
 
 impl PeriodogramResult<'_> {
     /// Names of the files, in the order in which they are written.
     pub fn files(&self) -> Vec<&'static str> {
         let second = self.detection.second.as_ref().map(|_| "periodogram_2.csv");
-        ["rv.csv", "covariance.csv", "periodogram.csv"].into_iter().chain(second).chain(["periodogram.json"]).collect()
+        ["rv.csv", "covariance.csv", "periodogram.csv"].into_iter().chain(second).chain([FILE]).collect()
     }
 
     /// Writes all files into `folder`, which must exist.
@@ -83,7 +90,7 @@ impl PeriodogramResult<'_> {
         if let Some(second) = &self.detection.second {
             write(&folder.join("periodogram_2.csv"), &self.periodogram(&second.search).into_bytes())?;
         }
-        write_json(&folder.join("periodogram.json"), &self.record())
+        write_json(&folder.join(FILE), &self.record())
     }
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.

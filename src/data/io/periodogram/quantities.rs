@@ -9,20 +9,26 @@ use crate::planets::periodogram::peaks::Peak;
 use crate::posterior::objective::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 use crate::star::Orbit;
 use crate::star::planet::minimum_mass;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// In a file.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct QuantitiesRecord {
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct QuantitiesRecord {
+    /// Time of the largest radial velocity (d).
     pub t_max_rv_d: Option<f64>,
+    /// Its error (d).
     pub sigma_t_max_rv_d: Option<f64>,
+    /// Time of inferior conjunction (d).
     pub t_conjunction_d: Option<f64>,
+    /// Its error (d).
     pub sigma_t_conjunction_d: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Minimum mass (Jupiter masses), where the star's is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub msini_mjup: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Its error (Jupiter masses).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_msini_mjup: Option<f64>,
 }
 
@@ -42,7 +48,7 @@ impl QuantitiesRecord {
     }
 
     /// Value and error of a quantity that is in it.
-    pub(super) fn of(&self, quantity: OrbitQuantity) -> Option<(f64, Option<f64>)> {
+    pub fn of(&self, quantity: OrbitQuantity) -> Option<(f64, Option<f64>)> {
         let (value, sigma) = match quantity {
             OrbitQuantity::Period => return None,
             OrbitQuantity::Maximum => (self.t_max_rv_d, self.sigma_t_max_rv_d),
@@ -94,11 +100,11 @@ impl PeriodogramResult<'_> {
     }
 
     /// Injected values by name.
-    pub(super) fn derived_truth(&self) -> BTreeMap<&'static str, f64> {
+    pub(super) fn derived_truth(&self) -> BTreeMap<String, f64> {
         let best = self.quantities(&self.detection.best);
         let value = |quantity: OrbitQuantity| {
             let (found, _) = best.of(quantity)?;
-            Some((quantity.name(), self.true_quantity(quantity, found)?))
+            Some((quantity.name().to_owned(), self.true_quantity(quantity, found)?))
         };
         OrbitQuantity::ALL.into_iter().filter_map(value).collect()
     }

@@ -11,56 +11,78 @@ use crate::planets::periodogram::{KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
 use crate::posterior::detection::View;
 use crate::posterior::objective::ParameterValues;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-#[derive(Serialize)]
-pub(super) struct Record<'a> {
+/// The content of `periodogram.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeriodogramFile {
     /// What is said of the best orbit.
-    pub verdict: &'a Verdict,
+    pub verdict: Verdict,
     /// In the expansion around its own image; its errors count the period's.
     pub best: OrbitRecord,
+    /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
     /// The same of what is usually quoted of the orbit, times nearest to those found.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub derived_truth: BTreeMap<&'static str, f64>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub derived_truth: BTreeMap<String, f64>,
     /// Of the highest peak without a planet.
     pub false_alarm: FalseAlarmRecord,
     /// Around the planet-free image, from high to low.
     pub peaks: Vec<PeakRecord>,
     /// Around the best orbit first, then around the other peaks.
     pub keplerian: Option<Vec<Option<KeplerianRecord>>>,
+    /// The second planet, if it was asked for.
     pub second: Option<SecondRecord>,
+    /// What was searched.
     pub search: SearchRecord,
+    /// The quadratic that it was searched in.
     pub expansion: ExpansionRecord,
     /// A constant velocity left free beside the orbit.
     pub offset: Option<Offset>,
+    /// What is lost where the orbit turns with the star.
     pub co_rotation: CoRotationRecord,
     /// Whether the best orbit hangs on a choice.
     pub robustness: RobustnessRecord,
-    pub warnings: Vec<&'a str>,
+    /// What has to be known beside the verdict.
+    pub warnings: Vec<String>,
+    /// Config, data and program.
     #[serde(flatten)]
-    pub provenance: &'a Provenance,
+    pub provenance: Provenance,
 }
 
-#[derive(Serialize)]
-pub(super) struct OrbitRecord {
+/// A circular orbit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OrbitRecord {
+    /// Semi-amplitude (km/s).
     pub k_kms: f64,
+    /// Its error (km/s).
     pub sigma_k_kms: f64,
+    /// Period (d).
     pub period_d: f64,
+    /// Its error (d).
     pub sigma_period_d: Option<f64>,
+    /// Period over the rotation period.
     pub porb_over_prot: f64,
+    /// Its error.
     pub sigma_porb_over_prot: Option<f64>,
+    /// Phase (cycles).
     pub phi: f64,
-    pub sigma_phi: f64,
+    /// Its error (cycles); null where K is 0.
+    pub sigma_phi: Option<f64>,
+    /// Gain in ln L.
     pub delta_ln_l: f64,
+    /// Whether its period is the first or last of the search.
     pub on_edge: bool,
+    /// What is usually quoted of it.
     #[serde(flatten)]
     pub quantities: QuantitiesRecord,
 }
 
-#[derive(Serialize)]
-pub(super) struct PeakRecord {
+/// A peak of the periodogram.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeakRecord {
+    /// Its orbit.
     #[serde(flatten)]
     pub orbit: OrbitRecord,
     /// How often a star without a planet shows one as high.
@@ -71,74 +93,112 @@ pub(super) struct PeakRecord {
     pub rotation: Option<String>,
 }
 
-#[derive(Serialize)]
-pub(super) struct AliasRecord {
+/// How a peak is an alias of the highest one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AliasRecord {
+    /// Frequency of the sampling window (1/d).
     pub window_frequency_per_d: f64,
+    /// Height of the window there.
     pub window: f64,
-    pub relation: &'static str,
+    /// Whether frequencies add or differ.
+    pub relation: String,
 }
 
-#[derive(Serialize)]
-pub(super) struct KeplerianRecord {
+/// An eccentric orbit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeplerianRecord {
+    /// Semi-amplitude (km/s).
     pub k_kms: f64,
-    pub sigma_k_kms: f64,
+    /// Its error (km/s).
+    pub sigma_k_kms: Option<f64>,
+    /// Period (d).
     pub period_d: f64,
-    pub sigma_period_d: f64,
+    /// Its error (d).
+    pub sigma_period_d: Option<f64>,
+    /// Eccentricity.
     pub eccentricity: f64,
-    pub sigma_eccentricity: f64,
+    /// Its error.
+    pub sigma_eccentricity: Option<f64>,
+    /// Argument of periastron (degrees).
     pub omega_deg: f64,
-    pub sigma_omega_deg: f64,
+    /// Its error (degrees).
+    pub sigma_omega_deg: Option<f64>,
+    /// Time of periastron (d).
     pub periastron_d: f64,
-    pub sigma_periastron_d: f64,
+    /// Its error (d).
+    pub sigma_periastron_d: Option<f64>,
+    /// Gain in ln L.
     pub delta_ln_l: f64,
+    /// The part of it that a circular orbit does not have.
     pub gain_over_circle: f64,
+    /// What is usually quoted of it.
     #[serde(flatten)]
     pub quantities: QuantitiesRecord,
 }
 
-#[derive(Serialize)]
-pub(super) struct SecondRecord {
+/// The search for a second planet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SecondRecord {
     /// Gain in ln L over the first orbit alone, its period kept.
     pub false_alarm: FalseAlarmRecord,
+    /// From high to low.
     pub peaks: Vec<PeakRecord>,
     /// Both orbits refined together.
     pub orbits: Option<[OrbitRecord; 2]>,
+    /// Gain in ln L of both over the first alone.
     pub gain: Option<f64>,
 }
 
-#[derive(Serialize)]
-pub(super) struct SearchRecord {
+/// What was searched.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SearchRecord {
+    /// Number of trial periods.
     pub periods: usize,
+    /// Shortest period (d).
     pub min_period_d: f64,
+    /// Longest period (d).
     pub max_period_d: f64,
+    /// Time base of the data (d).
     pub time_base_d: f64,
+    /// Seed of the draws.
     pub seed: u64,
 }
 
-#[derive(Serialize)]
-pub(super) struct ExpansionRecord {
-    pub marginalised: Vec<&'static str>,
+/// The quadratic that was searched in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExpansionRecord {
+    /// Parameters that are integrated out.
+    pub marginalised: Vec<String>,
     /// How many times larger than the entropy expects unresolved spots are, in variance: without a planet, at the best
     /// orbit.
     pub unresolved_spots: [f64; 2],
     /// Delta ln L of the best orbit with spots as the entropy sees them.
     pub regularised_delta_ln_l: f64,
+    /// Expansions that the best orbit took.
     pub rounds: usize,
+    /// Whether K stays in the last one.
     pub closed: bool,
+    /// Number of data.
     pub data: usize,
+    /// Target of chi2, per datum.
     pub chi2_target: f64,
+    /// chi2 per datum without a planet.
     pub chi2_per_datum_planet_free: f64,
+    /// The same at the best orbit.
     pub chi2_per_datum: f64,
 }
 
-#[derive(Serialize)]
-pub(super) struct CoRotationRecord {
+/// What is lost where the orbit turns with the star.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CoRotationRecord {
+    /// sigma_K at the rotation period over its median elsewhere.
     pub sigma_k_over_median: Option<f64>,
+    /// The same in words.
     pub statement: String,
 }
 
 impl PeriodogramResult<'_> {
-    pub(super) fn record(&self) -> Record<'_> {
+    pub(super) fn record(&self) -> PeriodogramFile {
         let found = self.detection;
         let prot = self.imager.star.rotation_period_d;
         let (lo, hi) = found.frequencies.range();
@@ -149,8 +209,8 @@ impl PeriodogramResult<'_> {
             orbits: second.both.map(|both| both.orbits.map(|peak| self.orbit(&peak))),
             gain: second.both.map(|both| both.gain),
         });
-        Record {
-            verdict: self.verdict,
+        PeriodogramFile {
+            verdict: self.verdict.clone(),
             best: self.orbit(&found.best),
             truth: self.truth,
             derived_truth: self.derived_truth(),
@@ -166,7 +226,7 @@ impl PeriodogramResult<'_> {
                 seed: self.settings.search.seed,
             },
             expansion: ExpansionRecord {
-                marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name()).collect(),
+                marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name().to_owned()).collect(),
                 unresolved_spots: [found.planet_free.unresolved_spots, found.last().unresolved_spots],
                 regularised_delta_ln_l: found.regularised_delta_ln_l(),
                 rounds: found.rounds,
@@ -182,8 +242,8 @@ impl PeriodogramResult<'_> {
                 statement: found.co_rotation(),
             },
             robustness: self.robustness_record(),
-            warnings: self.remarks.iter().map(|remark| remark.text.as_str()).collect(),
-            provenance: self.provenance,
+            warnings: self.remarks.iter().map(|remark| remark.text.clone()).collect(),
+            provenance: self.provenance.clone(),
         }
     }
 
@@ -202,7 +262,7 @@ impl PeriodogramResult<'_> {
             porb_over_prot: peak.porb_over_prot,
             sigma_porb_over_prot: peak.sigma_porb_over_prot,
             phi: orbit.phi,
-            sigma_phi: orbit.sigma_phi,
+            sigma_phi: known(orbit.sigma_phi),
             delta_ln_l: orbit.delta_ln_l,
             on_edge: peak.on_edge,
             quantities: self.quantities(peak),
@@ -217,7 +277,7 @@ impl PeriodogramResult<'_> {
             alias: peak.alias.map(|alias| AliasRecord {
                 window_frequency_per_d: alias.window.frequency / prot,
                 window: alias.window.height,
-                relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" },
+                relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" }.into(),
             }),
             rotation: peak.imitation.map(|imitation| imitation.words(prot)),
         };
@@ -229,18 +289,23 @@ impl PeriodogramResult<'_> {
         let prot = star.rotation_period_d;
         KeplerianRecord {
             k_kms: orbit.k_kms,
-            sigma_k_kms: orbit.sigma_k_kms,
+            sigma_k_kms: known(orbit.sigma_k_kms),
             period_d: prot * orbit.porb_over_prot,
-            sigma_period_d: prot * orbit.sigma_porb_over_prot,
+            sigma_period_d: known(prot * orbit.sigma_porb_over_prot),
             eccentricity: orbit.eccentricity,
-            sigma_eccentricity: orbit.sigma_eccentricity,
+            sigma_eccentricity: known(orbit.sigma_eccentricity),
             omega_deg: orbit.omega.to_degrees(),
-            sigma_omega_deg: orbit.sigma_omega.to_degrees(),
+            sigma_omega_deg: known(orbit.sigma_omega.to_degrees()),
             periastron_d: star.epoch_d + prot * orbit.periastron_cycle,
-            sigma_periastron_d: prot * orbit.sigma_periastron_cycle,
+            sigma_periastron_d: known(prot * orbit.sigma_periastron_cycle),
             delta_ln_l: orbit.delta_ln_l,
             gain_over_circle: orbit.gain_over_circle,
             quantities: self.eccentric_quantities(orbit),
         }
     }
+}
+
+/// An error, where there is one.
+fn known(sigma: f64) -> Option<f64> {
+    sigma.is_finite().then_some(sigma)
 }

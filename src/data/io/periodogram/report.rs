@@ -22,12 +22,13 @@ impl PeriodogramResult<'_> {
         text += &peaks(&self.peaks(&found.blind));
         for orbit in found.keplerian.iter().take(1).flatten() {
             let orbit = self.keplerian(orbit);
+            let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" +- {x:.digits$}"));
             text += &format!(
-                "eccentric orbit: e = {:.3} +- {:.3}, omega = {:.0} +- {:.0} deg, ln L {:+.2} over the circle\n",
+                "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circle\n",
                 orbit.eccentricity,
-                orbit.sigma_eccentricity,
+                error(orbit.sigma_eccentricity, 3),
                 orbit.omega_deg,
-                orbit.sigma_omega_deg,
+                error(orbit.sigma_omega_deg, 0),
                 orbit.gain_over_circle
             );
             for quantity in OrbitQuantity::ALL {
@@ -64,7 +65,7 @@ impl PeriodogramResult<'_> {
                 "k_kms" => (o.k_kms, Some(o.sigma_k_kms)),
                 "period_d" => (o.period_d, o.sigma_period_d),
                 "porb_over_prot" => (o.porb_over_prot, o.sigma_porb_over_prot),
-                _ => (o.phi, Some(o.sigma_phi)),
+                _ => (o.phi, o.sigma_phi),
             };
             let digits = |o: &OrbitRecord| decimals(value(o).1.unwrap_or(f64::NAN));
             let mut row = vec![name.to_owned()];

@@ -4,40 +4,54 @@ use super::PeriodogramResult;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::CircularOrbit;
 use crate::posterior::detection::{AtTarget, WithoutNight};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-#[derive(Serialize)]
-pub(super) struct RobustnessRecord {
+/// Whether the best orbit hangs on a choice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RobustnessRecord {
     /// K at the best period with other targets.
-    targets: [TargetRecord; 3],
+    pub targets: [TargetRecord; 3],
     /// K at the best period without each night; empty for profiles of one night.
-    without_night: Vec<NightRecord>,
+    pub without_night: Vec<NightRecord>,
 }
 
-#[derive(Serialize)]
-struct TargetRecord {
-    chi2_target: f64,
-    reached: bool,
+/// The orbit at the best period with another target chi2.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TargetRecord {
+    /// Target, per datum.
+    pub chi2_target: f64,
+    /// Whether the image reaches it.
+    pub reached: bool,
+    /// The orbit.
     #[serde(flatten)]
-    orbit: QuickRecord,
+    pub orbit: QuickRecord,
 }
 
-#[derive(Serialize)]
-struct NightRecord {
-    first_time_d: f64,
-    last_time_d: f64,
-    profiles: usize,
+/// The orbit at the best period without the profiles of a night.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NightRecord {
+    /// First time left out (d).
+    pub first_time_d: f64,
+    /// Last time left out (d).
+    pub last_time_d: f64,
+    /// Number of profiles left out.
+    pub profiles: usize,
+    /// The orbit.
     #[serde(flatten)]
-    orbit: QuickRecord,
+    pub orbit: QuickRecord,
 }
 
 /// Null where none is bounded.
-#[derive(Serialize)]
-struct QuickRecord {
-    k_kms: Option<f64>,
-    sigma_k_kms: Option<f64>,
-    phi: Option<f64>,
-    delta_ln_l: Option<f64>,
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct QuickRecord {
+    /// Semi-amplitude (km/s).
+    pub k_kms: Option<f64>,
+    /// Its error (km/s).
+    pub sigma_k_kms: Option<f64>,
+    /// Phase (cycles).
+    pub phi: Option<f64>,
+    /// Gain in ln L.
+    pub delta_ln_l: Option<f64>,
 }
 
 impl QuickRecord {
