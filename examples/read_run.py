@@ -26,17 +26,16 @@ run = Path(sys.argv[-1]) if Path(sys.argv[-1]).is_dir() else Path("runs/demo")
 chain = pd.read_json(run / "chain.jsonl", lines=True)
 print(chain.groupby("ensemble").log_prob.describe())
 
-# %% [markdown]
-# After the warm-up, for ArviZ: a chain is an ensemble. R-hat is that of `summary.json`. ESS is not quite, for ArviZ does not see
-# that walkers of an ensemble learn from each other.
+# %% [markdown] After the warm-up, for ArviZ: a chain is an ensemble. R-hat is that of `summary.json`. ESS is not
+# quite, for ArviZ does not see that walkers of an ensemble learn from each other.
 
 # %%
 tree = xr.open_datatree(run / "chain.zarr", engine="zarr")
 posterior = tree["posterior"].to_dataset()
 print(az.summary(posterior).to_string())
 
-# %% [markdown]
-# The marginals of the sampled parameters (what follows from them, as the period in days, is there too), with the injected values where there are any.
+# %% [markdown] The marginals of the sampled parameters (what follows from them, as the period in days, is there too),
+# with the injected values where there are any.
 
 # %%
 sampled = [name for name, one in posterior.data_vars.items() if "derived" not in one.attrs]

@@ -1,7 +1,8 @@
 """A simulated cluster: how many evaluations a second a chain gets out of 10 to 10,000 ranks.
 
-Events are those of the program: rank 0 proposes for one half of all walkers, hands the vectors out, some ahead while there are many,
-takes the answers as they come, decides and writes; then the other half. What things take is measured by `cargo bench --bench ranks
+Events are those of the program: rank 0 proposes for one half of all walkers, hands the vectors out, some ahead while
+there are many, takes the answers as they come, decides and writes; then the other half. What things take is measured by
+`cargo bench --bench ranks
 --features mpi` (the last tables and line). Prints the tables of results/scaling.md. Needs Python alone.
 """
 
@@ -76,7 +77,8 @@ def throughput(walkers, ranks, case, steps):
 def main():
     ranks = [10, 30, 100, 300, 1000, 3000, 10000]
     for case in CASES:
-        print(f"\n{case[0]}, evaluations of {1e3 * case[1]:g} ms: evaluations a second (share of the workers' time that is work)\n")
+        what = "evaluations a second (share of the workers' time that is work)"
+        print(f"\n{case[0]}, evaluations of {1e3 * case[1]:g} ms: {what}\n")
         print("| walkers in all | " + " | ".join(f"{n:,} ranks" for n in ranks) + " |")
         print("|---" * (len(ranks) + 1) + "|")
         for walkers in [128, 512, 2048, 8192, 32768]:

@@ -2,7 +2,8 @@
 
     python tests/export.py RUN
 
-RUN is a folder with summary.json, chain.jsonl and all exports at their default places, of a chain of four ensembles with a
+RUN is a folder with summary.json, chain.jsonl and all exports at their default places, of a chain of four ensembles with
+a
 phase around 0 and autocorrelation times of some ten steps. Run by tests/export.rs.
 """
 
@@ -68,7 +69,8 @@ tree = xr.open_datatree(run / "chain.zarr", engine="zarr")
 posterior, stats = tree["posterior"].to_dataset(), tree["sample_stats"].to_dataset()
 assert list(posterior.data_vars) == names + derived and posterior.sizes == {"chain": ensembles, "draw": kept * walkers}
 for group, first, last in [("posterior", discarded, steps), ("warmup_posterior", 0, discarded)]:
-    grid = tree[group].to_dataset().set_index(draw=["step", "walker"]).unstack("draw").transpose("step", "chain", "walker")
+    grid = tree[group].to_dataset().set_index(draw=["step", "walker"])
+    grid = grid.unstack("draw").transpose("step", "chain", "walker")
     assert grid["step"].values.tolist() == list(range(first, last))
     for name in names:
         difference = grid[name].values - cube(name)[first:last]
@@ -84,11 +86,13 @@ for name, key in [("lp", "log_prob"), ("spottedness",) * 2, ("chi2",) * 2, ("acc
 for name, start in [("move", "start"), ("status", ""), ("proposed", "")]:
     words = np.array(stats[name].attrs["flag_meanings"].split())
     assert stats[name].attrs["flag_values"] == list(range(len(words)))
-    assert (words[grid[name].values.astype(int)] == np.where(pd.isna(cube(name, discarded)), start, cube(name, discarded))).all()
+    expected = np.where(pd.isna(cube(name, discarded)), start, cube(name, discarded))
+    assert (words[grid[name].values.astype(int)] == expected).all()
 for name in derived:
     one, wanted = posterior[name], summary["derived"][name]
     grid = posterior.set_index(draw=["step", "walker"]).unstack("draw").transpose("step", "chain", "walker")
-    assert (grid[name].values == cube(name, discarded)).all() and one.attrs["derived"] == 1 and one.attrs["units"] in ["d", "Mjup"]
+    assert (grid[name].values == cube(name, discarded)).all()
+    assert one.attrs["derived"] == 1 and one.attrs["units"] in ["d", "Mjup"]
     close(f"median of {name}", (float(np.median(one)) - wanted["median"]) / wanted["sd"], 0, 1e-6)
     close(f"sd of {name}", float(one.std(ddof=1)) / wanted["sd"], 1, 1e-6)
 assert posterior["k_kms"].attrs["units"] == "km/s" and posterior["k_kms"].attrs["injected"] == 0.2
@@ -107,13 +111,14 @@ for name in names:
     close(f"ArviZ mean of {name} in standard errors", mean / error, 0, 1e-9)
     close(f"ArviZ sd of {name}", found.loc[name, "sd"] / wanted["sd"], 1, 1e-9)
     facets = [np.cos(2 * np.pi * one), np.sin(2 * np.pi * one)] if name in PERIODIC else [one]
-    # Both are rank-normalised split R-hat of the same halves, once the middle one of an odd number of steps is out. The program's
-    # normal quantiles are good to 4.5e-4, which makes a part in a thousand of R-hat - 1, and that is some 0.01
+    # Both are rank-normalised split R-hat of the same halves, once the middle one of an odd number of steps is out.
+    # The program's normal quantiles are good to 4.5e-4, which makes a part in a thousand of R-hat - 1, and that is
+    # some 0.01
     whole = kept % 2 == 0 or posterior.step.values != discarded + kept // 2
     halves = [facet.values[:, whole] if kept % 2 else facet.values for facet in facets]
     close(f"ArviZ R-hat of {name}", max(float(az.rhat(facet)) for facet in halves), wanted["rhat"], 2e-5)
-    # ArviZ looks at the series of the walkers, as tau does, but ends its sums by another rule and cuts the series in two, which
-    # takes 2 tau/kept = 3 % of the correlation away; both know tau to 10 %
+    # ArviZ looks at the series of the walkers, as tau does, but ends its sums by another rule and cuts the series in
+    # two, which takes 2 tau/kept = 3 % of the correlation away; both know tau to 10 %
     ess = min(float(az.ess(facet.values)) for facet in facets)
     within(f"ArviZ ESS of {name} over draws / tau", ess * wanted["tau"] / draws, 0.75, 1.35)
     # summary.json: from the series of the four ensembles' means, whose tau is known to 2 sqrt(5 tau / (4 kept)) = 30 %
@@ -149,11 +154,12 @@ close("acceptance fraction", accepted, summary["acceptance_fraction"], 1e-12)
 times = backend.get_autocorr_time(discard=discard, quiet=True)
 close("emcee tau", times, emcee.autocorr.integrated_time(positions[discard:], quiet=True), 1e-9)
 for time, name in zip(times, names):
-    # emcee takes every walker around its own mean, which takes some 10 tau^2/steps away; of a phase, here the worse of cosine and
-    # sine counts
+    # emcee takes every walker around its own mean, which takes some 10 tau^2/steps away; of a phase, here the worse
+    # of cosine and sine counts
     tau = parameters[name]["tau"]
     within(f"emcee tau of {name} over summary.json's", time / tau, 0.85 - 10 * tau / kept, 1.1)
-from_emcee = az.from_emcee(backend, var_names=names, blob_names=list(attributes["blob_names"]), blob_groups=["sample_stats"] * (2 + len(derived)))
+blobs = {"blob_names": list(attributes["blob_names"]), "blob_groups": ["sample_stats"] * (2 + len(derived))}
+from_emcee = az.from_emcee(backend, var_names=names, **blobs)
 assert dict(from_emcee["posterior"].sizes) == {"chain": ensembles * walkers, "draw": steps - 1}
 assert (from_emcee["sample_stats"]["chi2"].transpose("draw", "chain").values == backend.get_blobs()[..., 1]).all()
 
@@ -171,8 +177,10 @@ for p, name in enumerate(names):
     within(f"GetDist ESS of {name} over draws / tau", samples.getEffectiveSamples(p) * wanted["tau"] / draws, 0.8, 1.5)
 covariance = np.mean([np.cov(draws.T, ddof=0) for draws in kept_draws], axis=0)
 between = np.cov(np.array([draws.mean(axis=0) for draws in kept_draws]).T)
-close("GetDist R-1", samples.getGelmanRubin(), np.max(np.linalg.eigvals(np.linalg.solve(covariance, between)).real), 1e-9)
-assert samples.ranges.periodic == {"phi"} and (samples.ranges.getLower("k_kms"), samples.ranges.getUpper("k_kms")) == (0, 1)
+worst = np.max(np.linalg.eigvals(np.linalg.solve(covariance, between)).real)
+close("GetDist R-1", samples.getGelmanRubin(), worst, 1e-9)
+assert samples.ranges.periodic == {"phi"}
+assert (samples.ranges.getLower("k_kms"), samples.ranges.getUpper("k_kms")) == (0, 1)
 labels = {one.name: one.label for one in samples.paramNames.names}
 assert labels["k_kms"] == r"K\;[\mathrm{km/s}]" and samples.paramNames.numDerived() == 2 + len(derived)
 density = samples.get1DDensity("phi")

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Many stars in one allocation: every rank takes the next config of the list. Submit with `sbatch batch.sh stars.txt runs/stars`.
+# Many stars in one allocation: every rank takes the next config of the list. Submit with `sbatch batch.sh stars.txt
+# runs/stars`.
 #SBATCH --job-name=dimcmc-batch
 #SBATCH --ntasks=33            # one more than stars at once
 #SBATCH --cpus-per-task=1

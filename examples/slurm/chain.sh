@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# One chain on many cores: rank 0 holds it, all others reconstruct. Submit with `sbatch chain.sh star.json runs/star`; without
-# SLURM, `bash chain.sh star.json runs/star` does the same on this machine.
+# One chain on many cores: rank 0 holds it, all others reconstruct. Submit with `sbatch chain.sh star.json runs/star`;
+# without SLURM, `bash chain.sh star.json runs/star` does the same on this machine.
 #SBATCH --job-name=dimcmc
-#SBATCH --ntasks=33            # one more than reconstructions at once; no more than half the walkers of all ensembles, plus one
+# one more than reconstructions at once; no more than half the walkers of all ensembles, plus one
+#SBATCH --ntasks=33
 #SBATCH --cpus-per-task=1
 #SBATCH --time=04:00:00
 #SBATCH --signal=B:USR1@300      # five minutes before the end: finish the reconstructions under way, and stop
