@@ -79,11 +79,11 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
             // a response in the memory that the evaluation had its own in: with two of them one would be in the other's
             // way
             let problem = bulk.target.posterior().reconstruct(theta).1;
-            let (response, single) = (problem.response(), problem.single_passes());
+            let (response, single) = (problem.response(), problem.single_applications());
             let mut only_passes = Passes::new(response);
-            double = double.min(seconds(|| only_passes.run(response, evaluation.passes)));
+            double = double.min(seconds(|| only_passes.run(response, evaluation.model_applications)));
             own = own.min(seconds(|| {
-                only_passes.run(response, evaluation.passes - single);
+                only_passes.run(response, evaluation.model_applications - single);
                 only_passes.run_single(response, single);
             }));
         }
@@ -91,7 +91,7 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
         times.push(time);
         over_own.push(time / own);
         over_double.push(time / double);
-        passes.push(f64::from(evaluation.passes));
+        passes.push(f64::from(evaluation.model_applications));
     }
     let [at_median, at_95] = most_passes(free);
     table.row([

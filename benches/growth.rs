@@ -96,7 +96,8 @@ impl Case {
     fn passes(&self) -> f64 {
         let evaluations = self.evaluate();
         assert!(evaluations.iter().all(|evaluation| evaluation.status == Status::Converged), "{evaluations:?}");
-        evaluations.iter().map(|evaluation| f64::from(evaluation.passes)).sum::<f64>() / evaluations.len() as f64
+        evaluations.iter().map(|evaluation| f64::from(evaluation.model_applications)).sum::<f64>()
+            / evaluations.len() as f64
     }
 }
 

@@ -49,7 +49,7 @@ numbers = [*names, "log_prob", "spottedness", "chi2"]
 table = pd.read_csv(run / "chain.csv", converters={key: float for key in [*numbers, *derived]})
 close("pandas by itself", pd.read_csv(run / "chain.csv")[numbers] / table[numbers], 1, 1e-15)
 assert len(table) == len(records)
-for key in [*numbers, "ensemble", "step", "walker", "passes", "accepted", "status", "proposed"]:
+for key in [*numbers, "ensemble", "step", "walker", "model_applications", "accepted", "status", "proposed"]:
     assert table[key].tolist() == [record[key] for record in records], key
 assert table["move"].fillna("").tolist() == [record.get("move", "") for record in records]
 assert (table.warmup == (table.step < discarded)).all() and table.warmup.dtype == bool
@@ -81,7 +81,8 @@ for group, first, last in [("posterior", discarded, steps), ("warmup_posterior",
         # a turn more or less costs the last digits of a phase
         close(f"{group} {name}", difference, 0 * difference, 1e-15 if name in PERIODIC else 0)
 grid = stats.set_index(draw=["step", "walker"]).unstack("draw").transpose("step", "chain", "walker")
-for name, key in [("lp", "log_prob"), ("spottedness",) * 2, ("chi2",) * 2, ("accepted",) * 2, ("passes",) * 2]:
+for name in ["lp", "spottedness", "chi2", "accepted", "model_applications"]:
+    key = "log_prob" if name == "lp" else name
     assert (grid[name].values == cube(key, discarded)).all(), name
 for name, start in [("move", "start"), ("status", ""), ("proposed", "")]:
     words = np.array(stats[name].attrs["flag_meanings"].split())

@@ -29,5 +29,5 @@ pub trait Problem {
     fn curvature<N: Number>(&mut self, which: Curvature, v: &[N], out: &mut [N]);
 
     /// Applications of the response or its transpose so far.
-    fn passes(&self) -> u32;
+    fn model_applications(&self) -> u32;
 }

@@ -90,8 +90,9 @@ pub struct Image {
 pub struct Start {
     /// Image and lambda.
     pub image: Image,
-    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves passes where it is good; empty for none.
-    /// With an adjoint it is taken for that of a solution near by, and not solved for again in the first steps.
+    /// A guess of `dz / d ln(lambda)` in the entropy's metric, which saves model applications where it is good; empty
+    /// for none. With an adjoint it is taken for that of a solution near by, and not solved for again in the first
+    /// steps.
     pub path: Vec<f32>,
     /// A guess of `d chi2 / d ln(lambda)` to go with it.
     pub chi2_slope: f64,

@@ -18,6 +18,15 @@ pub fn shown(path: &Path) -> String {
     escaped(&path.to_string_lossy()).into_owned()
 }
 
+/// Numbers by name to six digits, each after a comma.
+pub fn listed<'a>(numbers: impl IntoIterator<Item = (&'a String, &'a f64)>) -> String {
+    let one = |(name, value): (&String, &f64)| {
+        let decimals = (5.0 - value.abs().max(1e-6).log10().floor()).clamp(0.0, 12.0) as usize;
+        format!(", {name} {value:.decimals$}")
+    };
+    numbers.into_iter().map(one).collect()
+}
+
 /// How a column is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
@@ -48,6 +57,13 @@ pub fn columns(rows: &[Vec<String>], aligns: &[Align]) -> String {
         cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
     };
     rows.iter().map(line).collect()
+}
+
+#[test]
+fn numbers_have_six_digits() {
+    let names = ["spottedness", "chi2", "log_evidence"].map(str::to_owned);
+    let text = listed(names.iter().zip(&[0.0593004, 2764.5, -1.25e5]));
+    assert_eq!(text, ", spottedness 0.0593004, chi2 2764.50, log_evidence -125000");
 }
 
 #[test]

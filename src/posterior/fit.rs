@@ -98,7 +98,8 @@ pub struct FitSummary {
     /// Skilling & Bryan's TEST, 0 at a maximum-entropy image.
     pub test: f64,
     /// Applications of the response or its transpose, those for the trade-off curve included.
-    pub passes: u32,
+    #[serde(alias = "passes")]
+    pub model_applications: u32,
     /// Newton steps of the last, exact solution.
     pub newton_steps: usize,
     /// Number of profiles.
@@ -242,7 +243,7 @@ fn summarise(
         spottedness: solution.spottedness,
         deviation: None,
         test: f64::NAN,
-        passes: reference.passes,
+        model_applications: reference.model_applications,
         newton_steps: solution.newton_steps,
         profiles: observations.profiles.len(),
         data,

@@ -137,8 +137,8 @@ pub struct ImagingProblem<'a> {
     data: &'a Data,
     response: Response,
     brightness_of: Brightness,
-    passes: u32,
-    single_passes: u32,
+    model_applications: u32,
+    single_applications: u32,
     /// Model depth of every bin at the current map.
     model: Vec<f64>,
     /// `W (model - data)`, without nuisances `(model - data) / sigma^2`.
@@ -167,8 +167,8 @@ impl<'a> ImagingProblem<'a> {
             data,
             response,
             brightness_of,
-            passes: 0,
-            single_passes: 0,
+            model_applications: 0,
+            single_applications: 0,
             model: vec![0.0; bins],
             weighted_residual: vec![0.0; bins],
             continuum: vec![0.0; profiles],
@@ -179,9 +179,9 @@ impl<'a> ImagingProblem<'a> {
         }
     }
 
-    /// How many of its passes were in single precision.
-    pub fn single_passes(&self) -> u32 {
-        self.single_passes
+    /// How many of its model applications were in single precision.
+    pub fn single_applications(&self) -> u32 {
+        self.single_applications
     }
 
     /// Model depth `1 - I` of every bin at the current map.
@@ -222,7 +222,7 @@ impl<'a> ImagingProblem<'a> {
 
     /// Change of every bin's model depth to first order in the change `v` of the map, at the current map.
     pub fn model_change(&mut self, v: &[f64], out: &mut [f64]) {
-        self.passes += 1;
+        self.model_applications += 1;
         self.response.apply(v, out, &mut self.constants);
         for k in 0..self.response.profiles() {
             let scale = self.brightness_of.slope / self.continuum[k];
@@ -248,7 +248,7 @@ impl Problem for ImagingProblem<'_> {
     }
 
     fn linearise(&mut self, s: &[f64]) -> f64 {
-        self.passes += 1;
+        self.model_applications += 1;
         let brightness_of = self.brightness_of;
         combine(&mut self.brightness, s, |_, s| brightness_of.at(s));
         self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
@@ -261,7 +261,7 @@ impl Problem for ImagingProblem<'_> {
     }
 
     fn gradient(&mut self, out: &mut [f64]) {
-        self.passes += 1;
+        self.model_applications += 1;
         let mut bins = std::mem::take(&mut self.bins);
         for k in 0..self.response.profiles() {
             self.constants[k] = self.pull(k, &self.weighted_residual, &mut bins);
@@ -271,8 +271,8 @@ impl Problem for ImagingProblem<'_> {
     }
 
     fn curvature<N: Number>(&mut self, which: Curvature, v: &[N], out: &mut [N]) {
-        self.passes += 2;
-        self.single_passes += if N::SINGLE { 2 } else { 0 };
+        self.model_applications += 2;
+        self.single_applications += if N::SINGLE { 2 } else { 0 };
         let exact = which == Curvature::Exact;
         let ImagingProblem { response, data, model, weighted_residual, continuum, differences, bins: weighed, .. } =
             self;
@@ -294,7 +294,7 @@ impl Problem for ImagingProblem<'_> {
         });
     }
 
-    fn passes(&self) -> u32 {
-        self.passes
+    fn model_applications(&self) -> u32 {
+        self.model_applications
     }
 }

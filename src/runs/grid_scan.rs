@@ -10,7 +10,7 @@ use crate::data::io::landscape;
 use crate::data::io::lines::{self, JournalError, LineFile};
 use crate::data::scene::Scene;
 use crate::data::search::Found;
-use crate::posterior::objective::Posterior;
+use crate::posterior::objective::{LIKELIHOOD_NUMBERS, Posterior};
 use crate::runs::origin::{self, Origin, OriginError};
 use crate::runs::pool::{Asked, Brief, Pool, Task};
 use crate::sampling::landscape::{Grid, Landscape, LandscapeError, Node};
@@ -43,6 +43,13 @@ pub struct Header {
     pub origin: Origin,
     /// Where the nodes are.
     pub grid: Grid,
+    /// Names of the numbers beside ln L at each.
+    #[serde(default = "likelihood_numbers")]
+    pub numbers: Vec<String>,
+}
+
+fn likelihood_numbers() -> Vec<String> {
+    LIKELIHOOD_NUMBERS.map(str::to_owned).to_vec()
 }
 
 impl Header {
@@ -114,7 +121,7 @@ impl GridScan {
         replace: bool,
     ) -> Result<Self, GridScanError> {
         let grid = &plan.grid;
-        let header = Header { origin: Origin::of(scene, &found), grid: grid.clone() };
+        let header = Header { origin: Origin::of(scene, &found), grid: grid.clone(), numbers: likelihood_numbers() };
         // the nodes first: whoever holds them may write the header
         let file = LineFile::create(&folder.join(NODES), replace)?;
         let path = folder.join(PARABOLOID);
@@ -123,7 +130,8 @@ impl GridScan {
             _ => {}
         }
         write_json(&folder.join(HEADER), &header)?;
-        Ok(GridScan::new(scene, header, found.posterior, Landscape::new(grid.clone()), file))
+        let landscape = Landscape::new(grid.clone(), header.numbers.clone());
+        Ok(GridScan::new(scene, header, found.posterior, landscape, file))
     }
 
     /// Goes on with the landscape of `plan` in `folder`.
@@ -136,7 +144,7 @@ impl GridScan {
         if let Some(what) = change(&header.grid, &plan.grid) {
             return Err(OriginError::Changed { folder: folder.into(), what }.into());
         }
-        let (file, landscape) = landscape::recover(&folder.join(NODES), plan.grid.clone())?;
+        let (file, landscape) = landscape::recover(&folder.join(NODES), plan.grid.clone(), &header.numbers)?;
         let posterior = header.origin.posterior(scene, scene.space_of(&plan.free), folder)?;
         Ok(GridScan::new(scene, header, posterior, landscape, file))
     }
@@ -175,9 +183,9 @@ impl GridScan {
             let after = (first + BATCH_EACH * pool.size()).min(grid.len());
             let thetas: Vec<Vec<f64>> = (first..after).map(|index| grid.theta(index)).collect();
             let found = pool.answers(&brief, &thetas, |theta| posterior.likelihood(theta));
-            let node = |(index, (theta, reconstruction))| Node { index, theta, reconstruction };
+            let node = |(index, (theta, evaluation))| Node { index, theta, evaluation };
             let batch: Vec<Node> = (first..).zip(thetas.into_iter().zip(found)).map(node).collect();
-            landscape::append(file, grid, &batch)?;
+            landscape::append(file, landscape, &batch)?;
             batch.into_iter().try_for_each(|node| landscape.push(node))?;
             on_batch(landscape);
         }

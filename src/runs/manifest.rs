@@ -8,7 +8,7 @@ mod conclusions;
 use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::posterior::objective::{
-    FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, definition, in_earths,
+    CHI2, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, SPOTTEDNESS, definition, in_earths,
 };
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
@@ -34,7 +34,10 @@ pub struct Manifest {
     pub origin: Origin,
     /// Names of the sampled parameters, in the order of the chain.
     pub names: Vec<String>,
-    /// Their priors.
+    /// Names of the numbers beside the log-probability of each draw.
+    #[serde(default = "posterior_numbers")]
+    pub numbers: Vec<String>,
+    /// Priors of the parameters.
     pub priors: BTreeMap<String, serde_json::Value>,
     /// Number of independent ensembles.
     pub ensembles: usize,
@@ -52,6 +55,10 @@ pub struct Manifest {
     pub blind_search: Option<BlindSearch>,
     /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
     pub start: Positions,
+}
+
+fn posterior_numbers() -> Vec<String> {
+    [SPOTTEDNESS, CHI2].map(str::to_owned).to_vec()
 }
 
 impl Manifest {
@@ -207,7 +214,8 @@ impl Manifest {
 
     /// Shape of the chain.
     pub fn shape(&self) -> Shape {
-        Shape { names: self.names.clone(), ensembles: self.ensembles, walkers: self.walkers }
+        let (names, numbers) = (self.names.clone(), self.numbers.clone());
+        Shape { names, numbers, ensembles: self.ensembles, walkers: self.walkers }
     }
 
     /// The settings that the run was begun with.

@@ -3,11 +3,13 @@
 use crate::data::io::provenance::Provenance;
 use crate::data::scene::Scene;
 use crate::data::search::{Attempt, Found};
+use crate::numerics::text::listed;
 use crate::posterior::objective::{Estimate, OrbitQuantities, OrbitQuantity, Parameter, definition, in_earths};
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{OptimumRecord, ReferenceRecord, by_name};
+use crate::sampling::log_density::LogDensity as _;
 use crate::sampling::optimise::Optimum;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -22,10 +24,9 @@ pub struct OptimumFile {
     /// Best value and standard deviation of each, and the log-probability there.
     #[serde(flatten)]
     pub optimum: OptimumRecord,
-    /// chi2 of the reconstruction at the optimum.
-    pub chi2: f64,
-    /// Spottedness there.
-    pub spottedness: f64,
+    /// Numbers beside the log-probability there, by name.
+    #[serde(flatten, deserialize_with = "numbers_alone")]
+    pub numbers: BTreeMap<String, f64>,
     /// Whether the curvature is positive definite: without that the standard deviations mean nothing.
     pub well_defined: bool,
     /// Whether the search met its tolerance.
@@ -74,6 +75,12 @@ pub struct StartRecord {
     pub evaluations: usize,
 }
 
+/// Of the keys that nothing else has claimed so far, those of numbers.
+fn numbers_alone<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, f64>, D::Error> {
+    let all = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
+    Ok(all.into_iter().filter_map(|(name, value)| Some((name, value.as_f64()?))).collect())
+}
+
 impl OptimumFile {
     /// The file for what a search in `scene` found.
     pub fn new(scene: &Scene, found: &Found) -> Self {
@@ -81,12 +88,12 @@ impl OptimumFile {
         let (derived, derived_truth) = derived(scene, optimum);
         let prot = scene.imager.star.rotation_period_d;
         let porb_over_prot = scene.space.values_at(&optimum.theta)[Parameter::PorbOverProt];
+        let names = found.posterior.number_names();
         let rows = |m: &nalgebra::DMatrix<f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect();
         OptimumFile {
             names: scene.space.names().to_vec(),
             optimum: OptimumRecord::of(scene.space.names(), optimum),
-            chi2: optimum.evaluation.chi2,
-            spottedness: optimum.evaluation.spottedness,
+            numbers: names.iter().map(|name| (*name).to_owned()).zip(optimum.evaluation.numbers.clone()).collect(),
             well_defined: optimum.well_defined,
             converged: optimum.converged,
             covariance: rows(&optimum.written_covariance),
@@ -127,7 +134,7 @@ impl OptimumFile {
             (true, false) => "the search ran out of steps; the values may be improved from there",
             (false, _) => "no well-defined maximum: on the edge of a prior, or the data leave some direction open",
         };
-        let _ = writeln!(table, "{maximum}; ln P = {:.3}, spottedness {:.5}", self.optimum.log_prob, self.spottedness);
+        let _ = writeln!(table, "{maximum}; ln P = {:.3}{}", self.optimum.log_prob, listed(&self.numbers));
         let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
         for note in remarks.chain(self.reference.warning()) {
             let _ = writeln!(table, "note: {note}");

@@ -1,5 +1,5 @@
-//! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few derived numbers
-//! out.
+//! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few named
+//! numbers out.
 //!
 //! The ensemble, the optimiser and the landscape know only this file; the objective implements it. Batches go through
 //! [`Evaluator`], behind which are the threads of one machine or the ranks of a cluster.
@@ -33,14 +33,13 @@ impl Status {
 /// What one evaluation returns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
-    /// ln(likelihood) + ln(prior) in the coordinates of the parameters as named; minus infinity where not allowed.
+    /// ln(likelihood) + ln(prior) in the coordinates of the parameters as named, in a landscape ln(likelihood) alone;
+    /// minus infinity where not allowed, or failed.
     pub log_prob: f64,
-    /// Spottedness of the reconstruction, as [`Likelihood::spottedness`].
-    pub spottedness: f64,
-    /// chi2 of the reconstruction, as [`Likelihood::chi2`].
-    pub chi2: f64,
-    /// Applications of the response or its transpose that this evaluation took.
-    pub passes: u32,
+    /// Numbers beside it, in the order of their names ([`LogDensity::number_names`]); none where it is minus infinity.
+    pub numbers: Vec<f64>,
+    /// Applications of the model or its transpose that this evaluation took.
+    pub model_applications: u32,
     /// How it ended.
     pub status: Status,
 }
@@ -52,45 +51,15 @@ impl Evaluation {
         Evaluation { log_prob, ..Evaluation::rejected(status) }
     }
 
-    /// An evaluation without a reconstruction: log-probability minus infinity, derived numbers zero.
+    /// An evaluation that came to nothing: log-probability minus infinity, no numbers.
     pub fn rejected(status: Status) -> Self {
-        Evaluation { log_prob: f64::NEG_INFINITY, spottedness: 0.0, chi2: 0.0, passes: 0, status }
+        Evaluation { log_prob: f64::NEG_INFINITY, numbers: Vec::new(), model_applications: 0, status }
     }
-}
 
-/// What a reconstruction is worth without the prior, and the numbers of its image: the values of a landscape.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Likelihood {
-    /// ln(likelihood); only differences mean something.
-    pub log_likelihood: f64,
-    /// Spottedness of the image, such as its fractional spot coverage; where the target chi2 is reached, what a
-    /// first-order forecast says that it is at the target, of which the log-likelihood is made.
-    pub spottedness: f64,
-    /// Entropy of the image at which the solver stopped.
-    pub entropy: f64,
-    /// chi2 of that image: near the target, where that is reached, as far as the forecast is good enough.
-    pub chi2: f64,
-    /// Lagrange multiplier of chi2/2 in `S - lambda chi2/2`, which the image maximises.
-    pub lambda: f64,
-}
-
-impl Likelihood {
-    /// Whether every number is finite.
+    /// Whether log-probability and numbers are finite.
     pub fn is_finite(&self) -> bool {
-        let Likelihood { log_likelihood, spottedness, entropy, chi2, lambda } = *self;
-        [log_likelihood, spottedness, entropy, chi2, lambda].iter().all(|x| x.is_finite())
+        self.log_prob.is_finite() && self.numbers.iter().all(|x| x.is_finite())
     }
-}
-
-/// What became of a reconstruction, whatever the prior says.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reconstruction {
-    /// Its values; `None` if it failed.
-    pub likelihood: Option<Likelihood>,
-    /// Applications of the response or its transpose that it took.
-    pub passes: u32,
-    /// How it ended; never [`Status::OutsidePrior`].
-    pub status: Status,
 }
 
 /// A posterior density over named parameters.
@@ -100,6 +69,12 @@ pub struct Reconstruction {
 pub trait LogDensity: Sync {
     /// Names of the parameters, in the order of every vector.
     fn names(&self) -> &[String];
+
+    /// Names of the numbers that an evaluation has beside its log-probability, in their order. They are kept with every
+    /// draw of a chain.
+    fn number_names(&self) -> &[&str] {
+        &[]
+    }
 
     /// The log-posterior at `theta`. A pure function: the same bytes for the same `theta`, whatever was evaluated
     /// before.

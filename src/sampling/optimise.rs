@@ -270,7 +270,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::log_density::{LogDensity, Status};
+    use crate::sampling::log_density::LogDensity;
 
     /// A curved valley: ln p = -(1 - a)^2 / 2 - 2 (b - a^2)^2.
     struct Rosenbrock(Vec<String>);
@@ -280,8 +280,7 @@ mod tests {
             &self.0
         }
         fn evaluate(&self, x: &[f64]) -> Evaluation {
-            let log_prob = -0.5 * (1.0 - x[0]).powi(2) - 2.0 * (x[1] - x[0] * x[0]).powi(2);
-            Evaluation { log_prob, spottedness: 0.0, chi2: 0.0, passes: 0, status: Status::Converged }
+            Evaluation::of(-0.5 * (1.0 - x[0]).powi(2) - 2.0 * (x[1] - x[0] * x[0]).powi(2))
         }
     }
 

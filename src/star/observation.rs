@@ -74,7 +74,7 @@ impl Observations {
             let inside = |j: &usize| (low..=high).contains(&profile.velocity_kms(*j, self.step_kms));
             let mut bins = (0..profile.intensity.len()).filter(inside);
             let first = bins.next().ok_or_else(|| format!("profile {k} has no bin from {low} to {high} km/s"))?;
-            let bins = first..bins.last().unwrap_or(first) + 1;
+            let bins = first..bins.next_back().unwrap_or(first) + 1;
             Ok(Profile {
                 time_d: profile.time_d,
                 first_velocity_kms: profile.velocity_kms(first, self.step_kms),

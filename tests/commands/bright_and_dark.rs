@@ -141,8 +141,7 @@ fn faint_features_look_the_same_to_both_models() {
         let posterior = Posterior::new(imager.clone(), space.clone(), kind, reference.clone());
         let posterior = posterior.with_settings(SolverSettings::exact());
         let start = posterior.space().start();
-        let at =
-            |k_kms: f64| posterior.likelihood(&[&[k_kms], &start[1..]].concat()).likelihood.unwrap().log_likelihood;
+        let at = |k_kms: f64| posterior.likelihood(&[&[k_kms], &start[1..]].concat()).log_prob;
         // one and two standard errors of K
         [-2e-5, 1e-5].map(|k| at(start[0] + k) - at(start[0]))
     };

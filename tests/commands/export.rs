@@ -131,8 +131,8 @@ fn text_formats_have_the_digits_of_the_chain() {
     let table = desk.read("run/chain.csv");
     let mut lines = table.lines();
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let names = "ensemble step walker warmup k_kms phi log_prob spottedness chi2 accepted status move proposed passes \
-                 t_max_rv_d t_conjunction_d";
+    let names = "ensemble step walker warmup k_kms phi log_prob spottedness chi2 accepted status move proposed \
+                 model_applications t_max_rv_d t_conjunction_d";
     assert_eq!(columns.join(" "), names);
     assert_eq!(lines.clone().count(), records.len());
     for (line, record) in lines.zip(&records) {

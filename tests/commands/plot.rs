@@ -158,7 +158,7 @@ fn corners_have_titles_of_their_width_logarithmic_axes_and_numbers_that_do_not_t
                 "ensemble": ensemble, "step": step, "walker": walker, "accepted": true,
                 "log_prob": -1.0, "k_kms": 0.4 + 1.5 * k,
                 "porb_over_prot": 0.4 * (9.0_f64 / 0.4).powf(ratio), "phi": phi, "spottedness": 0.05, "chi2": 1.0,
-                "status": "converged", "proposed": "converged", "passes": 10
+                "status": "converged", "proposed": "converged", "model_applications": 10
             });
             text += &format!("{line}\n");
         }
@@ -283,7 +283,7 @@ fn gaussian_run(desk: &Desk, centre: [f64; 2], sd: [f64; 2]) {
                 "ensemble": ensemble, "step": step, "walker": walker, "accepted": true,
                 "log_prob": -0.5 * (u * u + v * v),
                 "k_kms": k, "phi": phi.rem_euclid(1.0), "spottedness": 0.05, "chi2": 1.0, "status": "converged",
-                "proposed": "converged", "passes": 10
+                "proposed": "converged", "model_applications": 10
             });
             text += &format!("{line}\n");
         }

@@ -17,7 +17,8 @@ const GOALS: Goals = Goals { rhat: 1.01, ess: 1000.0 };
 fn chain(names: &[&str], size: [usize; 3], draw: &mut dyn FnMut(&mut ChaCha8Rng, [usize; 3]) -> Vec<f64>) -> Chain {
     let [ensembles, walkers, steps] = size;
     let names = names.iter().map(|name| (*name).to_owned()).collect();
-    let mut chain = Chain::new(Shape { names, ensembles, walkers });
+    let numbers = ["spottedness", "log_evidence"].map(str::to_owned).to_vec();
+    let mut chain = Chain::new(Shape { names, numbers, ensembles, walkers });
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for step in 0..steps {
         let mut records = Vec::new();
@@ -32,11 +33,10 @@ fn chain(names: &[&str], size: [usize; 3], draw: &mut dyn FnMut(&mut ChaCha8Rng,
                     accepted: rng.random(),
                     log_prob: -0.5 * theta[0] * theta[0],
                     theta,
-                    spottedness: rng.random::<f64>() * 1e-3,
-                    chi2: 1.0 / rng.random::<f64>(),
+                    numbers: vec![rng.random::<f64>() * 1e-3, 1.0 / rng.random::<f64>()],
                     status: Status::Converged,
                     proposed,
-                    passes: rng.random_range(20..60),
+                    model_applications: rng.random_range(20..60),
                     by: (step > 0).then_some(MoveKind::Stretch),
                 });
             }
@@ -73,7 +73,8 @@ fn every_number_survives() {
     assert!(first.starts_with(r#"{"ensemble":0,"step":0,"walker":0,"accepted":"#), "{first}");
     let line: BTreeMap<String, serde_json::Value> = serde_json::from_str(&first).unwrap();
     assert_eq!(line["status"], "converged");
-    let keys = "accepted chi2 ensemble k_kms log_prob passes phi proposed spottedness status step walker";
+    let keys = "accepted ensemble k_kms log_evidence log_prob model_applications phi proposed spottedness status step \
+                walker";
     assert_eq!(line.keys().map(String::as_str).collect::<Vec<_>>().join(" "), keys);
 }
 
@@ -133,17 +134,19 @@ fn torn_tails_are_dropped_and_corruption_is_refused_with_its_line() {
     refused(7, &lines[7].replace("\"log_prob\":", "\"log_prob\":null,\"x\":"), "`log_prob`");
     refused(7, &lines[7].replace("\"log_prob\":", "\"log_prob\":1e999,\"x\":"), "out of range");
     refused(7, &lines[7].replace("converged\",\"p", "convinced\",\"p"), "`status`");
-    refused(7, &lines[7].replace("\"passes\":", "\"passes\":-"), "`passes`");
-    let end = lines[6].find(",\"passes\"").unwrap();
-    refused(6, &format!("{}}}", &lines[6][..end]), "missing key `passes`");
+    let count = "\"model_applications\":";
+    refused(7, &lines[7].replace(count, &format!("{count}-")), "`model_applications`");
+    let end = lines[6].find(",\"model_applications\"").unwrap();
+    refused(6, &format!("{}}}", &lines[6][..end]), "missing key `model_applications`");
+    refused(7, &lines[7].replace("\"log_evidence\"", "\"chi2\""), "unknown key `chi2`");
     // Whole, but wrong: no torn tail, even on the last line.
     refused(23, lines[22], "expected step 3, ensemble 1, walker 2");
     std::fs::write(&path, "").unwrap();
     assert_eq!(journal::read(&path, chain.shape()).unwrap().steps(), 0);
     let error = journal::read(&folder.path().join("none"), chain.shape()).unwrap_err().to_string();
     assert!(error.contains("none"), "{error}");
-    let taken = Shape { names: vec!["chi2".to_owned()], ..chain.shape().clone() };
-    assert!(journal::read(&path, &taken).unwrap_err().to_string().contains("`chi2`"));
+    let taken = Shape { names: vec!["log_evidence".to_owned()], ..chain.shape().clone() };
+    assert!(journal::read(&path, &taken).unwrap_err().to_string().contains("`log_evidence`"));
 }
 
 #[test]

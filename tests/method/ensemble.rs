@@ -32,6 +32,9 @@ impl LogDensity for Orbit {
     fn names(&self) -> &[String] {
         &self.names
     }
+    fn number_names(&self) -> &[&str] {
+        &["spottedness", "chi2"]
+    }
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
         let [k, phi, v] = [theta[0], theta[1], theta[2]];
         if k > 0.3 {
@@ -44,7 +47,8 @@ impl LogDensity for Orbit {
             7 if self.fails => (log_prob, Status::Unreachable),
             _ => (log_prob, Status::Converged),
         };
-        Evaluation { log_prob, spottedness: 0.06 + 1e-3 * k, chi2: 2764.5 - v, passes: 20 + (v.abs() as u32), status }
+        let numbers = vec![0.06 + 1e-3 * k, 2764.5 - v];
+        Evaluation { log_prob, numbers, model_applications: 20 + (v.abs() as u32), status }
     }
     fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         vec![theta[0] * (TAU * theta[1]).cos(), theta[0] * (TAU * theta[1]).sin(), theta[2]]
@@ -74,7 +78,7 @@ fn settings(ensembles: usize, walkers: usize, steps: usize) -> SamplerSettings {
 }
 
 fn shape(density: &dyn LogDensity, settings: &SamplerSettings) -> Shape {
-    Shape { names: density.names().to_vec(), ensembles: settings.ensembles, walkers: settings.walkers }
+    Shape::of(density, settings.ensembles, settings.walkers)
 }
 
 fn start(density: &dyn LogDensity, settings: &SamplerSettings) -> Positions {
@@ -220,8 +224,7 @@ impl LogDensity for Phase {
     }
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
         assert!((0.0..1.0).contains(&theta[0]), "positions are written wrapped");
-        let log_prob = (TAU * (theta[0] - 0.1)).cos();
-        Evaluation { log_prob, spottedness: 0.0, chi2: 0.0, passes: 1, status: Status::Converged }
+        Evaluation::of((TAU * (theta[0] - 0.1)).cos())
     }
     fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         vec![internal[0].rem_euclid(1.0).min(1.0 - f64::EPSILON)]
@@ -352,8 +355,11 @@ fn a_chain_of_another_run_is_not_resumed() {
     assert_eq!(sampler.resume(&Chain::new(good.clone())), Err(EnsembleError::NothingToResume));
     let other = Shape { walkers: 6, ..good.clone() };
     assert!(sampler.resume(&Chain::new(other)).unwrap_err().to_string().contains("walkers of the chain: 8 expected"));
-    let other = Shape { names: vec!["k_kms".to_owned()], ..good };
+    let other = Shape { names: vec!["k_kms".to_owned()], ..good.clone() };
     assert!(matches!(sampler.resume(&Chain::new(other)), Err(EnsembleError::Names { .. })));
+    let other = Shape { numbers: vec!["log_evidence".to_owned()], ..good };
+    let error = sampler.resume(&Chain::new(other)).unwrap_err().to_string();
+    assert!(error.contains("log_evidence") && error.contains("spottedness"), "{error}");
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn exact(imager: &Imager, reference: &Reference) -> impl Fn(&ParameterValues) ->
     let posterior = posterior.with_settings(SolverSettings::exact());
     move |values| {
         let theta = posterior.space().theta_of(values);
-        posterior.likelihood(&theta).likelihood.unwrap().log_likelihood
+        posterior.likelihood(&theta).log_prob
     }
 }
 
@@ -247,7 +247,7 @@ fn a_posterior_that_counts_unresolved_spots() {
     let counted = SpotsCounted::new(&posterior).unwrap();
     let exact = |values: &ParameterValues| {
         let theta = [values[Parameter::K], values[Parameter::PorbOverProt], values[Parameter::Phi]];
-        posterior.likelihood(&theta).likelihood.unwrap().log_likelihood
+        posterior.likelihood(&theta).log_prob
     };
     let here = exact(&at);
     assert!((counted.log_likelihood(&at, here) - here).abs() < 1e-9);
@@ -306,8 +306,7 @@ fn unresolved_spots_magnify_nothing() {
     let free = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
     let posterior = Posterior::new(imager.clone(), space(&imager, at, &free), ObjectiveKind::Spottedness, reference);
     let counted = SpotsCounted::new(&posterior).unwrap();
-    let here = posterior.likelihood(&[0.07, at[Parameter::PorbOverProt], at[Parameter::Phi]]);
-    let here = here.likelihood.unwrap().log_likelihood;
+    let here = posterior.likelihood(&[0.07, at[Parameter::PorbOverProt], at[Parameter::Phi]]).log_prob;
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let mut above = 0;
     for _ in 0..2000 {

@@ -135,8 +135,7 @@ fn the_expansion_knows_of_them() {
     );
     let posterior = Posterior::new(imager, space, ObjectiveKind::RegularisedLikelihood, reference.clone());
     let posterior = posterior.with_settings(SolverSettings::exact());
-    let exact =
-        |values: &ParameterValues| posterior.likelihood(&free.map(|p| values[p])).likelihood.unwrap().log_likelihood;
+    let exact = |values: &ParameterValues| posterior.likelihood(&free.map(|p| values[p])).log_prob;
     let here = exact(&reference.values);
     assert!((here - expansion.log_likelihood).abs() < 1e-4);
     for moves in [[0.02, 0.0, 0.0], [-0.02, 0.02, 0.01], [0.0, 0.015, -0.02]] {

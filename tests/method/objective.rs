@@ -272,11 +272,11 @@ fn warm_starts_save_passes_and_change_nothing_else() {
         for theta in &thetas {
             let (got, wanted) = (placed.evaluate(theta), exact.evaluate(theta).log_prob);
             assert!((got.log_prob - wanted).abs() < 1e-3 + 0.005 * (best - wanted), "{theta:?}: {got:?} {wanted}");
-            with += got.passes;
-            without += posterior.evaluate(theta).passes;
+            with += got.model_applications;
+            without += posterior.evaluate(theta).model_applications;
         }
-        println!("{:?}: {with} passes instead of {without}", posterior.kind());
-        assert!(3 * with < 2 * without, "{:?}: {with} passes instead of {without}", posterior.kind());
+        println!("{:?}: {with} model applications instead of {without}", posterior.kind());
+        assert!(3 * with < 2 * without, "{:?}: {with} model applications instead of {without}", posterior.kind());
         // as many as they are worth, and none where nothing is far
         assert_eq!(
             posterior.clone().with_warm_starts_for(std::slice::from_ref(&start), 10_000).warm_starts().count(),
@@ -305,7 +305,12 @@ fn a_warm_start_out_of_the_targets_reach_is_right_for_those_within() {
         let best = exact.evaluate(&start).log_prob;
         for theta in (1..4).map(|i| at(beyond - i)) {
             let (got, wanted) = (placed.evaluate(&theta), exact.evaluate(&theta).log_prob);
-            println!("{} below: {:e}, {} passes", best - wanted, got.log_prob - wanted, got.passes);
+            println!(
+                "{} below: {:e}, {} model applications",
+                best - wanted,
+                got.log_prob - wanted,
+                got.model_applications
+            );
             assert_eq!(got.status, Status::Converged);
             assert!((got.log_prob - wanted).abs() < 1e-3 + 0.005 * (best - wanted), "{theta:?}: {got:?} {wanted}");
         }
@@ -354,6 +359,10 @@ fn absurd_parameters_are_refused_not_computed() {
         let mut theta = posterior.space().start();
         theta[parameter as usize] = value;
         let evaluation = posterior.evaluate(&theta);
-        assert_eq!((evaluation.log_prob, evaluation.passes), (f64::NEG_INFINITY, 0), "{parameter:?} {value}");
+        assert_eq!(
+            (evaluation.log_prob, evaluation.model_applications),
+            (f64::NEG_INFINITY, 0),
+            "{parameter:?} {value}"
+        );
     }
 }

@@ -56,7 +56,8 @@ fn solve(oracle: &super::common::Oracle, theta: &Value, goal: Goal) -> Solution 
     let solver =
         Solver { entropy: Entropy::new(oracle.default_spot), preconditioner: &none, settings: SolverSettings::exact() };
     let solution = solver.solve(&mut problem, goal, Start::blank(&solver.entropy, oracle.grid.len(), 1e-6));
-    println!("{theta}: {:?} {} Newton steps, {} passes", solution.termination, solution.newton_steps, problem.passes());
+    let (steps, applications) = (solution.newton_steps, problem.model_applications());
+    println!("{theta}: {:?} {steps} Newton steps, {applications} model applications", solution.termination);
     assert_eq!(solution.termination, Termination::Converged);
     solution
 }

@@ -3,7 +3,7 @@
 use dimcmc::internals::sampling::landscape::{
     Axis, Grid, Landscape, Marginal, Node, Paraboloid, Rule, Undefined, paraboloid, paraboloid_table,
 };
-use dimcmc::internals::sampling::log_density::{Likelihood, Reconstruction, Status};
+use dimcmc::internals::sampling::log_density::{Evaluation, Status};
 use nalgebra::{DMatrix, DVector};
 
 fn axis(name: &str, min: f64, max: f64, nodes: usize) -> Axis {
@@ -17,16 +17,15 @@ fn landscape(axes: &[Axis], log_likelihood: impl Fn(&[f64]) -> f64) -> Landscape
 
 fn with_status(axes: &[Axis], node: impl Fn(&[f64]) -> (f64, Status)) -> Landscape {
     let grid = Grid { axes: axes.to_vec() };
-    let mut landscape = Landscape::new(grid.clone());
+    let mut landscape = Landscape::new(grid.clone(), Vec::new());
     for index in 0..grid.len() {
         let theta = grid.theta(index);
         let (log_likelihood, status) = node(&theta);
-        let value = Likelihood { log_likelihood, spottedness: 0.06, entropy: -0.2, chi2: 2764.5, lambda: 1e-3 };
-        let (likelihood, status) =
-            if log_likelihood.is_nan() { (None, Status::StoppedShort) } else { (Some(value), status) };
-        landscape
-            .push(Node { index, theta, reconstruction: Reconstruction { likelihood, passes: 20, status } })
-            .unwrap();
+        let evaluation = match log_likelihood.is_nan() {
+            true => Evaluation::rejected(Status::StoppedShort),
+            false => Evaluation { status, ..Evaluation::of(log_likelihood) },
+        };
+        landscape.push(Node { index, theta, evaluation }).unwrap();
     }
     landscape
 }

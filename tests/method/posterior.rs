@@ -14,7 +14,7 @@ use dimcmc::internals::sampling::chain::{Chain, Goals, ParameterKind, Shape, Sum
 use dimcmc::internals::sampling::ensemble::{
     self, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start,
 };
-use dimcmc::internals::sampling::log_density::{LogDensity, Threads};
+use dimcmc::internals::sampling::log_density::Threads;
 use dimcmc::internals::sampling::optimise::climb;
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use std::sync::atomic::AtomicBool;
@@ -57,8 +57,7 @@ fn sample(posterior: &Posterior, surrogate: bool, ess: f64) -> Summary {
         assert!(acceptance > 0.8, "{acceptance}");
         sampler = sampler.with_move(settings.moves.surrogate, Box::new(SurrogateMove(surrogate)));
     }
-    let names = posterior.names().to_vec();
-    let mut chain = Chain::new(Shape { names, ensembles: settings.ensembles, walkers: settings.walkers });
+    let mut chain = Chain::new(Shape::of(posterior, settings.ensembles, settings.walkers));
     chain.push_step(&sampler.start(&start).unwrap().1).unwrap();
     let policy = StopPolicy::new(&settings);
     let nothing = &mut |_: &[_], _: Option<&_>| Ok::<(), std::convert::Infallible>(());
@@ -70,8 +69,8 @@ fn sample(posterior: &Posterior, surrogate: bool, ess: f64) -> Summary {
 /// Medians within `sigmas` and widths within `ratio` of the oracle's.
 fn compare(summary: &Summary, sigmas: f64, ratio: f64) {
     let wanted = json("posterior.json");
-    println!("{} evaluations, {} model applications each", summary.evaluations, summary.passes_median);
-    assert!(summary.passes_median <= 60.0, "{} model applications each", summary.passes_median);
+    println!("{} evaluations, {} model applications each", summary.evaluations, summary.model_applications_median);
+    assert!(summary.model_applications_median <= 60.0, "{} model applications each", summary.model_applications_median);
     for (name, key) in [("k_kms", "K"), ("porb_over_prot", "P"), ("phi", "phi")] {
         let q = numbers(&wanted[key]);
         let (median, width) = (q[2], 0.5 * (q[3] - q[1]));

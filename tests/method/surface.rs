@@ -65,8 +65,7 @@ fn the_contrast_has_an_upper_bound_alone() {
     let reference = Reference::provisional(&scene.imager, values, 0.97).unwrap();
     let kind = ObjectiveKind::RegularisedLikelihood;
     let posterior = Posterior::new(scene.imager.clone(), scene.space.clone(), kind, reference);
-    let [dark, injected, bright] =
-        [0.05, 0.2, 0.7].map(|c| posterior.likelihood(&[c]).likelihood.unwrap().log_likelihood);
+    let [dark, injected, bright] = [0.05, 0.2, 0.7].map(|c| posterior.likelihood(&[c]).log_prob);
     println!("ln L {:.2} at 0.05, {:.2} at 0.7", dark - injected, bright - injected);
     assert!(dark > injected && bright < injected - 20.0, "{dark} {injected} {bright}");
 }

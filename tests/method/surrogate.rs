@@ -62,7 +62,7 @@ impl LogDensity for Tilted<'_> {
             if inside { self.surrogate.log_density(&self.space.to_sampling(theta)) } else { f64::NEG_INFINITY };
         let log_prob = log_density - self.space.log_jacobian(theta) + (self.tilt)(theta);
         let status = if log_prob.is_finite() { Status::Converged } else { Status::OutsidePrior };
-        Evaluation { log_prob, spottedness: 0.1, chi2: 1.0, passes: 1, status }
+        Evaluation { status, ..Evaluation::of(log_prob) }
     }
     fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         self.space.to_sampling(theta)
@@ -91,8 +91,7 @@ fn chain_with(surrogate: &Surrogate, density: &Tilted, steps: usize, weight: f64
     if weight > 0.0 {
         sampler = sampler.with_move(weight, Box::new(SurrogateMove(surrogate.clone())));
     }
-    let shape = Shape { names: density.names().to_vec(), ensembles: 4, walkers: 16 };
-    let mut chain = Chain::new(shape);
+    let mut chain = Chain::new(Shape::of(density, 4, 16));
     let (mut state, first) = sampler.start(&start).unwrap();
     chain.push_step(&first).unwrap();
     for _ in 0..steps {

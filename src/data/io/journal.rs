@@ -10,19 +10,18 @@ use std::path::Path;
 
 pub use super::lines::JournalError;
 
-/// Keys of a line that are not parameters.
-const KEYS: [&str; 11] = [
+/// Keys of every line, whatever is sampled; the last is what `model_applications` was called before.
+const KEYS: [&str; 10] = [
     "ensemble",
     "step",
     "walker",
     "accepted",
     "log_prob",
-    "spottedness",
-    "chi2",
     "status",
     "proposed",
-    "passes",
+    "model_applications",
     "move",
+    "passes",
 ];
 
 /// A journal open for appending, locked against other processes until it is dropped.
@@ -70,7 +69,7 @@ impl Journal {
         for (index, record) in step.iter().enumerate() {
             self.shape.check(self.lines + index, record).map_err(refuse)?;
         }
-        self.file.append(step.iter().map(|record| Line { names: &self.shape.names, record }))?;
+        self.file.append(step.iter().map(|record| Line { shape: &self.shape, record }))?;
         self.lines += step.len();
         Ok(())
     }
@@ -101,7 +100,7 @@ impl StepReader {
     /// Takes the next line; whether a step is whole with it.
     fn take(&mut self, line: &[u8]) -> Result<bool, Refusal> {
         let shape = self.chain.shape();
-        let record = parse_line(line, &shape.names)?;
+        let record = parse_line(line, shape)?;
         let index = self.chain.records().len() + self.step.len();
         shape.check(index, &record).map_err(|error| error.to_string())?;
         self.step.push(record);
@@ -114,24 +113,30 @@ impl StepReader {
     }
 }
 
-fn parse_line(text: &[u8], names: &[String]) -> Result<Record, serde_json::Error> {
+fn parse_line(text: &[u8], shape: &Shape) -> Result<Record, serde_json::Error> {
     let mut deserializer = serde_json::Deserializer::from_slice(text);
-    let record = LineSeed { names }.deserialize(&mut deserializer)?;
+    let record = LineSeed { shape }.deserialize(&mut deserializer)?;
     deserializer.end()?;
     Ok(record)
 }
 
 fn check_names(shape: &Shape) -> Result<(), JournalError> {
-    let taken = |(i, name): &(usize, &String)| KEYS.contains(&name.as_str()) || shape.names[..*i].contains(name);
-    match shape.names.iter().enumerate().find(taken) {
+    let taken =
+        |(i, name): &(usize, &String)| KEYS.contains(&name.as_str()) || named(shape).take(*i).any(|n| n == *name);
+    match named(shape).enumerate().find(taken) {
         Some((_, name)) => Err(JournalError::Name { name: name.clone() }),
         None => Ok(()),
     }
 }
 
+/// Names of the parameters, then those of the numbers beside the log-probability.
+fn named(shape: &Shape) -> impl Iterator<Item = &String> {
+    shape.names.iter().chain(&shape.numbers)
+}
+
 /// A record on its way to text.
 struct Line<'a> {
-    names: &'a [String],
+    shape: &'a Shape,
     record: &'a Record,
 }
 
@@ -144,14 +149,12 @@ impl Serialize for Line<'_> {
         map.serialize_entry("walker", &record.walker)?;
         map.serialize_entry("accepted", &record.accepted)?;
         map.serialize_entry("log_prob", &record.log_prob)?;
-        for (name, value) in self.names.iter().zip(&record.theta) {
+        for (name, value) in named(self.shape).zip(record.theta.iter().chain(&record.numbers)) {
             map.serialize_entry(name, value)?;
         }
-        map.serialize_entry("spottedness", &record.spottedness)?;
-        map.serialize_entry("chi2", &record.chi2)?;
         map.serialize_entry("status", &record.status)?;
         map.serialize_entry("proposed", &record.proposed)?;
-        map.serialize_entry("passes", &record.passes)?;
+        map.serialize_entry("model_applications", &record.model_applications)?;
         if let Some(by) = record.by {
             map.serialize_entry("move", &by)?;
         }
@@ -159,10 +162,10 @@ impl Serialize for Line<'_> {
     }
 }
 
-/// Reads a line whose parameters have these names: each key once, none missing, none unknown.
+/// Reads a line with the names of a shape: each key once, none missing, none unknown.
 #[derive(Clone, Copy)]
 struct LineSeed<'a> {
-    names: &'a [String],
+    shape: &'a Shape,
 }
 
 impl<'de> DeserializeSeed<'de> for LineSeed<'_> {
@@ -177,11 +180,12 @@ impl<'de> DeserializeSeed<'de> for LineSeed<'_> {
 struct Slots {
     counts: [Option<usize>; 3],
     accepted: Option<bool>,
-    numbers: [Option<f64>; 3],
+    log_prob: Option<f64>,
     status: [Option<Status>; 2],
-    passes: Option<u32>,
+    model_applications: Option<u32>,
     by: Option<MoveKind>,
-    theta: Vec<Option<f64>>,
+    /// In the order of [`named`].
+    values: Vec<Option<f64>>,
 }
 
 impl<'de> Visitor<'de> for LineSeed<'_> {
@@ -192,22 +196,20 @@ impl<'de> Visitor<'de> for LineSeed<'_> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Record, A::Error> {
-        let mut slots = Slots { theta: vec![None; self.names.len()], ..Slots::default() };
+        let mut slots = Slots { values: vec![None; named(self.shape).count()], ..Slots::default() };
         while let Some(key) = map.next_key::<String>()? {
             match key.as_str() {
                 "ensemble" => fill(&mut slots.counts[0], &key, &mut map)?,
                 "step" => fill(&mut slots.counts[1], &key, &mut map)?,
                 "walker" => fill(&mut slots.counts[2], &key, &mut map)?,
                 "accepted" => fill(&mut slots.accepted, &key, &mut map)?,
-                "log_prob" => fill(&mut slots.numbers[0], &key, &mut map)?,
-                "spottedness" => fill(&mut slots.numbers[1], &key, &mut map)?,
-                "chi2" => fill(&mut slots.numbers[2], &key, &mut map)?,
+                "log_prob" => fill(&mut slots.log_prob, &key, &mut map)?,
                 "status" => fill(&mut slots.status[0], &key, &mut map)?,
                 "proposed" => fill(&mut slots.status[1], &key, &mut map)?,
-                "passes" => fill(&mut slots.passes, &key, &mut map)?,
+                "model_applications" | "passes" => fill(&mut slots.model_applications, &key, &mut map)?,
                 "move" => fill(&mut slots.by, &key, &mut map)?,
-                name => match self.names.iter().position(|known| known == name) {
-                    Some(index) => fill(&mut slots.theta[index], &key, &mut map)?,
+                name => match named(self.shape).position(|known| known == name) {
+                    Some(index) => fill(&mut slots.values[index], &key, &mut map)?,
                     None => {
                         map.next_value::<IgnoredAny>()?;
                         return Err(A::Error::custom(format!("unknown key `{key}`")));
@@ -215,27 +217,29 @@ impl<'de> Visitor<'de> for LineSeed<'_> {
                 },
             }
         }
-        slots.record(self.names).map_err(|name| A::Error::custom(format!("missing key `{name}`")))
+        slots.record(self.shape).map_err(|name| A::Error::custom(format!("missing key `{name}`")))
     }
 }
 
 impl Slots {
     /// The record, or the key that is missing.
-    fn record(self, names: &[String]) -> Result<Record, &str> {
-        let theta: Result<Vec<f64>, &str> =
-            self.theta.iter().zip(names).map(|(value, name)| value.ok_or(name.as_str())).collect();
+    fn record(self, shape: &Shape) -> Result<Record, &str> {
+        let (ensemble, step) = (self.counts[0].ok_or("ensemble")?, self.counts[1].ok_or("step")?);
+        let (walker, accepted) = (self.counts[2].ok_or("walker")?, self.accepted.ok_or("accepted")?);
+        let log_prob = self.log_prob.ok_or("log_prob")?;
+        let values = self.values.iter().zip(named(shape)).map(|(value, name)| value.ok_or(name.as_str()));
+        let mut theta = values.collect::<Result<Vec<f64>, &str>>()?;
         Ok(Record {
-            ensemble: self.counts[0].ok_or("ensemble")?,
-            step: self.counts[1].ok_or("step")?,
-            walker: self.counts[2].ok_or("walker")?,
-            accepted: self.accepted.ok_or("accepted")?,
-            log_prob: self.numbers[0].ok_or("log_prob")?,
-            theta: theta?,
-            spottedness: self.numbers[1].ok_or("spottedness")?,
-            chi2: self.numbers[2].ok_or("chi2")?,
+            ensemble,
+            step,
+            walker,
+            accepted,
+            log_prob,
+            numbers: theta.split_off(shape.names.len()),
+            theta,
             status: self.status[0].ok_or("status")?,
             proposed: self.status[1].ok_or("proposed")?,
-            passes: self.passes.ok_or("passes")?,
+            model_applications: self.model_applications.ok_or("model_applications")?,
             by: self.by,
         })
     }

@@ -1,11 +1,11 @@
 //! A landscape as text: `landscape.jsonl`, one line per node, in the order of the grid.
 //!
 //! `{"index":0,"k_kms":0.0,...,"log_likelihood":-38.2,"spottedness":0.06,"entropy":-0.2,"chi2":2764.5,"lambda":0.001,
-//! "passes":24,"status":"converged"}`.
+//! "model_applications":24,"status":"converged"}`.
 
 use super::lines::{self, JournalError, LineFile, Refusal};
 use crate::sampling::landscape::{Grid, Landscape, Node};
-use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
+use crate::sampling::log_density::{Evaluation, Status};
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,9 +13,10 @@ use std::path::Path;
 /// Opens a landscape to go on with it: the nodes so far, and the file cut after them.
 ///
 /// # Errors
-/// [`JournalError`]: a file that cannot be opened, is being written, or does not hold the first nodes of `grid`.
-pub fn recover(path: &Path, grid: Grid) -> Result<(LineFile, Landscape), JournalError> {
-    let mut landscape = Landscape::new(grid);
+/// [`JournalError`]: a file that cannot be opened, is being written, or does not hold the first nodes of `grid` with
+/// these `numbers`.
+pub fn recover(path: &Path, grid: Grid, numbers: &[String]) -> Result<(LineFile, Landscape), JournalError> {
+    let mut landscape = Landscape::new(grid, numbers.to_vec());
     let file = LineFile::recover(path, &mut |line| take(&mut landscape, line))?;
     Ok((file, landscape))
 }
@@ -24,83 +25,83 @@ pub fn recover(path: &Path, grid: Grid) -> Result<(LineFile, Landscape), Journal
 ///
 /// # Errors
 /// As [`recover`].
-pub fn read(path: &Path, grid: Grid) -> Result<Landscape, JournalError> {
-    let mut landscape = Landscape::new(grid);
+pub fn read(path: &Path, grid: Grid, numbers: &[String]) -> Result<Landscape, JournalError> {
+    let mut landscape = Landscape::new(grid, numbers.to_vec());
     lines::read(path, &mut |line| take(&mut landscape, line))?;
     Ok(landscape)
 }
 
-/// Appends `nodes` of `grid` and hands them to the operating system.
+/// Appends the next `nodes` of a `landscape` and hands them to the operating system.
 ///
 /// # Errors
 /// [`JournalError::Io`].
-pub fn append(file: &mut LineFile, grid: &Grid, nodes: &[Node]) -> Result<(), JournalError> {
+pub fn append(file: &mut LineFile, landscape: &Landscape, nodes: &[Node]) -> Result<(), JournalError> {
     file.append(nodes.iter().map(|node| {
-        let Node { index, ref theta, reconstruction: Reconstruction { likelihood, passes, status } } = *node;
+        let Node { index, theta, evaluation: Evaluation { log_prob, numbers, model_applications, status } } = node;
+        let names = landscape.numbers().iter().enumerate();
         Line {
-            index,
-            coordinates: Coordinates { grid, theta },
-            log_likelihood: likelihood.map(|values| values.log_likelihood),
-            spottedness: likelihood.map(|values| values.spottedness),
-            entropy: likelihood.map(|values| values.entropy),
-            chi2: likelihood.map(|values| values.chi2),
-            lambda: likelihood.map(|values| values.lambda),
-            passes,
-            status,
+            index: *index,
+            coordinates: Named(landscape.grid().names().zip(theta.iter().copied().map(Some)).collect()),
+            log_likelihood: Some(*log_prob).filter(|ln_l| ln_l.is_finite()),
+            numbers: Named(names.map(|(i, name)| (name.as_str(), numbers.get(i).copied())).collect()),
+            model_applications: *model_applications,
+            status: *status,
         }
     }))
 }
 
-/// A node as text. The five values are null where the reconstruction failed.
-#[derive(Serialize, Deserialize)]
-struct Line<C> {
+/// A node as text. ln L and the numbers beside it are null where the evaluation failed.
+#[derive(Serialize)]
+struct Line<'a> {
     index: usize,
     #[serde(flatten)]
-    coordinates: C,
+    coordinates: Named<'a>,
     log_likelihood: Option<f64>,
-    spottedness: Option<f64>,
-    entropy: Option<f64>,
-    chi2: Option<f64>,
-    lambda: Option<f64>,
-    passes: u32,
+    #[serde(flatten)]
+    numbers: Named<'a>,
+    model_applications: u32,
     status: Status,
 }
 
-/// Names and values, in the order of the axes.
-struct Coordinates<'a> {
-    grid: &'a Grid,
-    theta: &'a [f64],
+/// Names and values, in order.
+struct Named<'a>(Vec<(&'a str, Option<f64>)>);
+
+impl Serialize for Named<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().copied())
+    }
 }
 
-impl Serialize for Coordinates<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.grid.names().zip(self.theta))
-    }
+/// The same, coordinates and numbers not told apart yet.
+#[derive(Deserialize)]
+struct ReadLine {
+    index: usize,
+    log_likelihood: Option<f64>,
+    #[serde(alias = "passes")]
+    model_applications: u32,
+    status: Status,
+    #[serde(flatten)]
+    named: BTreeMap<String, Option<f64>>,
 }
 
 fn take(landscape: &mut Landscape, text: &[u8]) -> Result<bool, Refusal> {
-    let line: Line<BTreeMap<String, f64>> = serde_json::from_slice(text)?;
-    let likelihood = line.likelihood();
-    let Line { index, mut coordinates, passes, status, .. } = line;
-    let mut coordinate = |name: &str| coordinates.remove(name).ok_or_else(|| format!("missing key `{name}`"));
+    let ReadLine { index, log_likelihood, model_applications, status, mut named } = serde_json::from_slice(text)?;
+    let missing = |name: &str| format!("missing key `{name}`");
+    let mut coordinate = |name: &str| named.remove(name).flatten().ok_or_else(|| missing(name));
     let theta = landscape.grid().names().map(&mut coordinate).collect::<Result<Vec<f64>, String>>()?;
-    if let Some(name) = coordinates.keys().next() {
+    let numbers: Vec<Option<Option<f64>>> = landscape.numbers().iter().map(|name| named.remove(name)).collect();
+    if let Some(name) = named.keys().next() {
         return Err(format!("unknown key `{name}`").into());
     }
-    let reconstruction = Reconstruction { likelihood, passes, status };
-    landscape.push(Node { index, theta, reconstruction }).map_err(|error| error.to_string())?;
-    Ok(true)
-}
-
-impl<C> Line<C> {
-    /// The values, if all five are there.
-    fn likelihood(&self) -> Option<Likelihood> {
-        Some(Likelihood {
-            log_likelihood: self.log_likelihood?,
-            spottedness: self.spottedness?,
-            entropy: self.entropy?,
-            chi2: self.chi2?,
-            lambda: self.lambda?,
-        })
+    if let Some((name, _)) = landscape.numbers().iter().zip(&numbers).find(|(_, number)| number.is_none()) {
+        return Err(missing(name).into());
     }
+    let evaluation = Evaluation {
+        log_prob: log_likelihood.unwrap_or(f64::NEG_INFINITY),
+        numbers: numbers.into_iter().flatten().flatten().collect(),
+        model_applications,
+        status,
+    };
+    landscape.push(Node { index, theta, evaluation }).map_err(|error| error.to_string())?;
+    Ok(true)
 }

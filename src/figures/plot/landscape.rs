@@ -60,14 +60,12 @@ pub(super) fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, 
 impl Scene {
     fn read(folder: &Path, run: Option<&Path>) -> Result<Self, PlotError> {
         let header = Header::read(folder)?;
-        let landscape: Landscape = landscape::read(&folder.join(NODES), header.grid.clone())?;
+        let landscape: Landscape = landscape::read(&folder.join(NODES), header.grid.clone(), &header.numbers)?;
         let wrong = |file: &str, problem: &str| PlotError::Content { path: folder.join(file), problem: problem.into() };
-        let (top, best) = landscape.best().ok_or_else(|| wrong(NODES, "no node has a value"))?;
+        let top = landscape.best().ok_or_else(|| wrong(NODES, "no node has a value"))?;
         let mut delta = vec![f64::NAN; header.grid.len()];
-        for node in landscape.nodes() {
-            if let Some(likelihood) = node.reconstruction.likelihood {
-                delta[node.index] = 2.0 * (best.log_likelihood - likelihood.log_likelihood);
-            }
+        for node in landscape.valued() {
+            delta[node.index] = 2.0 * (top.evaluation.log_prob - node.evaluation.log_prob);
         }
         let lowest = header.grid.position(top.index);
         let nodes: Vec<Vec<f64>> = header.grid.axes.iter().map(nodes).collect();

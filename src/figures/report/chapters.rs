@@ -393,7 +393,7 @@ mod tests {
         let chapter = |status: &str| {
             map(&file(&[
                 &json!({ "status": status, "chi2": 9.0, "chi2_per_datum": 0.97, "chi2_target": 9.0, "lambda": 1.0 }),
-                &json!({ "alpha": 1.0, "entropy": -1.0, "spottedness": 0.1, "test": 0.0, "passes": 9 }),
+                &json!({ "alpha": 1.0, "entropy": -1.0, "spottedness": 0.1, "test": 0.0, "model_applications": 9 }),
                 &json!({ "newton_steps": 3, "profiles": 2, "data": 9, "pixels": 100, "equivalent_width_kms": 5.0 }),
                 &json!({ "contrast": 0.3, "parameters": { "k_kms": 0.1 }, "truth": null, "trade_off": [] }),
                 &json!({ "observed_rv_rms_kms": 0.1, "filtered_rv_rms_kms": 0.1, "photon_rv_error_kms": 0.1 }),

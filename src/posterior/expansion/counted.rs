@@ -63,7 +63,7 @@ impl SpotsCounted {
         let factor = |place: i32| UNRESOLVED_SPOTS.0 * 10f64.powf(f64::from(place) / SIZES_PER_DECADE);
         let sizes = (0..=places).filter_map(|place| Size::new(&entropy, factor(place))).collect();
         let theta = posterior.space().theta_of(&reference.values);
-        let at_reference = posterior.likelihood(&theta).likelihood?.log_likelihood;
+        let at_reference = Some(posterior.likelihood(&theta).log_prob).filter(|ln_l| ln_l.is_finite())?;
         let counted = SpotsCounted::of(at_reference, entropy, cautious, sizes);
         counted.density_at_reference.is_finite().then_some(counted)
     }
@@ -120,7 +120,8 @@ impl SpotsCounted {
         let log_prior = space.log_prior(theta);
         let log_likelihood = self.log_likelihood(&space.values_at(theta), evaluation.log_prob - log_prior);
         if log_likelihood.is_nan() {
-            return Evaluation { passes: evaluation.passes, ..Evaluation::rejected(Status::NonFinite) };
+            let Evaluation { model_applications, .. } = evaluation;
+            return Evaluation { model_applications, ..Evaluation::rejected(Status::NonFinite) };
         }
         Evaluation { log_prob: log_prior + log_likelihood, ..evaluation }
     }

@@ -4,31 +4,36 @@
 //! In the posterior it is joined by the prior; alone it is what a landscape shows.
 
 use super::kind::ObjectiveKind;
-use super::posterior::Posterior;
+use super::posterior::{CHI2, Posterior, SPOTTEDNESS};
 use super::tradeoff::Measure;
 use crate::maxent::{Goal, Problem, Solution, Termination};
-use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
+use crate::sampling::log_density::{Evaluation, Status};
 
 /// A chi2 this many times the target is far from any fit.
 const FAR: f64 = 1.05;
 
+/// Names of the numbers beside ln L.
+pub const NUMBERS: [&str; 4] = [SPOTTEDNESS, "entropy", CHI2, "lambda"];
+
 impl Posterior {
-    /// The likelihood at `theta` (physical coordinates). The log-probability there is its logarithm plus that of the
-    /// prior.
-    pub fn likelihood(&self, theta: &[f64]) -> Reconstruction {
+    /// ln L at `theta` (physical coordinates), with [`NUMBERS`] beside it. The log-probability there is that plus the
+    /// logarithm of the prior.
+    pub fn likelihood(&self, theta: &[f64]) -> Evaluation {
         if !self.is_physical(theta) {
-            return Reconstruction { likelihood: None, passes: 0, status: Status::NonFinite };
+            return Evaluation::rejected(Status::NonFinite);
         }
         let (solution, problem) = self.reconstruct(theta);
-        let passes = problem.passes();
-        match self.judge(&solution) {
+        let numbers = [self.spottedness(&solution), solution.entropy, solution.chi2, solution.image.lambda];
+        self.judged(&solution, numbers.to_vec(), problem.model_applications())
+    }
+
+    /// ln L of a reconstruction of so many model applications, with `numbers` beside it.
+    pub(super) fn judged(&self, solution: &Solution, numbers: Vec<f64>, model_applications: u32) -> Evaluation {
+        match self.judge(solution) {
             Ok((log_likelihood, status)) => {
-                let (spottedness, entropy) = (self.spottedness(&solution), solution.entropy);
-                let (chi2, lambda) = (solution.chi2, solution.image.lambda);
-                let likelihood = Likelihood { log_likelihood, spottedness, entropy, chi2, lambda };
-                Reconstruction { likelihood: Some(likelihood), passes, status }
+                Evaluation { log_prob: log_likelihood, numbers, model_applications, status }
             }
-            Err(status) => Reconstruction { likelihood: None, passes, status },
+            Err(status) => Evaluation { model_applications, ..Evaluation::rejected(status) },
         }
     }
 
@@ -69,7 +74,7 @@ impl Posterior {
     }
 
     /// ln L of a reconstruction and how it ended, or the status of its failure.
-    pub(super) fn judge(&self, solution: &Solution) -> Result<(f64, Status), Status> {
+    fn judge(&self, solution: &Solution) -> Result<(f64, Status), Status> {
         let status = match solution.termination {
             Termination::Converged => Status::Converged,
             Termination::Unreachable => Status::Unreachable,

@@ -16,8 +16,9 @@ mod warm_start;
 
 pub use coordinates::{FreeParameter, ParameterSpace};
 pub use kind::{ObjectiveKind, UnresolvedSpots};
+pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
 pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 pub use parameters::{Parameter, ParameterValues};
-pub use posterior::Posterior;
+pub use posterior::{CHI2, Posterior, SPOTTEDNESS};
 pub use prior::Prior;
 pub use reference::{Reference, ReferenceError};

@@ -30,6 +30,13 @@ pub struct Posterior {
     nearby: Option<Arc<Nearby>>,
 }
 
+/// Name of the spottedness of the image, such as its fractional spot coverage. Where the target chi2 is reached, it is
+/// what a first-order forecast says that it is at the target, of which the log-probability is made.
+pub const SPOTTEDNESS: &str = "spottedness";
+
+/// Name of the chi2 of the image: near the target, where that is reached, as far as the forecast is good enough.
+pub const CHI2: &str = "chi2";
+
 /// Fastest velocity of any latitude (km/s, projected) that is tried; beyond it a parameter vector is absurd.
 const LARGEST_VSINI_KMS: f64 = 2000.0;
 
@@ -136,9 +143,9 @@ impl Posterior {
         WarmStart { place: place(imager, space, &theta), theta, start, preconditioner, prediction }
     }
 
-    /// A warm start's prediction to second order. For orbits around the reference it is worth its passes (those of an
-    /// evaluation become a quarter fewer). Rotation, inclination and vsini change maps too much within their errors: in
-    /// 7-D it saves none; nor does it at a fixed lambda, where the first order leaves little.
+    /// A warm start's prediction to second order. For orbits around the reference it is worth its model applications
+    /// (those of an evaluation become a quarter fewer). Rotation, inclination and vsini change maps too much within
+    /// their errors: in 7-D it saves none; nor does it at a fixed lambda, where the first order leaves little.
     fn second_order(&self, warm_start: &WarmStart) -> Prediction {
         let settings = SolverSettings { tolerance: BEND_TOLERANCE, leniency: 0.0, ..SolverSettings::patient() };
         let solve = |x: &[f64]| {
@@ -246,15 +253,11 @@ impl Posterior {
         near.solve(problem, self.goal(), start)
     }
 
-    /// The evaluation that a reconstruction of so many passes makes with its prior.
-    fn evaluation(&self, solution: &Solution, passes: u32, log_prior: f64) -> Evaluation {
-        let (spottedness, chi2) = (self.spottedness(solution), solution.chi2);
-        match self.judge(solution) {
-            Ok((log_likelihood, status)) => {
-                Evaluation { log_prob: log_likelihood + log_prior, spottedness, chi2, passes, status }
-            }
-            Err(status) => Evaluation { passes, ..Evaluation::rejected(status) },
-        }
+    /// The evaluation that a reconstruction of so many model applications makes with its prior.
+    fn evaluation(&self, solution: &Solution, model_applications: u32, log_prior: f64) -> Evaluation {
+        let numbers = vec![self.spottedness(solution), solution.chi2];
+        let likelihood = self.judged(solution, numbers, model_applications);
+        Evaluation { log_prob: likelihood.log_prob + log_prior, ..likelihood }
     }
 
     /// Prior and physics, before anything is reconstructed: the prior's log-density, or why `theta` is refused.
@@ -316,12 +319,16 @@ impl LogDensity for Posterior {
         self.space.names()
     }
 
+    fn number_names(&self) -> &[&str] {
+        &[SPOTTEDNESS, CHI2]
+    }
+
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
         match self.admit(theta) {
             Err(refused) => refused,
             Ok(log_prior) => {
                 let (solution, problem) = self.reconstruct(theta);
-                self.evaluation(&solution, problem.passes(), log_prior)
+                self.evaluation(&solution, problem.model_applications(), log_prior)
             }
         }
     }
@@ -346,7 +353,7 @@ impl Gradient for Posterior {
             Err(refused) => return (refused, Vec::new()),
         };
         let (solution, mut problem) = self.reconstruct(theta);
-        let evaluation = self.evaluation(&solution, problem.passes(), log_prior);
+        let evaluation = self.evaluation(&solution, problem.model_applications(), log_prior);
         if evaluation.log_prob == f64::NEG_INFINITY {
             return (evaluation, Vec::new());
         }

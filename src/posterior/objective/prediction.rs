@@ -49,8 +49,8 @@ const REACH: f64 = 3.0;
 /// Solutions for the second order are so many natural scales away.
 const BEND_STEP: f64 = 0.4;
 
-/// The second order is followed no farther than this many natural scales: beyond, it takes passes instead of saving
-/// them.
+/// The second order is followed no farther than this many natural scales: beyond, it takes model applications instead
+/// of saving them.
 const BEND_REACH: f64 = 1.5;
 
 /// Largest change of a coordinate of the image by either order.

@@ -22,8 +22,8 @@ const SMALLEST_CURVATURE: f64 = 0.2;
 /// Step in ln(lambda) between nodes of the trade-off curve.
 const CURVE_STEP: f64 = 0.25;
 
-/// Residual of the Newton systems on the way to a node: more steps, and fewer passes. Slopes are of one system solved
-/// well.
+/// Residual of the Newton systems on the way to a node: more steps, and fewer model applications. Slopes are of one
+/// system solved well.
 const CURVE_CG_TOLERANCE: f64 = 0.05;
 
 /// Reach of the trade-off curve in ln(lambda), to larger and to smaller lambda.
@@ -39,8 +39,8 @@ const FIRST_CHI2: f64 = 1.5;
 /// chi2 per datum, all of them independent, that a map fits to: the paper's.
 const USUAL_CHI2: f64 = 0.97;
 
-/// Error allowed to the image of a provisional reference: a worse one costs every evaluation that starts from it
-/// passes.
+/// Error allowed to the image of a provisional reference: a worse one costs every evaluation that starts from it model
+/// applications.
 const PROVISIONAL_TOLERANCE: f64 = 1e-7;
 
 /// A target is given up at lambda = this over the number of data, some twenty times what the paper's setup takes.
@@ -74,7 +74,7 @@ pub struct Reference {
     /// Largest lambda of an evaluation: the end of the trade-off curve.
     pub largest_lambda: f64,
     /// Applications of the response or its transpose that all this took.
-    pub passes: u32,
+    pub model_applications: u32,
 }
 
 /// Why there is no reference.
@@ -154,7 +154,7 @@ impl Reference {
         reference.tradeoff = follow(&solver, &mut problem, &solution);
         reference.largest_lambda = reference.tradeoff.nodes().last().expect("the reference itself").lambda;
         reference.solution = solution;
-        reference.passes += problem.passes();
+        reference.model_applications += problem.model_applications();
         Ok(reference)
     }
 
@@ -181,7 +181,7 @@ impl Reference {
         // evaluations nearby take its path, which the last step has left as it was before
         Solver { settings: SolverSettings::exact(), ..solver }.find_path(&mut problem, &mut reference.solution);
         reference.tradeoff = TradeOff::new(vec![node(&reference.solution)], 0);
-        reference.passes += problem.passes();
+        reference.model_applications += problem.model_applications();
         Ok(reference)
     }
 
@@ -228,8 +228,17 @@ impl Reference {
         let solution = fine.solve(&mut problem, goal(chi2_target), start(&easy));
         let preconditioner = Arc::new(precondition(imager, &mut problem, &solution));
         let tradeoff = TradeOff::new(vec![node(&solution)], 0);
-        let passes = problem.passes();
-        Ok(Reference { values, response, largest_lambda, solution, preconditioner, tradeoff, chi2_target, passes })
+        let model_applications = problem.model_applications();
+        Ok(Reference {
+            values,
+            response,
+            largest_lambda,
+            solution,
+            preconditioner,
+            tradeoff,
+            chi2_target,
+            model_applications,
+        })
     }
 
     /// What every evaluation by `kind` solves for.

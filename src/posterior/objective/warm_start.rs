@@ -1,9 +1,9 @@
 //! Warm starts: images that evaluations nearby start from, each with its preconditioner and what a prediction needs.
 //!
 //! The reference is one. Far from it a Newton system is no longer close to the one that its preconditioner inverts, and
-//! an evaluation takes hundreds of passes instead of tens; another warm start there brings it down again, for the
-//! passes of about five such evaluations. What an evaluation ends at does not depend on where it started beyond the
-//! solver's tolerance.
+//! an evaluation takes hundreds of model applications instead of tens; another warm start there brings it down again,
+//! for the model applications of about five such evaluations. What an evaluation ends at does not depend on where it
+//! started beyond the solver's tolerance.
 
 use super::coordinates::ParameterSpace;
 use super::prediction::Prediction;
@@ -72,7 +72,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 
 /// Model applications per evaluation that starts so far from where it ends: about what the paper's setup takes in the
 /// mean.
-fn passes(distance: f64) -> f64 {
+fn applications(distance: f64) -> f64 {
     (15.0 + 6.0 * distance.powf(3.5)).min(500.0)
 }
 
@@ -93,14 +93,14 @@ pub fn sampled(thetas: &[Vec<f64>]) -> Vec<&Vec<f64>> {
     chosen.into_iter().map(|i| &thetas[i]).collect()
 }
 
-/// At which of `places` warm starts save more passes than they take, if so many `evaluations` are spread like the
-/// places and there is the `reference` already: the one that saves most, then the next. The places are in no particular
-/// order.
+/// At which of `places` warm starts save more model applications than they take, if so many `evaluations` are spread
+/// like the places and there is the `reference` already: the one that saves most, then the next. The places are in no
+/// particular order.
 pub fn worthwhile(reference: &WarmStart, places: &[Vec<f64>], evaluations: usize) -> Vec<usize> {
     let each = evaluations as f64 / places.len() as f64;
-    let mut now: Vec<f64> = places.iter().map(|place| passes(distance(&reference.place, place))).collect();
+    let mut now: Vec<f64> = places.iter().map(|place| applications(distance(&reference.place, place))).collect();
     // what evaluations at all places would take from each candidate
-    let from = |candidate: &Vec<f64>| places.iter().map(|place| passes(distance(candidate, place))).collect();
+    let from = |candidate: &Vec<f64>| places.iter().map(|place| applications(distance(candidate, place))).collect();
     let candidates: Vec<Vec<f64>> = places.iter().take(CONSIDERED).map(from).collect();
     let mut chosen = Vec::new();
     while chosen.len() < MEMORY / reference.bytes() {

@@ -1,4 +1,4 @@
-//! What chain and landscape took: reconstructions, and passes, which hardly depend on the machine.
+//! What chain and landscape took: reconstructions, and model applications, which hardly depend on the machine.
 
 use super::{Compared, Pair};
 use crate::sampling::chain::Summary;
@@ -26,10 +26,12 @@ pub struct ChainCost {
     pub reconstructions: usize,
     /// How many of them failed.
     pub failed: usize,
-    /// Median number of applications of the response that one took.
-    pub passes_median: f64,
-    /// Applications of all together.
-    pub passes: u64,
+    /// Median number of model applications that one took.
+    #[serde(alias = "passes_median")]
+    pub model_applications_median: f64,
+    /// Those of all together.
+    #[serde(alias = "passes")]
+    pub model_applications: u64,
     /// Seconds, the search before it included; null where they are not recorded.
     pub seconds: Option<f64>,
     /// Effective draws of the parameter that has fewest; null where unknown.
@@ -45,10 +47,12 @@ pub struct LandscapeCost {
     pub unreachable: usize,
     /// How many failed.
     pub failed: usize,
-    /// Median number of applications of the response that one took.
-    pub passes_median: u32,
-    /// Applications of all together.
-    pub passes: u64,
+    /// Median number of model applications that one took.
+    #[serde(alias = "passes_median")]
+    pub model_applications_median: u32,
+    /// Those of all together.
+    #[serde(alias = "passes")]
+    pub model_applications: u64,
     /// Seconds, the search before it included; null where they are not recorded.
     pub seconds: Option<f64>,
     /// Nodes that the paraboloid was fitted to; null without one.
@@ -65,8 +69,8 @@ impl Cost {
             chain: ChainCost {
                 reconstructions: summary.evaluations,
                 failed: summary.failures,
-                passes_median: summary.passes_median,
-                passes: chain.records().iter().map(|record| u64::from(record.passes)).sum(),
+                model_applications_median: summary.model_applications_median,
+                model_applications: chain.records().iter().map(|record| u64::from(record.model_applications)).sum(),
                 seconds: chain_seconds,
                 effective_draws: ess.reduce(|a, b| Some(a?.min(b?))).flatten(),
             },
@@ -74,8 +78,12 @@ impl Cost {
                 reconstructions: landscape.nodes().len(),
                 unreachable: landscape.count(|status| status == Status::Unreachable),
                 failed: landscape.count(Status::is_failure),
-                passes_median: landscape.passes_median(),
-                passes: landscape.nodes().iter().map(|node| u64::from(node.reconstruction.passes)).sum(),
+                model_applications_median: landscape.model_applications_median(),
+                model_applications: landscape
+                    .nodes()
+                    .iter()
+                    .map(|node| u64::from(node.evaluation.model_applications))
+                    .sum(),
                 seconds: landscape_seconds,
                 paraboloid_nodes: paraboloid.map(|paraboloid| paraboloid.nodes),
             },

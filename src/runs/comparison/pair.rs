@@ -78,7 +78,7 @@ impl Pair {
         if let Some(what) = what_differs(&manifest, &settings, &header, &grid_settings) {
             return Err(PairError::Different { run: run.into(), grid: grid.into(), what });
         }
-        let landscape = landscape::read(&grid.join(NODES), header.grid.clone())?;
+        let landscape = landscape::read(&grid.join(NODES), header.grid.clone(), &header.numbers)?;
         if !landscape.is_whole() {
             let (found, total) = (landscape.nodes().len(), header.grid.len());
             return Err(PairError::Unfinished { folder: grid.into(), found, total });

@@ -68,12 +68,12 @@ fn cost(cost: &Cost) -> String {
          landscape: {} reconstructions{}, {} model applications each in the median, {} in all{used}\n",
         chain.reconstructions,
         seconds(chain.seconds),
-        chain.passes_median,
-        chain.passes,
+        chain.model_applications_median,
+        chain.model_applications,
         landscape.reconstructions,
         seconds(landscape.seconds),
-        landscape.passes_median,
-        landscape.passes,
+        landscape.model_applications_median,
+        landscape.model_applications,
     )
 }
 

@@ -5,9 +5,9 @@ use super::laboratory::{ExperimentError, Laboratory};
 use super::report::{Drawn, Report};
 use super::star::{paper, with};
 use crate::data::search::{self, SearchSettings};
-use crate::posterior::objective::Parameter;
+use crate::posterior::objective::{CHI2, Parameter, SPOTTEDNESS};
 use crate::runs::comparison::{Comparison, Pair};
-use crate::sampling::landscape::{Axis, Grid, Rule};
+use crate::sampling::landscape::{Axis, Grid, Node, Rule};
 use serde_json::{Value, json};
 
 /// Ends of the axes: K (km/s), Porb/Prot, phi.
@@ -38,12 +38,11 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
     let whole = Grid { axes: AXES.iter().map(|a| axis(a, along)).collect() };
     let (grid, survey) = case::landscape(&scene, found.clone(), whole, &folder.join("grid"), laboratory.pool)?;
     let mut report = Report::new(["k_kms", "porb_over_prot", "phi", "spottedness", "chi2", "ln_l"]);
-    for node in survey.landscape.nodes() {
-        let Some(likelihood) = node.reconstruction.likelihood else { continue };
-        report.row([&node.theta[..], &[likelihood.spottedness, likelihood.chi2, likelihood.log_likelihood]].concat());
+    for node in survey.landscape.valued() {
+        let numbers = [SPOTTEDNESS, CHI2].map(|name| survey.landscape.number(node, name).unwrap_or(f64::NAN));
+        report.row([&node.theta[..], &numbers, &[node.evaluation.log_prob]].concat());
     }
-    let highest =
-        |survey: &crate::runs::grid_scan::GridScan| survey.landscape.best().map(|(node, _)| node.theta.clone());
+    let highest = |survey: &crate::runs::grid_scan::GridScan| survey.landscape.best().map(|node| node.theta.clone());
     report.number("highest_node", json!(highest(&survey)));
     let mut slices = 0;
     for (k, &(fixed, ..)) in AXES.iter().enumerate() {
@@ -56,14 +55,14 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         let (route, survey) =
             case::landscape(&scene, found, grid, &folder.join(format!("slice_{fixed}")), laboratory.pool)?;
         slices += route.reconstructions;
-        let lowest = survey.landscape.nodes().iter().filter_map(|node| Some((node, node.reconstruction.likelihood?)));
-        let lowest = lowest.min_by(|a, b| a.1.spottedness.total_cmp(&b.1.spottedness));
+        let spottedness = |node: &Node| survey.landscape.number(node, SPOTTEDNESS).unwrap_or(f64::NAN);
+        let lowest = survey.landscape.valued().min_by(|a, b| spottedness(a).total_cmp(&spottedness(b)));
         report.number(
             &format!("slice_at_{fixed}"),
             json!({
                 "axes": survey.header.grid.names().collect::<Vec<_>>(),
                 "highest_node": highest(&survey),
-                "least_spots": lowest.map(|(node, _)| node.theta.clone()),
+                "least_spots": lowest.map(|node| node.theta.clone()),
                 "nodes": route.reconstructions,
                 "seconds": route.seconds,
                 "paraboloid": route.parameters,

@@ -129,6 +129,11 @@ impl Contents {
         self.parameters.iter().map(|one| one.name.as_str())
     }
 
+    /// Names of the numbers beside the log-probability.
+    pub fn numbers(&self) -> impl Iterator<Item = &str> {
+        self.chain.shape().numbers.iter().map(String::as_str)
+    }
+
     /// Priors by name, as JSON text.
     pub fn priors(&self) -> String {
         Value::from_iter(self.parameters.iter().map(|one| (one.name.clone(), one.prior.clone()))).to_string()

@@ -23,22 +23,22 @@ pub fn is_own(file: &Path) -> bool {
 /// # Errors
 /// A file that cannot be written.
 pub fn write(contents: &Contents, file: &Path) -> Result<(), WriteError> {
-    let after = ["log_prob", "spottedness", "chi2", "accepted", "status", "move", "proposed", "passes"];
+    let after = ["accepted", "status", "move", "proposed", "model_applications"];
     let derived = contents.derived.iter().map(DerivedQuantity::name);
-    let columns: Vec<&str> = FIRST.into_iter().chain(contents.names()).chain(after).chain(derived).collect();
+    let columns = FIRST.into_iter().chain(contents.names()).chain(["log_prob"]).chain(contents.numbers());
+    let columns: Vec<&str> = columns.chain(after).chain(derived).collect();
     let mut table = Table::new(&columns);
     for record in contents.chain.records() {
         let warmup = record.step < contents.summary.discarded_steps;
         let place =
             [record.ensemble.to_string(), record.step.to_string(), record.walker.to_string(), warmup.to_string()];
-        let values =
-            record.theta.iter().chain([&record.log_prob, &record.spottedness, &record.chi2]).map(f64::to_string);
+        let values = record.theta.iter().chain([&record.log_prob]).chain(&record.numbers).map(f64::to_string);
         let outcome = [
             record.accepted.to_string(),
             word(&record.status),
             record.by.map_or_else(String::new, |by| by.name().to_owned()),
             word(&record.proposed),
-            record.passes.to_string(),
+            record.model_applications.to_string(),
         ];
         let derived = contents.derived.iter().map(|one| one.settled.value(&record.theta).to_string());
         table.cells(place.into_iter().chain(values).chain(outcome).chain(derived));

@@ -24,9 +24,6 @@ const GROUP: &str = "mcmc";
 /// Version of emcee whose layout this is.
 const EMCEE: &str = "3.1.6";
 
-/// The first blobs; what follows from the parameters comes after them.
-const BLOBS: [&str; 2] = ["spottedness", "chi2"];
-
 /// Whether there is anything to write.
 ///
 /// # Errors
@@ -65,7 +62,7 @@ fn encode(contents: &Contents) -> hdf5_writer::Result<Vec<u8>> {
     }
     let log_prob: Vec<f64> = records.iter().map(|record| record.log_prob).collect();
     let derived = |record: &Record| contents.derived.iter().map(|one| one.settled.value(&record.theta)).collect();
-    let blobs_of = |record: &Record| [vec![record.spottedness, record.chi2], derived(record)].concat();
+    let blobs_of = |record: &Record| [record.numbers.clone(), derived(record)].concat();
     let blobs: Vec<f64> = records.iter().flat_map(blobs_of).collect();
     let dataset = |name: &str, shape: &[usize], values: &[f64]| {
         let shape: Vec<u64> = shape.iter().map(|&length| length as u64).collect();
@@ -83,8 +80,9 @@ fn encode(contents: &Contents) -> hdf5_writer::Result<Vec<u8>> {
     file.into_plan()?.encode(WriteOptions::default())
 }
 
+/// The numbers beside the log-probability, then what follows from the parameters.
 fn blob_names(contents: &Contents) -> Vec<&str> {
-    BLOBS.into_iter().chain(contents.derived.iter().map(DerivedQuantity::name)).collect()
+    contents.numbers().chain(contents.derived.iter().map(DerivedQuantity::name)).collect()
 }
 
 fn attributes(contents: &Contents) -> hdf5_writer::Result<Vec<AttributeBuilder>> {
@@ -106,7 +104,8 @@ fn attributes(contents: &Contents) -> hdf5_writer::Result<Vec<AttributeBuilder>>
     attributes.push(AttributeBuilder::vlen_strings("parameter_names", &names)?);
     attributes.push(AttributeBuilder::vlen_strings("parameter_units", &units)?);
     attributes.push(AttributeBuilder::vlen_strings("blob_names", &blob_names(contents))?);
-    let blob_units: Vec<&str> = BLOBS.iter().map(|_| "1").chain(contents.derived.iter().map(|one| one.unit)).collect();
+    let blob_units: Vec<&str> =
+        contents.numbers().map(|_| "1").chain(contents.derived.iter().map(|one| one.unit)).collect();
     attributes.push(AttributeBuilder::vlen_strings("blob_units", &blob_units)?);
     let texts = [
         ("version", EMCEE.to_owned()),

@@ -2,19 +2,17 @@
 //! `ROOT.paramnames`, `ROOT.ranges`.
 //!
 //! An ensemble is a file, so that GetDist's R-1 (variance of the files' means over mean of their variances) compares
-//! what is independent. Rows are weight (always 1), -ln P, the parameters, and as derived ones what follows from them,
-//! spottedness and chi2, in the order of `draws`; the warm-up is left out, `ignore_rows` is to stay 0. `.ranges` has
-//! the bounds of the priors, `N` where there is none; a periodic parameter is unwrapped around its mode and its range
-//! is one period around that.
+//! what is independent. Rows are weight (always 1), -ln P, the parameters, and as derived ones what follows from them
+//! and the numbers beside the log-probability, in the order of `draws`; the warm-up is left out, `ignore_rows` is to
+//! stay 0. `.ranges` has the bounds of the priors, `N` where there is none; a periodic parameter is unwrapped around
+//! its mode and its range is one period around that.
 
 use super::draws::Draws;
 use super::{Contents, ExportError, Quantity};
 use crate::data::io::atomic::{self, WriteError};
+use crate::posterior::objective::CHI2;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-
-/// The last derived quantities in `.paramnames`; no other program ends the file so.
-const DERIVED: &str = "spottedness*\t\\mathrm{spottedness}\nchi2*\t\\chi^2\n";
 
 /// Writes the files.
 ///
@@ -30,7 +28,7 @@ pub fn write(contents: &Contents, root: &Path) -> Result<(), WriteError> {
             let numbers = [1.0, -record.log_prob].into_iter().chain(parameters);
             let numbers = numbers.chain(contents.derived.iter().map(|one| one.settled.value(&record.theta)));
             let line: Vec<String> =
-                numbers.chain([record.spottedness, record.chi2]).map(|number| number.to_string()).collect();
+                numbers.chain(record.numbers.iter().copied()).map(|number| number.to_string()).collect();
             text += &line.join(" ");
             text.push('\n');
         }
@@ -47,17 +45,19 @@ pub fn files(root: &Path, ensembles: usize) -> Vec<PathBuf> {
 }
 
 /// Whether the file, one of [`files`], may be of an earlier export: `ROOT.paramnames` is one of ours, or the file has
-/// nothing but rows of a chain of so many parameters and quantities that follow from them (an export that was
-/// interrupted).
-pub fn is_own(root: &Path, file: &Path, parameters: usize) -> bool {
+/// nothing but rows of a chain of as many numbers (an export that was interrupted).
+pub fn is_own(contents: &Contents, root: &Path, file: &Path) -> bool {
     let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
-    if read(&ending(root, ".paramnames")).ends_with(DERIVED) {
+    // no other program ends the file so
+    let last = number_names(contents);
+    if !last.is_empty() && read(&ending(root, ".paramnames")).ends_with(&last) {
         return true;
     }
+    // weight and -ln P before the parameters, derived quantities after them
+    let columns = 2 + contents.parameters.len() + contents.derived.len() + contents.numbers().count();
     let is_row = |line: &str| {
         let numbers: Option<Vec<f64>> = line.split(' ').map(|cell| cell.parse().ok()).collect();
-        // weight and -ln P before the parameters, derived quantities after them
-        numbers.is_some_and(|numbers| numbers.len() == 2 + parameters + DERIVED.lines().count() && numbers[0] == 1.0)
+        numbers.is_some_and(|numbers| numbers.len() == columns && numbers[0] == 1.0)
     };
     let text = read(file);
     !text.is_empty() && text.lines().all(is_row)
@@ -116,7 +116,16 @@ fn paramnames(contents: &Contents) -> String {
     for one in &contents.derived {
         let _ = writeln!(text, "{}*\t{}{}", one.name(), one.latex, unit(one.unit));
     }
-    text + DERIVED
+    text + &number_names(contents)
+}
+
+/// Those of the numbers beside the log-probability, which come last.
+fn number_names(contents: &Contents) -> String {
+    let latex = |name: &str| match name {
+        CHI2 => r"\chi^2".to_owned(),
+        other => format!(r"\mathrm{{{}}}", other.replace('_', r"\_")),
+    };
+    contents.numbers().map(|name| format!("{name}*\t{}\n", latex(name))).collect()
 }
 
 /// Bounds, `N` for none.

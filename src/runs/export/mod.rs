@@ -118,7 +118,7 @@ fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Resu
     match format {
         Format::Zarr => place::check_folder(out, replace, &zarr::is_own),
         Format::Getdist => {
-            let is_own = |file: &Path| getdist::is_own(out, file, contents.parameters.len() + contents.derived.len());
+            let is_own = |file: &Path| getdist::is_own(contents, out, file);
             place::check_files(&targets(format, ensembles, out), replace, &is_own)?;
             getdist::check_strangers(out, ensembles)
         }

@@ -3,7 +3,7 @@
 //!
 //! Dimensions are `chain` and `draw`: an ensemble is a chain, draws are in the order of `draws`, which says why; `step`
 //! and `walker` are coordinates along `draw`, so that the ensemble can be had back. `sample_stats` has what belongs to
-//! a draw and is no parameter: `lp` (ln of the posterior density), spottedness, chi2, and how the draw came about,
+//! a draw and is no parameter: `lp` (ln of the posterior density), the numbers beside it, and how the draw came about,
 //! words as codes with CF's `flag_values` and `flag_meanings`. Attributes are numbers and text, JSON where there is
 //! more to say, so that xarray can also write them to netCDF. A periodic parameter is unwrapped around its mode. What
 //! follows from the parameters is in `posterior` too, with the attribute `derived`.
@@ -14,6 +14,7 @@ use super::draws::Draws;
 use super::{Contents, DerivedQuantity, Quantity};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::zarr::{self, Array, Attributes, Group, Values};
+use crate::posterior::objective::{CHI2, SPOTTEDNESS};
 use crate::sampling::chain::{MoveKind, Record};
 use crate::sampling::log_density::Status;
 use serde_json::{Value, json};
@@ -120,8 +121,8 @@ fn posterior(contents: &Contents, draws: &Draws) -> Group {
 
 fn sample_stats(contents: &Contents, draws: &Draws) -> Group {
     let records = || draws.records(&contents.chain);
-    let floats = |name: &str, about: &str, unit: &str, value: fn(&Record) -> f64| {
-        let attributes = some_attributes([("long_name", json!(about)), ("units", json!(unit))]);
+    let floats = |name: &str, about: &str, value: &dyn Fn(&Record) -> f64| {
+        let attributes = some_attributes([("long_name", json!(about)), ("units", json!("1"))]);
         variable(name, draws, Values::Floats(records().map(value).collect()), attributes)
     };
     let codes = |name: &str, about: &str, words: Vec<&str>, code: fn(&Record) -> usize| {
@@ -135,20 +136,29 @@ fn sample_stats(contents: &Contents, draws: &Draws) -> Group {
     };
     let about = |text: &str| some_attributes([("long_name", json!(text))]);
     let accepted = Values::Booleans(records().map(|record| record.accepted).collect());
-    let passes = Values::Integers(records().map(|record| i64::from(record.passes)).collect());
+    let applications = Values::Integers(records().map(|record| i64::from(record.model_applications)).collect());
     let status_words = || STATUS.iter().map(|(_, word)| *word).collect();
     let move_words = std::iter::once("start").chain(MoveKind::ALL.map(MoveKind::name)).collect();
-    let arrays = vec![
-        floats("lp", "ln of the posterior density", "1", |record| record.log_prob),
-        floats("spottedness", "spottedness of the image", "1", |record| record.spottedness),
-        floats("chi2", "chi2 of the reconstruction", "1", |record| record.chi2),
+    let mut arrays = vec![floats("lp", "ln of the posterior density", &|record| record.log_prob)];
+    let numbers = contents.numbers().enumerate();
+    arrays.extend(numbers.map(|(i, name)| floats(name, meaning(name), &|record| record.numbers[i])));
+    arrays.extend([
         codes("status", "how the evaluation of the draw ended", status_words(), |record| status(record.status)),
         variable("accepted", draws, accepted, about("whether the draw is new at its step")),
         codes("move", "how the step's proposal was made", move_words, |record| made_by(record.by)),
         codes("proposed", "how the evaluation of the proposal ended", status_words(), |record| status(record.proposed)),
-        variable("passes", draws, passes, about("applications of the response that the proposal took")),
-    ];
+        variable("model_applications", draws, applications, about("model applications that the proposal took")),
+    ]);
     group(contents, draws, arrays)
+}
+
+/// What a number beside the log-probability is.
+fn meaning(name: &str) -> &str {
+    match name {
+        SPOTTEDNESS => "spottedness of the image",
+        CHI2 => "chi2 of the reconstruction",
+        other => other,
+    }
 }
 
 /// The code of a status.

@@ -1,7 +1,7 @@
 //! Questions and answers as bytes: numbers, little-endian, bit for bit.
 
 use crate::runs::limits::Outcome;
-use crate::sampling::log_density::{Evaluation, Likelihood, Reconstruction, Status};
+use crate::sampling::log_density::{Evaluation, Status};
 use crate::star::Orbit;
 
 /// What is asked, as bytes.
@@ -61,54 +61,22 @@ impl Answer for Option<Outcome> {
     }
 }
 
-/// All of them; the place is the number on the way.
+/// All of them; the place is the number on the way, which is exact.
 const STATUS: [Status; 5] =
     [Status::Converged, Status::Unreachable, Status::OutsidePrior, Status::StoppedShort, Status::NonFinite];
 
-/// Passes and status as numbers, which are exact.
-fn ended(passes: u32, status: Status) -> [f64; 2] {
-    let place = STATUS.iter().position(|one| *one == status).expect("all of them are listed");
-    [f64::from(passes), place as f64]
-}
-
-fn end_of(passes: f64, place: f64) -> Option<(u32, Status)> {
-    Some((passes as u32, *STATUS.get(place as usize)?))
-}
-
 impl Answer for Evaluation {
     fn to_bytes(&self) -> Vec<u8> {
-        let [passes, status] = ended(self.passes, self.status);
-        numbers_to_bytes(&[self.log_prob, self.spottedness, self.chi2, passes, status])
+        let place = STATUS.iter().position(|one| *one == self.status).expect("all of them are listed");
+        let ended = [self.log_prob, f64::from(self.model_applications), place as f64];
+        numbers_to_bytes(&[&ended[..], &self.numbers].concat())
     }
 
     fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let [log_prob, spottedness, chi2, passes, status] = *numbers_from_bytes(bytes).first_chunk()?;
-        let (passes, status) = end_of(passes, status)?;
-        Some(Evaluation { log_prob, spottedness, chi2, passes, status })
-    }
-}
-
-impl Answer for Reconstruction {
-    fn to_bytes(&self) -> Vec<u8> {
-        let mut numbers = ended(self.passes, self.status).to_vec();
-        if let Some(Likelihood { log_likelihood, spottedness, entropy, chi2, lambda }) = self.likelihood {
-            numbers.extend([log_likelihood, spottedness, entropy, chi2, lambda]);
-        }
-        numbers_to_bytes(&numbers)
-    }
-
-    fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let numbers = numbers_from_bytes(bytes);
-        let ([passes, status], rest) = numbers.split_first_chunk()?;
-        let (passes, status) = end_of(*passes, *status)?;
-        let likelihood = rest.first_chunk().map(|&[log_likelihood, spottedness, entropy, chi2, lambda]| Likelihood {
-            log_likelihood,
-            spottedness,
-            entropy,
-            chi2,
-            lambda,
-        });
-        Some(Reconstruction { likelihood, passes, status })
+        let all = numbers_from_bytes(bytes);
+        let (&[log_prob, model_applications, place], numbers) = all.split_first_chunk()?;
+        let status = *STATUS.get(place as usize)?;
+        Some(Evaluation { log_prob, numbers: numbers.to_vec(), model_applications: model_applications as u32, status })
     }
 }
 
@@ -131,14 +99,10 @@ mod tests {
     fn answers_survive_exactly() {
         for status in STATUS {
             for log_prob in [-0.0, 5e-324, f64::NEG_INFINITY, -1.0 / 3.0] {
-                let one = Evaluation { log_prob, spottedness: 0.1, chi2: 1e300, passes: u32::MAX, status };
-                let back = Evaluation::from_bytes(&one.to_bytes()).unwrap();
-                assert_eq!((back.log_prob.to_bits(), &back), (log_prob.to_bits(), &one));
-                let values =
-                    Likelihood { log_likelihood: log_prob, spottedness: 0.1, entropy: -2.0, chi2: 3.0, lambda: 0.2 };
-                for likelihood in [None, Some(values)] {
-                    let one = Reconstruction { likelihood, passes: 7, status };
-                    assert_eq!(Reconstruction::from_bytes(&one.to_bytes()), Some(one));
+                for numbers in [Vec::new(), vec![0.1, 1e300]] {
+                    let one = Evaluation { log_prob, numbers, model_applications: u32::MAX, status };
+                    let back = Evaluation::from_bytes(&one.to_bytes()).unwrap();
+                    assert_eq!((back.log_prob.to_bits(), &back), (log_prob.to_bits(), &one));
                 }
             }
         }
@@ -147,7 +111,8 @@ mod tests {
         for outcome in [None, Some(found)] {
             assert_eq!(Option::<Outcome>::from_bytes(&outcome.to_bytes()), Some(outcome));
         }
-        assert_eq!(Evaluation::from_bytes(&numbers_to_bytes(&[1.0, 2.0, 3.0, 4.0])), None);
-        assert_eq!(Reconstruction::from_bytes(&numbers_to_bytes(&[1.0, 9.0])), None);
+        for broken in [&[1.0, 2.0][..], &[1.0, 2.0, 9.0]] {
+            assert_eq!(Evaluation::from_bytes(&numbers_to_bytes(broken)), None);
+        }
     }
 }

@@ -69,6 +69,10 @@ impl LogDensity for Target {
         self.posterior.names()
     }
 
+    fn number_names(&self) -> &[&str] {
+        self.posterior.number_names()
+    }
+
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
         let evaluation = self.posterior.evaluate(theta);
         match &self.counted {

@@ -21,6 +21,7 @@ use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record, S
 use crate::sampling::ensemble::{
     self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason,
 };
+use crate::sampling::log_density::LogDensity as _;
 use std::path::Path;
 
 /// Name of the chain in a run's folder.
@@ -135,7 +136,7 @@ impl Run {
         let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
         // what was not evaluated looks like a start that is none
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
-        let manifest = new_manifest(scene, origin, BlindSearch::of(scene), start);
+        let manifest = new_manifest(scene, origin, &target, BlindSearch::of(scene), start);
         let mut chain = Chain::new(manifest.shape());
         chain.push_step(&first)?;
         let run = Run::of(scene, manifest, (target, task), surrogate, (None, chain));
@@ -259,13 +260,20 @@ impl Run {
     }
 }
 
-fn new_manifest(scene: &Scene, origin: Origin, blind_search: Option<BlindSearch>, start: Positions) -> Manifest {
+fn new_manifest(
+    scene: &Scene,
+    origin: Origin,
+    target: &Target,
+    blind_search: Option<BlindSearch>,
+    start: Positions,
+) -> Manifest {
     let prior = |f: &crate::posterior::objective::FreeParameter| {
         (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
     };
     Manifest {
         origin,
         names: scene.space.names().to_vec(),
+        numbers: target.number_names().iter().map(|name| (*name).to_owned()).collect(),
         priors: scene.space.free().iter().map(prior).collect(),
         ensembles: scene.settings.sampler.ensembles,
         walkers: scene.settings.sampler.walkers,

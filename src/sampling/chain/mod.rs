@@ -39,10 +39,10 @@ pub enum ChainError {
         /// Step, ensemble and walker found.
         found: [usize; 3],
     },
-    /// A position has the wrong number of parameters.
-    #[error("expected {expected} parameters but found {found}")]
+    /// A record has the wrong number of parameters, or of numbers beside the log-probability.
+    #[error("expected {expected} values but found {found}")]
     Dimension {
-        /// Number of parameters of the chain.
+        /// As many as there are names.
         expected: usize,
         /// Number found.
         found: usize,

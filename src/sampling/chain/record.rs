@@ -3,7 +3,7 @@
 //! The sampler makes these, the journal writes them and the store keeps them; this file belongs to none of the three.
 
 use crate::sampling::chain::ChainError;
-use crate::sampling::log_density::Status;
+use crate::sampling::log_density::{LogDensity, Status};
 use serde::{Deserialize, Serialize};
 
 /// How a proposal was made.
@@ -47,25 +47,26 @@ pub struct Record {
     pub log_prob: f64,
     /// The position, in physical coordinates, in the order of the names.
     pub theta: Vec<f64>,
-    /// Spottedness of the reconstruction at the position.
-    pub spottedness: f64,
-    /// chi2 of the reconstruction at the position.
-    pub chi2: f64,
+    /// Numbers beside the log-probability, in the order of their names.
+    pub numbers: Vec<f64>,
     /// How the evaluation of the position ended.
     pub status: Status,
     /// How the evaluation of this step's proposal ended, accepted or not.
     pub proposed: Status,
-    /// Applications of the response that the evaluation of this step's proposal took.
-    pub passes: u32,
+    /// Applications of the model that the evaluation of this step's proposal took.
+    pub model_applications: u32,
     /// How this step's proposal was made; `None` at step 0.
     pub by: Option<MoveKind>,
 }
 
-/// What every step of a chain looks like: names of the parameters, number of ensembles, walkers of each.
+/// What every step of a chain looks like: names of the parameters and of the numbers beside the log-probability, number
+/// of ensembles, walkers of each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Names of the parameters, in the order of every vector.
     pub names: Vec<String>,
+    /// Names of the numbers beside the log-probability.
+    pub numbers: Vec<String>,
     /// Number of independent ensembles.
     pub ensembles: usize,
     /// Walkers of an ensemble.
@@ -73,9 +74,21 @@ pub struct Shape {
 }
 
 impl Shape {
+    /// Of a chain of `density`.
+    pub fn of(density: &dyn LogDensity, ensembles: usize, walkers: usize) -> Self {
+        let numbers = density.number_names().iter().map(|name| (*name).to_owned()).collect();
+        Shape { names: density.names().to_vec(), numbers, ensembles, walkers }
+    }
+
     /// Lines of one step.
     pub fn size(&self) -> usize {
         self.ensembles * self.walkers
+    }
+
+    /// Parameters and numbers of a record, by name.
+    fn named<'a>(&'a self, record: &'a Record) -> impl Iterator<Item = (&'a str, &'a f64)> {
+        let values = record.theta.iter().chain(&record.numbers);
+        self.names.iter().chain(&self.numbers).map(String::as_str).zip(values)
     }
 
     /// Checks that `record` is line `index` of a chain (counted from 0; order: step, ensemble, walker) and whole.
@@ -91,12 +104,13 @@ impl Shape {
                 found: [record.step, record.ensemble, record.walker],
             });
         }
-        if record.theta.len() != self.names.len() {
-            return Err(ChainError::Dimension { expected: self.names.len(), found: record.theta.len() });
+        for (names, values) in [(&self.names, &record.theta), (&self.numbers, &record.numbers)] {
+            if values.len() != names.len() {
+                return Err(ChainError::Dimension { expected: names.len(), found: values.len() });
+            }
         }
-        let derived = [("log_prob", record.log_prob), ("spottedness", record.spottedness), ("chi2", record.chi2)];
-        let parameters = self.names.iter().map(String::as_str).zip(record.theta.iter().copied());
-        match parameters.chain(derived).find(|(_, value)| !value.is_finite()) {
+        let log_prob = [("log_prob", &record.log_prob)];
+        match self.named(record).chain(log_prob).find(|(_, value)| !value.is_finite()) {
             Some((name, _)) => Err(ChainError::NotFinite { name: name.to_owned(), step, ensemble, walker }),
             None => Ok(()),
         }

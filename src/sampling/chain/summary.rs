@@ -7,8 +7,8 @@
 //!   or hi above 1.
 //! - `upper95`, the 95 % quantile, is there for an amplitude whose posterior touches zero: the lower end of its 95 %
 //!   HDI is within a tenth of a standard deviation of 0.
-//! - Statistics are of the steps kept after the burn-in (`convergence`); `evaluations`, `failures`, `passes_median` and
-//!   `best` are of the whole chain, the start included.
+//! - Statistics are of the steps kept after the burn-in (`convergence`); `evaluations`, `failures`,
+//!   `model_applications_median` and `best` are of the whole chain, the start included.
 //!
 //! What is said of a planet, and which parameters are constrained, is not the chain's to know: whoever knows the priors
 //! and the blind search fills it in (`manifest::conclusions`).
@@ -109,8 +109,9 @@ pub struct Summary {
     pub evaluations: usize,
     /// How many of them failed.
     pub failures: usize,
-    /// Median number of applications of the response that an evaluation took.
-    pub passes_median: f64,
+    /// Median number of model applications that an evaluation took.
+    #[serde(alias = "passes_median")]
+    pub model_applications_median: f64,
     /// The place of the highest log-probability.
     pub best: Best,
     /// What to do, where the chain has not converged or something looks wrong.
@@ -160,7 +161,7 @@ pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Resul
         discarded_steps: discarded,
         evaluations: chain.evaluations(),
         failures: chain.failures(),
-        passes_median: passes_median(chain),
+        model_applications_median: model_applications_median(chain),
         best: Best { log_prob: best.log_prob, parameters: names.iter().cloned().zip(best.theta.clone()).collect() },
         advice: advice::advice(chain, &convergence, goals),
         verdict: None,
@@ -232,10 +233,10 @@ pub(super) fn parameter_summary(
     }
 }
 
-/// Median passes of the evaluations; 0 when there are none.
-fn passes_median(chain: &Chain) -> f64 {
+/// That of the evaluations; 0 when there are none.
+fn model_applications_median(chain: &Chain) -> f64 {
     let evaluated = chain.records().iter().filter(|record| record.proposed != Status::OutsidePrior);
-    let mut passes: Vec<f64> = evaluated.map(|record| f64::from(record.passes)).collect();
-    passes.sort_unstable_by(f64::total_cmp);
-    if passes.is_empty() { 0.0 } else { quantile(&passes, 0.5) }
+    let mut counts: Vec<f64> = evaluated.map(|record| f64::from(record.model_applications)).collect();
+    counts.sort_unstable_by(f64::total_cmp);
+    if counts.is_empty() { 0.0 } else { quantile(&counts, 0.5) }
 }

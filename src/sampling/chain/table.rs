@@ -40,7 +40,7 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
         summary.acceptance_fraction,
         summary.evaluations,
         summary.failures,
-        summary.passes_median,
+        summary.model_applications_median,
         summary.best.log_prob
     );
     text + &moves(summary) + &convergence(summary) + "\n"

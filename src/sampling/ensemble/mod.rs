@@ -46,6 +46,14 @@ pub enum EnsembleError {
         /// Names in the chain.
         found: Vec<String>,
     },
+    /// The chain to go on from holds other numbers beside each log-probability.
+    #[error("the chain holds {found:?} beside each log-probability, but the density gives {expected:?}")]
+    Numbers {
+        /// Names of the density's.
+        expected: Vec<String>,
+        /// Names in the chain.
+        found: Vec<String>,
+    },
     /// The evaluator stopped before the start was evaluated.
     #[error("stopped before the first step")]
     Stopped,

@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Walker {
     /// Position in physical coordinates.
     pub theta: Vec<f64>,
-    /// Its evaluation (`passes` is not kept through a resume and plays no role).
+    /// Its evaluation (`model_applications` are not kept through a resume and play no role).
     pub evaluation: Evaluation,
 }
 
@@ -58,7 +58,7 @@ struct Trial {
 struct Outcome {
     accepted: bool,
     proposed: Status,
-    passes: u32,
+    model_applications: u32,
     by: Option<MoveKind>,
 }
 
@@ -115,7 +115,7 @@ impl<'a> Sampler<'a> {
             .map(|Walker { evaluation, .. }| Outcome {
                 accepted: true,
                 proposed: evaluation.status,
-                passes: evaluation.passes,
+                model_applications: evaluation.model_applications,
                 by: None,
             })
             .collect();
@@ -139,10 +139,14 @@ impl<'a> Sampler<'a> {
             let (expected, found) = (self.density.names().to_vec(), chain.names().to_vec());
             return Err(EnsembleError::Names { expected, found });
         }
+        if shape.numbers != self.density.number_names() {
+            let expected = self.density.number_names().iter().map(|name| (*name).to_owned()).collect();
+            return Err(EnsembleError::Numbers { expected, found: shape.numbers.clone() });
+        }
         let last = chain.last_step().ok_or(EnsembleError::NothingToResume)?;
         let walker = |record: &Record| {
-            let Record { log_prob, spottedness, chi2, status, .. } = *record;
-            let evaluation = Evaluation { log_prob, spottedness, chi2, passes: 0, status };
+            let Record { log_prob, ref numbers, status, .. } = *record;
+            let evaluation = Evaluation { log_prob, numbers: numbers.clone(), model_applications: 0, status };
             Walker { theta: record.theta.clone(), evaluation }
         };
         let ensembles = last.chunks(self.walkers).map(|records| records.iter().map(walker).collect()).collect();
@@ -221,7 +225,7 @@ impl<'a> Sampler<'a> {
 
     /// Accepts or rejects a trial.
     fn decide(&self, state: &mut State, trial: Trial, evaluation: Evaluation) -> Outcome {
-        let Evaluation { status: proposed, passes, .. } = evaluation;
+        let Evaluation { status: proposed, model_applications, .. } = evaluation;
         let by = trial.by;
         let current = &mut state.ensembles[trial.ensemble][trial.walker];
         let candidate = Walker { theta: trial.theta, evaluation };
@@ -231,7 +235,7 @@ impl<'a> Sampler<'a> {
         if accepted {
             *current = candidate;
         }
-        Outcome { accepted, proposed, passes, by: Some(by) }
+        Outcome { accepted, proposed, model_applications, by: Some(by) }
     }
 
     /// ln of the density in sampling coordinates, up to a constant.
@@ -251,8 +255,7 @@ impl<'a> Sampler<'a> {
             return None;
         }
         for evaluation in &mut evaluations {
-            let derived = evaluation.spottedness.is_finite() && evaluation.chi2.is_finite();
-            let usable = evaluation.log_prob.is_finite() && derived;
+            let usable = evaluation.is_finite();
             if !usable && evaluation.log_prob != f64::NEG_INFINITY {
                 evaluation.status = Status::NonFinite;
             }
@@ -310,11 +313,10 @@ fn records(state: &State, outcomes: &[Outcome]) -> Vec<Record> {
                 accepted: outcome.accepted,
                 log_prob: evaluation.log_prob,
                 theta: theta.clone(),
-                spottedness: evaluation.spottedness,
-                chi2: evaluation.chi2,
+                numbers: evaluation.numbers.clone(),
                 status: evaluation.status,
                 proposed: outcome.proposed,
-                passes: outcome.passes,
+                model_applications: outcome.model_applications,
                 by: outcome.by,
             }
         })

@@ -90,12 +90,11 @@ fn integrated(landscape: &Landscape, target: usize, prior: &dyn Fn(usize, f64) -
     let weights_of = |(i, axis)| if i == target { Vec::new() } else { weights(axis, &|x| prior(i, x)) };
     let weights: Vec<Vec<f64>> = grid.axes.iter().enumerate().map(weights_of).collect();
     let mut log_terms: Vec<Vec<f64>> = vec![Vec::new(); grid.axes[target].nodes];
-    for node in landscape.nodes() {
-        let Some(likelihood) = node.reconstruction.likelihood else { continue };
+    for node in landscape.valued() {
         let position = grid.position(node.index);
         let others = position.iter().enumerate().filter(|(i, _)| *i != target);
         let weight: f64 = others.map(|(i, k)| weights[i][*k].ln()).sum();
-        log_terms[position[target]].push(likelihood.log_likelihood + weight);
+        log_terms[position[target]].push(node.evaluation.log_prob + weight);
     }
     log_terms.iter().map(|terms| log_sum(terms)).collect()
 }

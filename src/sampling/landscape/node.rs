@@ -1,7 +1,7 @@
 //! The values at the nodes, in the order of the grid.
 
 use super::grid::Grid;
-use crate::sampling::log_density::{Likelihood, Reconstruction, Status};
+use crate::sampling::log_density::{Evaluation, Status};
 
 /// A node with what was found there.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,14 +10,15 @@ pub struct Node {
     pub index: usize,
     /// Its coordinates, in the order of the axes.
     pub theta: Vec<f64>,
-    /// What became of the reconstruction there.
-    pub reconstruction: Reconstruction,
+    /// ln L there, and numbers beside it.
+    pub evaluation: Evaluation,
 }
 
 /// A landscape, perhaps not finished: the values at the first nodes of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landscape {
     grid: Grid,
+    numbers: Vec<String>,
     nodes: Vec<Node>,
 }
 
@@ -56,9 +57,9 @@ pub enum LandscapeError {
 }
 
 impl Landscape {
-    /// A landscape without values.
-    pub fn new(grid: Grid) -> Self {
-        Landscape { grid, nodes: Vec::new() }
+    /// A landscape without values, of `numbers` of these names beside ln L.
+    pub fn new(grid: Grid, numbers: Vec<String>) -> Self {
+        Landscape { grid, numbers, nodes: Vec::new() }
     }
 
     /// Adds the next node.
@@ -77,9 +78,10 @@ impl Landscape {
         if node.theta != theta {
             return Err(LandscapeError::Place { index: expected, expected: theta, found: node.theta });
         }
-        let Reconstruction { likelihood, status, .. } = node.reconstruction;
+        let status = node.evaluation.status;
         let failed = status.is_failure() || status == Status::OutsidePrior;
-        if likelihood.is_none_or(|likelihood| !likelihood.is_finite()) != failed {
+        let is_whole = node.evaluation.is_finite() && node.evaluation.numbers.len() == self.numbers.len();
+        if is_whole == failed {
             return Err(LandscapeError::Values { index: expected, status });
         }
         self.nodes.push(node);
@@ -89,6 +91,17 @@ impl Landscape {
     /// Where the nodes are.
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// Names of the numbers beside ln L.
+    pub fn numbers(&self) -> &[String] {
+        &self.numbers
+    }
+
+    /// The number of that name at a node.
+    pub fn number(&self, node: &Node, name: &str) -> Option<f64> {
+        let place = self.numbers.iter().position(|number| number == name)?;
+        node.evaluation.numbers.get(place).copied()
     }
 
     /// The nodes so far, in order.
@@ -101,22 +114,26 @@ impl Landscape {
         self.nodes.len() == self.grid.len()
     }
 
-    /// The node of the largest ln L (the first of equals) with its values; `None` if there is none with a value.
-    pub fn best(&self) -> Option<(&Node, Likelihood)> {
-        let valued = self.nodes.iter().filter_map(|node| Some((node, node.reconstruction.likelihood?)));
-        valued.reduce(|best, node| if node.1.log_likelihood > best.1.log_likelihood { node } else { best })
+    /// The nodes with a value.
+    pub fn valued(&self) -> impl Iterator<Item = &Node> {
+        self.nodes.iter().filter(|node| node.evaluation.log_prob.is_finite())
     }
 
-    /// Number of nodes whose reconstruction ended like that.
+    /// The node of the largest ln L (the first of equals); `None` if there is none with a value.
+    pub fn best(&self) -> Option<&Node> {
+        self.valued().reduce(|best, node| if node.evaluation.log_prob > best.evaluation.log_prob { node } else { best })
+    }
+
+    /// Number of nodes whose evaluation ended like that.
     pub fn count(&self, is: impl Fn(Status) -> bool) -> usize {
-        self.nodes.iter().filter(|node| is(node.reconstruction.status)).count()
+        self.nodes.iter().filter(|node| is(node.evaluation.status)).count()
     }
 
-    /// Median number of passes of those reconstructions that were begun (the upper one of two); 0 without any.
-    pub fn passes_median(&self) -> u32 {
-        let all = self.nodes.iter().map(|node| node.reconstruction.passes);
-        let mut passes: Vec<u32> = all.filter(|passes| *passes > 0).collect();
-        passes.sort_unstable();
-        passes.get(passes.len() / 2).copied().unwrap_or(0)
+    /// Median number of model applications of those evaluations that were begun (the upper one of two); 0 without any.
+    pub fn model_applications_median(&self) -> u32 {
+        let all = self.nodes.iter().map(|node| node.evaluation.model_applications);
+        let mut counts: Vec<u32> = all.filter(|count| *count > 0).collect();
+        counts.sort_unstable();
+        counts.get(counts.len() / 2).copied().unwrap_or(0)
     }
 }

@@ -115,12 +115,12 @@ pub enum Undefined {
 /// [`Undefined`]: no well-defined minimum.
 pub fn paraboloid(landscape: &Landscape, rule: Rule) -> Result<Paraboloid, Undefined> {
     let grid = landscape.grid();
-    let (top, best) = landscape.best().ok_or(Undefined::Nothing)?;
+    let top = landscape.best().ok_or(Undefined::Nothing)?;
     let edges = grid.edges(top.index);
     if !edges.is_empty() {
         return Err(Undefined::Edge { axes: edges.iter().map(|axis| axis.name.clone()).collect() });
     }
-    if top.reconstruction.status != Status::Converged {
+    if top.evaluation.status != Status::Converged {
         return Err(Undefined::Unreachable(top.index));
     }
     let coefficients = terms(&vec![0.0; grid.axes.len()]).len();
@@ -164,11 +164,11 @@ pub fn paraboloid(landscape: &Landscape, rule: Rule) -> Result<Paraboloid, Undef
     }
     let among = |node: &&Node| is_within(&reach, grid, node.index, top.index);
     let within: Vec<&Node> = landscape.nodes().iter().filter(among).collect();
-    let count = |is: fn(Status) -> bool| within.iter().filter(|node| is(node.reconstruction.status)).count();
+    let count = |is: fn(Status) -> bool| within.iter().filter(|node| is(node.evaluation.status)).count();
     Ok(Paraboloid {
         parameters,
         covariance: (0..unit.len()).map(|i| (0..unit.len()).map(|j| covariance(i, j)).collect()).collect(),
-        log_likelihood: best.log_likelihood - 0.5 * (constant + 0.5 * gradient.dot(&vertex)),
+        log_likelihood: top.evaluation.log_prob - 0.5 * (constant + 0.5 * gradient.dot(&vertex)),
         rms_chi2: (residuals.norm_squared() / members.len() as f64).sqrt(),
         nodes: members.len(),
         delta_chi2: members.iter().map(|member| member.delta_chi2).fold(0.0, f64::max),

@@ -38,9 +38,8 @@ pub struct Member {
 pub fn region(landscape: &Landscape, centre: usize, rule: Rule, enough: impl Fn(&[Member]) -> bool) -> Vec<Member> {
     let grid = landscape.grid();
     let height = |index: usize| {
-        let reconstruction = &landscape.nodes().get(index)?.reconstruction;
-        let converged = reconstruction.status == Status::Converged;
-        reconstruction.likelihood.filter(|_| converged).map(|likelihood| likelihood.log_likelihood)
+        let evaluation = &landscape.nodes().get(index)?.evaluation;
+        (evaluation.status == Status::Converged).then_some(evaluation.log_prob)
     };
     let Some(top) = height(centre) else { return Vec::new() };
     let mut region: Vec<Member> = Vec::new();

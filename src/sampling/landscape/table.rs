@@ -1,7 +1,7 @@
 //! The landscape in a few lines: where it is highest, whether that is on an edge, and what it cost; and its paraboloid.
 
 use super::{Axis, Grid, Landscape, Paraboloid, Undefined};
-use crate::numerics::text::aligned;
+use crate::numerics::text::{aligned, listed};
 use crate::sampling::log_density::Status;
 use std::collections::BTreeMap;
 
@@ -15,13 +15,13 @@ pub fn table(landscape: &Landscape, truth: Option<&BTreeMap<String, f64>>) -> St
         landscape.nodes().len(),
         count(|status| status == Status::Unreachable),
         count(Status::is_failure),
-        landscape.passes_median()
+        landscape.model_applications_median()
     )
 }
 
 /// Where ln L is largest.
 fn best(landscape: &Landscape, truth: Option<&BTreeMap<String, f64>>) -> Option<String> {
-    let (node, values) = landscape.best()?;
+    let node = landscape.best()?;
     let edges = landscape.grid().edges(node.index);
     let mut head = vec!["parameter", "at largest ln L", "spacing", "first", "last", "on an edge"];
     if truth.is_some() {
@@ -41,10 +41,8 @@ fn best(landscape: &Landscape, truth: Option<&BTreeMap<String, f64>>) -> Option<
         rows.push(row);
     }
     let mut text = aligned(&rows);
-    text += &format!(
-        "largest ln L {:.3} at node {}, spottedness {:.5}, chi2 {:.2}\n",
-        values.log_likelihood, node.index, values.spottedness, values.chi2
-    );
+    let numbers = listed(landscape.numbers().iter().zip(&node.evaluation.numbers));
+    text += &format!("largest ln L {:.3} at node {}{numbers}\n", node.evaluation.log_prob, node.index);
     if !edges.is_empty() {
         let keys: Vec<String> = edges.iter().map(|axis| format!("grid.axes.{}", axis.name)).collect();
         text += &format!("on the edge of the grid, the maximum may lie outside: widen {}\n", keys.join(", "));

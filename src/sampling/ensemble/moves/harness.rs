@@ -29,7 +29,7 @@ impl<F: Fn(&[f64]) -> f64 + Sync> LogDensity for Toy<F> {
     fn evaluate(&self, theta: &[f64]) -> Evaluation {
         let log_prob = (self.log_prob)(theta);
         let status = if log_prob == f64::NEG_INFINITY { Status::OutsidePrior } else { Status::Converged };
-        Evaluation { log_prob, spottedness: 0.1, chi2: 1.0, passes: 1, status }
+        Evaluation { status, ..Evaluation::of(log_prob) }
     }
 }
 
