@@ -25,7 +25,7 @@
 //!
 //! # A star in code
 //!
-//! A config has the keys of `docs/reference/config.md`, whether it is read from a file ([`Config::load`]) or built here.
+//! A config has the keys of `docs/reference/config.md`, read from a file ([`Config::load`]) or built here.
 //! A [`Scene`] is a config with its observations, a [`Run`] the chain of its posterior.
 //!
 //! ```

@@ -106,6 +106,7 @@ fn velocities_have_the_same_sign() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn targets_become_errors_and_flags_decide() {
     // (line of inzdi.dat, its new text, chi2_target, what the table says)
     type Case<'a> = (usize, &'a str, f64, &'a str);
@@ -147,6 +148,7 @@ fn bright_and_dark_maps_stay_what_they_are() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn other_layouts_and_no_line_file() {
     let desk = desk();
     // older ZDIpy has no mass and radius

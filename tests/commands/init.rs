@@ -404,6 +404,7 @@ fn two_profiles_are_enough_for_a_start() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn lo_peg_has_a_config() {
     let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if !data.exists() {

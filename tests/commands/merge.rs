@@ -21,6 +21,7 @@ fn renumbered(chain: &str, first: usize, steps: usize) -> Vec<String> {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn the_whole_is_its_parts() {
     let desk = Desk::new(tiny(40));
     // the seed of the config, given or not

@@ -223,6 +223,7 @@ impl Walk {
 
 /// Nothing is claimed of a star without a planet, on few pixels and few nights for the sake of time.
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn one_star() {
     let star = Star { spots: few(), nights: (9, 3), continuum: (0.0, 0.985), ..PLAIN };
     let alone = star.walked(0.0, 11, "500");

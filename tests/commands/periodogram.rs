@@ -115,6 +115,7 @@ fn python_fits_the_same(desk: &Desk, k_kms: f64) {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn threads_do_not_change_a_byte() {
     let desk = demo();
     for (threads, out) in [("1", "a"), ("2", "b")] {

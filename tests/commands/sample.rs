@@ -81,6 +81,7 @@ fn the_number_of_threads_does_not_show() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn killed_at_ten_random_moments_and_resumed_is_uninterrupted() {
     let desk = finished();
     let mut rng = ChaCha8Rng::seed_from_u64(10);
@@ -388,6 +389,7 @@ fn a_prior_that_excludes_the_best_orbit_is_no_obstacle() {
 
 /// Wherever the walkers start, and whichever moves they make, the posterior is the same.
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn starts_and_moves_make_no_difference() {
     let mut config = tiny(STEPS);
     config["sampler"]["ess"] = json!(600);

@@ -102,6 +102,20 @@ fn pages() -> Vec<Page> {
     paths.iter().map(|path| Page::read(path)).collect()
 }
 
+/// Files of these folders that people write.
+fn sources(of: &[&str]) -> Vec<PathBuf> {
+    let mut left: Vec<PathBuf> = of.iter().map(|path| root().join(path)).collect();
+    let mut files = Vec::new();
+    while let Some(path) = left.pop() {
+        if path.is_dir() {
+            left.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+        } else if path.extension().is_none_or(|e| ["rs", "py", "sh", "toml", "css", "md"].iter().any(|one| e == *one)) {
+            files.push(path);
+        }
+    }
+    files
+}
+
 fn hold(faults: Vec<String>) {
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
 }
@@ -115,6 +129,13 @@ fn the_readme_is_one_page() {
 #[test]
 fn lines_are_short() {
     let mut faults = Vec::new();
+    for path in sources(&["src", "tests", "benches", "examples", ".ci", "Cargo.toml", "CONTRIBUTING.md"]) {
+        for (number, line) in std::fs::read_to_string(&path).unwrap().lines().enumerate() {
+            if line.chars().count() > LONGEST_LINE && !line.starts_with('|') {
+                faults.push(format!("{}:{}: {} characters", path.display(), number + 1, line.chars().count()));
+            }
+        }
+    }
     for page in pages() {
         for (number, block, line) in page.lines() {
             // tables, links and what the program prints are as long as they are

@@ -141,6 +141,7 @@ fn stellar_parameters_one_sigma_off() {
 
 /// The orbit and its errors by the quadratic around the best orbit, against emcee on full reconstructions.
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn posterior_of_the_orbit() {
     let oracle = oracle();
     let imager = imager(&oracle, oracle.grid.clone());

@@ -206,6 +206,7 @@ fn predictions_of_orbits_alone_are_right_to_second_order() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
     let walks = [
         (Parameter::K, vec![0.0, 0.1, 0.3, 0.8, 1.8]),
@@ -231,6 +232,7 @@ fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn evaluations_are_as_precise_as_they_say() {
     for posterior in MAPS.into_iter().flat_map(|map| [posteriors(map), of_orbits(map)].concat()) {
         let exact = posterior.clone().with_settings(SolverSettings::exact());
@@ -252,6 +254,7 @@ fn evaluations_are_as_precise_as_they_say() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn warm_starts_save_passes_and_change_nothing_else() {
     for posterior in MAPS.into_iter().flat_map(posteriors) {
         let start = posterior.space().start();

@@ -31,6 +31,7 @@ fn vsini(pixels: usize) -> (f64, f64) {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn vsini_on_2000_pixels_is_that_of_20000() {
     let ((coarse, _), (fine, sigma)) = (vsini(2000), vsini(20_000));
     println!("vsini {coarse:.4} on 2,000 pixels, {fine:.4} +- {sigma:.4} on 20,000");

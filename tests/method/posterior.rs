@@ -106,6 +106,7 @@ fn regularised_likelihood_by_affine_moves_alone() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn regularised_likelihood_on_5000_pixels() {
     let oracle = oracle();
     let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);
@@ -113,6 +114,7 @@ fn regularised_likelihood_on_5000_pixels() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn spottedness_on_5000_pixels() {
     let oracle = oracle();
     let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);

@@ -135,6 +135,7 @@ fn draws_follow_the_density_and_every_proposal_is_accepted() {
 }
 
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn a_poor_surrogate_changes_nothing_but_the_cost() {
     let (surrogate, space) = surrogate(0.1);
     // a planet of twice the amplitude at another inclination, told more sharply than the surrogate thinks
@@ -145,6 +146,7 @@ fn a_poor_surrogate_changes_nothing_but_the_cost() {
 
 /// Also where a chain stays for long at places that the surrogate hardly ever proposes.
 #[test]
+#[ignore = "long: .ci/run has it run"]
 fn acceptance_on_trial_is_that_of_a_chain() {
     let (surrogate, space) = surrogate(0.1);
     let narrow: fn(&[f64]) -> f64 = |theta| if (theta[2] - 0.5).abs() < 0.005 { 3.5 } else { 0.0 };

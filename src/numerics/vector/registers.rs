@@ -5,12 +5,12 @@
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use super::{Instructions, Portable, sealed};
+use super::{Instructions, Portable, sealed::Sealed};
 use std::ops::{Add, Mul, Sub};
 
 /// A number in one of two precisions.
 pub trait Number:
-    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Into<f64> + sealed::Sealed
+    Copy + Default + PartialEq + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Into<f64> + Sealed
 {
     /// Whether it has single precision.
     const SINGLE: bool;
@@ -29,7 +29,7 @@ pub trait Number:
 }
 
 /// Arithmetic on numbers side by side; having it at hand proves that the processor has the instructions.
-pub trait Registers: Copy + sealed::Sealed {
+pub trait Registers: Copy + Sealed {
     /// What stands in a lane.
     type Number: Number;
 

@@ -2,7 +2,7 @@
 //!
 //! | format | for | warm-up | ensembles and walkers |
 //! |---|---|---|---|
-//! | [`zarr`] | xarray, ArviZ | in groups of its own | an ensemble is a chain, its walkers one after the other (`draws`) |
+//! | [`zarr`] | xarray, ArviZ | in groups of its own | an ensemble is a chain of all walkers in turn (`draws`) |
 //! | [`emcee`] | emcee, ArviZ | there, `discard` says how much | all walkers side by side |
 //! | [`getdist`] | GetDist | left out | an ensemble is a file |
 //! | [`csv`] | pandas and everything else | there, marked | as in the chain, a row a line |
