@@ -151,8 +151,8 @@ fn rows(names: &[String]) -> Result<Vec<&'static Row>, Failure> {
 
 /// Whether what is in the folder is the reduced version.
 fn quick_there(folder: &Path) -> Option<bool> {
-    let summary: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.join(SUMMARY)).ok()?).ok()?;
-    summary["quick"].as_bool()
+    let made: Made = serde_json::from_slice(&std::fs::read(folder.join(SUMMARY)).ok()?).ok()?;
+    Some(made.quick)
 }
 
 fn remove(folder: &Path) -> Result<(), Failure> {

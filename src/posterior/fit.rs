@@ -7,6 +7,7 @@ pub use checks::{Checks, ProfileCheck};
 
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Problem, Termination, parallelism};
+use crate::numerics::json::number_or_null;
 use crate::posterior::imaging::Imager;
 use crate::posterior::nuisances::{Estimate, LineAndContinuum};
 use crate::posterior::objective::tradeoff::Node;
@@ -115,14 +116,18 @@ pub struct FitSummary {
     /// The parameters at which the star was reconstructed.
     pub parameters: ParameterValues,
     /// Standard deviation of the observed velocities (km/s).
+    #[serde(deserialize_with = "number_or_null")]
     pub observed_rv_rms_kms: f64,
     /// Standard deviation of the filtered velocities (km/s).
+    #[serde(deserialize_with = "number_or_null")]
     pub filtered_rv_rms_kms: f64,
     /// Root mean square of their standard errors (km/s).
+    #[serde(deserialize_with = "number_or_null")]
     pub photon_rv_error_kms: f64,
     /// Root mean square of observed minus modelled intensity.
     pub residual_rms: f64,
     /// The same over the core of the line: bins where the model is deeper than half its greatest depth.
+    #[serde(deserialize_with = "number_or_null")]
     pub residual_rms_core: f64,
     /// Root mean square of the standard errors of the intensities, scaled as the config says.
     pub sigma_rms: f64,

@@ -224,7 +224,7 @@ fn what_cannot_be_drawn_is_refused() {
     says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/profiles.csv:5:", "3 columns instead of 8"]);
     desk.write("map/profiles.csv", &profiles.replacen("sigma", "error", 1));
     says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/profiles.csv", "no column sigma"]);
-    desk.write("map/map.json", "{}");
+    desk.edit("map/map.json", |map| map.replace("\"ring_pixels\"", "\"rings\""));
     says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/map.json", "ring_pixels"]);
 }
 

@@ -58,6 +58,17 @@ fn a_run_has_a_page() {
     assert!(desk.read("short.html").contains("The chain has not converged"));
 }
 
+/// What cannot be computed there, such as chi2 outside of the line, is null in the file.
+#[test]
+fn a_map_of_nothing_but_the_core_of_the_line_has_a_page() {
+    let desk = Desk::new(config());
+    desk.set("/observations/simulate/velocity_kms", json!({ "min": -6.0, "max": 6.0, "step": 1.0 }));
+    desk.succeed(&["map", CONFIG, "--out", "map"]);
+    assert!(desk.json("map/fit.json")["checks"]["chi2_per_datum_outside"].is_null());
+    desk.succeed(&["report", "map"]);
+    assert!(!desk.read("map/report.html").contains("NaN"));
+}
+
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn every_folder_has_a_page_that_a_browser_shows() {

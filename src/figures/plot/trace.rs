@@ -6,6 +6,7 @@ use crate::data::io::journal;
 use crate::figures::drawing::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Align, Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
+use crate::posterior::objective::Prior;
 use crate::runs::manifest::{Manifest, kinds_and_goals};
 use crate::runs::run::CHAIN;
 use crate::sampling::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
@@ -21,7 +22,9 @@ pub struct Sampled {
     pub manifest: Manifest,
     /// All its steps.
     pub chain: Chain,
-    /// What sort of number each parameter is.
+    /// The prior of each parameter.
+    pub priors: Vec<Prior>,
+    /// What sort of number each is.
     pub kinds: Vec<ParameterKind>,
     /// What every parameter must reach.
     pub goals: Goals,
@@ -41,10 +44,11 @@ impl Sampled {
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
         let settings = manifest.settings(folder)?;
         let (kinds, goals) = kinds_and_goals(&settings);
+        let priors = settings.free.iter().map(|f| f.prior).collect();
         let wrong = |problem: String| PlotError::Content { path: folder.join(CHAIN), problem };
         let (summary, _) = manifest.summarise(&settings, &chain).map_err(|e| wrong(e.to_string()))?;
         let truth = manifest.truth(&settings, &summary);
-        Ok(Sampled { manifest, chain, kinds, goals, summary, truth })
+        Ok(Sampled { manifest, chain, priors, kinds, goals, summary, truth })
     }
 
     /// Draws of parameter `i` after the burn-in; a periodic one within half a turn of its mode.
@@ -65,8 +69,7 @@ impl Sampled {
 
     /// How values of a parameter become lengths: by their logarithms where the prior is even in these.
     pub(super) fn scale(&self, i: usize) -> Scale {
-        let prior = self.manifest.priors.get(&self.summary.names[i]).and_then(|prior| prior.get("prior")?.as_str());
-        if prior == Some("log-uniform") { Scale::Log } else { Scale::Linear }
+        if matches!(self.priors[i], Prior::LogUniform { .. }) { Scale::Log } else { Scale::Linear }
     }
 
     /// Series of all steps, unwrapped like the draws.
@@ -99,14 +102,7 @@ impl Sampled {
 
     /// From where to where the prior of a parameter reaches.
     pub(super) fn bounds(&self, i: usize) -> [f64; 2] {
-        let prior = self.manifest.priors.get(&self.summary.names[i]);
-        let bound = |key: &str, none: f64| {
-            prior.and_then(|prior| prior.get(key)).and_then(serde_json::Value::as_f64).unwrap_or(none)
-        };
-        match self.mode(i) {
-            Some(mode) => [mode - 0.5, mode + 0.5],
-            None => [bound("min", f64::NEG_INFINITY), bound("max", f64::INFINITY)],
-        }
+        self.mode(i).map_or(self.priors[i].bounds().into(), |mode| [mode - 0.5, mode + 0.5])
     }
 }
 

@@ -8,7 +8,6 @@ use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::planets::verdict::probability;
-use crate::posterior::fit::Deviation;
 use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterValues, definition};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
@@ -73,9 +72,9 @@ fn map(file: &FitFile) -> Chapter {
     };
     let spottedness = match fit.deviation {
         None => ("spot coverage", number(fit.spottedness, 4)),
-        Some(Deviation { darkness, brightness_excess }) => (
+        Some(mean) => (
             "brightness minus 1, rms (mean of dark, of bright parts)",
-            format!("{:.4} ({darkness:.4}, {brightness_excess:.4})", fit.spottedness),
+            format!("{:.4} ({:.4}, {:.4})", fit.spottedness, mean.darkness, mean.brightness_excess),
         ),
     };
     let rows = [

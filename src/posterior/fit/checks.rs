@@ -8,6 +8,7 @@
 //! What the map itself takes up is spread evenly here.
 
 use super::Residual;
+use crate::numerics::json::number_or_null;
 use crate::numerics::normal::cumulative;
 use serde::{Deserialize, Serialize};
 
@@ -23,14 +24,19 @@ pub struct Checks {
     /// Profile by profile.
     pub profiles: Vec<ProfileCheck>,
     /// chi2 per datum in the core of the line: where the model is deeper than half its greatest depth.
+    #[serde(deserialize_with = "number_or_null")]
     pub chi2_per_datum_core: f64,
     /// chi2 per datum outside of the core.
+    #[serde(deserialize_with = "number_or_null")]
     pub chi2_per_datum_outside: f64,
     /// By how many standard deviations of replicated data these differ.
+    #[serde(deserialize_with = "number_or_null")]
     pub core_excess_sigma: f64,
     /// Correlation of the residuals of neighbouring bins.
+    #[serde(deserialize_with = "number_or_null")]
     pub neighbour_correlation: f64,
     /// Its standard deviation in replicated data.
+    #[serde(deserialize_with = "number_or_null")]
     pub sigma_neighbour_correlation: f64,
     /// What does not look like noise.
     pub warnings: Vec<String>,
@@ -46,6 +52,7 @@ pub struct ProfileCheck {
     /// Number of bins.
     pub data: usize,
     /// Probability that replicated data have a larger share of chi2 in this profile.
+    #[serde(deserialize_with = "number_or_null")]
     pub p_value: f64,
 }
 

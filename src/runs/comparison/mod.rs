@@ -15,6 +15,7 @@ pub use cost::{ChainCost, Cost, LandscapeCost};
 pub use draws::Distance;
 pub use pair::{Pair, PairError};
 
+use crate::numerics::json::number_or_null;
 use crate::posterior::objective::{Parameter, UnresolvedSpots};
 use crate::sampling::chain::statistics::wrap;
 use crate::sampling::chain::{ChainError, Summary};
@@ -93,8 +94,10 @@ pub struct AgainstChain {
     #[serde(flatten)]
     pub interval: Interval,
     /// Minus the chain's, in error bars of the chain.
+    #[serde(deserialize_with = "number_or_null")]
     pub difference: f64,
     /// Width of its interval over that of the chain's.
+    #[serde(deserialize_with = "number_or_null")]
     pub width_ratio: f64,
 }
 

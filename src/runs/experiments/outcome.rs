@@ -1,5 +1,6 @@
 //! What a case came to: three estimates of the same orbit, and what each of them took.
 
+use crate::numerics::json::number_or_null;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -63,11 +64,6 @@ pub struct Outcome {
     pub periodogram: Option<Route>,
     /// Its false-alarm probability.
     pub false_alarm: Option<f64>,
-}
-
-/// A number; NaN, which is written as null, comes back.
-fn number_or_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// Share of `of` and its binomial error: that of the share with one more of either kind, which is not nothing where all

@@ -1,5 +1,6 @@
 //! False alarms in `periodogram.json`.
 
+use crate::numerics::json::number_or_null;
 use crate::planets::periodogram::{FalseAlarm, Search};
 use serde::{Deserialize, Serialize};
 
@@ -12,18 +13,22 @@ pub struct FalseAlarmRecord {
     /// Height of the peak.
     pub delta_ln_l: f64,
     /// The probability, by what is `used`.
+    #[serde(deserialize_with = "number_or_null")]
     pub probability: f64,
     /// The share of draws with as high a peak.
     pub by_draws: f64,
     /// What the distribution of highest peaks says.
+    #[serde(deserialize_with = "number_or_null")]
     pub by_extreme_value: f64,
     /// `draws` or `extreme value`.
     pub used: String,
     /// Number of draws.
     pub draws: usize,
     /// Effective bandwidth of the search (Baluev 2008).
+    #[serde(deserialize_with = "number_or_null")]
     pub w: f64,
     /// How many independent periods there are.
+    #[serde(deserialize_with = "number_or_null")]
     pub independent_periods: f64,
     /// Heights of usual probabilities.
     pub levels: [LevelRecord; 3],

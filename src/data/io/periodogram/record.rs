@@ -5,6 +5,7 @@ use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::quantities::QuantitiesRecord;
 use super::robustness::RobustnessRecord;
+use crate::numerics::json::number_or_null;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{KeplerianOrbit, Search};
@@ -86,6 +87,7 @@ pub struct PeakRecord {
     #[serde(flatten)]
     pub orbit: OrbitRecord,
     /// How often a star without a planet shows one as high.
+    #[serde(deserialize_with = "number_or_null")]
     pub false_alarm_probability: f64,
     /// How it is an alias of the highest peak.
     pub alias: Option<AliasRecord>,
