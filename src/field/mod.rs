@@ -18,19 +18,24 @@
 
 pub mod compress;
 mod dense;
+pub mod derivatives;
 pub mod epoch;
 pub mod evidence;
 pub mod harmonics;
 pub mod kernel;
+mod maps;
+pub mod quadratic;
 pub mod settle;
 pub mod spectrum;
 
 pub use compress::Compression;
+pub use derivatives::Derivatives;
 pub use epoch::Epoch;
-pub use evidence::{Derivatives, Evidence};
+pub use evidence::Evidence;
 pub use harmonics::Harmonics;
 pub use kernel::{Kernel, Lifetime};
-pub use settle::{Model, Settled, Settling};
+pub use quadratic::Quadratic;
+pub use settle::{Settled, Settling, Sought, settle};
 pub use spectrum::Spectrum;
 
 use serde::{Deserialize, Serialize};
