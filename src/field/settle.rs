@@ -61,9 +61,8 @@ pub struct Settled {
 /// epochs linear around such coefficients, one column an epoch: always the same epochs in the same order. Where there
 /// is no model it gives numbers that are not finite.
 ///
-/// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. An error of
-/// the coefficients leaves one of ln Z, by way of the determinant: some 0.003 at the default tolerance, on the stars of
-/// `tests/method/field.rs`.
+/// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
+/// left of the way is an error of ln Z (`docs/method.md` section 9).
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].
