@@ -28,6 +28,9 @@ impl Default for Compression {
     }
 }
 
+/// Steps after which eigenvalues are given up: some 2 a number are usual, and of what is not finite there is no end.
+const MOST_ROTATIONS: usize = 10_000;
+
 /// How the data of an epoch are told in few numbers.
 #[derive(Clone, Debug)]
 pub struct Compressed {
@@ -66,7 +69,7 @@ impl Compressed {
         let mut rows = &whiten * &epoch.jacobian;
         rows.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
         let mut directions = DMatrix::identity(n, n);
-        if how.left_out > 0.0 {
+        if how.left_out > 0.0 && n > 0 {
             directions = leading(&rows, how)?;
             directions = with(directions, &(&whiten * &epoch.misfit));
             directions = with(directions, &(&whiten * &epoch.slopes));
@@ -102,7 +105,7 @@ impl Compressed {
 /// finite.
 fn leading(rows: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
     let n = rows.nrows();
-    let eigen = (rows * rows.transpose()).try_symmetric_eigen(f64::EPSILON, 0)?;
+    let eigen = (rows * rows.transpose()).try_symmetric_eigen(f64::EPSILON, MOST_ROTATIONS)?;
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     let mut left_out = 0.0;

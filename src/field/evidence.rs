@@ -4,6 +4,12 @@
 //! r - 1/2 ln |C| - n/2 ln 2 pi` (n data), the density of the data with all fields and nuisances integrated out;
 //! gradient and information of numbers that change the model by D' are `D'^T C^-1 r` and `D'^T C^-1 D'`. All of it in
 //! units of the noise and compressed, where N is 1.
+//!
+//! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers a profile (`benches/field.rs`:
+//! 0.07 s for 40 profiles, 0.4 s for 100, 8 s for 300). Seasons that are 13 lifetimes apart, with k below 1e-8, are
+//! apart: ln Z is the sum of theirs. Within one season a Kalman filter takes time in proportion to the number of
+//! profiles, if its states are value and rate along the 300 to 500 directions of the coefficients that all profiles
+//! together see, not of all coefficients: a trial took 1.5 times as long as this for 100 profiles, two thirds for 300.
 
 use super::compress::{Compressed, Compression, Told};
 use super::dense::{self, Factor};
@@ -51,8 +57,11 @@ impl Evidence {
         let sd: Vec<f64> = field.spectrum.variances(degrees).into_iter().map(f64::sqrt).collect();
         let compressed = epochs.iter().enumerate().map(|(k, epoch)| {
             epoch.check_shapes(degrees.len());
-            let of_epoch = || Compressed::new(epoch, around.column(k), &sd, how);
-            epoch.is_sound().then(of_epoch).flatten().ok_or(FieldError::NotFinite { epoch: k })
+            let sound = epoch.is_sound() && around.column(k).iter().all(|c| c.is_finite());
+            sound
+                .then(|| Compressed::new(epoch, around.column(k), &sd, how))
+                .flatten()
+                .ok_or(FieldError::NotFinite { epoch: k })
         });
         let (compressed, rows): (Vec<_>, Vec<_>) = compressed.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();

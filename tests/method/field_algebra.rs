@@ -423,3 +423,34 @@ fn what_is_no_field_or_not_finite_is_refused() {
         assert!(matches!(refused(&problem), FieldError::NoSuchField { .. }));
     }
 }
+
+#[test]
+fn numbers_beyond_sense_come_to_an_end() {
+    for (size, how) in [(1e200, EXACT), (1e200, Compression::default()), (f64::MAX, Compression::default())] {
+        let mut problem = Problem::of_degree_3(field(0.3, 0.8, Lifetime::Days(4.0), 0.1));
+        problem.epochs[1].jacobian.fill(size);
+        assert!(Evidence::new(problem.field, &problem.degrees, &problem.epochs, &problem.around, how).is_err());
+    }
+    let mut problem = Problem::of_degree_3(field(0.3, 0.8, Lifetime::Days(4.0), 0.1));
+    problem.around[(3, 1)] = f64::NAN;
+    let refused = Evidence::new(problem.field, &problem.degrees, &problem.epochs, &problem.around, EXACT).unwrap_err();
+    assert_eq!(refused, FieldError::NotFinite { epoch: 1 });
+}
+
+#[test]
+fn without_data_the_field_is_as_before() {
+    let mut problem = Problem::new(field(0.3, 0.8, Lifetime::Days(4.0), 0.1), &[1, 1, 1], &[0.0, 1.0], 0, 0, 1);
+    // the second epoch has one datum, which the field does not touch
+    problem.epochs[1].jacobian.fill(0.0);
+    let epoch = &problem.epochs[1];
+    let alone = -0.5 * (epoch.misfit[0].powi(2) / epoch.variance[0] + (TAU * epoch.variance[0]).ln());
+    for how in [EXACT, Compression::default()] {
+        let evidence = problem.evidence(how);
+        assert!((evidence.ln_evidence() - alone).abs() < 1e-14);
+        let harmonics = DMatrix::identity(3, 3);
+        let sd = evidence.standard_deviations(&harmonics, &[0.5]);
+        assert!(sd.iter().all(|sd| (sd - 0.3 / 3.0_f64.sqrt()).abs() < 1e-15) && evidence.coefficients().amax() == 0.0);
+    }
+    let nothing = Evidence::new(problem.field, &problem.degrees, &[], &DMatrix::zeros(3, 0), EXACT).unwrap();
+    assert_eq!((nothing.ln_evidence(), nothing.quadratic().gradient.len()), (0.0, 0));
+}
