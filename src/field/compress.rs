@@ -1,92 +1,111 @@
 //! From the data of an epoch to the few numbers that hold what they say of the field.
 //!
-//! In units of the noise, `N^(-1/2) J S^(1/2)` has some dozen singular values that count: a profile has so many
-//! resolution elements. Along all other directions of the data there is white noise and nothing else; what residual and
-//! slopes have there enters the evidence as it is (`docs/method.md` section 9). The variance of the field that is left
-//! out is at most [`Compression::left_out`] an epoch, in units of that of the noise: ln Z changes by less than half of
-//! it for the determinant, and by half of it times the mean square of the residual, about 1.
+//! In units of the noise, `W J S^(1/2)` with `W N W^T = 1` has few singular values that count: a profile has so many
+//! resolution elements. Along directions Q of the data that hold these, the field is as it is; along all others it
+//! is that around which the model was made linear, and there is white noise beside it (`docs/method.md` section 9).
+//!
+//! Misfit and slopes are made directions of Q, which makes more exact than one might think: in the most probable field
+//! `C^-1 r = N^-1 misfit`, so that it, and the gradient there, do not depend on what is left out. ln Z and the
+//! information do: ln Z by less than half of the variance left out, [`Compression::left_out`] in every epoch.
 
 use super::epoch::Epoch;
 use nalgebra::{DMatrix, DVector, DVectorView};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// How much may be lost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Compression {
-    /// Variance of the field along the directions of an epoch's data that are left out, over that of the noise; 0 keeps
-    /// all.
+    /// Largest variance of the field, over that of the noise, along the directions of an epoch's data that are left
+    /// out; 0 keeps all.
     pub left_out: f64,
 }
 
 impl Default for Compression {
     fn default() -> Self {
-        Compression { left_out: 1e-6 }
+        Compression { left_out: 1e-3 }
     }
 }
 
-/// An epoch in units of its noise, along the directions that hold something of the field.
+/// Steps after which eigenvalues are given up: some 2 a number are usual, and of what is not finite there is no end.
+const MOST_ROTATIONS: usize = 10_000;
+
+/// How the data of an epoch are told in few numbers.
 #[derive(Clone, Debug)]
 pub struct Compressed {
-    /// `Q^T N^(-1/2) J S^(1/2)` (directions, H).
-    pub rows: DMatrix<f64>,
-    /// `Q^T N^(-1/2) r`, r = misfit + J c0.
-    pub residual: DVector<f64>,
-    /// `Q^T N^(-1/2) D'` (directions, columns).
-    pub slopes: DMatrix<f64>,
-    /// What is along the other directions.
-    pub beside: Beside,
+    /// W (data, data), lower triangular.
+    whiten: DMatrix<f64>,
+    /// Q (data, kept), orthonormal.
+    directions: DMatrix<f64>,
+    /// `Q^T W J c0`, which makes a residual of a misfit.
+    expected: DVector<f64>,
+    /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data.
+    pub constant: f64,
 }
 
-/// Along the directions in which there is noise alone: products of residual and slopes.
+/// Misfit and slopes of an epoch in these numbers, and what is along the other directions.
 #[derive(Clone, Debug)]
-pub struct Beside {
-    /// Number of data of the epoch, all directions.
-    pub data: usize,
-    /// Logarithm of the determinant of N.
-    pub ln_noise: f64,
-    /// Squared residual.
+pub struct Told {
+    /// `Q^T W (misfit + J c0)`.
+    pub residual: DVector<f64>,
+    /// `Q^T W D'` (kept, columns).
+    pub slopes: DMatrix<f64>,
+    /// Squared misfit along the other directions.
     pub chi2: f64,
-    /// Slopes times residual.
+    /// Slopes times misfit there.
     pub gradient: DVector<f64>,
-    /// Slopes times slopes.
+    /// Slopes times slopes there.
     pub information: DMatrix<f64>,
 }
 
 impl Compressed {
-    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`.
-    /// `None` where the covariance of the noise has no Cholesky factor.
-    pub fn new(epoch: &Epoch, around: DVectorView<f64>, sd: &[f64], how: Compression) -> Option<Self> {
+    /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`;
+    /// and its `Q^T W J S^(1/2)` (kept, H). `None` where the covariance of the noise has no Cholesky factor.
+    pub fn new(epoch: &Epoch, around: DVectorView<f64>, sd: &[f64], how: Compression) -> Option<(Self, DMatrix<f64>)> {
         let factor = epoch.noise().cholesky()?.unpack();
-        let whiten = factor.solve_lower_triangular(&DMatrix::identity(epoch.len(), epoch.len()))?;
-        let mut scaled = epoch.jacobian.clone();
-        scaled.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
-        let directions = directions(&whiten, &scaled, how)?;
-        let along = directions.tr_mul(&whiten);
-        let residual = &whiten * (&epoch.misfit + &epoch.jacobian * around);
-        let slopes = &whiten * &epoch.slopes;
-        let (kept, kept_slopes) = (directions.tr_mul(&residual), directions.tr_mul(&slopes));
-        let (rest, rest_slopes) = (residual - &directions * &kept, slopes - &directions * &kept_slopes);
-        let beside = Beside {
-            data: epoch.len(),
-            ln_noise: 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>(),
+        let n = epoch.len();
+        let whiten = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
+        let mut rows = &whiten * &epoch.jacobian;
+        rows.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
+        let mut directions = DMatrix::identity(n, n);
+        if how.left_out > 0.0 && n > 0 {
+            directions = leading(&rows, how)?;
+            directions = with(directions, &(&whiten * &epoch.misfit));
+            directions = with(directions, &(&whiten * &epoch.slopes));
+            rows = directions.tr_mul(&rows);
+        }
+        let expected = directions.tr_mul(&(&whiten * (&epoch.jacobian * around)));
+        let ln_noise = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        let constant = -0.5 * (ln_noise + n as f64 * TAU.ln());
+        Some((Compressed { whiten, directions, expected, constant }, rows))
+    }
+
+    /// Misfit (data) and slopes (data, columns) of this epoch, those of which it was made or others.
+    pub fn tell(&self, misfit: &DVector<f64>, slopes: &DMatrix<f64>) -> Told {
+        let (misfit, slopes) = (&self.whiten * misfit, &self.whiten * slopes);
+        let (kept, kept_slopes) = (self.directions.tr_mul(&misfit), self.directions.tr_mul(&slopes));
+        let (rest, rest_slopes) = (misfit - &self.directions * &kept, slopes - &self.directions * &kept_slopes);
+        Told {
+            residual: kept + &self.expected,
+            slopes: kept_slopes,
             chi2: rest.norm_squared(),
             gradient: rest_slopes.tr_mul(&rest),
             information: rest_slopes.tr_mul(&rest_slopes),
-        };
-        Some(Compressed { rows: along * scaled, residual: kept, slopes: kept_slopes, beside })
+        }
+    }
+
+    /// Number of data.
+    pub fn data(&self) -> usize {
+        self.whiten.nrows()
     }
 }
 
-/// Orthonormal directions Q (data, kept) that hold all of `N^(-1/2) J S^(1/2)` but what may be lost; `None` if that is
-/// not finite.
-fn directions(whiten: &DMatrix<f64>, scaled: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
-    let n = whiten.nrows();
-    if how.left_out == 0.0 {
-        return Some(DMatrix::identity(n, n));
-    }
-    let gram = whiten * (scaled * scaled.transpose()) * whiten.transpose();
-    let eigen = gram.try_symmetric_eigen(f64::EPSILON, 0)?;
+/// Orthonormal directions (data, kept) that hold all of `rows` (data, H) but what may be lost; `None` if that is not
+/// finite.
+fn leading(rows: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
+    let n = rows.nrows();
+    let eigen = (rows * rows.transpose()).try_symmetric_eigen(f64::EPSILON, MOST_ROTATIONS)?;
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     let mut left_out = 0.0;
@@ -96,4 +115,23 @@ fn directions(whiten: &DMatrix<f64>, scaled: &DMatrix<f64>, how: Compression) ->
     });
     let columns: Vec<_> = kept.map(|i| eigen.eigenvectors.column(i)).collect();
     Some(if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) })
+}
+
+/// Orthonormal directions that hold some more columns, too.
+fn with<C: nalgebra::Dim, S: nalgebra::Storage<f64, nalgebra::Dyn, C>>(
+    mut directions: DMatrix<f64>,
+    more: &nalgebra::Matrix<f64, nalgebra::Dyn, C, S>,
+) -> DMatrix<f64> {
+    for column in more.column_iter() {
+        let mut rest = column - &directions * directions.tr_mul(&column);
+        // once more, for the first time leaves rounding errors of the size of the column
+        rest -= &directions * directions.tr_mul(&rest);
+        let norm = rest.norm();
+        if norm > 1e-10 * column.norm() {
+            let columns = directions.ncols();
+            directions = directions.insert_column(columns, 0.0);
+            directions.set_column(columns, &(rest / norm));
+        }
+    }
+    directions
 }

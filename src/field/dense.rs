@@ -76,10 +76,16 @@ impl Factor {
 
     /// `L^-1 B` in place of B (n, columns).
     pub fn forward(&self, b: &mut DMatrix<f64>) {
-        let (n, columns) = b.shape();
+        self.forward_from(b, &vec![0; b.ncols()]);
+    }
+
+    /// The same where each column of B is known to be zero in its rows before `starts`, which are in ascending order.
+    pub fn forward_from(&self, b: &mut DMatrix<f64>, starts: &[usize]) {
+        let n = b.nrows();
         for ((first, width), inverse) in blocks(n, BLOCK).zip(&self.inverses) {
-            let solved = inverse * b.rows(first, width);
-            b.rows_mut(first, width).copy_from(&solved);
+            let columns = starts.partition_point(|start| *start < first + width);
+            let solved = inverse * b.view((first, 0), (width, columns));
+            b.view_mut((first, 0), (width, columns)).copy_from(&solved);
             let below = first + width;
             if below < n {
                 let left = self.lower.view((below, first), (n - below, width));
@@ -165,6 +171,12 @@ mod tests {
             let mut b = some(n, 9);
             factor.forward(&mut b);
             assert!((plain.l() * b - some(n, 9)).amax() < 1e-11);
+            // columns that begin later and later
+            let starts: Vec<usize> = (0..9).map(|j| j * n / 9).collect();
+            let late = some(n, 9).map_with_location(|i, j, x| if i < starts[j] { 0.0 } else { x });
+            let mut b = late.clone();
+            factor.forward_from(&mut b, &starts);
+            assert!((plain.l() * b - late).amax() < 1e-11);
             assert!((factor.inverse().lower_triangle() - plain.inverse().lower_triangle()).amax() < 1e-11);
         }
     }

@@ -44,6 +44,25 @@ impl Epoch {
             && self.variance.iter().all(|v| v.is_finite() && *v > 0.0)
     }
 
+    /// With noise of its own on each number of which there are slopes, of these standard deviations (columns): more
+    /// nuisances. A velocity jitter is this, with slopes `D'`; that of [`super::Quadratic::jittered`] leaves the most
+    /// probable field as it is without.
+    #[must_use]
+    pub fn jittered(mut self, sd: &[f64]) -> Self {
+        assert_eq!(sd.len(), self.slopes.ncols(), "standard deviations of all numbers of an epoch");
+        let (before, more) = (self.nuisances.ncols(), sd.len());
+        self.nuisances = self.nuisances.resize_horizontally(before + more, 0.0);
+        for (j, sd) in sd.iter().enumerate() {
+            self.nuisances.set_column(before + j, &(self.slopes.column(j) * *sd));
+        }
+        self
+    }
+
+    /// `J^T N^-1 misfit` (H); `None` where the covariance of the noise has no Cholesky factor.
+    pub(super) fn pulled(&self) -> Option<DVector<f64>> {
+        Some(self.jacobian.tr_mul(&self.noise().cholesky()?.solve(&self.misfit)))
+    }
+
     /// Panics where shapes do not go together: that is a mistake of the program.
     pub(super) fn check_shapes(&self, coefficients: usize) {
         let n = self.len();

@@ -1,36 +1,48 @@
 //! Gaussian fields on the sphere and in time, integrated out of data that are linear, or nearly so, in them.
 //!
-//! A field `x(p, t) = sum_h c_h(t) Y_h(p)`: real spherical harmonics ([`harmonics`]) whose coefficients are independent
-//! Gaussian processes, `<c_h(t) c_h(t')> = S_h k(t - t')`, with a [`spectrum`] S over degrees and a [`kernel`] k in
-//! time. In come epochs ([`Epoch`]): at a time, data `r = J c + noise` with J made linear around some coefficients,
-//! noise with nuisances, and slopes `D'` of numbers whose gradient is asked for. Out come ln Z with all fields
-//! integrated out, the most probable field at any time with its standard deviation, and gradient and information of
-//! those numbers.
+//! A field `x(p, t) = sum_h c_h(t) Y_h(p)`: real spherical harmonics ([`Harmonics`]) whose coefficients are independent
+//! Gaussian processes, `<c_h(t) c_h(t')> = S_h k(t - t')`, with a [`Spectrum`] S over degrees and a [`Kernel`] k in
+//! time. Units of the field and of the data are the caller's; times are days.
 //!
-//! Steps, in this order:
-//! 1. [`settle`]: where data are not linear, Gauss-Newton to the most probable coefficients, which
-//!    linearises at each step and asks
-//! 2. [`compress`] for the few combinations of an epoch's data that say something of the field, of which
-//! 3. [`evidence`] makes covariance, ln Z and all that follows from it, with the means of `dense`.
+//! A likelihood by these steps:
+//! 1. Say what is assumed: a [`Field`] (amplitude, slope, lifetime or static, persistent share), and the degree of each
+//!    coefficient ([`Harmonics::degrees`]).
+//! 2. Write a closure from coefficients (H, epochs) to one [`Epoch`] a profile, made linear there: time, design J,
+//!    misfit, variance of the noise, columns of nuisances, slopes D' in the velocity. Errors that go together over
+//!    neighbouring bins are larger variances; a velocity jitter that the field is to know of is
+//!    [`Epoch::jittered`].
+//! 3. [`settle()`] finds the most probable coefficients, from zeros once and from those of a reference afterwards, and
+//!    gives the [`Evidence`] there. For data that are linear, [`Evidence::new`] does.
+//! 4. [`Evidence::quadratic`]: ln Z, and its gradient and information in the velocities; a jitter of any size by
+//!    [`Quadratic::jittered`], at once. [`Evidence::with`]: the same for another orbit, design unchanged, by new
+//!    misfits and slopes.
+//! 5. [`Evidence::derivatives`]: of ln Z, with respect to the hyperparameters.
+//! 6. [`Evidence::coefficients_at`], [`Evidence::means`] and [`Evidence::standard_deviations`]: the field after the
+//!    data, at any time.
 //!
-//! Units of the field and of the data are the caller's; times are
-//! days.
+//! Inside, `compress` finds the few numbers of an epoch that say something of the field, and `dense` has the products
+//! and the Cholesky factor in which nearly all of the time goes.
 
-pub mod compress;
+mod compress;
 mod dense;
-pub mod epoch;
-pub mod evidence;
-pub mod harmonics;
-pub mod kernel;
-pub mod settle;
-pub mod spectrum;
+mod derivatives;
+mod epoch;
+mod evidence;
+mod harmonics;
+mod kernel;
+mod maps;
+mod quadratic;
+mod settle;
+mod spectrum;
 
 pub use compress::Compression;
+pub use derivatives::Derivatives;
 pub use epoch::Epoch;
-pub use evidence::{Derivatives, Evidence};
+pub use evidence::Evidence;
 pub use harmonics::Harmonics;
 pub use kernel::{Kernel, Lifetime};
-pub use settle::{Model, Settled, Settling};
+pub use quadratic::Quadratic;
+pub use settle::{Settled, Settling, Sought, settle};
 pub use spectrum::Spectrum;
 
 use serde::{Deserialize, Serialize};

@@ -3,17 +3,25 @@
 //!
 //! The largest change of the field in a step is limited: far from the answer the linear model promises too much. Start
 //! from no field at all or from the answer of the same hyperparameters nearby; from that of others it may not come
-//! back.
+//! back. Where the field hardly changes any more, steps by the covariance of an earlier one come nearer as fast as by
+//! one of their own, and cost next to nothing.
 
 use super::{Compression, Epoch, Evidence, Field, FieldError};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// What is observed of a field.
-pub trait Model {
-    /// All epochs, made linear around coefficients (H, epochs), one column an epoch: always the same epochs in the same
-    /// order. Numbers that are not finite, where there is no model, are noticed.
-    fn linearise(&mut self, coefficients: &DMatrix<f64>) -> Vec<Epoch>;
+/// Largest change of the field in a step after which the next is made by the same covariance.
+const FROZEN_BELOW: f64 = 0.1;
+
+/// What is looked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Sought<'a> {
+    /// The field before the data.
+    pub field: Field,
+    /// Degree of each coefficient (H).
+    pub degrees: &'a [usize],
+    /// Harmonics (H, points) of the points at which changes of the field are watched: some hundred.
+    pub watched: &'a DMatrix<f64>,
 }
 
 /// When Gauss-Newton ends.
@@ -32,7 +40,7 @@ pub struct Settling {
 
 impl Default for Settling {
     fn default() -> Self {
-        Settling { steps: 40, tolerance: 1e-3, longest: 0.6, compression: Compression::default() }
+        Settling { steps: 40, tolerance: 1e-4, longest: 0.6, compression: Compression::default() }
     }
 }
 
@@ -43,47 +51,71 @@ pub struct Settled {
     pub coefficients: DMatrix<f64>,
     /// The evidence of the data linearised there.
     pub evidence: Evidence,
-    /// Steps that were made.
-    pub steps: usize,
+    /// Steps that were made, and in how many of them a covariance was made anew.
+    pub steps: [usize; 2],
+    /// Largest change of the field in the last of them.
+    pub change: f64,
 }
 
-/// Finds the most probable field from the coefficients `start` (H, epochs), zeros for no field. The change of the field
-/// is watched at points, given their harmonics (H, points).
+/// Finds the most probable field from the coefficients `start` (H, epochs), zeros for no field. `linearise` makes all
+/// epochs linear around such coefficients, one column an epoch: always the same epochs in the same order. Where there
+/// is no model it gives numbers that are not finite.
+///
+/// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
+/// left of the way is an error of ln Z (`docs/method.md` section 9).
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].
 pub fn settle(
-    model: &mut impl Model,
-    field: Field,
-    degrees: &[usize],
-    watched: &DMatrix<f64>,
+    mut linearise: impl FnMut(&DMatrix<f64>) -> Vec<Epoch>,
+    sought: Sought,
     start: DMatrix<f64>,
+    nearby: Option<&Evidence>,
     settings: &Settling,
 ) -> Result<Settled, FieldError> {
     let mut coefficients = start;
-    let mut change = f64::INFINITY;
-    for steps in 0..=settings.steps {
-        let evidence = linear(model, field, degrees, &coefficients, settings)?;
-        if change < settings.tolerance {
-            return Ok(Settled { coefficients, evidence, steps });
-        }
-        let step = evidence.coefficients() - &coefficients;
-        change = (watched.tr_mul(&step)).amax();
-        if !change.is_finite() {
+    let mut epochs = linearise(&coefficients);
+    let mut changes = [f64::INFINITY; 2];
+    let mut last: Option<Evidence> = None;
+    let mut steps = [0; 2];
+    let evidence = |epochs: &[Epoch], around: &DMatrix<f64>| {
+        Evidence::new(sought.field, sought.degrees, epochs, around, settings.compression)
+    };
+    while steps[0] < settings.steps {
+        let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || converges(changes)) {
+            Some(earlier) => earlier,
+            None => {
+                steps[1] += 1;
+                last.insert(evidence(&epochs, &coefficients)?)
+            }
+        };
+        let step = by.step(&sought.field, &coefficients, &pulled(&epochs)?);
+        steps[0] += 1;
+        changes = [changes[1], sought.watched.tr_mul(&step).amax()];
+        if !changes[1].is_finite() {
             break;
         }
-        coefficients += step * (settings.longest / change).min(1.0);
+        coefficients += step * (settings.longest / changes[1]).min(1.0);
+        epochs = linearise(&coefficients);
+        if changes[1] < settings.tolerance {
+            let evidence = evidence(&epochs, &coefficients)?;
+            return Ok(Settled { coefficients, evidence, steps, change: changes[1] });
+        }
     }
-    Err(FieldError::NotSettled { steps: settings.steps, change })
+    Err(FieldError::NotSettled { steps: steps[0], change: changes[1] })
 }
 
-/// The evidence of the model linearised at coefficients.
-fn linear(
-    model: &mut impl Model,
-    field: Field,
-    degrees: &[usize],
-    coefficients: &DMatrix<f64>,
-    settings: &Settling,
-) -> Result<Evidence, FieldError> {
-    Evidence::new(field, degrees, &model.linearise(coefficients), coefficients, settings.compression)
+/// Whether steps by the covariance of an earlier one come nearer.
+fn converges([before, last]: [f64; 2]) -> bool {
+    last < FROZEN_BELOW && last < 0.5 * before
+}
+
+/// `J^T N^-1 misfit` (H, epochs).
+fn pulled(epochs: &[Epoch]) -> Result<DMatrix<f64>, FieldError> {
+    let mut all = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.ncols()), epochs.len());
+    for (k, epoch) in epochs.iter().enumerate() {
+        let pulled = epoch.is_sound().then(|| epoch.pulled()).flatten();
+        all.set_column(k, &pulled.ok_or(FieldError::NotFinite { epoch: k })?);
+    }
+    Ok(all)
 }

@@ -6,6 +6,7 @@ mod chain;
 mod ensemble;
 mod expansion;
 mod field;
+mod field_algebra;
 mod figure;
 mod first_look;
 mod forward;

@@ -1,0 +1,85 @@
+//! The field after the data (`docs/method.md` section 9): its mean `c(t) = sum_k k(t - t_k) S J_k^T (C^-1 r)_k`, its
+//! standard deviation at points, and the step of Gauss-Newton that both imply.
+
+use super::{Evidence, Field};
+use nalgebra::{DMatrix, DVector};
+
+impl Evidence {
+    /// Most probable coefficients (H, epochs) at the times of the epochs.
+    pub fn coefficients(&self) -> DMatrix<f64> {
+        self.coefficients_at(&self.times_d)
+    }
+
+    /// Most probable coefficients (H, times) at any times (d).
+    pub fn coefficients_at(&self, times_d: &[f64]) -> DMatrix<f64> {
+        self.spread(&self.dual, times_d)
+    }
+
+    /// Mean of the field (points, times) at points, given their harmonics (H, points), and at any times (d).
+    pub fn means(&self, harmonics: &DMatrix<f64>, times_d: &[f64]) -> DMatrix<f64> {
+        harmonics.tr_mul(&self.coefficients_at(times_d))
+    }
+
+    /// Standard deviation of the field (points, times) at points, given their harmonics (H, points), and at any times
+    /// (d).
+    pub fn standard_deviations(&self, harmonics: &DMatrix<f64>, times_d: &[f64]) -> DMatrix<f64> {
+        let mut scaled = harmonics.clone();
+        scale_rows(&mut scaled, &self.sd);
+        let seen = &self.rows * &scaled;
+        let before: Vec<f64> = scaled.column_iter().map(|point| point.norm_squared()).collect();
+        let correlations = correlations(&self.field, &self.times_d, times_d);
+        let mut after = DMatrix::zeros(harmonics.ncols(), times_d.len());
+        for (correlations, mut after) in correlations.column_iter().zip(after.column_iter_mut()) {
+            let mut known = seen.clone();
+            for (part, correlation) in self.parts.iter().zip(&correlations) {
+                let mut rows = known.rows_range_mut(part.clone());
+                rows *= *correlation;
+            }
+            self.factor.forward(&mut known);
+            for ((after, before), known) in after.iter_mut().zip(&before).zip(known.column_iter()) {
+                // rounding may take more than there was
+                *after = (before - known.norm_squared()).max(0.0).sqrt();
+            }
+        }
+        after
+    }
+
+    /// The Newton step (H, epochs) from coefficients c (H, epochs) for a `field` and a model that may differ somewhat
+    /// from those of this evidence, where `pulled` is `J^T N^-1 misfit` (H, epochs) at c:
+    /// `(1 - K J^T C^-1 J) (K' pulled - c)`, K' of that field, all else of this evidence. With all of one model that is
+    /// the step of Gauss-Newton; and it vanishes at the most probable coefficients of the other, `c = K' pulled`.
+    pub(super) fn step(&self, field: &Field, coefficients: &DMatrix<f64>, pulled: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut gradient = pulled * correlations(field, &self.times_d, &self.times_d);
+        scale_rows(&mut gradient, &field.spectrum.variances(&self.degrees));
+        gradient -= coefficients;
+        let mut scaled = gradient.clone();
+        scale_rows(&mut scaled, &self.sd.iter().map(|sd| if *sd > 0.0 { sd.recip() } else { 0.0 }).collect::<Vec<_>>());
+        let mut seen = DVector::zeros(self.rows.nrows());
+        for (part, scaled) in self.parts.iter().zip(scaled.column_iter()) {
+            seen.rows_range_mut(part.clone()).gemv(1.0, &self.rows.rows_range(part.clone()), &scaled, 0.0);
+        }
+        gradient - self.spread(&self.factor.solve(&seen), &self.times_d)
+    }
+
+    /// `K J^T N^(-1/2) x`, coefficients (H, times) at any times (d), of numbers x as compressed.
+    fn spread(&self, x: &DVector<f64>, times_d: &[f64]) -> DMatrix<f64> {
+        let mut pulls = DMatrix::zeros(self.sd.len(), self.times_d.len());
+        for (part, mut pull) in self.parts.iter().zip(pulls.column_iter_mut()) {
+            pull.gemv_tr(1.0, &self.rows.rows_range(part.clone()), &x.rows_range(part.clone()), 0.0);
+        }
+        scale_rows(&mut pulls, &self.sd);
+        pulls * correlations(&self.field, &self.times_d, times_d)
+    }
+}
+
+/// k between some times (rows) and others (d).
+fn correlations(field: &Field, times_d: &[f64], others_d: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(times_d.len(), others_d.len(), |k, t| field.kernel.at(times_d[k] - others_d[t]))
+}
+
+/// Multiplies each row by a factor of its own.
+fn scale_rows(matrix: &mut DMatrix<f64>, factors: &[f64]) {
+    for mut column in matrix.column_iter_mut() {
+        column.iter_mut().zip(factors).for_each(|(x, factor)| *x *= factor);
+    }
+}

@@ -1,0 +1,43 @@
+//! ln Z to second order in numbers of the epochs, velocities for example (`docs/method.md` section 9).
+
+use nalgebra::{DMatrix, DVector};
+
+/// `ln Z(v) = ln Z + g^T v - 1/2 v^T I v` of numbers v that change the models of the epochs by slopes `D' v`: exactly
+/// so as long as the design and the slopes are those at v = 0. The numbers of one epoch stand together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quadratic {
+    /// ln Z at v = 0, all constants included.
+    pub ln_evidence: f64,
+    /// g = `D'^T C^-1 r`.
+    pub gradient: DVector<f64>,
+    /// I = `D'^T C^-1 D'`, symmetric.
+    pub information: DMatrix<f64>,
+}
+
+impl Quadratic {
+    /// `ln Z(v)`.
+    pub fn at(&self, v: &DVector<f64>) -> f64 {
+        self.ln_evidence + self.gradient.dot(v) - 0.5 * (&self.information * v).dot(v)
+    }
+
+    /// The same where each number has noise of its own beside what is asked of it, of standard deviation `sd`:
+    /// integrated out, as if `D' sd` had been nuisances of the epochs. `None` where the information is not finite.
+    pub fn jittered(&self, sd: &[f64]) -> Option<Self> {
+        let n = self.gradient.len();
+        assert_eq!(sd.len(), n, "standard deviations of all numbers");
+        // with s the diagonal matrix of sd, A = 1 + s I s
+        let mut scaled = self.information.clone();
+        scaled.row_iter_mut().zip(sd).for_each(|(mut row, sd)| row *= *sd);
+        let mut a = scaled.clone();
+        a.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
+        a += DMatrix::identity(n, n);
+        let factor = a.cholesky()?;
+        let pulled = DVector::from_fn(n, |k, _| sd[k] * self.gradient[k]);
+        let answer = factor.solve(&pulled);
+        Some(Quadratic {
+            ln_evidence: self.ln_evidence + 0.5 * pulled.dot(&answer) - 0.5 * factor.ln_determinant(),
+            gradient: &self.gradient - scaled.tr_mul(&answer),
+            information: &self.information - scaled.tr_mul(&factor.solve(&scaled)),
+        })
+    }
+}
