@@ -13,6 +13,7 @@ pub mod expansion;
 pub mod first_look;
 pub mod fit;
 pub mod imaging;
+pub mod marginal;
 pub mod noise;
 pub mod nuisances;
 pub mod objective;

@@ -123,6 +123,14 @@ impl Nuisances {
         Nuisances { templates, corrections, ..*self }
     }
 
+    /// How the depths of the profile with these `bins` change with line and continuum, per standard deviation of their
+    /// priors (bins, nuisances).
+    pub fn line_and_continuum_of(&self, bins: Range<usize>) -> DMatrix<f64> {
+        let columns: Vec<&Vec<f64>> =
+            self.templates.iter().filter(|(i, _)| *i != ZERO_POINT).map(|(_, template)| template).collect();
+        DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][bins.start + j])
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.templates.is_empty()

@@ -10,6 +10,7 @@ use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
 use crate::numerics::vector::{self, Instructions, Number, Task};
 use crate::star::observation::Observations;
+use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// When and at which velocities the star is observed.
@@ -166,6 +167,14 @@ impl Response {
         }
         depths
     }
+
+    /// The same of a star that changes: profile k sees the brightness map in column k (pixels, profiles).
+    pub fn depths_of_each(&self, brightness: &DMatrix<f64>) -> Vec<f64> {
+        assert_eq!(brightness.shape(), (self.pixels(), self.profiles()), "a map of each profile");
+        let mut depths = vec![0.0; self.data_len()];
+        vector::run(OfEach { response: self, brightness, depths: &mut depths });
+        depths
+    }
 }
 
 /// A star, its surface that of the state, as it is observed.
@@ -232,6 +241,27 @@ impl Task for Apply<'_> {
         let mut pass = Pass::new(response);
         for (k, continuum) in continuum.iter_mut().enumerate() {
             *continuum = pass.forward(instructions, k, x, &mut line[response.bins(k)]);
+        }
+    }
+}
+
+struct OfEach<'a> {
+    response: &'a Response,
+    brightness: &'a DMatrix<f64>,
+    depths: &'a mut [f64],
+}
+
+impl Task for OfEach<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, instructions: I) {
+        let OfEach { response, brightness, depths } = self;
+        let mut pass = Pass::new(response);
+        for (k, map) in brightness.column_iter().enumerate() {
+            let depths = &mut depths[response.bins(k)];
+            let continuum = pass.forward(instructions, k, map.as_slice(), depths);
+            depths.iter_mut().for_each(|depth| *depth /= continuum);
         }
     }
 }

@@ -22,6 +22,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "imaging",
             "objective",
             "expansion",
+            "marginal",
             "surrogate",
             "simulate",
             "noise",
@@ -29,7 +30,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "detection",
             "zero_points",
         ],
-        &["numerics", "star", "maxent", "planets", "sampling"],
+        &["numerics", "star", "maxent", "field", "planets", "sampling"],
     ),
     (
         "data",

@@ -1,5 +1,6 @@
 //! The method against independent numbers, limit cases and itself: the library alone.
 
+mod marginal;
 mod common;
 
 mod chain;

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 pub use counted::SpotsCounted;
 pub use marginal::{Nuisance, nuisances};
-pub use model::velocity_slopes;
+pub use model::{VELOCITY_STEP_KMS, stellar_step, velocity_slopes};
 pub use spots::UNRESOLVED_SPOTS;
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
@@ -159,7 +159,7 @@ impl Expansion {
 }
 
 /// Velocities of the profiles at these rotation cycles, and stellar parameters.
-fn coordinates(values: &ParameterValues, cycles: &[f64], stellar: &[Parameter]) -> DVector<f64> {
+pub fn coordinates(values: &ParameterValues, cycles: &[f64], stellar: &[Parameter]) -> DVector<f64> {
     let state = values.state();
     let velocities = state.orbit.velocities_kms(cycles).map(|orbit| state.vsys_kms + orbit);
     DVector::from_vec(velocities.chain(stellar.iter().map(|&p| values[p])).collect())

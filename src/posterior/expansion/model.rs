@@ -12,10 +12,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Step of the velocities (km/s): derivatives of a line are good to its square over that of the line's width.
-const VELOCITY_STEP_KMS: f64 = 0.02;
+pub const VELOCITY_STEP_KMS: f64 = 0.02;
 
 /// Step of a stellar parameter: large enough that so many pixels come into sight at the limb that they do so smoothly.
-fn step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64 {
+pub fn stellar_step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64 {
     // angle (rad) that the star turns by in half the time base
     let turn = 0.01 / (0.5 * time_base_d).max(1e-3);
     match parameter {
@@ -50,7 +50,7 @@ impl<'a> DisplacedModel<'a> {
     pub fn new(imager: &'a Imager, reference: &'a Reference, stellar: &[Parameter]) -> Self {
         let map = imager.entropy.image(&reference.solution.image.coordinates);
         let base = imager.time_base_cycles() * imager.star.rotation_period_d;
-        let steps: Vec<f64> = stellar.iter().map(|&p| step(p, &reference.values, base)).collect();
+        let steps: Vec<f64> = stellar.iter().map(|&p| stellar_step(p, &reference.values, base)).collect();
         let at = |response: Response| displaced(imager, response, &map);
         let here = at(reference.response.clone());
         let shift = |h: f64| at(shifted(imager, &reference.response, &reference.values, h));

@@ -1,0 +1,130 @@
+//! The star's side of the marginal likelihood: what profiles each harmonic makes.
+
+use super::{DEGREE, MEAN_FILLING};
+use crate::field::{Epoch, Harmonics};
+use crate::posterior::imaging::Imager;
+use crate::star::{Response, StarState, SurfaceGrid};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Pixels at which changes of the maps are watched, about.
+const WATCHED: usize = 150;
+
+/// The harmonics on the pixels of a map.
+#[derive(Clone, Debug)]
+pub struct Basis {
+    /// Degree of each harmonic (H).
+    pub degrees: Vec<usize>,
+    /// The harmonics (pixels, H).
+    pub on_pixels: DMatrix<f64>,
+    /// The harmonics (H, points) where changes of the maps are watched.
+    pub(super) watched: DMatrix<f64>,
+}
+
+impl Basis {
+    /// On the pixels of `grid`.
+    pub fn new(grid: &SurfaceGrid) -> Self {
+        let harmonics = Harmonics::new(DEGREE);
+        let on_pixels = harmonics.at(&grid.longitude, &grid.latitude);
+        let each = (grid.len() / WATCHED).max(1);
+        let watched: Vec<usize> = (0..grid.len()).step_by(each).collect();
+        Basis {
+            degrees: harmonics.degrees(),
+            watched: on_pixels.select_columns(&watched),
+            on_pixels: on_pixels.transpose(),
+        }
+    }
+
+    /// Spot filling factors (pixels, columns) of maps with these `coefficients` (H, columns).
+    pub fn filling(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
+        (&self.on_pixels * coefficients).add_scalar(MEAN_FILLING)
+    }
+
+    /// Brightness of the same over that of the photosphere, for spots of that `contrast`.
+    pub fn brightness(&self, coefficients: &DMatrix<f64>, contrast: f64) -> DMatrix<f64> {
+        self.filling(coefficients).map(|filling| 1.0 - (1.0 - contrast) * filling)
+    }
+}
+
+/// Line depth and continuum of every profile for each harmonic, before the division of one by the other.
+#[derive(Clone, Debug)]
+pub struct Design {
+    response: Response,
+    /// Of each profile (bins, H).
+    line: Vec<DMatrix<f64>>,
+    /// (H, profiles).
+    continuum: DMatrix<f64>,
+    /// The same of a star without spots: all bins, all profiles.
+    bare_line: Vec<f64>,
+    bare_continuum: Vec<f64>,
+}
+
+impl Design {
+    /// Of the star in `imager` at `state`. A model application a harmonic.
+    pub fn new(imager: &Imager, basis: &Basis, state: &StarState) -> Self {
+        Design::of(imager.response(state), basis)
+    }
+
+    /// Seen through `response`.
+    pub fn of(response: Response, basis: &Basis) -> Self {
+        let apply = |map: &[f64]| {
+            let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
+            response.apply(map, &mut line, &mut continuum);
+            (line, continuum)
+        };
+        let columns: Vec<(Vec<f64>, Vec<f64>)> =
+            (0..basis.degrees.len()).into_par_iter().map(|h| apply(basis.on_pixels.column(h).as_slice())).collect();
+        let of_profile = |k: usize| {
+            let bins = response.bins(k);
+            let mut line = DMatrix::zeros(bins.len(), columns.len());
+            for (mut to, (from, _)) in line.column_iter_mut().zip(&columns) {
+                to.copy_from_slice(&from[bins.clone()]);
+            }
+            line
+        };
+        let line = (0..response.profiles()).map(of_profile).collect();
+        let continuum = DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]);
+        let (bare_line, bare_continuum) = apply(&vec![1.0; response.pixels()]);
+        Design { response, line, continuum, bare_line, bare_continuum }
+    }
+
+    /// Brightness of a spot over that of the photosphere.
+    pub fn contrast(&self) -> f64 {
+        self.response.contrast()
+    }
+
+    /// The response that it was made with.
+    pub fn response(&self) -> &Response {
+        &self.response
+    }
+
+    /// Model depth of the bins of profile `k` for a map of these coefficients, and its continuum.
+    fn depths(&self, k: usize, coefficients: &DVector<f64>) -> (DVector<f64>, f64) {
+        let q = 1.0 - self.contrast();
+        let bare = 1.0 - q * MEAN_FILLING;
+        let continuum = bare * self.bare_continuum[k] - q * self.continuum.column(k).dot(coefficients);
+        let line = DVector::from_column_slice(&self.bare_line[self.response.bins(k)]) * bare;
+        ((line - &self.line[k] * coefficients * q) / continuum, continuum)
+    }
+
+    /// The profiles linearised around maps of these coefficients (H, profiles), without slopes.
+    pub fn epochs(&self, imager: &Imager, maps: &DMatrix<f64>) -> Vec<Epoch> {
+        (0..self.response.profiles()).into_par_iter().map(|k| self.epoch(imager, k, &maps.column(k).into_owned())).collect()
+    }
+
+    fn epoch(&self, imager: &Imager, k: usize, coefficients: &DVector<f64>) -> Epoch {
+        let (bins, data) = (self.response.bins(k), &imager.data);
+        let (model, continuum) = self.depths(k, coefficients);
+        let scale = -(1.0 - self.contrast()) / continuum;
+        let mut jacobian = &self.line[k] * scale;
+        jacobian.ger(-scale, &model, &self.continuum.column(k), 1.0);
+        Epoch {
+            time_d: imager.sampling.profiles[k].0,
+            jacobian,
+            misfit: DVector::from_column_slice(&data.depth[bins.clone()]) - model,
+            variance: DVector::from_iterator(bins.len(), data.inverse_variance[bins.clone()].iter().map(|w| w.recip())),
+            nuisances: data.nuisances.line_and_continuum_of(bins.clone()),
+            slopes: DMatrix::zeros(bins.len(), 0),
+        }
+    }
+}

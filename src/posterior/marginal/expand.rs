@@ -1,0 +1,106 @@
+//! ln Z to second order in the velocities of the profiles and in the star's own parameters.
+
+use super::{Basis, Marginal};
+use crate::field::{FieldError, Quadratic};
+use crate::posterior::expansion::{Expansion, VELOCITY_STEP_KMS, coordinates, stellar_step};
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::{Parameter, ParameterValues};
+use crate::star::Response;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+impl Marginal {
+    /// ln Z, the jitter counted.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn ln_evidence(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
+        match self.assumed.jitter_kms {
+            0.0 => Ok(self.settled.evidence.ln_evidence()),
+            _ => Ok(self.quadratic(imager, basis, &[])?.ln_evidence),
+        }
+    }
+
+    /// ln Z around the values, at the most probable maps. As the maps are fixed in the derivatives, the information is
+    /// that of the model linearised there; the covariance of the gradient over data of the model is the same matrix.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn expansion(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
+        let Quadratic { ln_evidence, gradient, information } = self.quadratic(imager, basis, stellar)?;
+        let cycles = imager.cycles();
+        Ok(Expansion {
+            values: self.values,
+            centre: coordinates(&self.values, &cycles, stellar),
+            cycles,
+            stellar: stellar.to_vec(),
+            log_likelihood: ln_evidence,
+            gradient,
+            noise: information.clone(),
+            information,
+        })
+    }
+
+    fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
+        let slopes = self.slopes(imager, basis, stellar);
+        let misfits: Vec<DVector<f64>> =
+            self.design.epochs(imager, &self.settled.coefficients).into_iter().map(|epoch| epoch.misfit).collect();
+        let of_all = self.settled.evidence.with(&misfits, &slopes)?;
+        let summed = summed(&of_all, misfits.len(), stellar.len());
+        if self.assumed.jitter_kms == 0.0 {
+            return Ok(summed);
+        }
+        let mut sd = vec![self.assumed.jitter_kms; misfits.len()];
+        sd.resize(summed.gradient.len(), 0.0);
+        summed.jittered(&sd).ok_or(FieldError::NotPositive)
+    }
+
+    /// How the depths of each profile change with its velocity and with the star's parameters, at the most probable
+    /// maps (bins, 1 + parameters).
+    fn slopes(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+        let brightness = self.brightness(basis);
+        let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
+        let derivative = |parameter: Option<Parameter>| {
+            let h = parameter.map_or(VELOCITY_STEP_KMS, |p| stellar_step(p, &self.values, time_base_d));
+            let at = |h: f64| {
+                let mut values = self.values;
+                values[parameter.unwrap_or(Parameter::Vsys)] += h;
+                self.response(imager, parameter, &values).depths_of_each(&brightness)
+            };
+            let (above, below) = (at(h), at(-h));
+            above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * h)).collect::<Vec<f64>>()
+        };
+        let all: Vec<Option<Parameter>> = std::iter::once(None).chain(stellar.iter().map(|p| Some(*p))).collect();
+        let columns: Vec<Vec<f64>> = all.into_par_iter().map(derivative).collect();
+        let response = self.design.response();
+        let of_profile = |k: usize| {
+            let bins = response.bins(k);
+            DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][bins.start + j])
+        };
+        (0..response.profiles()).map(of_profile).collect()
+    }
+
+    fn response(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
+        match moved {
+            None => self.design.response().with_velocities(&imager.star, &values.state(), &imager.sampling),
+            Some(_) => imager.response(&values.state()),
+        }
+    }
+}
+
+/// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of all epochs and the
+/// parameters, which are those of all epochs.
+fn summed(of_all: &Quadratic, epochs: usize, stellar: usize) -> Quadratic {
+    let mut sums = DMatrix::zeros(epochs * (1 + stellar), epochs + stellar);
+    for k in 0..epochs {
+        sums[(k * (1 + stellar), k)] = 1.0;
+        for s in 0..stellar {
+            sums[(k * (1 + stellar) + 1 + s, epochs + s)] = 1.0;
+        }
+    }
+    Quadratic {
+        ln_evidence: of_all.ln_evidence,
+        gradient: sums.tr_mul(&of_all.gradient),
+        information: sums.tr_mul(&(&of_all.information * &sums)),
+    }
+}

@@ -1,0 +1,249 @@
+//! What the profiles say of the field itself: the amplitude, slope and lifetime for which ln Z is largest, and the
+//! jitter.
+
+use super::{Assumed, Basis, Design, Marginal};
+use crate::field::{Derivatives, Field, FieldError, Kernel, Lifetime, Spectrum};
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::ParameterValues;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Bounds of amplitude, slope and lifetime (d).
+pub const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.3, 3.0), (0.3, 3000.0)];
+
+/// Names of the three.
+const NAMES: [&str; 3] = ["spot_amplitude", "spot_slope", "spot_lifetime_d"];
+
+/// Where searches start: amplitude and slope are usual ones.
+const USUAL: (f64, f64) = (0.2, 0.9);
+const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
+
+/// A search ends when a step would gain less than this in ln Z, or after so many.
+const GAIN: f64 = 0.02;
+const STEPS: usize = 25;
+
+/// Longest step in ln amplitude, slope and ln lifetime: maps are found from those of the step before.
+const LONGEST: f64 = 0.35;
+
+/// What is known of the field beforehand; what is `None` is fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Known {
+    /// Standard deviation of the filling factor.
+    pub amplitude: Option<f64>,
+    /// Slope of the spectrum.
+    pub slope: Option<f64>,
+    /// Lifetime.
+    pub lifetime: Option<Lifetime>,
+    /// Velocity jitter (km/s).
+    pub jitter_kms: Option<f64>,
+}
+
+impl Known {
+    /// The same of a star that does not change.
+    pub fn unchanging(self) -> Self {
+        Known { lifetime: Some(Lifetime::Static), ..self }
+    }
+}
+
+/// The most probable field.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The profiles with it.
+    pub marginal: Marginal,
+    /// ln Z, the jitter counted.
+    pub ln_evidence: f64,
+    /// Bounds of the search that were reached.
+    pub at_bounds: Vec<&'static str>,
+}
+
+/// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from several lifetimes.
+///
+/// # Errors
+/// [`FieldError`] of the last attempt, where none succeeds.
+pub fn fit(
+    imager: &Imager,
+    basis: &Basis,
+    values: ParameterValues,
+    known: Known,
+    near: Option<&Marginal>,
+) -> Result<Fitted, FieldError> {
+    let design = Arc::new(Design::new(imager, basis, &values.state()));
+    let at = |field: Field, jitter_kms: f64, nearby: Option<&Marginal>| {
+        Marginal::new(imager, basis, Arc::clone(&design), values, Assumed { field, jitter_kms }, nearby)
+    };
+    let jitter_kms = known.jitter_kms.unwrap_or(0.0);
+    let first = match near {
+        Some(near) => at(near.assumed.field, near.assumed.jitter_kms, Some(near)).or_else(|_| {
+            // maps of another orbit may be too far away
+            at(near.assumed.field, near.assumed.jitter_kms, None)
+        })?,
+        None => {
+            let lifetimes: Vec<Lifetime> = match known.lifetime {
+                Some(lifetime) => vec![lifetime],
+                None => LIFETIMES_D.map(Lifetime::Days).to_vec(),
+            };
+            let spectrum =
+                Spectrum { amplitude: known.amplitude.unwrap_or(USUAL.0), slope: known.slope.unwrap_or(USUAL.1) };
+            let start = |lifetime: &Lifetime| at(Field { spectrum, kernel: Kernel::of(*lifetime) }, jitter_kms, None);
+            let tried: Vec<Result<Marginal, FieldError>> = lifetimes.par_iter().with_max_len(1).map(start).collect();
+            let height = |m: &Marginal| m.settled.evidence.ln_evidence();
+            let mut error = None;
+            let mut best: Option<Marginal> = None;
+            for tried in tried {
+                match tried {
+                    Ok(next) if best.as_ref().is_none_or(|best| height(&next) > height(best)) => best = Some(next),
+                    Ok(_) => {}
+                    Err(e) => error = Some(e),
+                }
+            }
+            best.ok_or_else(|| error.expect("no start, so an error"))?
+        }
+    };
+    let mut marginal = climb(first, &known, &at)?;
+    if known.jitter_kms.is_none() {
+        marginal.assumed.jitter_kms = likeliest_jitter(imager, basis, &marginal)?;
+    }
+    let ln_evidence = marginal.ln_evidence(imager, basis)?;
+    let at_bounds = reached(&marginal.assumed.field, &known);
+    Ok(Fitted { marginal, ln_evidence, at_bounds })
+}
+
+/// ln amplitude, slope, ln lifetime.
+fn place(field: &Field) -> Vector3<f64> {
+    let lifetime_d = match field.kernel.lifetime {
+        Lifetime::Days(days) => days,
+        Lifetime::Static => f64::INFINITY,
+    };
+    Vector3::new(field.spectrum.amplitude.ln(), field.spectrum.slope, lifetime_d.ln())
+}
+
+fn field_at(place: Vector3<f64>, like: &Field) -> Field {
+    let lifetime = match like.kernel.lifetime {
+        Lifetime::Static => Lifetime::Static,
+        Lifetime::Days(_) => Lifetime::Days(place[2].exp()),
+    };
+    Field {
+        spectrum: Spectrum { amplitude: place[0].exp(), slope: place[1] },
+        kernel: Kernel { lifetime, ..like.kernel },
+    }
+}
+
+/// Bounds in the coordinates of [`place`].
+fn bounds() -> [(f64, f64); 3] {
+    let [amplitude, slope, lifetime] = BOUNDS;
+    [(amplitude.0.ln(), amplitude.1.ln()), slope, (lifetime.0.ln(), lifetime.1.ln())]
+}
+
+/// Which of the fitted numbers lie on a bound.
+fn reached(field: &Field, known: &Known) -> Vec<&'static str> {
+    let (place, free) = (place(field), free(field, known));
+    let on = |i: &usize| free[*i] && (place[*i] <= bounds()[*i].0 + 1e-9 || place[*i] >= bounds()[*i].1 - 1e-9);
+    (0..3).filter(on).map(|i| NAMES[i]).collect()
+}
+
+fn free(field: &Field, known: &Known) -> [bool; 3] {
+    let lives = known.lifetime.is_none() && field.kernel.lifetime != Lifetime::Static;
+    [known.amplitude.is_none(), known.slope.is_none(), lives]
+}
+
+/// The way up from `first` by quasi-Newton steps (BFGS; Nocedal & Wright 2006, chapter 6), within the bounds.
+fn climb(
+    first: Marginal,
+    known: &Known,
+    at: &impl Fn(Field, f64, Option<&Marginal>) -> Result<Marginal, FieldError>,
+) -> Result<Marginal, FieldError> {
+    let free = free(&first.assumed.field, known);
+    let slope = |of: &Marginal| {
+        let Derivatives { ln_amplitude, slope, ln_lifetime, .. } = of.settled.evidence.derivatives();
+        let all = [ln_amplitude, slope, ln_lifetime];
+        Vector3::from_fn(|i, _| if free[i] { all[i] } else { 0.0 })
+    };
+    let height = |of: &Marginal| of.settled.evidence.ln_evidence();
+    let mut here = first;
+    let mut gradient = slope(&here);
+    // the inverse Hessian of minus ln Z: errors of a few per cent are usual
+    let mut inverse = Matrix3::identity() * 0.01;
+    for _ in 0..STEPS {
+        let from = place(&here.assumed.field);
+        // what pushes against a bound stays there
+        let pushes = |i: usize| {
+            let (low, high) = bounds()[i];
+            (from[i] <= low + 1e-9 && gradient[i] < 0.0) || (from[i] >= high - 1e-9 && gradient[i] > 0.0)
+        };
+        let inside = Vector3::from_fn(|i, _| if pushes(i) { 0.0 } else { gradient[i] });
+        let mut step = inverse * inside;
+        step = Vector3::from_fn(|i, _| if pushes(i) || !free[i] { 0.0 } else { step[i] });
+        if inside.dot(&step) < 2.0 * GAIN {
+            break;
+        }
+        step *= (LONGEST / step.amax()).min(1.0);
+        let Some((next, slope_there)) = shortened(&here, step, &gradient, &height, &slope, at) else { break };
+        let moved = Vector3::from_fn(|i, _| {
+            if free[i] { place(&next.assumed.field)[i] - from[i] } else { 0.0 }
+        });
+        let bent = gradient - slope_there;
+        let gained = height(&next) - height(&here);
+        (here, gradient) = (next, slope_there);
+        let curved = moved.dot(&bent);
+        if curved > 0.0 {
+            let rho = 1.0 / curved;
+            let left = Matrix3::identity() - moved * bent.transpose() * rho;
+            inverse = left * inverse * left.transpose() + moved * moved.transpose() * rho;
+        }
+        if gained < 0.1 * GAIN {
+            break;
+        }
+    }
+    Ok(here)
+}
+
+/// The first of ever shorter steps that leads up, and the gradient there; `None` where none does.
+fn shortened(
+    here: &Marginal,
+    mut step: Vector3<f64>,
+    gradient: &Vector3<f64>,
+    height: &impl Fn(&Marginal) -> f64,
+    slope: &impl Fn(&Marginal) -> Vector3<f64>,
+    at: &impl Fn(Field, f64, Option<&Marginal>) -> Result<Marginal, FieldError>,
+) -> Option<(Marginal, Vector3<f64>)> {
+    const TRIES: usize = 6;
+    let from = place(&here.assumed.field);
+    for _ in 0..TRIES {
+        let to = Vector3::from_fn(|i, _| (from[i] + step[i]).clamp(bounds()[i].0, bounds()[i].1.max(from[i])));
+        let next = at(field_at(to, &here.assumed.field), here.assumed.jitter_kms, Some(here));
+        if let Some(next) = next.ok().filter(|next| height(next) > height(here) + 1e-4 * gradient.dot(&step)) {
+            let slope = slope(&next);
+            return Some((next, slope));
+        }
+        step *= 0.3;
+    }
+    None
+}
+
+/// The jitter (km/s) for which ln Z is largest, the field as it is; 0 where none gains.
+fn likeliest_jitter(imager: &Imager, basis: &Basis, marginal: &Marginal) -> Result<f64, FieldError> {
+    const LARGEST_KMS: f64 = 3.0;
+    const RATIO: f64 = 1.25;
+    let mut bare = marginal.clone();
+    bare.assumed.jitter_kms = 0.0;
+    let expansion = bare.expansion(imager, basis, &[])?;
+    let n = expansion.gradient.len();
+    let quadratic = crate::field::Quadratic {
+        ln_evidence: expansion.log_likelihood,
+        gradient: expansion.gradient,
+        information: expansion.information,
+    };
+    let height = |sd: f64| quadratic.jittered(&vec![sd; n]).map_or(f64::NEG_INFINITY, |q| q.ln_evidence);
+    let mut best = (0.0, quadratic.ln_evidence);
+    let mut sd = 1e-3;
+    while sd < LARGEST_KMS {
+        let here = height(sd);
+        if here > best.1 {
+            best = (sd, here);
+        }
+        sd *= RATIO;
+    }
+    Ok(best.0)
+}

@@ -1,0 +1,93 @@
+//! The marginal likelihood: spots as a Gaussian field on the sphere and in time ([`crate::field`]), integrated out of
+//! the profiles (`docs/method.md` section 9).
+//!
+//! In: what the star is imaged with ([`Imager`]), values of all parameters, what is assumed of the field
+//! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
+//! parameters, as an [`Expansion`] like that of maximum entropy. The order:
+//! 1. [`Basis`]: the harmonics on the pixels of the map, once.
+//! 2. [`Design`]: the profiles of each harmonic, for one star; a model application a harmonic.
+//! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
+//! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
+//! 5. [`change`]: whether a star that changes explains the profiles better than one that does not.
+
+pub mod change;
+mod design;
+mod expand;
+mod fit;
+
+pub use change::Change;
+pub use design::{Basis, Design};
+pub use fit::{Fitted, Known, fit};
+
+use crate::field::{Compression, Field, FieldError, Settled, Settling, Sought, settle};
+#[allow(unused_imports)]
+use crate::posterior::expansion::Expansion;
+use crate::posterior::imaging::Imager;
+use crate::posterior::objective::ParameterValues;
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Mean of the field: the spot filling factor of a star of which nothing else is known. Profiles do not tell it.
+pub const MEAN_FILLING: f64 = 0.06;
+
+/// Largest degree of the harmonics: finer than the line resolves. With 18, what is left over of a star of 40 km/s at
+/// S/N 1000 is taken for spots that change.
+pub const DEGREE: usize = 36;
+
+/// What is assumed before the data, beside the parameters of star and orbit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Assumed {
+    /// The spots.
+    pub field: Field,
+    /// Scatter of the profiles' velocity zero points (km/s).
+    pub jitter_kms: f64,
+}
+
+/// The profiles with all maps integrated out, linearised around the most probable ones.
+#[derive(Clone, Debug)]
+pub struct Marginal {
+    /// The parameters.
+    pub values: ParameterValues,
+    /// What is assumed.
+    pub assumed: Assumed,
+    /// The star's response.
+    pub design: Arc<Design>,
+    /// The most probable maps (their coefficients, a column a profile), and the evidence there.
+    pub settled: Settled,
+}
+
+impl Marginal {
+    /// At `values`, whose design is given. Maps are found from those of a star and field `nearby`, or else from
+    /// uniform ones.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn new(
+        imager: &Imager,
+        basis: &Basis,
+        design: Arc<Design>,
+        values: ParameterValues,
+        assumed: Assumed,
+        nearby: Option<&Marginal>,
+    ) -> Result<Self, FieldError> {
+        let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
+        let start = match nearby {
+            Some(nearby) => nearby.settled.coefficients.clone(),
+            None => DMatrix::zeros(basis.degrees.len(), imager.sampling.profiles.len()),
+        };
+        let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
+        let by = nearby.map(|nearby| &nearby.settled.evidence);
+        let settled = settle(linearise, sought, start, by, &settling())?;
+        Ok(Marginal { values, assumed, design, settled })
+    }
+
+    /// The brightness of each pixel (rows) in the most probable map of each profile (columns).
+    pub fn brightness(&self, basis: &Basis) -> DMatrix<f64> {
+        basis.brightness(&self.settled.coefficients, self.design.contrast())
+    }
+}
+
+/// How exactly maps are found: ln Z is good to some 1e-3.
+fn settling() -> Settling {
+    Settling { tolerance: 1e-2, compression: Compression::default(), ..Settling::default() }
+}
