@@ -428,10 +428,11 @@ fn replace_number(base: &[u8], at: usize, piece: &[u8]) -> Vec<u8> {
     [&base[..=start], piece, &base[end..]].concat()
 }
 
-/// A key that was renamed is refused with its new name.
+/// A key that was renamed is refused with its new name, and the changelog tells it.
 #[test]
 fn an_old_key_names_the_new_one() {
     let text = std::fs::read_to_string(shipped("demo.json")).unwrap().replace("unresolved_spots", "spots_left");
     let error = config::from_json(text.as_bytes(), Path::new("old.json")).unwrap_err().to_string();
     assert_eq!(error, "old.json: unknown key imaging.spots_left: it is now called unresolved_spots");
+    assert!(include_str!("../../CHANGELOG.md").contains("`imaging.spots_left` -> `imaging.unresolved_spots`"));
 }
