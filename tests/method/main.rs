@@ -1,7 +1,7 @@
 //! The method against independent numbers, limit cases and itself: the library alone.
 
-mod marginal;
 mod common;
+mod marginal;
 
 mod chain;
 mod ensemble;

@@ -2,11 +2,11 @@
 //! lives for ever, with the best orbit in the model on both sides. Without it a planet of 100 m/s alone makes a star
 //! look changing.
 
-use super::fit::{Fitted, Known, fit};
 use super::Basis;
+use super::fit::{Fitted, Known, fit};
 use crate::field::{FieldError, Lifetime};
-use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::Frequencies;
+use crate::planets::periodogram::orbits;
 use crate::posterior::expansion::{Nuisance, STELLAR};
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::{Parameter, ParameterValues};
@@ -38,8 +38,7 @@ impl Change {
     ) -> Result<Self, FieldError> {
         let basis = Basis::new(&imager.grid);
         let side = |known: Known| with_best_orbit(imager, &basis, values, frequencies, nuisances, known);
-        let (still, changing) =
-            rayon::join(|| side(known.unchanging()), || side(Known { lifetime: None, ..known }));
+        let (still, changing) = rayon::join(|| side(known.unchanging()), || side(Known { lifetime: None, ..known }));
         let (still, changing) = (still?, changing?);
         let spot_lifetime_d = match changing.marginal.assumed.field.kernel.lifetime {
             Lifetime::Days(days) => days,

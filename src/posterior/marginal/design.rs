@@ -109,7 +109,10 @@ impl Design {
 
     /// The profiles linearised around maps of these coefficients (H, profiles), without slopes.
     pub fn epochs(&self, imager: &Imager, maps: &DMatrix<f64>) -> Vec<Epoch> {
-        (0..self.response.profiles()).into_par_iter().map(|k| self.epoch(imager, k, &maps.column(k).into_owned())).collect()
+        (0..self.response.profiles())
+            .into_par_iter()
+            .map(|k| self.epoch(imager, k, &maps.column(k).into_owned()))
+            .collect()
     }
 
     fn epoch(&self, imager: &Imager, k: usize, coefficients: &DVector<f64>) -> Epoch {

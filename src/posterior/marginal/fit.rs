@@ -2,7 +2,7 @@
 //! jitter.
 
 use super::{Assumed, Basis, Design, Marginal};
-use crate::field::{Derivatives, Field, FieldError, Kernel, Lifetime, Spectrum};
+use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::ParameterValues;
 use nalgebra::{Matrix3, Vector3};
@@ -23,6 +23,9 @@ const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
 /// A search ends when a step would gain less than this in ln Z, or after so many.
 const GAIN: f64 = 0.02;
 const STEPS: usize = 25;
+
+/// Step of the derivatives of ln Z.
+const STEP: f64 = 0.05;
 
 /// Longest step in ln amplitude, slope and ln lifetime: maps are found from those of the step before.
 const LONGEST: f64 = 0.35;
@@ -152,15 +155,29 @@ fn free(field: &Field, known: &Known) -> [bool; 3] {
 fn climb(
     first: Marginal,
     known: &Known,
-    at: &impl Fn(Field, f64, Option<&Marginal>) -> Result<Marginal, FieldError>,
+    at: &(impl Fn(Field, f64, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
 ) -> Result<Marginal, FieldError> {
     let free = free(&first.assumed.field, known);
-    let slope = |of: &Marginal| {
-        let Derivatives { ln_amplitude, slope, ln_lifetime, .. } = of.settled.evidence.derivatives();
-        let all = [ln_amplitude, slope, ln_lifetime];
-        Vector3::from_fn(|i, _| if free[i] { all[i] } else { 0.0 })
-    };
     let height = |of: &Marginal| of.settled.evidence.ln_evidence();
+    // derivatives at fixed maps are not enough: the determinant changes with the maps, and outweighs the rest
+    let slope = |of: &Marginal| {
+        let from = place(&of.assumed.field);
+        let beside = |i: usize, h: f64| {
+            let mut to = from;
+            to[i] += h;
+            at(field_at(to, &of.assumed.field), of.assumed.jitter_kms, Some(of)).map(|there| height(&there)).ok()
+        };
+        let along = |i: usize| match free[i] {
+            true => match rayon::join(|| beside(i, STEP), || beside(i, -STEP)) {
+                (Some(above), Some(below)) => (above - below) / (2.0 * STEP),
+                (Some(above), None) => (above - height(of)) / STEP,
+                (None, Some(below)) => (height(of) - below) / STEP,
+                (None, None) => 0.0,
+            },
+            false => 0.0,
+        };
+        Vector3::from_iterator((0..3).map(along))
+    };
     let mut here = first;
     let mut gradient = slope(&here);
     // the inverse Hessian of minus ln Z: errors of a few per cent are usual
@@ -180,9 +197,7 @@ fn climb(
         }
         step *= (LONGEST / step.amax()).min(1.0);
         let Some((next, slope_there)) = shortened(&here, step, &gradient, &height, &slope, at) else { break };
-        let moved = Vector3::from_fn(|i, _| {
-            if free[i] { place(&next.assumed.field)[i] - from[i] } else { 0.0 }
-        });
+        let moved = Vector3::from_fn(|i, _| if free[i] { place(&next.assumed.field)[i] - from[i] } else { 0.0 });
         let bent = gradient - slope_there;
         let gained = height(&next) - height(&here);
         (here, gradient) = (next, slope_there);

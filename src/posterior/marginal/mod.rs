@@ -3,7 +3,7 @@
 //!
 //! In: what the star is imaged with ([`Imager`]), values of all parameters, what is assumed of the field
 //! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
-//! parameters, as an [`Expansion`] like that of maximum entropy. The order:
+//! parameters, as an expansion like that of maximum entropy. No command uses it yet. The order:
 //! 1. [`Basis`]: the harmonics on the pixels of the map, once.
 //! 2. [`Design`]: the profiles of each harmonic, for one star; a model application a harmonic.
 //! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
@@ -20,8 +20,6 @@ pub use design::{Basis, Design};
 pub use fit::{Fitted, Known, fit};
 
 use crate::field::{Compression, Field, FieldError, Settled, Settling, Sought, settle};
-#[allow(unused_imports)]
-use crate::posterior::expansion::Expansion;
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::ParameterValues;
 use nalgebra::DMatrix;
@@ -87,7 +85,7 @@ impl Marginal {
     }
 }
 
-/// How exactly maps are found: ln Z is good to some 1e-3.
+/// How exactly maps are found: ln Z is good to some 0.03.
 fn settling() -> Settling {
-    Settling { tolerance: 1e-2, compression: Compression::default(), ..Settling::default() }
+    Settling { tolerance: 1e-3, compression: Compression::default(), ..Settling::default() }
 }
