@@ -1,5 +1,5 @@
-//! The marginal likelihood: spots as a Gaussian field on the sphere and in time ([`crate::field`]), integrated out of
-//! the profiles (`docs/method.md` section 9).
+//! The marginal likelihood: spots as a Gaussian field on the sphere and in time (room `field`), integrated out of the
+//! profiles (`docs/method.md` section 9).
 //!
 //! In: what the star is imaged with ([`Imager`]), values of all parameters, what is assumed of the field
 //! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
