@@ -9,7 +9,7 @@ use dimcmc::internals::data::config;
 use dimcmc::internals::data::io::csv::Table;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings};
-use dimcmc::internals::posterior::detection::{Detection, DetectionSettings};
+use dimcmc::internals::posterior::detection::{Detection, DetectionSettings, Spots};
 use dimcmc::internals::posterior::expansion::Expansion;
 use dimcmc::internals::posterior::imaging::Imager;
 use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
@@ -85,6 +85,7 @@ fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Fai
         search: SearchSettings { draws, seed: 1 },
         eccentric: false,
         second_planet: false,
+        spots: Spots::OneMap(None),
     };
     Ok(Detection::find(imager, scene.settings.values, frequencies(imager)?, &settings, &|_| ())?)
 }

@@ -86,7 +86,7 @@ impl Failure {
     pub fn search(path: &Path, error: SearchError) -> Self {
         match error {
             SearchError::Reference(error) => Failure::reference(path, error),
-            SearchError::Optimise(error) => Failure::failed(format!("{}: {error}", path.display())),
+            error @ (SearchError::Optimise(_) | SearchError::Integrated) => Failure::failed(format!("{}: {error}", path.display())),
         }
     }
 

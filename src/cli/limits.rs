@@ -147,6 +147,7 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
             search: SearchSettings { draws: args.draws as usize, seed: args.seed },
             eccentric: false,
             second_planet: false,
+            spots: scene.spots(),
         },
         frequencies,
         without_best: args.without_best,
@@ -176,7 +177,7 @@ fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
 fn failure(args: &Args, error: DetectionError) -> Failure {
     match error {
         DetectionError::Reference(error) => Failure::reference(&args.config, error),
-        DetectionError::Unbounded(error) => Failure::failed(format!("{}: {error}", args.config.display())),
+        error => Failure::failed(format!("{}: {error}", args.config.display())),
     }
 }
 

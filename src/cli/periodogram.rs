@@ -69,7 +69,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &report);
     let choices = found.as_ref().map(|found| {
         spinner.set_message("other targets, without each night");
-        robustness(&scene.imager, scene.settings.values, &settings, &found.best)
+        robustness(&scene.imager, scene.settings.values, &settings, found)
     });
     spinner.finish_and_clear();
     let choices = choices.map_err(|e| failure(&args.config, *e))?;
@@ -116,12 +116,14 @@ fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
         search: SearchSettings { draws: args.draws as usize, seed: args.seed },
         eccentric: args.eccentric,
         second_planet: args.planets == 2,
+        spots: scene.spots(),
     }
 }
 
 fn message(stage: Stage) -> String {
     match stage {
         Stage::PlanetFree => "reconstructing without a planet".to_owned(),
+        Stage::Change => "looking whether the star changes".to_owned(),
         Stage::Search => "searching, false alarms".to_owned(),
         Stage::BestOrbit(round) => format!("reconstructing at the best orbit, round {round}"),
         Stage::SecondPlanet => "searching for a second planet".to_owned(),
@@ -131,6 +133,6 @@ fn message(stage: Stage) -> String {
 fn failure(config: &Path, error: DetectionError) -> Failure {
     match error {
         DetectionError::Reference(error) => Failure::reference(config, error),
-        DetectionError::Unbounded(error) => Failure::failed(format!("{}: {error}", config.display())),
+        error => Failure::failed(format!("{}: {error}", config.display())),
     }
 }

@@ -1,15 +1,20 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
-use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter};
+use crate::data::config::{
+    Automatic, Config, ConfigError, Hyperparameter, ImagingSettings, ObservationSource, Settings, VelocityJitter,
+};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, SearchError, SearchSettings};
+use crate::field::Lifetime;
+use crate::posterior::detection::Spots;
 use crate::posterior::fit::Fit;
 use crate::posterior::imaging::Imager;
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
-use crate::posterior::objective::{FreeParameter, ParameterSpace, ParameterValues, Reference, ReferenceError, target};
+use crate::posterior::marginal::Known;
+use crate::posterior::objective::{FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target};
 use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
@@ -197,6 +202,27 @@ impl Scene {
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
     }
 
+    /// What becomes of the spots in a blind search.
+    #[doc(hidden)]
+    pub fn spots(&self) -> Spots {
+        let ImagingSettings { objective, spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.settings.imaging;
+        let jitter_kms = match self.settings.velocity_jitter {
+            // a map that does not change would have said how large it is
+            _ if self.measured.velocity_jitter.is_some() => None,
+            VelocityJitter::Known(kms) => Some(kms),
+            VelocityJitter::Fitted => None,
+        };
+        let lifetime = match spot_lifetime_d {
+            Hyperparameter::Static => Some(Lifetime::Static),
+            days => days.known().map(Lifetime::Days),
+        };
+        let known = Known { amplitude: spot_amplitude.known(), slope: spot_slope.known(), lifetime, jitter_kms };
+        match objective {
+            ObjectiveKind::MarginalLikelihood => Spots::Integrated(known),
+            _ => Spots::OneMap(Some(known)),
+        }
+    }
+
     /// The star reconstructed at the config's values: map, model profiles, and whether they fit.
     ///
     /// # Errors
@@ -370,6 +396,10 @@ fn zero_points(
     let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
     let (sd_kms, measured) = match settings.velocity_jitter {
         VelocityJitter::Known(0.0) => return Ok((None, None)),
+        // it is fitted with the field
+        VelocityJitter::Fitted if settings.imaging.objective == ObjectiveKind::MarginalLikelihood => {
+            return Ok((None, None));
+        }
         VelocityJitter::Known(sd_kms) => (sd_kms, None),
         VelocityJitter::Fitted => {
             let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;
@@ -398,7 +428,8 @@ fn measured_errors(
         observations
     };
     let continuum = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
-    if !wanted.measured {
+    // what a map leaves over is no noise where stars may change
+    if !wanted.measured || settings.imaging.objective == ObjectiveKind::MarginalLikelihood {
         return Ok(continuum);
     }
     let before = scaled(&continuum);

@@ -80,6 +80,12 @@ pub enum SearchError {
     /// No reference image.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// Of an objective for which there is no search yet.
+    #[error(
+        "imaging.objective: \"marginal-likelihood\" is for dimcmc periodogram and dimcmc limits so far; here set \
+        \"spottedness\", or leave it out"
+    )]
+    Integrated,
     /// No start led anywhere.
     #[error("{0}")]
     Optimise(#[from] OptimiseError),
@@ -134,6 +140,9 @@ pub fn find(
     settings: SearchSettings,
     report: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, SearchError> {
+    if settings.objective == ObjectiveKind::MarginalLikelihood {
+        return Err(SearchError::Integrated);
+    }
     let SearchSettings { chi2_target, objective, .. } = settings;
     let (evaluations, done, all) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(1));
     let at = |stage| report(Progress { stage, evaluations: evaluations.load(Relaxed) });

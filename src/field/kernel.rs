@@ -13,6 +13,16 @@ pub enum Lifetime {
     Days(f64),
 }
 
+impl Lifetime {
+    /// In days; `None` for ever.
+    pub fn days(self) -> Option<f64> {
+        match self {
+            Lifetime::Static => None,
+            Lifetime::Days(days) => Some(days),
+        }
+    }
+}
+
 /// Correlation in time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

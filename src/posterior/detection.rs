@@ -12,6 +12,7 @@ mod robustness;
 pub use remarks::Evidence;
 pub use robustness::{AtTarget, Robustness, WithoutNight, robustness};
 
+use crate::field::{FieldError, Lifetime};
 use crate::maxent::Termination;
 use crate::planets::periodogram::eccentric::keplerian;
 use crate::planets::periodogram::offset::{Offset, offset};
@@ -24,6 +25,7 @@ use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::posterior::expansion::{Expansion, Nuisance, STELLAR};
 use crate::posterior::imaging::Imager;
+use crate::posterior::marginal::{Basis, Change, Fitted, Known, fit};
 use crate::posterior::objective::{Parameter, ParameterValues, Reference, ReferenceError};
 use crate::star::Orbit;
 use nalgebra::DVector;
@@ -48,6 +50,28 @@ pub struct DetectionSettings {
     pub eccentric: bool,
     /// Whether a second planet is searched for.
     pub second_planet: bool,
+    /// What becomes of the spots.
+    pub spots: Spots,
+}
+
+/// What becomes of the spots.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Spots {
+    /// They are those of the map of maximum entropy, and do not change. Whether they do is looked into first, with
+    /// what is known of the field, if anything is given.
+    OneMap(Option<Known>),
+    /// All maps are integrated over: the marginal likelihood.
+    Integrated(Known),
+}
+
+impl Spots {
+    /// What is known of the field in a comparison with a star that changes; `None` where there is none.
+    pub fn compared(&self) -> Option<Known> {
+        match self {
+            Spots::OneMap(known) => *known,
+            Spots::Integrated(known) => Some(*known).filter(|known| known.lifetime == Some(Lifetime::Static)),
+        }
+    }
 }
 
 /// A star's image and the quadratic in its profiles' velocities around it.
@@ -66,6 +90,8 @@ pub struct View {
     pub unresolved_spots: f64,
     /// Whether the image reaches the target chi2.
     pub on_target: bool,
+    /// The field that was integrated over; `None` where the image alone counts.
+    pub field: Option<Box<Fitted>>,
 }
 
 /// The second planet.
@@ -82,6 +108,8 @@ pub struct SecondPlanet {
 pub struct Detection {
     /// The trial periods.
     pub frequencies: Frequencies,
+    /// Whether the star changes, where that was looked into: of spots that are taken for unchanging.
+    pub change: Option<Result<Change, FieldError>>,
     /// Without a planet; its quadratic is the one that `search` is of.
     pub planet_free: View,
     /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots,
@@ -114,6 +142,9 @@ pub enum DetectionError {
     /// No orbit at all.
     #[error(transparent)]
     Unbounded(#[from] Unbounded),
+    /// No field.
+    #[error(transparent)]
+    Field(#[from] FieldError),
 }
 
 /// What is under way.
@@ -121,6 +152,8 @@ pub enum DetectionError {
 pub enum Stage {
     /// The planet-free image and its expansion.
     PlanetFree,
+    /// Whether the star changes.
+    Change,
     /// Periods, draws.
     Search,
     /// The image at the best orbit, for that many times.
@@ -133,26 +166,48 @@ impl DetectionSettings {
     /// The usual search: circular orbits, one planet.
     pub fn of(chi2_target: f64, nuisances: Vec<Nuisance>) -> Self {
         let search = SearchSettings::default();
-        DetectionSettings { chi2_target, nuisances, search, eccentric: false, second_planet: false }
+        DetectionSettings {
+            chi2_target,
+            nuisances,
+            search,
+            eccentric: false,
+            second_planet: false,
+            spots: Spots::OneMap(None),
+        }
     }
 }
 
 impl View {
     /// The star imaged at `values`. Where the target chi2 takes more than three times the entropy's weight over the
-    /// number of data, the image stops short of it: beyond, noise is turned into spots.
+    /// number of data, the image stops short of it: beyond, noise is turned into spots. Where maps are integrated over
+    /// the field is fitted from that of a view `near` by, if there is one, and the image is but a picture.
     ///
     /// # Errors
     /// [`DetectionError`].
-    pub fn new(imager: &Imager, values: ParameterValues, settings: &DetectionSettings) -> Result<Self, DetectionError> {
+    pub fn new(
+        imager: &Imager,
+        values: ParameterValues,
+        settings: &DetectionSettings,
+        near: Option<&View>,
+    ) -> Result<Self, DetectionError> {
         let reference = Reference::provisional(imager, values, settings.chi2_target)?;
         let on_target = reference.solution.termination == Termination::Converged;
         let nuisances = &settings.nuisances;
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
+        if let Spots::Integrated(known) = settings.spots {
+            let basis = Basis::new(&imager.grid);
+            let near = near.and_then(|view| view.field.as_ref()).map(|field| &field.marginal);
+            let fitted = fit(imager, &basis, values, known, near)?;
+            let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
+            let quadratic = expansion.velocities(nuisances);
+            let (regularised, field) = (quadratic.clone(), Some(Box::new(fitted)));
+            return Ok(View { reference, expansion, quadratic, regularised, unresolved_spots: 1.0, on_target, field });
+        }
         let expansion = Expansion::of(imager, &reference, &stellar);
         let regularised = expansion.velocities(nuisances);
         let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
         let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
-        Ok(View { reference, expansion, quadratic, regularised, unresolved_spots, on_target })
+        Ok(View { reference, expansion, quadratic, regularised, unresolved_spots, on_target, field: None })
     }
 }
 
@@ -171,16 +226,22 @@ impl Detection {
         report(Stage::PlanetFree);
         let mut alone = values;
         alone[Parameter::K] = 0.0;
-        let planet_free = View::new(imager, alone, settings)?;
+        let planet_free = View::new(imager, alone, settings, None)?;
         report(Stage::Search);
         let blind = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
         let best = blind.best().orbit.delta_ln_l;
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
+        report(Stage::Change);
+        let change = settings
+            .spots
+            .compared()
+            .map(|known| Change::of(imager, values, &frequencies, &settings.nuisances, known));
         let mut found = Detection {
             best: *blind.best(),
             planet_free,
             blind,
             frequencies,
+            change,
             at_best: None,
             rounds: 0,
             closed: false,
@@ -216,6 +277,12 @@ impl Detection {
         regularised.log_likelihood(&velocities)
     }
 
+    /// What is to be said where the star changes and is taken for one that does not.
+    pub fn changes(&self) -> Option<String> {
+        let Some(Ok(change)) = &self.change else { return None };
+        change.is_changing().then(|| change.sentence())
+    }
+
     /// The number that verdicts rest on: how often stars without a planet show as high a peak in the blind search.
     pub fn false_alarm_probability(&self) -> f64 {
         self.blind.false_alarm.probability(self.blind.best().orbit.delta_ln_l).value()
@@ -240,7 +307,7 @@ impl Detection {
             values[Parameter::K] = self.best.orbit.k_kms;
             values[Parameter::PorbOverProt] = self.best.porb_over_prot;
             values[Parameter::Phi] = self.best.orbit.phi;
-            let view = View::new(imager, values, settings)?;
+            let view = View::new(imager, values, settings, Some(self.last()))?;
             let mut next = refined(&view.quadratic, &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();

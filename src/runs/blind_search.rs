@@ -49,14 +49,16 @@ impl BlindSearch {
     fn tried(scene: &Scene) -> Result<Self, SearchError> {
         let rotation_period_d = scene.imager.star.rotation_period_d;
         let frequencies = Frequencies::new(&scene.imager.cycles(), rotation_period_d, FrequencySettings::default())?;
-        let settings =
-            DetectionSettings::of(scene.settings.imaging.chi2_target.value(), nuisances(&scene.settings.free));
+        let settings = DetectionSettings {
+            spots: scene.spots(),
+            ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), nuisances(&scene.settings.free))
+        };
         let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ())?;
         let fit = Fit::new(&scene.imager, &scene.observations, &found.last().reference);
         let misfit: Vec<String> = fit.checks.warnings.iter().cloned().chain(scene.measured.misfit_text()).collect();
         // of what is no candidate it would say nothing
         let choices =
-            found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, &found.best));
+            found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, &found));
         let evidence =
             Evidence { imager: &scene.imager, settings: &settings, robustness: choices.as_ref(), misfit: &misfit };
         let mut remarks = found.remarks(&evidence);
@@ -74,7 +76,9 @@ impl BlindSearch {
                     rotation_period_d * found.best.porb_over_prot
                 ),
             ));
-            verdict = within(&periods, &found, &remarks);
+            if verdict.finding != Finding::NotJudged {
+                verdict = within(&periods, &found, &remarks);
+            }
         }
         let k_kms = verdict.signal.map(|signal| signal.k_kms);
         if let Some((k_kms, prior)) = k_kms.zip(prior(Parameter::K)).filter(|(k_kms, prior)| !prior.contains(*k_kms)) {

@@ -35,7 +35,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     (
         "data",
         &["io", "config", "search", "scene", "diagnosis", "init", "import"],
-        &["numerics", "star", "maxent", "planets", "sampling", "posterior"],
+        &["numerics", "star", "maxent", "field", "planets", "sampling", "posterior"],
     ),
     (
         "runs",
@@ -55,7 +55,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "batch",
             "experiments",
         ],
-        &["numerics", "star", "maxent", "planets", "sampling", "posterior", "data"],
+        &["numerics", "star", "maxent", "field", "planets", "sampling", "posterior", "data"],
     ),
     // from saved files alone: nothing that makes images, samples or searches
     (

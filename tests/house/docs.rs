@@ -379,13 +379,13 @@ impl Described {
     }
 }
 
-/// Columns, or keys at the top.
+/// Columns, or keys, but those of the config.
 fn keys(name: &str, path: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(path).unwrap();
-    let of = |json: &str| -> Vec<String> {
-        let value: Value = serde_json::from_str(json).unwrap();
-        let object = if value.is_array() { value[0].clone() } else { value };
-        object.as_object().unwrap().keys().cloned().collect()
+    let of = |json: &str| {
+        let mut found = Vec::new();
+        all_keys(&serde_json::from_str(json).unwrap(), &mut found);
+        found
     };
     match name {
         // a matrix of numbers
@@ -393,6 +393,22 @@ fn keys(name: &str, path: &Path) -> Vec<String> {
         _ if name.ends_with(".csv") => text.lines().next().unwrap().split(',').map(str::to_owned).collect(),
         _ if name.ends_with(".jsonl") => of(text.lines().last().unwrap()),
         _ => of(&text),
+    }
+}
+
+/// Keys of an object and of what is in it.
+fn all_keys(value: &Value, found: &mut Vec<String>) {
+    match value {
+        Value::Array(items) => items.iter().for_each(|item| all_keys(item, found)),
+        Value::Object(object) => {
+            for (key, inside) in object {
+                found.push(key.strip_prefix("sigma_").unwrap_or(key).to_owned());
+                if key != "config" {
+                    all_keys(inside, found);
+                }
+            }
+        }
+        _ => {}
     }
 }
 

@@ -17,6 +17,7 @@ mod resolve_grid;
 mod resolve_observations;
 mod resolve_star;
 mod settings;
+mod spots;
 mod suggest;
 mod written;
 
@@ -28,6 +29,7 @@ pub use identity::{Difference, first_difference, jitter_difference, model_differ
 pub use jitter::VelocityJitter;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
+pub use spots::Hyperparameter;
 pub use written::Config;
 
 use std::path::Path;

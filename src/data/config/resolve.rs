@@ -7,9 +7,10 @@ use super::raw::Config;
 use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
-use super::{Automatic, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
+use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
+use crate::posterior::marginal;
 use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
 use std::path::Path;
 
@@ -127,6 +128,28 @@ pub(super) fn without_planet(free: &[FreeParameter], values: &ParameterValues) -
     parameters.find(|parameter| no_planet && parameter.is_orbital())
 }
 
+/// What is said of the spots has a meaning where they are integrated out, and lies within the bounds of a fit.
+fn check_spots(imaging: &ImagingSettings) -> Result<(), Fault> {
+    let all = [imaging.spot_amplitude, imaging.spot_slope, imaging.spot_lifetime_d];
+    for ((name, (low, high)), value) in marginal::NAMES.iter().zip(marginal::BOUNDS).zip(all) {
+        let fault = |problem: String| Err(Fault::new(&format!("imaging.{name}"), problem));
+        match value {
+            _ if value.is_default() => {}
+            _ if imaging.objective != ObjectiveKind::MarginalLikelihood => {
+                return fault("it has no meaning but with imaging.objective \"marginal-likelihood\"".into());
+            }
+            Hyperparameter::Static if *name != "spot_lifetime_d" => {
+                return fault("only spot_lifetime_d may be \"static\"".into());
+            }
+            Hyperparameter::Known(x) if !(low..=high).contains(&x) => {
+                return fault(format!("{x} must be from {low} to {high}"));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
 fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<(), Fault> {
     check_pixels("imaging.pixels", imaging.pixels)?;
     if !(imaging.default_spot > 0.0 && imaging.default_spot < 0.5) {
@@ -143,6 +166,7 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
                        give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
+    check_spots(imaging)?;
     if let Some(priors) = &imaging.nuisances {
         check_nuisances(
             priors,

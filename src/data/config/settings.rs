@@ -1,6 +1,7 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
 use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
+use super::spots::Hyperparameter;
 use crate::data::io::lsd::ReadOptions;
 use crate::maxent::entropy::Entropy;
 use crate::posterior::noise::ErrorSettings;
@@ -83,6 +84,17 @@ pub struct ImagingSettings {
     pub chi2_target: Automatic,
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
+    /// With objective "marginal-likelihood": standard deviation of the spot filling factor before the data, from 0.01
+    /// to 1.5.
+    #[serde(skip_serializing_if = "Hyperparameter::is_default")]
+    pub spot_amplitude: Hyperparameter,
+    /// With objective "marginal-likelihood": how fast the spots' power falls with the degree of the harmonics, from 0.3
+    /// (small spots) to 3 (large ones).
+    #[serde(skip_serializing_if = "Hyperparameter::is_default")]
+    pub spot_slope: Hyperparameter,
+    /// With objective "marginal-likelihood": how long spots live, from 0.3 to 3000 d, or "static".
+    #[serde(skip_serializing_if = "Hyperparameter::is_default")]
+    pub spot_lifetime_d: Hyperparameter,
     /// What the chain takes the spots that the map leaves over for. Landscapes and optima take them as the entropy has
     /// them.
     pub unresolved_spots: UnresolvedSpots,
@@ -100,6 +112,9 @@ impl Default for ImagingSettings {
             default_spot: 1e-4,
             chi2_target: Automatic::Fixed(0.97),
             objective: ObjectiveKind::default(),
+            spot_amplitude: Hyperparameter::Fitted,
+            spot_slope: Hyperparameter::Fitted,
+            spot_lifetime_d: Hyperparameter::Fitted,
             unresolved_spots: UnresolvedSpots::default(),
             nuisances: None,
         }

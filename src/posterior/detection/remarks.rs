@@ -2,6 +2,7 @@
 //! verdict.
 
 use super::{Detection, DetectionSettings, Robustness};
+use crate::posterior::marginal::Fitted;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict};
@@ -37,6 +38,14 @@ pub struct Evidence<'a> {
     pub misfit: &'a [String],
 }
 
+/// What has to be known of the field that was integrated over.
+fn of_the_field(field: &Fitted) -> Vec<Remark> {
+    let reached = |name: &&str| {
+        Remark::note(format!("{name} lies on the bound of its search: the profiles do not tell it, or it is wrong"))
+    };
+    field.at_bounds.iter().map(reached).collect()
+}
+
 impl Detection {
     /// The verdict on the best orbit, given the [`Detection::remarks`].
     pub fn verdict(&self, remarks: &[Remark]) -> Verdict {
@@ -45,7 +54,10 @@ impl Detection {
             k_kms: self.best.orbit.k_kms,
             sigma_k_kms: self.best.orbit.sigma_k_kms,
         };
-        Verdict::new(self.false_alarm_probability(), signal, remarks)
+        match self.changes() {
+            Some(sentence) => Verdict::not_judged(sentence),
+            None => Verdict::new(self.false_alarm_probability(), signal, remarks),
+        }
     }
 
     /// What an orbit at the rotation period is up against.
@@ -63,7 +75,12 @@ impl Detection {
 
     /// All that has to be said, what speaks against a planet with the rest.
     pub fn remarks(&self, evidence: &Evidence) -> Vec<Remark> {
-        let mut remarks = self.of_the_fit(evidence);
+        let mut remarks = match &self.last().field {
+            Some(field) => of_the_field(field),
+            None => self.of_the_fit(evidence),
+        };
+        remarks.extend(self.of_the_data(evidence));
+        remarks.extend(self.of_the_change());
         if self.is_candidate() {
             remarks.extend(self.of_the_period());
         }
@@ -126,6 +143,20 @@ impl Detection {
             ));
         }
         remarks.extend(misfit.iter().map(|text| Remark::against("the residuals are not like noise", text)));
+        if view.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
+            remarks.push(Remark::against(
+                "the model of the star is wrong",
+                "the profiles have nothing to do with the model of the star: what the map leaves over is without \
+                bounds",
+            ));
+        }
+        remarks
+    }
+
+    /// What the profiles lack.
+    fn of_the_data(&self, evidence: &Evidence) -> Vec<Remark> {
+        let Evidence { imager, settings, .. } = *evidence;
+        let mut remarks = Vec::new();
         let fixed = settings.nuisances.iter().all(|nuisance| nuisance.parameter != Parameter::Vsys);
         if let Some(offset) = self.offset.filter(|offset| fixed && offset.gain > OFFSET_GAIN) {
             let Offset { velocity_kms, sigma_kms, gain } = offset;
@@ -149,14 +180,18 @@ impl Detection {
                 ),
             ));
         }
-        if view.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
-            remarks.push(Remark::against(
-                "the model of the star is wrong",
-                "the profiles have nothing to do with the model of the star: what the map leaves over is without \
-                bounds",
-            ));
-        }
         remarks
+    }
+
+    /// Whether the star changes though it is taken for one that does not.
+    fn of_the_change(&self) -> Option<Remark> {
+        match self.change.as_ref()? {
+            Ok(change) => change.is_changing().then(|| Remark::against("the star changes", change.sentence())),
+            Err(error) => Some(Remark::against(
+                "whether the star changes is not known",
+                format!("whether the star changes while it is observed is not known: {error}"),
+            )),
+        }
     }
 
     /// Whether the best period is the one of the planet.

@@ -4,9 +4,10 @@
 //! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other
 //! target, or of the profiles that remain.
 
-use super::{DetectionError, DetectionSettings, View};
-use crate::planets::periodogram::{CircularOrbit, Peak, orbits};
+use super::{Detection, DetectionError, DetectionSettings, Spots, View};
+use crate::planets::periodogram::{CircularOrbit, orbits};
 use crate::posterior::imaging::Imager;
+use crate::posterior::marginal::Known;
 use crate::posterior::objective::{Parameter, ParameterValues};
 use rayon::prelude::*;
 
@@ -50,26 +51,33 @@ pub struct WithoutNight {
 /// The best orbit under other choices, its period kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robustness {
+    /// At the target asked for, and all nights.
+    pub all: Option<CircularOrbit>,
     /// With the target a little lower, as it is, and a little higher.
-    pub targets: [AtTarget; 3],
+    pub targets: Vec<AtTarget>,
     /// Without each night, in order of time; empty if the profiles are of one night, or too few.
     pub nights: Vec<WithoutNight>,
 }
 
-/// Tries the orbit of `peak` out, all else as in `values`.
+/// Tries the best orbit of `found` out, all else as in `values`. Where maps are integrated over there are no targets,
+/// and the field without a night is that of all profiles.
 pub fn robustness(
     imager: &Imager,
     mut values: ParameterValues,
     settings: &DetectionSettings,
-    peak: &Peak,
+    found: &Detection,
 ) -> Robustness {
+    let peak = &found.best;
+    let field = found.last().field.as_ref();
+    let spots = field.map_or(settings.spots, |field| Spots::Integrated(Known::of(&field.marginal)));
+    let settings = &DetectionSettings { spots, ..settings.clone() };
     values[Parameter::K] = peak.orbit.k_kms;
     values[Parameter::PorbOverProt] = peak.porb_over_prot;
     values[Parameter::Phi] = peak.orbit.phi;
     let orbit = |view: &View| orbits::at(&view.quadratic, 1.0 / peak.porb_over_prot).orbit;
     let at = |factor: f64| {
         let chi2_target = factor * settings.chi2_target;
-        let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() });
+        let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
         AtTarget {
             chi2_target,
             on_target: view.as_ref().is_ok_and(|view| view.on_target),
@@ -78,7 +86,7 @@ pub fn robustness(
     };
     let without = |night: &Vec<usize>| {
         let times = || night.iter().map(|&k| imager.sampling.profiles[k].0);
-        let view: Result<View, DetectionError> = View::new(&imager.without(night), values, settings);
+        let view: Result<View, DetectionError> = View::new(&imager.without(night), values, settings, None);
         WithoutNight {
             span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
             profiles: night.len(),
@@ -91,7 +99,12 @@ pub fn robustness(
     if nights.len() < 2 {
         nights.clear();
     }
-    Robustness { targets: TARGETS.map(at), nights: nights.par_iter().map(without).collect() }
+    let targets = match field {
+        Some(_) => Vec::new(),
+        None => TARGETS.map(at).to_vec(),
+    };
+    let all = orbit(found.last());
+    Robustness { all, targets, nights: nights.par_iter().map(without).collect() }
 }
 
 /// Profiles night by night, in order of time.
@@ -105,7 +118,7 @@ impl Robustness {
     /// By how many of its errors K differs between targets, where that is worth a warning.
     pub fn target_matters(&self) -> Option<f64> {
         let orbits: Vec<CircularOrbit> = self.targets.iter().filter_map(|at| at.orbit).collect();
-        let middle = self.targets[1].orbit?;
+        let middle = self.all?;
         let apart = |orbit: &CircularOrbit| (orbit.k_kms - middle.k_kms).abs() / middle.sigma_k_kms;
         let largest = orbits.iter().map(apart).fold(0.0, f64::max);
         (largest > MOVES).then_some(largest)
@@ -114,7 +127,7 @@ impl Robustness {
     /// Nights that make the result: without them ln L of the orbit falls below `level`, where it was above, or K moves
     /// by more than the profiles left out explain.
     pub fn decisive_nights(&self, level: f64) -> Vec<&WithoutNight> {
-        let Some(all) = self.targets[1].orbit else { return Vec::new() };
+        let Some(all) = self.all else { return Vec::new() };
         let decides = |night: &&WithoutNight| {
             night.orbit.is_none_or(|orbit| {
                 // of nested data, the variance of the difference is that of the variances
@@ -152,11 +165,11 @@ mod tests {
             night(orbit(0.27, 0.0225, 15.0)),
             night(None),
         ];
-        let steady = Robustness { targets: [at(0.205), at(0.2), at(0.192)], nights };
+        let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets: vec![at(0.205), at(0.2), at(0.192)], nights };
         assert_eq!(steady.target_matters(), None);
         let decisive: Vec<Option<CircularOrbit>> = steady.decisive_nights(8.0).iter().map(|n| n.orbit).collect();
         assert_eq!(decisive, vec![orbit(0.2, 0.03, 7.0), orbit(0.27, 0.0225, 15.0), None]);
-        let shaky = Robustness { targets: [at(0.18), at(0.2), at(0.2)], ..steady };
+        let shaky = Robustness { targets: vec![at(0.18), at(0.2), at(0.2)], ..steady };
         assert!((shaky.target_matters().unwrap() - 1.0).abs() < 1e-12);
     }
 }

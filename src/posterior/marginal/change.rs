@@ -1,24 +1,38 @@
 //! Whether the star changes while it is observed: ln Z of a field that lives for some time against that of one that
 //! lives for ever, with the best orbit in the model on both sides. Without it a planet of 100 m/s alone makes a star
 //! look changing.
+//!
+//! The field that lives for ever is fitted first. Its amplitude, slope and orbit are kept while the lifetime is
+//! shortened: where that alone gains enough the star changes, and where nothing is gained it does not. In between, the
+//! changing field is fitted as well, with an orbit of its own.
 
-use super::Basis;
 use super::fit::{Fitted, Known, fit};
-use crate::field::{FieldError, Lifetime};
+use super::{Assumed, Basis, Marginal};
+use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::planets::periodogram::Frequencies;
 use crate::planets::periodogram::orbits;
 use crate::posterior::expansion::{Nuisance, STELLAR};
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::{Parameter, ParameterValues};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// A star changes where that gains more than this in ln Z: odds of 150 to 1.
 pub const CHANGES: f64 = 5.0;
 
+/// Lifetimes that are tried, in time bases, from long to short.
+const LIFETIMES: [f64; 6] = [8.0, 4.0, 2.0, 1.0, 0.5, 0.25];
+
+/// Below this gain of the best of them a fit will not find [`CHANGES`].
+const NOTHING: f64 = 0.5;
+
+/// Shorter lifetimes are tried no further where ln Z is so far below the best.
+const FAR_BELOW: f64 = 10.0;
+
 /// The comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
-    /// ln Z of the best changing field over that of the best one that does not change.
+    /// ln Z of the best changing field that was tried over that of the best one that does not change.
     pub ln_evidence_gain: f64,
     /// Lifetime of its spots (d).
     pub spot_lifetime_d: f64,
@@ -28,7 +42,7 @@ impl Change {
     /// Compares both for the profiles of `imager`, all but the orbit as in `values`, the `nuisances` integrated out.
     ///
     /// # Errors
-    /// [`FieldError`] where one of the fields cannot be fitted.
+    /// [`FieldError`] where the field that does not change cannot be fitted.
     pub fn of(
         imager: &Imager,
         values: ParameterValues,
@@ -37,14 +51,26 @@ impl Change {
         known: Known,
     ) -> Result<Self, FieldError> {
         let basis = Basis::new(&imager.grid);
-        let side = |known: Known| with_best_orbit(imager, &basis, values, frequencies, nuisances, known);
-        let (still, changing) = rayon::join(|| side(known.unchanging()), || side(Known { lifetime: None, ..known }));
-        let (still, changing) = (still?, changing?);
-        let spot_lifetime_d = match changing.marginal.assumed.field.kernel.lifetime {
-            Lifetime::Days(days) => days,
-            Lifetime::Static => f64::INFINITY,
+        let best = |known: Known, near: Option<&Marginal>| {
+            with_best_orbit(imager, &basis, values, frequencies, nuisances, known, near)
         };
-        Ok(Change { ln_evidence_gain: changing.ln_evidence - still.ln_evidence, spot_lifetime_d })
+        let still = best(known.unchanging(), None)?;
+        let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
+        let Some((lifetime_d, gain, start)) = shortened(imager, &basis, &still, time_base_d)? else {
+            return Ok(Change { ln_evidence_gain: f64::NEG_INFINITY, spot_lifetime_d: f64::INFINITY });
+        };
+        let found = Change { ln_evidence_gain: gain, spot_lifetime_d: lifetime_d };
+        if !(NOTHING..=CHANGES).contains(&gain) {
+            return Ok(found);
+        }
+        let Ok(changing) = best(Known { lifetime: None, ..known }, Some(&start)) else { return Ok(found) };
+        let fitted_gain = changing.ln_evidence - still.ln_evidence;
+        Ok(match changing.marginal.assumed.field.kernel.lifetime {
+            Lifetime::Days(days) if fitted_gain > gain => {
+                Change { ln_evidence_gain: fitted_gain, spot_lifetime_d: days }
+            }
+            _ => found,
+        })
     }
 
     /// Whether the star changes.
@@ -55,14 +81,44 @@ impl Change {
     /// What is to be said of it where it does.
     pub fn sentence(&self) -> String {
         format!(
-            "the star changes while it is observed (spots that live {:.3} d rather than for ever gain {:.1} in ln of \
-            the evidence), which this objective does not allow for: set imaging.objective to \"marginal-likelihood\"",
+            "the star changes while it is observed (spots that live some {:.2} d rather than for ever gain {:.0} in \
+            ln of the evidence), which this objective does not allow for; dimcmc periodogram does with \
+            imaging.objective set to \"marginal-likelihood\"",
             self.spot_lifetime_d, self.ln_evidence_gain
         )
     }
 }
 
-/// The field fitted without an orbit, and again with the best one.
+/// The lifetime (d) with the highest ln Z, all else as in `still`: its gain, and the maps; `None` where no lifetime
+/// has maps.
+fn shortened(
+    imager: &Imager,
+    basis: &Basis,
+    still: &Fitted,
+    time_base_d: f64,
+) -> Result<Option<(f64, f64, Marginal)>, FieldError> {
+    let Marginal { values, design, assumed, .. } = &still.marginal;
+    let mut best: Option<(f64, f64, Marginal)> = None;
+    let mut last = still.marginal.clone();
+    for lifetime_d in LIFETIMES.map(|bases| bases * time_base_d) {
+        let kernel = Kernel::of(Lifetime::Days(lifetime_d));
+        let field = Field { kernel, ..assumed.field };
+        let at = |nearby| {
+            Marginal::new(imager, basis, Arc::clone(design), *values, Assumed { field, ..*assumed }, nearby)
+        };
+        let Ok(next) = at(Some(&last)).or_else(|_| at(None)) else { continue };
+        let gain = next.ln_evidence(imager, basis)? - still.ln_evidence;
+        last = next.clone();
+        match &best {
+            Some((_, highest, _)) if gain < highest - FAR_BELOW => break,
+            Some((_, highest, _)) if gain <= *highest => {}
+            _ => best = Some((lifetime_d, gain, next)),
+        }
+    }
+    Ok(best)
+}
+
+/// The field fitted without an orbit, from one `near` by if there is one, and again with the best orbit.
 fn with_best_orbit(
     imager: &Imager,
     basis: &Basis,
@@ -70,9 +126,10 @@ fn with_best_orbit(
     frequencies: &Frequencies,
     nuisances: &[Nuisance],
     known: Known,
+    near: Option<&Marginal>,
 ) -> Result<Fitted, FieldError> {
     values[Parameter::K] = 0.0;
-    let alone = fit(imager, basis, values, known, None)?;
+    let alone = fit(imager, basis, values, known, near)?;
     let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
     let quadratic = alone.marginal.expansion(imager, basis, &stellar)?.velocities(nuisances);
     let trials = orbits::scan(&quadratic, &frequencies.per_cycle);

@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.3, 3.0), (0.3, 3000.0)];
 
 /// Names of the three.
-const NAMES: [&str; 3] = ["spot_amplitude", "spot_slope", "spot_lifetime_d"];
+pub const NAMES: [&str; 3] = ["spot_amplitude", "spot_slope", "spot_lifetime_d"];
 
 /// Where searches start: amplitude and slope are usual ones.
 const USUAL: (f64, f64) = (0.2, 0.9);
@@ -44,6 +44,17 @@ pub struct Known {
 }
 
 impl Known {
+    /// All as it was fitted.
+    pub fn of(marginal: &Marginal) -> Self {
+        let Assumed { field, jitter_kms } = marginal.assumed;
+        Known {
+            amplitude: Some(field.spectrum.amplitude),
+            slope: Some(field.spectrum.slope),
+            lifetime: Some(field.kernel.lifetime),
+            jitter_kms: Some(jitter_kms),
+        }
+    }
+
     /// The same of a star that does not change.
     pub fn unchanging(self) -> Self {
         Known { lifetime: Some(Lifetime::Static), ..self }

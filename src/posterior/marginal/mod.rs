@@ -3,7 +3,7 @@
 //!
 //! In: what the star is imaged with ([`Imager`]), values of all parameters, what is assumed of the field
 //! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
-//! parameters, as an expansion like that of maximum entropy. No command uses it yet. The order:
+//! parameters, as an expansion like that of maximum entropy. The order:
 //! 1. [`Basis`]: the harmonics on the pixels of the map, once.
 //! 2. [`Design`]: the profiles of each harmonic, for one star; a model application a harmonic.
 //! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
@@ -17,7 +17,7 @@ mod fit;
 
 pub use change::Change;
 pub use design::{Basis, Design};
-pub use fit::{Fitted, Known, fit};
+pub use fit::{BOUNDS, Fitted, Known, NAMES, fit};
 
 use crate::field::{Compression, Field, FieldError, Settled, Settling, Sought, settle};
 use crate::posterior::imaging::Imager;

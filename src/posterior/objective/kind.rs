@@ -1,4 +1,4 @@
-//! The three objectives by name (`docs/method.md` section 3), and what is known of the spots that a map leaves over.
+//! The objectives by name (`docs/method.md` section 3), and what is known of the spots that a map leaves over.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,9 @@ pub enum ObjectiveKind {
     /// `max_s [alpha S - chi2/2]` at the alpha of the reference solution; spelt `regularized-likelihood` too.
     #[serde(alias = "regularized-likelihood")]
     RegularisedLikelihood,
+    /// The likelihood with all maps integrated out, which may change with time: spots are a Gaussian field. For
+    /// `periodogram` and `limits`.
+    MarginalLikelihood,
 }
 
 impl ObjectiveKind {
@@ -25,6 +28,7 @@ impl ObjectiveKind {
             ObjectiveKind::Spottedness => "spottedness",
             ObjectiveKind::Entropy => "entropy",
             ObjectiveKind::RegularisedLikelihood => "regularised-likelihood",
+            ObjectiveKind::MarginalLikelihood => "marginal-likelihood",
         }
     }
 }

@@ -40,7 +40,7 @@ impl Posterior {
     /// ln L of a reconstruction, and the derivative of chi2 on the trade-off curve with respect to its measure.
     pub(super) fn log_likelihood(&self, solution: &Solution) -> (f64, f64) {
         let measure = match self.kind() {
-            ObjectiveKind::RegularisedLikelihood => {
+            ObjectiveKind::RegularisedLikelihood | ObjectiveKind::MarginalLikelihood => {
                 let lambda = solution.image.lambda;
                 return (solution.entropy / lambda - 0.5 * solution.chi2, 0.0);
             }

@@ -288,7 +288,7 @@ impl Posterior {
         let lambda = solution.image.lambda;
         let unreachable = solution.termination != Termination::Converged;
         match self.kind {
-            ObjectiveKind::RegularisedLikelihood => (-0.5, None),
+            ObjectiveKind::RegularisedLikelihood | ObjectiveKind::MarginalLikelihood => (-0.5, None),
             // ln L = (chi2_curve(-S) - target)/2 and dS = -(lambda/2) dchi2
             ObjectiveKind::Entropy if !unreachable => (0.25 * curve_slope * lambda, None),
             // beyond the reach of the target: the leading term of its misfit

@@ -99,7 +99,9 @@ impl Prediction {
         let mut gradient = vec![0.0; n];
         problem.gradient(&mut gradient);
         let adjoint = match kind {
-            ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => Vec::new(),
+            ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood | ObjectiveKind::MarginalLikelihood => {
+                Vec::new()
+            }
             ObjectiveKind::Spottedness => {
                 let weights = imager.entropy.spottedness_gradient(&map, &imager.grid.area);
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);

@@ -13,7 +13,7 @@ use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::scene::Scene;
 use crate::data::search::{self, Found, SearchError, SearchSettings};
 use crate::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
-use crate::posterior::detection::{Detection, DetectionSettings};
+use crate::posterior::detection::{Detection, DetectionSettings, Spots};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::objective::{Parameter, Reference, ReferenceError};
 use crate::runs::grid_scan::{GridScan, GridScanError, PARABOLOID};
@@ -265,6 +265,7 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentEr
         search: PeriodSearch { draws, seed: 1 },
         eccentric: false,
         second_planet: false,
+        spots: Spots::OneMap(None),
     };
     let found = Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?;
     let (peak, orbit) = (&found.best, &found.best.orbit);

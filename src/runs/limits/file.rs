@@ -157,6 +157,13 @@ impl LimitsFile {
 
     fn doubts(&self, shortcut: &Shortcut) -> Vec<String> {
         let mut doubts = Vec::new();
+        match &shortcut.change {
+            Some(Ok(change)) if change.is_changing() => {
+                doubts.push(format!("these limits do not hold: {}", change.sentence()));
+            }
+            Some(Err(error)) => doubts.push(format!("whether the star changes is not known: {error}")),
+            _ => {}
+        }
         if self.before.false_alarm_probability < CANDIDATE_FAP {
             doubts.push(format!(
                 "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: \
@@ -165,7 +172,7 @@ impl LimitsFile {
                 self.before.period_d
             ));
         }
-        if !shortcut.view.on_target {
+        if !shortcut.view.on_target && shortcut.view.field.is_none() {
             doubts.push("no map reaches the target chi2 without turning noise into spots".into());
         }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) =

@@ -126,7 +126,7 @@ impl WholeWay {
             let star = scene.injected(&whole, &orbits).ok()?;
             let mut values = star.settings.values;
             values[Parameter::K] = 0.0;
-            let view = View::new(&star.imager, values, &settings.detection).ok()?;
+            let view = View::new(&star.imager, values, &settings.detection, None).ok()?;
             let search = Search::new(&view.quadratic, &settings.frequencies, settings.detection.search).ok()?;
             let best = search.best();
             let peak = (1.0 / best.porb_over_prot, best.orbit.delta_ln_l, best.orbit.k_kms);

@@ -1,12 +1,14 @@
 //! The blind search after an orbit has been put in, to second order around the image without a planet.
 
+use crate::field::FieldError;
 use crate::planets::periodogram::orbits::scan;
 use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
-use crate::posterior::detection::{DetectionError, View};
-use crate::posterior::expansion::{Expansion, Nuisance};
+use crate::posterior::detection::{DetectionError, DetectionSettings, Spots, View};
+use crate::posterior::expansion::Expansion;
 use crate::posterior::imaging::Imager;
+use crate::posterior::marginal::Change;
 use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::runs::limits::LimitSettings;
 use crate::star::Orbit;
@@ -45,6 +47,8 @@ pub struct Shortcut<'a> {
     pub settings: &'a LimitSettings,
     /// Image and expansion.
     pub view: View,
+    /// Whether the star changes, where spots are taken for unchanging.
+    pub change: Option<Result<Change, FieldError>>,
     /// What was taken out of the profiles: the orbit found, with the opposite sign.
     pub removed: Option<Orbit>,
     /// The search before anything is put in.
@@ -64,21 +68,23 @@ impl<'a> Shortcut<'a> {
         settings: &'a LimitSettings,
     ) -> Result<Self, DetectionError> {
         values[Parameter::K] = 0.0;
-        let mut view = View::new(imager, values, &settings.detection)?;
+        let mut view = View::new(imager, values, &settings.detection, None)?;
+        let known = settings.detection.spots.compared();
+        let nuisances = &settings.detection.nuisances;
+        let change = known.map(|known| Change::of(imager, values, &settings.frequencies, nuisances, known));
         let search = |view: &View| Search::new(&view.quadratic, &settings.frequencies, settings.detection.search);
         let mut before = search(&view)?;
         let mut removed = None;
         if settings.without_best {
             let CircularOrbit { k_kms, phi, .. } = before.best().orbit;
             let orbit = Orbit { k_kms: -k_kms, porb_over_prot: before.best().porb_over_prot, phi };
-            let nuisances = &settings.detection.nuisances;
             view.expansion = with(&view.expansion, &orbit);
-            view.quadratic = counted(&view.expansion, nuisances).ok_or(Unbounded)?;
+            view.quadratic = counted(&view.expansion, &settings.detection).ok_or(Unbounded)?;
             before = search(&view)?;
             removed = Some(orbit);
         }
         let level = before.false_alarm.level(CANDIDATE_FAP);
-        Ok(Shortcut { settings, view, removed, before, level })
+        Ok(Shortcut { settings, view, change, removed, before, level })
     }
 
     /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half
@@ -96,8 +102,8 @@ impl<'a> Shortcut<'a> {
     /// The search with `orbit` in the profiles. Nothing is found where no orbit is bounded.
     pub fn search(&self, orbit: &Orbit) -> Outcome {
         let frequencies = &self.settings.frequencies;
-        let nuisances = &self.settings.detection.nuisances;
-        let Some(quadratic) = counted(&with(&self.view.expansion, orbit), nuisances) else { return Outcome::default() };
+        let moved = with(&self.view.expansion, orbit);
+        let Some(quadratic) = counted(&moved, &self.settings.detection) else { return Outcome::default() };
         let trials = scan(&quadratic, &frequencies.per_cycle).into_iter();
         let peaks = trials.filter_map(|trial| Some((trial.frequency, trial.orbit?)));
         let highest = peaks.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
@@ -117,8 +123,15 @@ fn with(expansion: &Expansion, orbit: &Orbit) -> Expansion {
     moved
 }
 
-/// The quadratic of the orbit's velocities, unresolved spots counted as noise of the size that the gradient says.
-fn counted(expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
-    let unresolved_spots = expansion.unresolved_spots(nuisances)?;
-    Some(expansion.with_unresolved_spots(unresolved_spots)?.velocities(nuisances))
+/// The quadratic of the orbit's velocities; spots that one map does not resolve are counted as noise of the size that
+/// the gradient says.
+fn counted(expansion: &Expansion, settings: &DetectionSettings) -> Option<VelocityQuadratic> {
+    let nuisances = &settings.nuisances;
+    match settings.spots {
+        Spots::Integrated(_) => Some(expansion.velocities(nuisances)),
+        Spots::OneMap(_) => {
+            let unresolved_spots = expansion.unresolved_spots(nuisances)?;
+            Some(expansion.with_unresolved_spots(unresolved_spots)?.velocities(nuisances))
+        }
+    }
 }

@@ -11,6 +11,7 @@ use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
 use crate::posterior::detection::View;
+use crate::posterior::marginal::{Change, Fitted, Known};
 use crate::posterior::objective::ParameterValues;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -37,6 +38,12 @@ pub struct PeriodogramFile {
     pub second: Option<SecondRecord>,
     /// What was searched.
     pub search: SearchRecord,
+    /// The spots as a field, where all maps are integrated over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<FieldRecord>,
+    /// Whether the star changes, where spots are taken for unchanging.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub change: Option<Change>,
     /// The quadratic that it was searched in.
     pub expansion: ExpansionRecord,
     /// A constant velocity left free beside the orbit.
@@ -50,6 +57,48 @@ pub struct PeriodogramFile {
     /// Config, data and program.
     #[serde(flatten)]
     pub provenance: Provenance,
+}
+
+/// The most probable field of spots, at the best orbit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FieldRecord {
+    /// Standard deviation of the filling factor.
+    pub spot_amplitude: f64,
+    /// Slope of its spectrum.
+    pub spot_slope: f64,
+    /// Lifetime (d); null for a star that does not change.
+    pub spot_lifetime_d: Option<f64>,
+    /// Velocity jitter (km/s).
+    pub velocity_jitter_kms: f64,
+    /// ln Z.
+    pub ln_evidence: f64,
+    /// Which of them lie on a bound of the search.
+    pub at_bounds: Vec<String>,
+}
+
+impl FieldRecord {
+    /// Of a fit.
+    pub fn of(fitted: &Fitted) -> Self {
+        let Known { amplitude, slope, lifetime, jitter_kms } = Known::of(&fitted.marginal);
+        FieldRecord {
+            spot_amplitude: amplitude.unwrap_or(f64::NAN),
+            spot_slope: slope.unwrap_or(f64::NAN),
+            spot_lifetime_d: lifetime.and_then(|lifetime| lifetime.days()),
+            velocity_jitter_kms: jitter_kms.unwrap_or(0.0),
+            ln_evidence: fitted.ln_evidence,
+            at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
+        }
+    }
+
+    /// It in a line.
+    pub fn line(&self) -> String {
+        let FieldRecord { spot_amplitude, spot_slope, velocity_jitter_kms, ln_evidence, .. } = self;
+        let life = self.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2} d"));
+        format!(
+            "spots, integrated over: amplitude {spot_amplitude:.3}, slope {spot_slope:.2}, lifetime {life}; velocity \
+            jitter {velocity_jitter_kms:.3} km/s; ln of the evidence {ln_evidence:.1}\n"
+        )
+    }
 }
 
 /// A circular orbit.
@@ -227,6 +276,8 @@ impl PeriodogramResult<'_> {
                 time_base_d: found.frequencies.time_base_cycles * prot,
                 seed: self.settings.search.seed,
             },
+            field: found.last().field.as_ref().map(|field| FieldRecord::of(field)),
+            change: found.change.and_then(Result::ok),
             expansion: ExpansionRecord {
                 marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name().to_owned()).collect(),
                 unresolved_spots: [found.planet_free.unresolved_spots, found.last().unresolved_spots],

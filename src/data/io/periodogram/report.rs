@@ -3,7 +3,7 @@
 
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
-use super::record::{OrbitRecord, PeakRecord};
+use super::record::{FieldRecord, OrbitRecord, PeakRecord};
 use crate::numerics::text::{Align, aligned, columns};
 use crate::planets::verdict::probability;
 use crate::posterior::objective::{OrbitQuantity, Parameter};
@@ -18,6 +18,9 @@ impl PeriodogramResult<'_> {
         let best = self.orbit(&found.best);
         let meanings = self.meanings(&best.quantities);
         let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(&[best]) + &meanings;
+        if let Some(field) = &found.last().field {
+            text += &FieldRecord::of(field).line();
+        }
         text += &format!("{}\n", chance(&false_alarm(&found.blind)));
         text += &peaks(&self.peaks(&found.blind));
         for orbit in found.keplerian.iter().take(1).flatten() {

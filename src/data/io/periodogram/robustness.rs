@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobustnessRecord {
     /// K at the best period with other targets.
-    pub targets: [TargetRecord; 3],
+    pub targets: Vec<TargetRecord>,
     /// K at the best period without each night; empty for profiles of one night.
     pub without_night: Vec<NightRecord>,
 }
@@ -68,7 +68,7 @@ impl QuickRecord {
 
 impl PeriodogramResult<'_> {
     pub(super) fn robustness_record(&self) -> RobustnessRecord {
-        let target = |at: AtTarget| TargetRecord {
+        let target = |at: &AtTarget| TargetRecord {
             chi2_target: at.chi2_target,
             reached: at.on_target,
             orbit: QuickRecord::of(at.orbit),
@@ -80,7 +80,7 @@ impl PeriodogramResult<'_> {
             orbit: QuickRecord::of(night.orbit),
         };
         RobustnessRecord {
-            targets: self.robustness.targets.map(target),
+            targets: self.robustness.targets.iter().map(target).collect(),
             without_night: self.robustness.nights.iter().map(night).collect(),
         }
     }
