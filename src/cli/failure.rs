@@ -86,7 +86,9 @@ impl Failure {
     pub fn search(path: &Path, error: SearchError) -> Self {
         match error {
             SearchError::Reference(error) => Failure::reference(path, error),
-            error @ (SearchError::Optimise(_) | SearchError::Integrated) => Failure::failed(format!("{}: {error}", path.display())),
+            error @ (SearchError::Optimise(_) | SearchError::Integrated) => {
+                Failure::failed(format!("{}: {error}", path.display()))
+            }
         }
     }
 

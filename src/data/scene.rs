@@ -12,9 +12,11 @@ use crate::field::Lifetime;
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::Fit;
 use crate::posterior::imaging::Imager;
-use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::posterior::marginal::Known;
-use crate::posterior::objective::{FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target};
+use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
+use crate::posterior::objective::{
+    FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
+};
 use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;

@@ -232,10 +232,8 @@ impl Detection {
         let best = blind.best().orbit.delta_ln_l;
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
-        let change = settings
-            .spots
-            .compared()
-            .map(|known| Change::of(imager, values, &frequencies, &settings.nuisances, known));
+        let change =
+            settings.spots.compared().map(|known| Change::of(imager, values, &frequencies, &settings.nuisances, known));
         let mut found = Detection {
             best: *blind.best(),
             planet_free,

@@ -57,8 +57,7 @@ impl BlindSearch {
         let fit = Fit::new(&scene.imager, &scene.observations, &found.last().reference);
         let misfit: Vec<String> = fit.checks.warnings.iter().cloned().chain(scene.measured.misfit_text()).collect();
         // of what is no candidate it would say nothing
-        let choices =
-            found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, &found));
+        let choices = found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, &found));
         let evidence =
             Evidence { imager: &scene.imager, settings: &settings, robustness: choices.as_ref(), misfit: &misfit };
         let mut remarks = found.remarks(&evidence);

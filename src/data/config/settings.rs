@@ -1,7 +1,7 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
-use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
 use super::spots::Hyperparameter;
+use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::maxent::entropy::Entropy;
 use crate::posterior::noise::ErrorSettings;

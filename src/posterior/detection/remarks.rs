@@ -2,12 +2,12 @@
 //! verdict.
 
 use super::{Detection, DetectionSettings, Robustness};
-use crate::posterior::marginal::Fitted;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict};
 use crate::posterior::expansion::UNRESOLVED_SPOTS;
 use crate::posterior::imaging::Imager;
+use crate::posterior::marginal::Fitted;
 use crate::posterior::objective::Parameter;
 
 /// chi2 per datum that many of its standard deviations from 1 says that something is wrong.

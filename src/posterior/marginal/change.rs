@@ -2,11 +2,12 @@
 //! lives for ever, with the best orbit in the model on both sides. Without it a planet of 100 m/s alone makes a star
 //! look changing.
 //!
-//! The field that lives for ever is fitted first. Its amplitude, slope and orbit are kept while the lifetime is
-//! shortened: where that alone gains enough the star changes, and where nothing is gained it does not. In between, the
-//! changing field is fitted as well, with an orbit of its own.
+//! A usual field that lives for ever, with the best orbit, comes first. Where shorter lifetimes gain nothing the star
+//! does not change. Otherwise the field that lives for ever is fitted, and again its lifetime is shortened, all else
+//! kept: where that gains enough the star changes, and where it gains nothing it does not. In between, the changing
+//! field is fitted as well, with an orbit of its own.
 
-use super::fit::{Fitted, Known, fit};
+use super::fit::{Fitted, Known, fit, usual};
 use super::{Assumed, Basis, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::planets::periodogram::Frequencies;
@@ -51,25 +52,30 @@ impl Change {
         known: Known,
     ) -> Result<Self, FieldError> {
         let basis = Basis::new(&imager.grid);
-        let best = |known: Known, near: Option<&Marginal>| {
-            with_best_orbit(imager, &basis, values, frequencies, nuisances, known, near)
-        };
-        let still = best(known.unchanging(), None)?;
+        let with_best_orbit = |near: &Marginal| with_best_orbit(near, imager, &basis, values, frequencies, nuisances);
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
-        let Some((lifetime_d, gain, start)) = shortened(imager, &basis, &still, time_base_d)? else {
-            return Ok(Change { ln_evidence_gain: f64::NEG_INFINITY, spot_lifetime_d: f64::INFINITY });
-        };
-        let found = Change { ln_evidence_gain: gain, spot_lifetime_d: lifetime_d };
-        if !(NOTHING..=CHANGES).contains(&gain) {
-            return Ok(found);
+        let shortened = |still: &Fitted| shortened(imager, &basis, still, time_base_d);
+        let unchanging = known.unchanging();
+        let alone = usual(imager, &basis, without_planet(values), unchanging, None)?;
+        let values = with_best_orbit(&alone.marginal)?;
+        let still = usual(imager, &basis, values, unchanging, Some(&alone.marginal))?;
+        if let Some(best) = shortened(&still)?.filter(|best| best.gain < NOTHING) {
+            return Ok(best.change());
         }
-        let Ok(changing) = best(Known { lifetime: None, ..known }, Some(&start)) else { return Ok(found) };
-        let fitted_gain = changing.ln_evidence - still.ln_evidence;
-        Ok(match changing.marginal.assumed.field.kernel.lifetime {
-            Lifetime::Days(days) if fitted_gain > gain => {
-                Change { ln_evidence_gain: fitted_gain, spot_lifetime_d: days }
-            }
-            _ => found,
+        let still = fit(imager, &basis, values, unchanging, Some(&still.marginal))?;
+        let Some(best) = shortened(&still)? else {
+            return Ok(Change { ln_evidence_gain: f64::NEG_INFINITY, spot_lifetime_d: time_base_d });
+        };
+        if !(NOTHING..=CHANGES).contains(&best.gain) {
+            return Ok(best.change());
+        }
+        let known = Known { lifetime: None, ..known };
+        let values = with_best_orbit(&best.marginal)?;
+        let Ok(changing) = fit(imager, &basis, values, known, Some(&best.marginal)) else { return Ok(best.change()) };
+        let gain = changing.ln_evidence - still.ln_evidence;
+        Ok(match changing.marginal.assumed.field.kernel.lifetime.days() {
+            Some(lifetime_d) if gain > best.gain => Change { ln_evidence_gain: gain, spot_lifetime_d: lifetime_d },
+            _ => best.change(),
         })
     }
 
@@ -89,58 +95,70 @@ impl Change {
     }
 }
 
-/// The lifetime (d) with the highest ln Z, all else as in `still`: its gain, and the maps; `None` where no lifetime
-/// has maps.
+/// The best of the lifetimes.
+struct Shortened {
+    lifetime_d: f64,
+    gain: f64,
+    marginal: Marginal,
+}
+
+impl Shortened {
+    fn change(&self) -> Change {
+        Change { ln_evidence_gain: self.gain, spot_lifetime_d: self.lifetime_d }
+    }
+}
+
+/// The lifetime with the highest ln Z, all else as in `still`; `None` where no lifetime has maps.
 fn shortened(
     imager: &Imager,
     basis: &Basis,
     still: &Fitted,
     time_base_d: f64,
-) -> Result<Option<(f64, f64, Marginal)>, FieldError> {
+) -> Result<Option<Shortened>, FieldError> {
     let Marginal { values, design, assumed, .. } = &still.marginal;
-    let mut best: Option<(f64, f64, Marginal)> = None;
+    let mut best: Option<Shortened> = None;
     let mut last = still.marginal.clone();
     for lifetime_d in LIFETIMES.map(|bases| bases * time_base_d) {
         let kernel = Kernel::of(Lifetime::Days(lifetime_d));
         let field = Field { kernel, ..assumed.field };
-        let at = |nearby| {
-            Marginal::new(imager, basis, Arc::clone(design), *values, Assumed { field, ..*assumed }, nearby)
-        };
-        let Ok(next) = at(Some(&last)).or_else(|_| at(None)) else { continue };
-        let gain = next.ln_evidence(imager, basis)? - still.ln_evidence;
-        last = next.clone();
+        let at =
+            |nearby| Marginal::new(imager, basis, Arc::clone(design), *values, Assumed { field, ..*assumed }, nearby);
+        let Ok(marginal) = at(Some(&last)).or_else(|_| at(None)) else { continue };
+        let gain = marginal.ln_evidence(imager, basis)? - still.ln_evidence;
+        last = marginal.clone();
         match &best {
-            Some((_, highest, _)) if gain < highest - FAR_BELOW => break,
-            Some((_, highest, _)) if gain <= *highest => {}
-            _ => best = Some((lifetime_d, gain, next)),
+            Some(best) if gain < best.gain - FAR_BELOW => break,
+            Some(best) if gain <= best.gain => {}
+            _ => best = Some(Shortened { lifetime_d, gain, marginal }),
         }
     }
     Ok(best)
 }
 
-/// The field fitted without an orbit, from one `near` by if there is one, and again with the best orbit.
+fn without_planet(mut values: ParameterValues) -> ParameterValues {
+    values[Parameter::K] = 0.0;
+    values
+}
+
+/// `values` with the best orbit, the field as in `near`.
 fn with_best_orbit(
+    near: &Marginal,
     imager: &Imager,
     basis: &Basis,
     mut values: ParameterValues,
     frequencies: &Frequencies,
     nuisances: &[Nuisance],
-    known: Known,
-    near: Option<&Marginal>,
-) -> Result<Fitted, FieldError> {
-    values[Parameter::K] = 0.0;
-    let alone = fit(imager, basis, values, known, near)?;
+) -> Result<ParameterValues, FieldError> {
     let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
-    let quadratic = alone.marginal.expansion(imager, basis, &stellar)?.velocities(nuisances);
+    let quadratic = near.expansion(imager, basis, &stellar)?.velocities(nuisances);
     let trials = orbits::scan(&quadratic, &frequencies.per_cycle);
     let best = trials
         .iter()
         .filter_map(|trial| Some((trial.frequency, trial.orbit?)))
         .max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
-    let Some((frequency, orbit)) = best else { return Ok(alone) };
+    let Some((frequency, orbit)) = best else { return Ok(without_planet(values)) };
     values[Parameter::K] = orbit.k_kms;
     values[Parameter::PorbOverProt] = 1.0 / frequency;
     values[Parameter::Phi] = orbit.phi;
-    let beside = fit(imager, basis, values, known, Some(&alone.marginal))?;
-    Ok(if beside.ln_evidence > alone.ln_evidence { beside } else { alone })
+    Ok(values)
 }

@@ -72,6 +72,24 @@ pub struct Fitted {
     pub at_bounds: Vec<&'static str>,
 }
 
+/// The profiles with a usual field, but for what is known: one that does not change, if the lifetime is not. Maps are
+/// found from those `near` by.
+pub(super) fn usual(
+    imager: &Imager,
+    basis: &Basis,
+    values: ParameterValues,
+    known: Known,
+    near: Option<&Marginal>,
+) -> Result<Fitted, FieldError> {
+    let spectrum = Spectrum { amplitude: known.amplitude.unwrap_or(USUAL.0), slope: known.slope.unwrap_or(USUAL.1) };
+    let kernel = Kernel::of(known.lifetime.unwrap_or(Lifetime::Static));
+    let assumed = Assumed { field: Field { spectrum, kernel }, jitter_kms: known.jitter_kms.unwrap_or(0.0) };
+    let design = Arc::new(Design::new(imager, basis, &values.state()));
+    let marginal = Marginal::new(imager, basis, design, values, assumed, near)?;
+    let ln_evidence = marginal.ln_evidence(imager, basis)?;
+    Ok(Fitted { marginal, ln_evidence, at_bounds: Vec::new() })
+}
+
 /// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from several lifetimes.
 ///
 /// # Errors

@@ -244,7 +244,9 @@ impl Reference {
     /// What every evaluation by `kind` solves for.
     pub fn goal(&self, kind: ObjectiveKind) -> Goal {
         match kind {
-            ObjectiveKind::RegularisedLikelihood | ObjectiveKind::MarginalLikelihood => Goal::Lambda(self.solution.image.lambda),
+            ObjectiveKind::RegularisedLikelihood | ObjectiveKind::MarginalLikelihood => {
+                Goal::Lambda(self.solution.image.lambda)
+            }
             ObjectiveKind::Spottedness | ObjectiveKind::Entropy => {
                 Goal::Chi2 { target: self.chi2_target, largest_lambda: self.largest_lambda }
             }
