@@ -86,9 +86,8 @@ impl Failure {
     pub fn search(path: &Path, error: SearchError) -> Self {
         match error {
             SearchError::Reference(error) => Failure::reference(path, error),
-            error @ (SearchError::Optimise(_) | SearchError::Integrated) => {
-                Failure::failed(format!("{}: {error}", path.display()))
-            }
+            SearchError::Integrated => Failure::input(format!("{}: {error}", path.display())),
+            SearchError::Optimise(error) => Failure::failed(format!("{}: {error}", path.display())),
         }
     }
 

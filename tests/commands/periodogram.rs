@@ -167,3 +167,44 @@ fn a_massive_planet_is_found_in_spite_of_the_target() {
     let off = (number(&best["k_kms"]) - 2.0) / number(&best["sigma_k_kms"]);
     assert!(off.abs() < 4.0, "{off} sigma");
 }
+
+/// A simulated star that changes, made by another program (`tests/data/evolving`).
+fn changing(objective: Value) -> Desk {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/evolving/slow-planet");
+    let mut config: Value = serde_json::from_slice(&std::fs::read(folder.join("config.json")).unwrap()).unwrap();
+    config["observations"]["path"] = json!(folder.join("observations.txt"));
+    config["imaging"]["objective"] = objective;
+    config["imaging"]["pixels"] = json!(1000);
+    Desk::new(config)
+}
+
+#[test]
+fn a_star_that_changes_is_not_judged_by_one_map() {
+    let desk = changing(json!("spottedness"));
+    let table = desk.succeed(&["periodogram", "config.json", "--out", "a"]);
+    says(&table, &["Whether there is a planet is not judged: the star changes", "marginal-likelihood"]);
+    let found = desk.json("a/periodogram.json");
+    assert_eq!(found["verdict"]["finding"], "not-judged");
+    assert!(found["verdict"]["false_alarm_probability"].is_null());
+    assert!(number(&found["change"]["ln_evidence_gain"]) > 20.0);
+    let table = desk.succeed(&["limits", "config.json", "--out", "b", "--periods", "3", "--phases", "2"]);
+    says(&table, &["these limits do not hold: the star changes"]);
+}
+
+#[test]
+fn all_maps_of_a_star_that_changes_are_integrated_over() {
+    let desk = changing(json!("marginal-likelihood"));
+    let table = desk.succeed(&["periodogram", "config.json", "--out", "a"]);
+    says(&table, &["spots, integrated over: amplitude"]);
+    let found = desk.json("a/periodogram.json");
+    let (best, field) = (&found["best"], &found["field"]);
+    // what was simulated: K of 0.1 km/s at 1.7 rotations
+    assert!((number(&best["k_kms"]) - 0.1).abs() < 3.0 * number(&best["sigma_k_kms"]), "{best}");
+    assert!((number(&best["porb_over_prot"]) - 1.7).abs() < 0.2, "{best}");
+    assert!((5.0..200.0).contains(&number(&field["spot_lifetime_d"])), "{field}");
+    assert!(found["change"].is_null() && found["robustness"]["targets"].as_array().unwrap().is_empty());
+    for command in ["optimise", "sample"] {
+        let error = desk.refusal(&[command, "config.json", "--out", "c"]);
+        says(&error, &["imaging.objective", "dimcmc periodogram"]);
+    }
+}

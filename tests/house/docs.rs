@@ -370,7 +370,9 @@ impl Described {
         };
         let free = dimcmc::internals::posterior::objective::Parameter::ALL.map(|parameter| parameter.name());
         for key in keys(&name, path) {
-            let known = section.contains(&format!("`{key}`")) || self.common.contains(&format!("`{key}`"));
+            let is_known = |key: &str| [section, &self.common].iter().any(|text| text.contains(&format!("`{key}`")));
+            // the error of a number that is described
+            let known = is_known(&key) || key.strip_prefix("sigma_").is_some_and(is_known);
             if !known && !free.contains(&key.as_str()) {
                 self.faults.insert(format!("{name}: `{key}` is not described"));
             }
@@ -402,7 +404,7 @@ fn all_keys(value: &Value, found: &mut Vec<String>) {
         Value::Array(items) => items.iter().for_each(|item| all_keys(item, found)),
         Value::Object(object) => {
             for (key, inside) in object {
-                found.push(key.strip_prefix("sigma_").unwrap_or(key).to_owned());
+                found.push(key.clone());
                 if key != "config" {
                     all_keys(inside, found);
                 }

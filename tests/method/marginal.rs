@@ -55,7 +55,6 @@ fn the_highest_peak_is_that_of_another_implementation() {
 }
 
 #[test]
-#[ignore = "half a minute"]
 fn a_star_that_changes_is_told_from_one_that_does_not() {
     for (name, changes) in [("slow-planet", true), ("static-planet", false)] {
         let (scene, values, frequencies) = star(name);

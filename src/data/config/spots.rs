@@ -86,7 +86,7 @@ impl JsonSchema for Hyperparameter {
         json_schema!({
             "description": "A number, or \"fitted\": that for which the profiles are most probable. A lifetime may be \
                 \"static\" too: spots do not change.",
-            "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "enum": ["fitted", "static"] }]
+            "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "const": "fitted" }, { "const": "static" }]
         })
     }
 }
