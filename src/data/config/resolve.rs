@@ -132,7 +132,7 @@ pub(super) fn without_planet(free: &[FreeParameter], values: &ParameterValues) -
 fn check_spots(imaging: &ImagingSettings) -> Result<(), Fault> {
     let all = [imaging.spot_amplitude, imaging.spot_slope, imaging.spot_lifetime_d];
     for ((name, (low, high)), value) in marginal::NAMES.iter().zip(marginal::BOUNDS).zip(all) {
-        let fault = |problem: String| Err(Fault::new(&format!("imaging.{name}"), problem));
+        let fault = |problem: String| Err(Fault::new(format!("imaging.{name}"), problem));
         match value {
             _ if value.is_default() => {}
             _ if imaging.objective != ObjectiveKind::MarginalLikelihood => {

@@ -51,7 +51,7 @@ impl Change {
         nuisances: &[Nuisance],
         known: Known,
     ) -> Result<Self, FieldError> {
-        let basis = Basis::new(&imager.grid);
+        let basis = Basis::rough(&imager.grid);
         let with_best_orbit = |near: &Marginal| with_best_orbit(near, imager, &basis, values, frequencies, nuisances);
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
         let shortened = |still: &Fitted| shortened(imager, &basis, still, time_base_d);
@@ -127,6 +127,11 @@ fn shortened(
         let gain = marginal.ln_evidence(imager, basis)? - still.ln_evidence;
         last = marginal.clone();
         match &best {
+            // a little change already is too much
+            None if gain < -CHANGES => {
+                best = Some(Shortened { lifetime_d, gain, marginal });
+                break;
+            }
             Some(best) if gain < best.gain - FAR_BELOW => break,
             Some(best) if gain <= best.gain => {}
             _ => best = Some(Shortened { lifetime_d, gain, marginal }),

@@ -1,7 +1,7 @@
 //! The star's side of the marginal likelihood: what profiles each harmonic makes.
 
 use super::{DEGREE, MEAN_FILLING};
-use crate::field::{Epoch, Harmonics};
+use crate::field::{Compression, Epoch, Harmonics, Settling};
 use crate::posterior::imaging::Imager;
 use crate::star::{Response, StarState, SurfaceGrid};
 use nalgebra::{DMatrix, DVector};
@@ -19,10 +19,12 @@ pub struct Basis {
     pub on_pixels: DMatrix<f64>,
     /// The harmonics (H, points) where changes of the maps are watched.
     pub(super) watched: DMatrix<f64>,
+    /// How exactly maps are found.
+    pub(super) settling: Settling,
 }
 
 impl Basis {
-    /// On the pixels of `grid`.
+    /// On the pixels of `grid`, maps exact enough for ln Z to some 0.03.
     pub fn new(grid: &SurfaceGrid) -> Self {
         let harmonics = Harmonics::new(DEGREE);
         let on_pixels = harmonics.at(&grid.longitude, &grid.latitude);
@@ -32,7 +34,15 @@ impl Basis {
             degrees: harmonics.degrees(),
             watched: on_pixels.select_columns(&watched),
             on_pixels: on_pixels.transpose(),
+            settling: Settling { tolerance: 1e-3, ..Settling::default() },
         }
+    }
+
+    /// The same where differences of ln Z need be good to a few tenths only.
+    pub fn rough(grid: &SurfaceGrid) -> Self {
+        let compression = Compression { left_out: 0.03 };
+        let settling = Settling { tolerance: 5e-3, compression, ..Settling::default() };
+        Basis { settling, ..Basis::new(grid) }
     }
 
     /// Spot filling factors (pixels, columns) of maps with these `coefficients` (H, columns).

@@ -19,7 +19,7 @@ pub use change::Change;
 pub use design::{Basis, Design};
 pub use fit::{BOUNDS, Fitted, Known, NAMES, fit};
 
-use crate::field::{Compression, Field, FieldError, Settled, Settling, Sought, settle};
+use crate::field::{Field, FieldError, Settled, Sought, settle};
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::ParameterValues;
 use nalgebra::DMatrix;
@@ -75,7 +75,7 @@ impl Marginal {
         };
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
         let by = nearby.map(|nearby| &nearby.settled.evidence);
-        let settled = settle(linearise, sought, start, by, &settling())?;
+        let settled = settle(linearise, sought, start, by, &basis.settling)?;
         Ok(Marginal { values, assumed, design, settled })
     }
 
@@ -83,9 +83,4 @@ impl Marginal {
     pub fn brightness(&self, basis: &Basis) -> DMatrix<f64> {
         basis.brightness(&self.settled.coefficients, self.design.contrast())
     }
-}
-
-/// How exactly maps are found: ln Z is good to some 0.03.
-fn settling() -> Settling {
-    Settling { tolerance: 1e-3, compression: Compression::default(), ..Settling::default() }
 }
