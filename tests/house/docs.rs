@@ -179,6 +179,20 @@ fn the_summary_lists_every_page() {
 }
 
 #[test]
+fn the_paths_through_the_code_are_there() {
+    let page = std::fs::read_to_string(root().join("docs/reference/code.md")).unwrap();
+    let mut calls = 0;
+    for line in page.lines().filter(|line| line.starts_with("| `")) {
+        let names: Vec<&str> = line.split('`').skip(1).step_by(2).collect();
+        let source = std::fs::read_to_string(root().join(names[1])).unwrap_or_else(|e| panic!("{}: {e}", names[1]));
+        let is_there = [format!("fn {}(", names[0]), format!("fn {}<", names[0])].iter().any(|f| source.contains(f));
+        assert!(is_there, "no {} in {}", names[0], names[1]);
+        calls += 1;
+    }
+    assert!(calls > 10);
+}
+
+#[test]
 fn the_reference_of_the_config_is_that_of_the_schema() {
     let path = root().join("docs/reference/config.md");
     let generated = reference::page(&serde_json::from_str(&config::schema()).unwrap());
