@@ -86,8 +86,9 @@ impl Failure {
     pub fn search(path: &Path, error: SearchError) -> Self {
         match error {
             SearchError::Reference(error) => Failure::reference(path, error),
-            SearchError::Integrated => Failure::input(format!("{}: {error}", path.display())),
-            SearchError::Optimise(error) => Failure::failed(format!("{}: {error}", path.display())),
+            SearchError::Field(_) | SearchError::Optimise(_) => {
+                Failure::failed(format!("{}: {error}", path.display()))
+            }
         }
     }
 

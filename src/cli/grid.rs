@@ -97,7 +97,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         others => format!(" from {} images", others + 1),
     };
     console::line(format_args!("{}{images}", meter.cost(landscape)));
-    if let Some(warning) = header.origin.reference.warning() {
+    for warning in header.origin.reference.warnings() {
         console::line(format_args!("note: {warning}"));
     }
     console::line(format_args!("written: {}: {HEADER}, {NODES}, {PARABOLOID}", shown(folder)));

@@ -2,13 +2,12 @@
 //! with.
 
 use crate::data::config::{
-    Automatic, Config, ConfigError, Hyperparameter, ImagingSettings, ObservationSource, Settings, VelocityJitter,
+    Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter,
 };
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, SearchError, SearchSettings};
-use crate::field::Lifetime;
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::Fit;
 use crate::posterior::imaging::Imager;
@@ -207,20 +206,11 @@ impl Scene {
     /// What becomes of the spots in a blind search.
     #[doc(hidden)]
     pub fn spots(&self) -> Spots {
-        let ImagingSettings { objective, spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.settings.imaging;
-        let jitter_kms = match self.settings.velocity_jitter {
-            // a map that does not change would have said how large it is
-            _ if self.measured.velocity_jitter.is_some() => None,
-            VelocityJitter::Known(kms) => Some(kms),
-            VelocityJitter::Fitted => None,
-        };
-        let lifetime = match spot_lifetime_d {
-            Hyperparameter::Static => Some(Lifetime::Static),
-            days => days.known().map(Lifetime::Days),
-        };
-        let known = Known { amplitude: spot_amplitude.known(), slope: spot_slope.known(), lifetime, jitter_kms };
-        match objective {
+        let known = self.settings.known_field();
+        match self.settings.imaging.objective {
             ObjectiveKind::MarginalLikelihood => Spots::Integrated(known),
+            // a map that does not change would have said how large the jitter is
+            _ if self.measured.velocity_jitter.is_some() => Spots::OneMap(Some(Known { jitter_kms: None, ..known })),
             _ => Spots::OneMap(Some(known)),
         }
     }
@@ -398,10 +388,8 @@ fn zero_points(
     let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
     let (sd_kms, measured) = match settings.velocity_jitter {
         VelocityJitter::Known(0.0) => return Ok((None, None)),
-        // it is fitted with the field
-        VelocityJitter::Fitted if settings.imaging.objective == ObjectiveKind::MarginalLikelihood => {
-            return Ok((None, None));
-        }
+        // it is counted with the field
+        _ if settings.imaging.objective == ObjectiveKind::MarginalLikelihood => return Ok((None, None)),
         VelocityJitter::Known(sd_kms) => (sd_kms, None),
         VelocityJitter::Fitted => {
             let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;

@@ -7,7 +7,10 @@
 //! climb is on the objective asked for.
 
 use crate::data::config::{ImagingSettings, Settings};
+use crate::field::FieldError;
+use crate::posterior::density::Density;
 use crate::posterior::imaging::Imager;
+use crate::posterior::marginal::Known;
 use crate::posterior::objective::{
     FreeParameter, ObjectiveKind, ParameterSpace, Posterior, Prior, Reference, ReferenceError,
 };
@@ -18,6 +21,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
+mod integrated;
+
 /// What to search for, and from where.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchSettings {
@@ -25,6 +30,8 @@ pub struct SearchSettings {
     pub chi2_target: f64,
     /// The objective.
     pub objective: ObjectiveKind,
+    /// What is known of the field, where maps are integrated over.
+    pub known: Known,
     /// Most other orbits to start from, beside the config's values.
     pub other_starts: usize,
     /// Seed of those draws.
@@ -38,6 +45,7 @@ impl SearchSettings {
         SearchSettings {
             chi2_target: chi2_target.value(),
             objective,
+            known: settings.known_field(),
             other_starts: OTHER_STARTS,
             seed: settings.sampler.seed,
         }
@@ -66,7 +74,7 @@ pub struct Attempt {
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The posterior relative to the reference at the optimum.
-    pub posterior: Posterior,
+    pub posterior: Density,
     /// The optimum of the objective asked for.
     pub optimum: Optimum,
     /// All starts, by regularised likelihood at the first reference's lambda.
@@ -80,12 +88,9 @@ pub enum SearchError {
     /// No reference image.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
-    /// Of an objective for which there is no search yet.
-    #[error(
-        "imaging.objective: \"marginal-likelihood\" is for dimcmc periodogram and dimcmc limits so far; here set \
-        \"spottedness\", or leave it out"
-    )]
-    Integrated,
+    /// No field, where maps are integrated over.
+    #[error("{0}")]
+    Field(#[from] FieldError),
     /// No start led anywhere.
     #[error("{0}")]
     Optimise(#[from] OptimiseError),
@@ -141,7 +146,7 @@ pub fn find(
     report: &(dyn Fn(Progress) + Sync),
 ) -> Result<Found, SearchError> {
     if settings.objective == ObjectiveKind::MarginalLikelihood {
-        return Err(SearchError::Integrated);
+        return integrated::find(imager, space, settings, report);
     }
     let SearchSettings { chi2_target, objective, .. } = settings;
     let (evaluations, done, all) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(1));
@@ -181,7 +186,7 @@ pub fn find(
         let moved = shift(space, &optimum.theta, &next);
         optimum = next;
         if moved < REFERENCE_SHIFT || round + 1 == ROUNDS {
-            return Ok(Found { posterior, optimum, attempts });
+            return Ok(Found { posterior: Density::Mapped(Box::new(posterior)), optimum, attempts });
         }
     }
     unreachable!("the loop returns")

@@ -8,6 +8,7 @@
 //! and [`detection`] the search of it, [`surrogate`] the posterior that follows from it. Before any: [`first_look`] at
 //! the profiles alone, their errors ([`noise`]) and [`zero_points`]. [`simulate`] makes profiles.
 
+pub mod density;
 pub mod detection;
 pub mod expansion;
 pub mod first_look;

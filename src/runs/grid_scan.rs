@@ -10,7 +10,8 @@ use crate::data::io::landscape;
 use crate::data::io::lines::{self, JournalError, LineFile};
 use crate::data::scene::Scene;
 use crate::data::search::Found;
-use crate::posterior::objective::{LIKELIHOOD_NUMBERS, Posterior};
+use crate::posterior::density::Density;
+use crate::posterior::objective::LIKELIHOOD_NUMBERS;
 use crate::runs::origin::{self, Origin, OriginError};
 use crate::runs::pool::{Asked, Brief, Pool, Task};
 use crate::sampling::landscape::{Grid, Landscape, LandscapeError, Node};
@@ -83,7 +84,7 @@ pub struct GridScan {
     /// What it was begun with.
     pub header: Header,
     /// What is evaluated at the nodes, without its prior; of a whole landscape without its warm starts.
-    posterior: Posterior,
+    posterior: Density,
     /// The nodes so far.
     pub landscape: Landscape,
     task: Task,
@@ -121,7 +122,8 @@ impl GridScan {
         replace: bool,
     ) -> Result<Self, GridScanError> {
         let grid = &plan.grid;
-        let header = Header { origin: Origin::of(scene, &found), grid: grid.clone(), numbers: likelihood_numbers() };
+        let numbers = found.posterior.likelihood_numbers();
+        let header = Header { origin: Origin::of(scene, &found), grid: grid.clone(), numbers };
         // the nodes first: whoever holds them may write the header
         let file = LineFile::create(&folder.join(NODES), replace)?;
         let path = folder.join(PARABOLOID);
@@ -150,13 +152,13 @@ impl GridScan {
     }
 
     /// With warm starts where nodes far from the reference are worth them.
-    fn new(scene: &Scene, header: Header, posterior: Posterior, landscape: Landscape, file: LineFile) -> Self {
+    fn new(scene: &Scene, header: Header, posterior: Density, landscape: Landscape, file: LineFile) -> Self {
         let grid = landscape.grid();
         // all nodes, whatever is left of them: a landscape that goes on has the warm starts that it began with
         let nodes = if landscape.is_whole() { 0 } else { grid.len() };
         let thetas: Vec<Vec<f64>> = (0..nodes).map(|index| grid.theta(index)).collect();
         let posterior = posterior.with_warm_starts_for(&thetas, nodes);
-        let warm_starts = posterior.warm_starts().map(<[f64]>::to_vec).collect();
+        let warm_starts = posterior.warm_starts();
         let names = posterior.space().names();
         let task = Task::new(scene, &header.origin, names, Asked::Likelihood { warm_starts });
         GridScan { header, posterior, landscape, task, file }
@@ -164,7 +166,7 @@ impl GridScan {
 
     /// Images, besides the reference, that nodes start from; none where no node is left.
     pub fn warm_starts(&self) -> usize {
-        self.posterior.warm_starts().count()
+        self.posterior.warm_starts().len()
     }
 
     /// Reconstructs until the landscape is whole or `pool` is told to stop; every batch is on disk before the next one,

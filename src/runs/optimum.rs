@@ -102,7 +102,7 @@ impl OptimumFile {
             derived,
             truth: scene.truth.map(|values| by_name(&values)),
             derived_truth,
-            reference: ReferenceRecord::of(found.posterior.reference()),
+            reference: ReferenceRecord::of(&found.posterior),
             starts: found.attempts.iter().map(StartRecord::of).collect(),
             profiles: scene.observations.profiles.len(),
             time_span_d: scene.observations.time_span_d(),
@@ -136,7 +136,7 @@ impl OptimumFile {
         };
         let _ = writeln!(table, "{maximum}; ln P = {:.3}{}", self.optimum.log_prob, listed(&self.numbers));
         let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
-        for note in remarks.chain(self.reference.warning()) {
+        for note in remarks.chain(self.reference.warnings()) {
             let _ = writeln!(table, "note: {note}");
         }
         table

@@ -7,6 +7,9 @@ use crate::data::config::{self, ConfigError};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
 use crate::data::search::Found;
+use crate::field::FieldError;
+use crate::posterior::density::Density;
+use crate::posterior::marginal::{MarginalPosterior, bounds};
 use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues, Posterior, Reference, ReferenceError};
 use crate::sampling::optimise::Optimum;
 use serde::de::DeserializeOwned;
@@ -44,11 +47,35 @@ pub struct Origin {
     pub rivals: Vec<OptimumRecord>,
 }
 
+/// What every evaluation starts from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ReferenceRecord {
+    /// A map of maximum entropy.
+    Image(ImageRecord),
+    /// The most probable maps, where all are integrated over.
+    Field(FieldRecord),
+}
+
+/// The most probable maps, one a profile.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FieldRecord {
+    /// All parameters, those of the field among them; without a lifetime spots live for ever.
+    pub parameters: BTreeMap<String, f64>,
+    /// Scatter of the profiles' velocity zero points (km/s).
+    pub velocity_jitter_kms: f64,
+    /// ln of the evidence.
+    pub ln_evidence: f64,
+    /// Number of data.
+    pub data: usize,
+}
+
 /// The reference solution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ReferenceRecord {
-    /// All eight parameters.
+pub struct ImageRecord {
+    /// All parameters.
     pub parameters: BTreeMap<String, f64>,
     /// Target of chi2.
     pub chi2_target: f64,
@@ -125,19 +152,24 @@ pub enum OriginError {
         what: String,
     },
     /// The reference comes out differently: another version of the program, or another kind of processor.
-    #[error("{}: the reference image comes out differently here (lambda {now:e} instead of {then:e}): resume with the \
+    #[error("{}: the reference comes out differently here ({what} {now:e} instead of {then:e}): resume with the \
     version and on the kind of machine it was begun with", folder.display())]
     Irreproducible {
         /// The folder.
         folder: PathBuf,
-        /// lambda then.
+        /// Which of its numbers.
+        what: &'static str,
+        /// That number then.
         then: f64,
-        /// lambda now.
+        /// And now.
         now: f64,
     },
     /// No reference at the recorded parameters.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// No maps there.
+    #[error(transparent)]
+    Field(#[from] FieldError),
 }
 
 impl Origin {
@@ -154,7 +186,7 @@ impl Origin {
             profiles: Some(scene.observations.profiles.len()),
             time_span_d: scene.observations.time_span_d(),
             truth: scene.truth.map(|values| by_name(&values)),
-            reference: ReferenceRecord::of(found.posterior.reference()),
+            reference: ReferenceRecord::of(&found.posterior),
             optimum: OptimumRecord::of(names, &found.optimum),
             rivals: found.rivals().into_iter().map(|rival| OptimumRecord::of(names, rival)).collect(),
         }
@@ -181,14 +213,26 @@ impl Origin {
     ///
     /// # Errors
     /// [`OriginError::Irreproducible`], [`OriginError::Reference`].
-    pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Posterior, OriginError> {
+    pub fn posterior(&self, scene: &Scene, space: ParameterSpace, folder: &Path) -> Result<Density, OriginError> {
         let values = self.reference.values(&scene.settings.values);
-        let reference = Reference::build(&scene.imager, values, scene.settings.imaging.chi2_target.value())?;
-        let (then, now) = (self.reference.lambda, reference.solution.image.lambda);
-        if then.to_bits() != now.to_bits() {
-            return Err(OriginError::Irreproducible { folder: folder.into(), then, now });
+        let imager = scene.imager.clone();
+        let (density, what, then, now) = match &self.reference {
+            ReferenceRecord::Image(then) => {
+                let reference = Reference::build(&imager, values, scene.settings.imaging.chi2_target.value())?;
+                let now = reference.solution.image.lambda;
+                let posterior = Posterior::new(imager, space, scene.settings.imaging.objective, reference);
+                (Density::Mapped(Box::new(posterior)), "lambda", then.lambda, now)
+            }
+            ReferenceRecord::Field(then) => {
+                let posterior = MarginalPosterior::new(imager, &space, values, then.velocity_jitter_kms)?;
+                let now = posterior.reference_ln_evidence();
+                (Density::Integrated(Box::new(posterior)), "ln of the evidence", then.ln_evidence, now)
+            }
+        };
+        match then.to_bits() == now.to_bits() {
+            true => Ok(density),
+            false => Err(OriginError::Irreproducible { folder: folder.into(), what, then, now }),
         }
-        Ok(Posterior::new(scene.imager.clone(), space, scene.settings.imaging.objective, reference))
     }
 }
 
@@ -247,10 +291,73 @@ pub fn read<T: DeserializeOwned>(folder: &Path, file: &'static str) -> Result<T,
 }
 
 impl ReferenceRecord {
-    /// The record of a reference.
-    pub fn of(reference: &Reference) -> Self {
+    /// The record of a density's reference.
+    pub fn of(density: &Density) -> Self {
+        match density {
+            Density::Mapped(posterior) => ReferenceRecord::Image(ImageRecord::of(posterior.reference())),
+            Density::Integrated(posterior) => ReferenceRecord::Field(FieldRecord::of(posterior)),
+        }
+    }
+
+    /// The parameters, by name.
+    pub fn parameters(&self) -> &BTreeMap<String, f64> {
+        match self {
+            ReferenceRecord::Image(record) => &record.parameters,
+            ReferenceRecord::Field(record) => &record.parameters,
+        }
+    }
+
+    /// What has to be known of it.
+    pub fn warnings(&self) -> Vec<String> {
+        match self {
+            ReferenceRecord::Image(record) => record.warning().into_iter().collect(),
+            ReferenceRecord::Field(record) => record.warnings(),
+        }
+    }
+
+    /// All parameters; those missing in the record are taken from `others`, but for a lifetime: without one spots live
+    /// for ever.
+    pub fn values(&self, others: &ParameterValues) -> ParameterValues {
+        let mut values = *others;
+        values[Parameter::SpotLifetime] = f64::NAN;
+        for p in Parameter::ALL {
+            values[p] = self.parameters().get(p.name()).copied().unwrap_or(values[p]);
+        }
+        values
+    }
+}
+
+impl FieldRecord {
+    fn of(posterior: &MarginalPosterior) -> Self {
+        FieldRecord {
+            parameters: by_name(&posterior.reference().values),
+            velocity_jitter_kms: posterior.reference().assumed.jitter_kms,
+            ln_evidence: posterior.reference_ln_evidence(),
+            data: posterior.imager().data.depth.len(),
+        }
+    }
+
+    /// Parameters of the field that lie on a bound of its search.
+    fn warnings(&self) -> Vec<String> {
+        /// Nearer than this part a bound is reached.
+        const REACHED: f64 = 0.01;
+        let on_bound = |p: &Parameter| {
+            let (value, (low, high)) = (*self.parameters.get(p.name())?, bounds(*p));
+            let near = |bound: f64| (value / bound - 1.0).abs() < REACHED;
+            let bound = [low, high].into_iter().find(|bound| near(*bound))?;
+            Some(match (p, bound == high) {
+                (Parameter::SpotLifetime, true) => "the profiles do not show that the spots change".to_owned(),
+                _ => format!("{} lies on the bound of its search, {bound}", p.name()),
+            })
+        };
+        Parameter::FIELD.iter().filter_map(on_bound).collect()
+    }
+}
+
+impl ImageRecord {
+    fn of(reference: &Reference) -> Self {
         let solution = &reference.solution;
-        ReferenceRecord {
+        ImageRecord {
             parameters: by_name(&reference.values),
             chi2_target: reference.chi2_target,
             chi2: solution.chi2,
@@ -264,7 +371,7 @@ impl ReferenceRecord {
 
     /// A target that a noise realisation, which moves the attainable chi2 by sqrt(2/N), may put out of reach: there
     /// spottedness explodes, and the answer hangs on the target (`docs/method.md` section 3).
-    pub fn warning(&self) -> Option<String> {
+    fn warning(&self) -> Option<String> {
         let noise = (2.0 / self.data as f64).sqrt() * self.chi2_target;
         (self.chi2_target - self.chi2_reach < noise).then(|| {
             let per_datum = |chi2: f64| chi2 / self.data as f64;
@@ -277,15 +384,6 @@ impl ReferenceRecord {
                 per_datum(noise)
             )
         })
-    }
-
-    /// All parameters; those missing in the record are taken from `others`.
-    pub fn values(&self, others: &ParameterValues) -> ParameterValues {
-        let mut values = *others;
-        for p in Parameter::ALL {
-            values[p] = self.parameters.get(p.name()).copied().unwrap_or(values[p]);
-        }
-        values
     }
 }
 

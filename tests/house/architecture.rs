@@ -23,6 +23,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "objective",
             "expansion",
             "marginal",
+            "density",
             "surrogate",
             "simulate",
             "noise",

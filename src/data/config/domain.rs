@@ -2,6 +2,7 @@
 
 use super::error::Fault;
 use super::raw_parts::{PriorKind, PriorSection};
+use crate::posterior::marginal;
 use crate::posterior::objective::{Parameter, Prior};
 
 /// Where a value of the parameter stands in the config.
@@ -11,6 +12,7 @@ pub(super) fn key(parameter: Parameter) -> String {
         Parameter::LimbDarkening => "star.limb_darkening.coefficients".into(),
         Parameter::LineSigma => "star.line.sigma_kms".into(),
         Parameter::EquivalentWidth => "star.line.equivalent_width_kms".into(),
+        _ if parameter.is_of_field() => format!("imaging.{}", parameter.name()),
         _ => format!("star.{}", parameter.name()),
     }
 }
@@ -47,6 +49,13 @@ pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result
         Parameter::Vsini => (value > 0.0 && value <= most::VSINI_KMS, "above 0 and up to 2000"),
         Parameter::Inclination => (value > 0.0 && value <= 90.0, "above 0 and up to 90"),
         Parameter::Phi | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
+        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => {
+            let (low, high) = marginal::bounds(parameter);
+            return match (low..=high).contains(&value) {
+                true => Ok(()),
+                false => Err(Fault::new(key, format!("{value} must be from {low} to {high}"))),
+            };
+        }
     };
     if !(fine && value.is_finite()) {
         return Err(Fault::new(key, format!("{value} must be {allowed}")));
@@ -69,6 +78,7 @@ fn domain(parameter: Parameter, phi_free: bool) -> (f64, f64) {
         Parameter::Phi | Parameter::LimbDarkening | Parameter::Contrast => (0.0, 1.0),
         Parameter::Inclination => (0.0, 90.0),
         Parameter::DOmega | Parameter::Vsys => (f64::NEG_INFINITY, f64::INFINITY),
+        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => marginal::bounds(parameter),
     }
 }
 

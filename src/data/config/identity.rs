@@ -49,7 +49,7 @@ pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<D
         let mut section = resolved.get(name).cloned().unwrap_or(Value::Null);
         if let Some(map) = section.as_object_mut() {
             // a landscape has unresolved spots as the entropy has them, whatever the chain does
-            let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_surface());
+            let free = |key: &str| Parameter::from_name(key).is_some_and(|p| !p.is_optional());
             map.retain(|key, _| !free(key) && key != "unresolved_spots" && key != "mass_msun");
         }
         section

@@ -52,6 +52,15 @@ pub(super) struct PerParameter<T> {
     /// value: the darker they are, the fewer a map needs, so that a flat prior ends at 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contrast: Option<T>,
+    /// Standard deviation of the spots' filling factor before the data, with objective "marginal-likelihood".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spot_amplitude: Option<T>,
+    /// How fast the spots' power falls with the degree of the harmonics, with objective "marginal-likelihood".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spot_slope: Option<T>,
+    /// How long spots live (d), with objective "marginal-likelihood".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spot_lifetime_d: Option<T>,
 }
 
 impl<T> Default for PerParameter<T> {
@@ -69,6 +78,9 @@ impl<T> Default for PerParameter<T> {
             line_sigma_kms: None,
             equivalent_width_kms: None,
             contrast: None,
+            spot_amplitude: None,
+            spot_slope: None,
+            spot_lifetime_d: None,
         }
     }
 }
@@ -89,6 +101,9 @@ impl<T> PerParameter<T> {
             Parameter::LineSigma => &mut self.line_sigma_kms,
             Parameter::EquivalentWidth => &mut self.equivalent_width_kms,
             Parameter::Contrast => &mut self.contrast,
+            Parameter::SpotAmplitude => &mut self.spot_amplitude,
+            Parameter::SpotSlope => &mut self.spot_slope,
+            Parameter::SpotLifetime => &mut self.spot_lifetime_d,
         }
     }
 }
@@ -119,6 +134,13 @@ pub(super) struct PriorSection {
     /// Standard deviation of a normal prior, above 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sd: Option<f64>,
+}
+
+impl PriorSection {
+    /// The section that stands for a uniform or log-uniform prior.
+    pub fn even(prior: PriorKind, (min, max): (f64, f64)) -> Self {
+        PriorSection { prior, min: Some(min), max: Some(max), mean: None, sd: None }
+    }
 }
 
 /// Kinds of priors.

@@ -4,6 +4,7 @@ use super::domain::{check_value, key, resolve_prior};
 use super::error::Fault;
 use super::identity::fingerprint;
 use super::raw::Config;
+use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
 use super::resolve_star::resolve_star;
@@ -22,6 +23,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let mut values = values(&mut raw, &star)?;
     let source = resolve_observations(&mut raw, &star, &values, path)?;
     check_imaging(&raw.imaging, raw.observations.velocity_jitter_kms)?;
+    resolve_field(&mut raw, &mut values)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
     if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
@@ -62,7 +64,7 @@ fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, 
     let (star, planet) = (&raw.star, &raw.planet);
     let mut values = ParameterValues::of_eight([0.0; 8]);
     for parameter in Parameter::ALL {
-        if parameter.is_surface() && !free[parameter as usize] {
+        if parameter.is_of_field() || (parameter.is_surface() && !free[parameter as usize]) {
             continue;
         }
         values[parameter] = match parameter {
@@ -82,6 +84,7 @@ fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, 
             }
             Parameter::EquivalentWidth => resolved.line.equivalent_width_kms,
             Parameter::Contrast => resolved.contrast,
+            Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => unreachable!("passed over"),
         };
         check_value(parameter, values[parameter], &key(parameter))?;
     }
@@ -128,23 +131,43 @@ pub(super) fn without_planet(free: &[FreeParameter], values: &ParameterValues) -
     parameters.find(|parameter| no_planet && parameter.is_orbital())
 }
 
-/// What is said of the spots has a meaning where they are integrated out, and lies within the bounds of a fit.
-fn check_spots(imaging: &ImagingSettings) -> Result<(), Fault> {
-    let all = [imaging.spot_amplitude, imaging.spot_slope, imaging.spot_lifetime_d];
-    for ((name, (low, high)), value) in marginal::NAMES.iter().zip(marginal::BOUNDS).zip(all) {
-        let fault = |problem: String| Err(Fault::new(format!("imaging.{name}"), problem));
-        match value {
-            _ if value.is_default() => {}
-            _ if imaging.objective != ObjectiveKind::MarginalLikelihood => {
-                return fault("it has no meaning but with imaging.objective \"marginal-likelihood\"".into());
+/// What is said of the spots has a meaning where they are integrated out, and lies within the bounds of a fit. What is
+/// left to the profiles is free in a chain: with a weak prior, all over those bounds.
+fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), Fault> {
+    let imaging = &raw.imaging;
+    let integrated = imaging.objective == ObjectiveKind::MarginalLikelihood;
+    let something_is_free = !raw.parameters.entries().is_empty();
+    let given = [imaging.spot_amplitude, imaging.spot_slope, imaging.spot_lifetime_d];
+    for (parameter, given) in Parameter::FIELD.into_iter().zip(given) {
+        let name = parameter.name();
+        let axis = raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(parameter).is_some());
+        let prior = raw.parameters.slot(parameter).is_some();
+        let wanted = [(prior, "parameters"), (axis, "grid.axes"), (!given.is_default(), "imaging")];
+        if let Some((_, section)) = wanted.into_iter().find(|(is_there, _)| *is_there && !integrated) {
+            let problem = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
+            return Err(Fault::new(format!("{section}.{name}"), problem));
+        }
+        match given {
+            _ if !integrated => {}
+            Hyperparameter::Static if parameter != Parameter::SpotLifetime => {
+                return Err(Fault::new(format!("imaging.{name}"), "only spot_lifetime_d may be \"static\""));
             }
-            Hyperparameter::Static if *name != "spot_lifetime_d" => {
-                return fault("only spot_lifetime_d may be \"static\"".into());
+            Hyperparameter::Static if prior || axis => {
+                let problem = "\"static\" spots live for ever, and their lifetime cannot be free";
+                return Err(Fault::new(format!("imaging.{name}"), problem));
             }
-            Hyperparameter::Known(x) if !(low..=high).contains(&x) => {
-                return fault(format!("{x} must be from {low} to {high}"));
+            Hyperparameter::Static => {}
+            Hyperparameter::Known(value) => {
+                check_value(parameter, value, &format!("imaging.{name}"))?;
+                values[parameter] = value;
             }
-            _ => {}
+            Hyperparameter::Fitted => {
+                values[parameter] = marginal::usual_value(parameter);
+                if something_is_free && !prior {
+                    let kind = if parameter == Parameter::SpotSlope { PriorKind::Uniform } else { PriorKind::LogUniform };
+                    *raw.parameters.slot(parameter) = Some(PriorSection::even(kind, marginal::bounds(parameter)));
+                }
+            }
         }
     }
     Ok(())
@@ -166,7 +189,6 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
                        give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
-    check_spots(imaging)?;
     if let Some(priors) = &imaging.nuisances {
         check_nuisances(
             priors,

@@ -3,7 +3,9 @@
 use super::spots::Hyperparameter;
 use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
+use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
+use crate::posterior::marginal::Known;
 use crate::posterior::noise::ErrorSettings;
 use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, UnresolvedSpots};
@@ -257,6 +259,23 @@ impl Settings {
             }
         }
         config
+    }
+
+    /// What is known of the field of spots before the profiles, where maps are integrated over.
+    pub fn known_field(&self) -> Known {
+        let ImagingSettings { spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.imaging;
+        Known {
+            amplitude: spot_amplitude.known(),
+            slope: spot_slope.known(),
+            lifetime: match spot_lifetime_d {
+                Hyperparameter::Static => Some(Lifetime::Static),
+                days => days.known().map(Lifetime::Days),
+            },
+            jitter_kms: match self.velocity_jitter {
+                VelocityJitter::Known(kms) => Some(kms),
+                VelocityJitter::Fitted => None,
+            },
+        }
     }
 
     /// That something is wrong with a key.

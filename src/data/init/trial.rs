@@ -188,7 +188,7 @@ fn search(draft: &mut Draft, config: &Path, profiles: Profiles, tried: Option<&S
     let found = match search::find(&imager, &space, SearchSettings::new(&settings), &|_| ()) {
         Ok(found) => found,
         // what matters is that there is no map
-        Err(SearchError::Reference(_) | SearchError::Optimise(_) | SearchError::Integrated) => return Ok(false),
+        Err(SearchError::Reference(_) | SearchError::Optimise(_) | SearchError::Field(_)) => return Ok(false),
     };
     let best = space.values_at(&found.optimum.theta);
     // rounding does not lead out of the priors

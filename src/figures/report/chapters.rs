@@ -256,7 +256,7 @@ fn best(file: &OptimumFile) -> Chapter {
     Chapter {
         heading: "Optimum".into(),
         verdicts,
-        warnings: remarks.chain(file.reference.warning()).collect(),
+        warnings: remarks.chain(file.reference.warnings()).collect(),
         notes,
         tables: vec![(
             "The best parameters, with errors from the curvature.".into(),

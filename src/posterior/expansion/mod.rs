@@ -40,7 +40,8 @@ pub fn free_stellar(free: &[FreeParameter]) -> Vec<Parameter> {
 }
 
 /// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic
-/// velocity together), then the stellar parameters in the units of their names.
+/// velocity together), then the stellar parameters in the units of their names; those of the field in the coordinates
+/// that samplers move in ([`Parameter::to_sampling`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expansion {
     /// The parameters that it was made at.
@@ -162,5 +163,5 @@ impl Expansion {
 pub fn coordinates(values: &ParameterValues, cycles: &[f64], stellar: &[Parameter]) -> DVector<f64> {
     let state = values.state();
     let velocities = state.orbit.velocities_kms(cycles).map(|orbit| state.vsys_kms + orbit);
-    DVector::from_vec(velocities.chain(stellar.iter().map(|&p| values[p])).collect())
+    DVector::from_vec(velocities.chain(stellar.iter().map(|&p| p.to_sampling(values[p]))).collect())
 }

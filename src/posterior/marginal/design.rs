@@ -38,6 +38,12 @@ impl Basis {
         }
     }
 
+    /// The same where ln Z is compared with that of neighbours: good to some 0.003.
+    pub fn exact(grid: &SurfaceGrid) -> Self {
+        let settling = Settling { tolerance: 2e-4, ..Settling::default() };
+        Basis { settling, ..Basis::new(grid) }
+    }
+
     /// The same where differences of ln Z need be good to a few tenths only.
     pub fn rough(grid: &SurfaceGrid) -> Self {
         let compression = Compression { left_out: 0.03 };

@@ -4,20 +4,32 @@
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
 use crate::posterior::imaging::Imager;
-use crate::posterior::objective::ParameterValues;
+use crate::posterior::objective::{Parameter, ParameterValues};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Bounds of amplitude, slope and lifetime (d).
-pub const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.3, 3.0), (0.3, 3000.0)];
+const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.3, 3.0), (0.3, 3000.0)];
 
-/// Names of the three.
-pub const NAMES: [&str; 3] = ["spot_amplitude", "spot_slope", "spot_lifetime_d"];
+/// Where searches start: usual ones.
+const USUAL: [f64; 3] = [0.2, 0.9, 36.0];
 
-/// Where searches start: amplitude and slope are usual ones.
-const USUAL: (f64, f64) = (0.2, 0.9);
+/// Bounds of a parameter of the field, in the units of its name.
+pub fn bounds(parameter: Parameter) -> (f64, f64) {
+    BOUNDS[place_of(parameter)]
+}
+
+/// A usual value of a parameter of the field.
+pub fn usual_value(parameter: Parameter) -> f64 {
+    USUAL[place_of(parameter)]
+}
+
+fn place_of(parameter: Parameter) -> usize {
+    Parameter::FIELD.iter().position(|p| *p == parameter).expect("a parameter of the field")
+}
+
 const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
 
 /// A search ends when a step would gain less than this in ln Z, or after so many.
@@ -55,6 +67,11 @@ impl Known {
         }
     }
 
+    /// The spectrum where a search starts.
+    fn spectrum(&self) -> Spectrum {
+        Spectrum { amplitude: self.amplitude.unwrap_or(USUAL[0]), slope: self.slope.unwrap_or(USUAL[1]) }
+    }
+
     /// The same of a star that does not change.
     pub fn unchanging(self) -> Self {
         Known { lifetime: Some(Lifetime::Static), ..self }
@@ -81,7 +98,7 @@ pub(super) fn usual(
     known: Known,
     near: Option<&Marginal>,
 ) -> Result<Fitted, FieldError> {
-    let spectrum = Spectrum { amplitude: known.amplitude.unwrap_or(USUAL.0), slope: known.slope.unwrap_or(USUAL.1) };
+    let spectrum = known.spectrum();
     let kernel = Kernel::of(known.lifetime.unwrap_or(Lifetime::Static));
     let assumed = Assumed { field: Field { spectrum, kernel }, jitter_kms: known.jitter_kms.unwrap_or(0.0) };
     let design = Arc::new(Design::new(imager, basis, &values.state()));
@@ -116,8 +133,7 @@ pub fn fit(
                 Some(lifetime) => vec![lifetime],
                 None => LIFETIMES_D.map(Lifetime::Days).to_vec(),
             };
-            let spectrum =
-                Spectrum { amplitude: known.amplitude.unwrap_or(USUAL.0), slope: known.slope.unwrap_or(USUAL.1) };
+            let spectrum = known.spectrum();
             let start = |lifetime: &Lifetime| at(Field { spectrum, kernel: Kernel::of(*lifetime) }, jitter_kms, None);
             let tried: Vec<Result<Marginal, FieldError>> = lifetimes.par_iter().with_max_len(1).map(start).collect();
             let height = |m: &Marginal| m.settled.evidence.ln_evidence();
@@ -163,16 +179,18 @@ fn field_at(place: Vector3<f64>, like: &Field) -> Field {
 }
 
 /// Bounds in the coordinates of [`place`].
-fn bounds() -> [(f64, f64); 3] {
-    let [amplitude, slope, lifetime] = BOUNDS;
-    [(amplitude.0.ln(), amplitude.1.ln()), slope, (lifetime.0.ln(), lifetime.1.ln())]
+fn limits() -> [(f64, f64); 3] {
+    Parameter::FIELD.map(|p| {
+        let (low, high) = bounds(p);
+        (p.to_sampling(low), p.to_sampling(high))
+    })
 }
 
 /// Which of the fitted numbers lie on a bound.
 fn reached(field: &Field, known: &Known) -> Vec<&'static str> {
     let (place, free) = (place(field), free(field, known));
-    let on = |i: &usize| free[*i] && (place[*i] <= bounds()[*i].0 + 1e-9 || place[*i] >= bounds()[*i].1 - 1e-9);
-    (0..3).filter(on).map(|i| NAMES[i]).collect()
+    let on = |i: &usize| free[*i] && (place[*i] <= limits()[*i].0 + 1e-9 || place[*i] >= limits()[*i].1 - 1e-9);
+    (0..3).filter(on).map(|i| Parameter::FIELD[i].name()).collect()
 }
 
 fn free(field: &Field, known: &Known) -> [bool; 3] {
@@ -215,7 +233,7 @@ fn climb(
         let from = place(&here.assumed.field);
         // what pushes against a bound stays there
         let pushes = |i: usize| {
-            let (low, high) = bounds()[i];
+            let (low, high) = limits()[i];
             (from[i] <= low + 1e-9 && gradient[i] < 0.0) || (from[i] >= high - 1e-9 && gradient[i] > 0.0)
         };
         let inside = Vector3::from_fn(|i, _| if pushes(i) { 0.0 } else { gradient[i] });
@@ -255,7 +273,7 @@ fn shortened(
     const TRIES: usize = 6;
     let from = place(&here.assumed.field);
     for _ in 0..TRIES {
-        let to = Vector3::from_fn(|i, _| (from[i] + step[i]).clamp(bounds()[i].0, bounds()[i].1.max(from[i])));
+        let to = Vector3::from_fn(|i, _| (from[i] + step[i]).clamp(limits()[i].0, limits()[i].1.max(from[i])));
         let next = at(field_at(to, &here.assumed.field), here.assumed.jitter_kms, Some(here));
         if let Some(next) = next.ok().filter(|next| height(next) > height(here) + 1e-4 * gradient.dot(&step)) {
             let slope = slope(&next);

@@ -9,19 +9,24 @@
 //! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
 //! 5. [`change`]: whether a star that changes explains the profiles better than one that does not.
+//! 6. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 
 pub mod change;
 mod design;
 mod expand;
 mod fit;
+mod forecast;
+mod posterior;
 
 pub use change::Change;
 pub use design::{Basis, Design};
-pub use fit::{BOUNDS, Fitted, Known, NAMES, fit};
+pub use forecast::Forecast;
+pub use posterior::{LN_EVIDENCE, MarginalPosterior};
+pub use fit::{Fitted, Known, bounds, fit, usual_value};
 
-use crate::field::{Field, FieldError, Settled, Sought, settle};
+use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};
 use crate::posterior::imaging::Imager;
-use crate::posterior::objective::ParameterValues;
+use crate::posterior::objective::{Parameter, ParameterValues};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -41,10 +46,28 @@ pub struct Assumed {
     pub jitter_kms: f64,
 }
 
+impl Assumed {
+    /// The field among the parameters, beside a jitter.
+    pub fn of(values: &ParameterValues, jitter_kms: f64) -> Self {
+        let spectrum = Spectrum { amplitude: values[Parameter::SpotAmplitude], slope: values[Parameter::SpotSlope] };
+        let lifetime = values.given(Parameter::SpotLifetime).map_or(Lifetime::Static, Lifetime::Days);
+        Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms }
+    }
+
+    /// `values` with this field among them.
+    fn among(&self, mut values: ParameterValues) -> ParameterValues {
+        let Field { spectrum, kernel } = self.field;
+        values[Parameter::SpotAmplitude] = spectrum.amplitude;
+        values[Parameter::SpotSlope] = spectrum.slope;
+        values[Parameter::SpotLifetime] = kernel.lifetime.days().unwrap_or(f64::NAN);
+        values
+    }
+}
+
 /// The profiles with all maps integrated out, linearised around the most probable ones.
 #[derive(Clone, Debug)]
 pub struct Marginal {
-    /// The parameters.
+    /// The parameters, those of the field as assumed.
     pub values: ParameterValues,
     /// What is assumed.
     pub assumed: Assumed,
@@ -76,7 +99,7 @@ impl Marginal {
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
         let by = nearby.map(|nearby| &nearby.settled.evidence);
         let settled = settle(linearise, sought, start, by, &basis.settling)?;
-        Ok(Marginal { values, assumed, design, settled })
+        Ok(Marginal { values: assumed.among(values), assumed, design, settled })
     }
 
     /// The brightness of each pixel (rows) in the most probable map of each profile (columns).

@@ -51,6 +51,14 @@ impl ParameterSpace {
         ParameterSpace { polar, names, free, values, mid_cycle, time_base_cycles, rotation_period_d }
     }
 
+    /// The same with the field of `values` where it is fixed.
+    pub fn with_field_of(mut self, values: &ParameterValues) -> Self {
+        for p in Parameter::FIELD.into_iter().filter(|p| self.free.iter().all(|f| f.parameter != *p)) {
+            self.values[p] = values[p];
+        }
+        self
+    }
+
     /// Number of free parameters.
     pub fn dimension(&self) -> usize {
         self.free.len()
@@ -109,7 +117,8 @@ impl ParameterSpace {
 
     /// Internal coordinates of `theta`.
     pub fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
-        let mut x = theta.to_vec();
+        let own = |(f, x): (&FreeParameter, &f64)| f.parameter.to_sampling(*x);
+        let mut x: Vec<f64> = self.free.iter().zip(theta).map(own).collect();
         if let Some((k, phi)) = self.polar {
             let (sin, cos) = (self.mid_angle(theta) - TAU * theta[phi]).sin_cos();
             (x[k], x[phi]) = (theta[k] * cos, theta[k] * sin);
@@ -129,14 +138,15 @@ impl ParameterSpace {
             theta[phi] -= (theta[phi] - lowest.max(-1e6)).floor();
         }
         for (f, x) in self.free.iter().zip(&mut theta) {
-            *x = f.prior.wrap(*x);
+            *x = f.prior.wrap(f.parameter.to_physical(*x));
         }
         theta
     }
 
-    /// ln |d(written) / d(internal)| at `theta`: `d(K, phi) = dx dy / (2 pi K)`.
+    /// ln |d(written) / d(internal)| at `theta`: `d(K, phi) = dx dy / (2 pi K)`, and logarithms of the field.
     pub fn log_jacobian(&self, theta: &[f64]) -> f64 {
-        self.polar.map_or(0.0, |(k, _)| -(TAU * theta[k].max(SMALLEST_K_KMS)).ln())
+        let own: f64 = self.free.iter().zip(theta).map(|(f, x)| f.parameter.log_jacobian(*x)).sum();
+        own + self.polar.map_or(0.0, |(k, _)| -(TAU * theta[k].max(SMALLEST_K_KMS)).ln())
     }
 
     /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what
@@ -161,6 +171,8 @@ impl ParameterSpace {
             Parameter::LineSigma => 0.01 * self.values[Parameter::LineSigma],
             Parameter::EquivalentWidth => 2e-3 * self.values[Parameter::EquivalentWidth],
             Parameter::Contrast => 0.02,
+            Parameter::SpotAmplitude | Parameter::SpotSlope => 0.05,
+            Parameter::SpotLifetime => 0.1,
         };
         self.free.iter().map(scale).collect()
     }

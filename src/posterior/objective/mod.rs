@@ -19,6 +19,6 @@ pub use kind::{ObjectiveKind, UnresolvedSpots};
 pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
 pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 pub use parameters::{Parameter, ParameterValues};
-pub use posterior::{CHI2, Posterior, SPOTTEDNESS};
+pub use posterior::{CHI2, Posterior, SPOTTEDNESS, is_physical};
 pub use prior::Prior;
 pub use reference::{Reference, ReferenceError};

@@ -32,11 +32,17 @@ pub enum Parameter {
     EquivalentWidth,
     /// Brightness of a spot over that of the photosphere.
     Contrast,
+    /// Standard deviation of the spots' filling factor before the data, where maps are integrated over.
+    SpotAmplitude,
+    /// Slope of the spots' spectrum there.
+    SpotSlope,
+    /// Lifetime of the spots there (d).
+    SpotLifetime,
 }
 
 impl Parameter {
     /// All of them, in order.
-    pub const ALL: [Parameter; 12] = [
+    pub const ALL: [Parameter; 15] = [
         Parameter::K,
         Parameter::PorbOverProt,
         Parameter::Phi,
@@ -49,7 +55,13 @@ impl Parameter {
         Parameter::LineSigma,
         Parameter::EquivalentWidth,
         Parameter::Contrast,
+        Parameter::SpotAmplitude,
+        Parameter::SpotSlope,
+        Parameter::SpotLifetime,
     ];
+
+    /// Those of the field of spots that is integrated over.
+    pub const FIELD: [Parameter; 3] = [Parameter::SpotAmplitude, Parameter::SpotSlope, Parameter::SpotLifetime];
 
     /// The name used in config, chain, tables and plots.
     pub fn name(self) -> &'static str {
@@ -66,6 +78,9 @@ impl Parameter {
             Parameter::LineSigma => "line_sigma_kms",
             Parameter::EquivalentWidth => "equivalent_width_kms",
             Parameter::Contrast => "contrast",
+            Parameter::SpotAmplitude => "spot_amplitude",
+            Parameter::SpotSlope => "spot_slope",
+            Parameter::SpotLifetime => "spot_lifetime_d",
         }
     }
 
@@ -75,6 +90,8 @@ impl Parameter {
             Parameter::K | Parameter::Vsini | Parameter::Vsys => "km/s",
             Parameter::LineSigma | Parameter::EquivalentWidth => "km/s",
             Parameter::PorbOverProt | Parameter::LimbDarkening | Parameter::Contrast => "1",
+            Parameter::SpotAmplitude | Parameter::SpotSlope => "1",
+            Parameter::SpotLifetime => "d",
             Parameter::Phi => "cycles",
             Parameter::OmegaEq | Parameter::DOmega => "rad/d",
             Parameter::Inclination => "deg",
@@ -96,6 +113,9 @@ impl Parameter {
             Parameter::LineSigma => r"\sigma_\mathrm{line}",
             Parameter::EquivalentWidth => r"W_\mathrm{line}",
             Parameter::Contrast => "c",
+            Parameter::SpotAmplitude => r"\sigma_\mathrm{spot}",
+            Parameter::SpotSlope => r"\alpha_\mathrm{spot}",
+            Parameter::SpotLifetime => r"\tau_\mathrm{spot}",
         }
     }
 
@@ -104,9 +124,40 @@ impl Parameter {
         matches!(self, Parameter::K | Parameter::PorbOverProt | Parameter::Phi)
     }
 
-    /// Whether it stands in place of one of the star's settings, and need not be given.
+    /// Whether it stands in place of one of the star's settings.
     pub fn is_surface(self) -> bool {
-        self >= Parameter::LimbDarkening
+        self >= Parameter::LimbDarkening && !self.is_of_field()
+    }
+
+    /// Whether it says what is assumed of the spots where all maps are integrated over.
+    pub fn is_of_field(self) -> bool {
+        Parameter::FIELD.contains(&self)
+    }
+
+    /// Whether values of all parameters may do without it.
+    pub fn is_optional(self) -> bool {
+        self.is_surface() || self.is_of_field()
+    }
+
+    /// Whether samplers move in its logarithm.
+    fn is_logarithmic(self) -> bool {
+        matches!(self, Parameter::SpotAmplitude | Parameter::SpotLifetime)
+    }
+
+    /// The coordinate of its own that samplers move in, of a value; orbits have others
+    /// ([`super::ParameterSpace::to_sampling`]).
+    pub fn to_sampling(self, value: f64) -> f64 {
+        if self.is_logarithmic() { value.ln() } else { value }
+    }
+
+    /// The value at that coordinate.
+    pub fn to_physical(self, coordinate: f64) -> f64 {
+        if self.is_logarithmic() { coordinate.exp() } else { coordinate }
+    }
+
+    /// ln of the derivative of the value with respect to that coordinate.
+    pub fn log_jacobian(self, value: f64) -> f64 {
+        if self.is_logarithmic() { value.ln() } else { 0.0 }
     }
 
     /// Whether it only shifts whole profiles, so that what a pixel looks like does not depend on it.
@@ -121,9 +172,10 @@ impl Parameter {
 }
 
 /// Values of all parameters in the units of their names, free or not; index by [`Parameter`]. Those of the surface are
-/// NaN where they are not given: they are those of the star's settings then.
+/// NaN where they are not given: they are those of the star's settings then. Those of the field are NaN where no maps
+/// are integrated over, the lifetime where spots live for ever.
 #[derive(Clone, Copy, Debug)]
-pub struct ParameterValues(pub [f64; 12]);
+pub struct ParameterValues(pub [f64; Parameter::ALL.len()]);
 
 impl std::ops::Index<Parameter> for ParameterValues {
     type Output = f64;
@@ -148,14 +200,14 @@ impl PartialEq for ParameterValues {
 impl ParameterValues {
     /// Of the eight parameters of orbit, rotation and systemic velocity; the surface is that of the star's settings.
     pub fn of_eight(eight: [f64; 8]) -> Self {
-        let mut values = [f64::NAN; 12];
+        let mut values = [f64::NAN; Parameter::ALL.len()];
         values[..8].copy_from_slice(&eight);
         ParameterValues(values)
     }
 
     /// The value, if it is given.
     pub fn given(&self, p: Parameter) -> Option<f64> {
-        (!p.is_surface() || !self[p].is_nan()).then_some(self[p])
+        (!p.is_optional() || !self[p].is_nan()).then_some(self[p])
     }
 
     /// Whether both have the same value of a parameter, or both none.

@@ -3,7 +3,7 @@
 
 use super::coordinates::ParameterSpace;
 use super::kind::ObjectiveKind;
-use super::parameters::Parameter;
+use super::parameters::{Parameter, ParameterValues};
 use super::prediction::{Prediction, Solved};
 use super::reference::{Reference, precondition, start};
 use super::warm_start::{WarmStart, nearest, place, sampled, worthwhile};
@@ -197,21 +197,7 @@ impl Posterior {
 
     /// Whether profiles can be computed at all at `theta`.
     pub(super) fn is_physical(&self, theta: &[f64]) -> bool {
-        let values = self.space.values_at(theta);
-        let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
-        let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
-        if !Parameter::ALL.iter().filter_map(|&p| values.given(p)).chain(theta.iter().copied()).all(f64::is_finite) {
-            return false;
-        }
-        let state = values.state();
-        let (steps, nodes) = Response::velocity_grid(&self.imager.star, &state, self.imager.sampling.step_kms);
-        nodes <= MOST_NODES
-            && steps <= MOST_STEPS_PER_BIN
-            && self.imager.star.with(&state.surface).is_possible()
-            && fastest.is_finite()
-            && fastest <= LARGEST_VSINI_KMS
-            && values[Parameter::Vsini] > 0.0
-            && values[Parameter::PorbOverProt] > 0.0
+        is_physical(&self.imager, &self.space.values_at(theta), theta)
     }
 
     fn nearest(&self, theta: &[f64]) -> &WarmStart {
@@ -312,6 +298,24 @@ impl Posterior {
             }
         }
     }
+}
+
+/// Whether profiles can be computed at all at `values`, whose free ones are `theta`.
+pub fn is_physical(imager: &Imager, values: &ParameterValues, theta: &[f64]) -> bool {
+    let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
+    let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
+    if !Parameter::ALL.iter().filter_map(|&p| values.given(p)).chain(theta.iter().copied()).all(f64::is_finite) {
+        return false;
+    }
+    let state = values.state();
+    let (steps, nodes) = Response::velocity_grid(&imager.star, &state, imager.sampling.step_kms);
+    nodes <= MOST_NODES
+        && steps <= MOST_STEPS_PER_BIN
+        && imager.star.with(&state.surface).is_possible()
+        && fastest.is_finite()
+        && fastest <= LARGEST_VSINI_KMS
+        && values[Parameter::Vsini] > 0.0
+        && values[Parameter::PorbOverProt] > 0.0
 }
 
 impl LogDensity for Posterior {

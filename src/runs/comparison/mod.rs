@@ -166,7 +166,7 @@ fn parameter(
     let truth = origin.truth.as_ref().and_then(|truth| truth.get(name).copied());
     let periodic = Parameter::from_name(name) == Some(Parameter::Phi);
     let Some(k) = pair.axis(name) else {
-        let fixed_at = pair.header.origin.reference.parameters.get(name).copied();
+        let fixed_at = pair.header.origin.reference.parameters().get(name).copied();
         return Compared {
             periodic,
             truth,

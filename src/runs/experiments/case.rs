@@ -101,14 +101,14 @@ impl Case {
         let began = Instant::now();
         let (scene, found) = search(&self.config, &folder.join("config.json"), pool)?;
         let search_seconds = began.elapsed().as_secs_f64();
-        let reference = found.posterior.reference();
+        let image = found.posterior.mapped().map(|posterior| &posterior.reference().solution);
         let data = scene.imager.data.depth.len() as f64;
         let ends = found.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok());
         let mut outcome = Outcome {
             truth: scene.truth.map(|values| by_name(&values)).unwrap_or_default(),
             chi2_target: scene.settings.imaging.chi2_target.value(),
-            lambda_data: reference.solution.image.lambda * data,
-            spottedness: reference.solution.spottedness,
+            lambda_data: image.map_or(f64::NAN, |image| image.image.lambda * data),
+            spottedness: image.map_or(f64::NAN, |image| image.spottedness),
             search_reconstructions: ends.map(|end| end.evaluations).sum::<usize>() + found.optimum.evaluations,
             search_seconds,
             ..self.nothing()

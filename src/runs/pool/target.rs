@@ -1,7 +1,8 @@
-//! What a run samples: the posterior, with unresolved spots counted as noise or not.
+//! What a run samples: the posterior, with unresolved spots counted as noise or not where one map counts.
 
 use crate::posterior::expansion::SpotsCounted;
-use crate::posterior::objective::{Posterior, UnresolvedSpots};
+use crate::posterior::density::Density;
+use crate::posterior::objective::UnresolvedSpots;
 use crate::posterior::surrogate::Surrogate;
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
 use rand::SeedableRng;
@@ -9,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// The density that is sampled.
 pub struct Target {
-    posterior: Posterior,
+    posterior: Density,
     counted: Option<SpotsCounted>,
     /// Of the surrogates' kind, before it is fitted; none where there is none.
     surrogate: Option<Surrogate>,
@@ -35,15 +36,20 @@ impl Target {
     ///
     /// # Errors
     /// [`UnresolvedSpotsError`].
-    pub fn new(posterior: Posterior, unresolved_spots: UnresolvedSpots) -> Result<Self, UnresolvedSpotsError> {
-        let counted = match unresolved_spots {
-            UnresolvedSpots::Entropy => None,
-            UnresolvedSpots::Fitted => Some(SpotsCounted::new(&posterior).ok_or(UnresolvedSpotsError)?),
+    pub fn new(posterior: Density, unresolved_spots: UnresolvedSpots) -> Result<Self, UnresolvedSpotsError> {
+        let counted = match (&posterior, unresolved_spots) {
+            (Density::Integrated(_), _) | (_, UnresolvedSpots::Entropy) => None,
+            (Density::Mapped(posterior), UnresolvedSpots::Fitted) => {
+                Some(SpotsCounted::new(posterior).ok_or(UnresolvedSpotsError)?)
+            }
         };
         let (imager, space) = (posterior.imager(), posterior.space());
-        let surrogate = match &counted {
-            Some(counted) => Surrogate::of_expansion(counted.expansion(), space, imager),
-            None => Surrogate::new(imager, space, posterior.reference()),
+        let surrogate = match (&posterior, &counted) {
+            (Density::Integrated(posterior), _) => {
+                posterior.expansion().ok().and_then(|expansion| Surrogate::of_expansion(expansion, space, imager))
+            }
+            (_, Some(counted)) => Surrogate::of_expansion(counted.expansion(), space, imager),
+            (Density::Mapped(posterior), None) => Surrogate::new(imager, space, posterior.reference()),
         };
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let draws = (0..DRAWS).filter_map(|_| surrogate.as_ref()?.draw(&mut rng));
@@ -53,7 +59,7 @@ impl Target {
     }
 
     /// The posterior.
-    pub fn posterior(&self) -> &Posterior {
+    pub fn posterior(&self) -> &Density {
         &self.posterior
     }
 
