@@ -86,9 +86,7 @@ impl Failure {
     pub fn search(path: &Path, error: SearchError) -> Self {
         match error {
             SearchError::Reference(error) => Failure::reference(path, error),
-            SearchError::Field(_) | SearchError::Optimise(_) => {
-                Failure::failed(format!("{}: {error}", path.display()))
-            }
+            SearchError::Field(_) | SearchError::Optimise(_) => Failure::failed(format!("{}: {error}", path.display())),
         }
     }
 

@@ -1,9 +1,7 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
-use crate::data::config::{
-    Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter,
-};
+use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;

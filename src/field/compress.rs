@@ -66,14 +66,23 @@ impl Compressed {
         let factor = epoch.noise().cholesky()?.unpack();
         let n = epoch.len();
         let whiten = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
-        let mut rows = &whiten * &epoch.jacobian;
+        let mut rows = match epoch.nuisances.ncols() {
+            // W is diagonal
+            0 => {
+                let mut rows = epoch.jacobian.clone();
+                rows.column_iter_mut().for_each(|mut column| column.component_mul_assign(&whiten.diagonal()));
+                rows
+            }
+            _ => &whiten * &epoch.jacobian,
+        };
         rows.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
         let mut directions = DMatrix::identity(n, n);
         if how.left_out > 0.0 && n > 0 {
             directions = leading(&rows, how)?;
             directions = with(directions, &(&whiten * &epoch.misfit));
             directions = with(directions, &(&whiten * &epoch.slopes));
-            rows = directions.tr_mul(&rows);
+            // nalgebra's own product with a transpose is no product of blocks: five times slower
+            rows = directions.transpose() * rows;
         }
         let expected = directions.tr_mul(&(&whiten * (&epoch.jacobian * around)));
         let ln_noise = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();

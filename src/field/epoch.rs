@@ -58,9 +58,13 @@ impl Epoch {
         self
     }
 
-    /// `J^T N^-1 misfit` (H); `None` where the covariance of the noise has no Cholesky factor.
+    /// `J^T N^-1 misfit` (H); `None` where that is not finite, or the covariance of the noise has no Cholesky factor.
     pub(super) fn pulled(&self) -> Option<DVector<f64>> {
-        Some(self.jacobian.tr_mul(&self.noise().cholesky()?.solve(&self.misfit)))
+        let weighed = match self.nuisances.ncols() {
+            0 => self.misfit.component_div(&self.variance),
+            _ => self.noise().cholesky()?.solve(&self.misfit),
+        };
+        Some(self.jacobian.tr_mul(&weighed)).filter(|pulled| pulled.iter().all(|x| x.is_finite()))
     }
 
     /// Panics where shapes do not go together: that is a mistake of the program.

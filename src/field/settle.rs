@@ -114,8 +114,7 @@ fn converges([before, last]: [f64; 2]) -> bool {
 fn pulled(epochs: &[Epoch]) -> Result<DMatrix<f64>, FieldError> {
     let mut all = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.ncols()), epochs.len());
     for (k, epoch) in epochs.iter().enumerate() {
-        let pulled = epoch.is_sound().then(|| epoch.pulled()).flatten();
-        all.set_column(k, &pulled.ok_or(FieldError::NotFinite { epoch: k })?);
+        all.set_column(k, &epoch.pulled().ok_or(FieldError::NotFinite { epoch: k })?);
     }
     Ok(all)
 }

@@ -299,18 +299,23 @@ impl Detection {
         settings: &DetectionSettings,
         report: &dyn Fn(Stage),
     ) -> Result<(), DetectionError> {
+        let mut settings = settings.clone();
         while self.rounds < MOST_ROUNDS && !self.closed && !self.best.on_edge {
             self.rounds += 1;
             report(Stage::BestOrbit(self.rounds));
             values[Parameter::K] = self.best.orbit.k_kms;
             values[Parameter::PorbOverProt] = self.best.porb_over_prot;
             values[Parameter::Phi] = self.best.orbit.phi;
-            let view = View::new(imager, values, settings, Some(self.last()))?;
+            let view = View::new(imager, values, &settings, Some(self.last()))?;
             let mut next = refined(&view.quadratic, &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();
             self.closed = moved < STAYS * next.orbit.sigma_k_kms;
             self.best = next;
+            // the field with a planet in the model is another one; what moves after that is too little to matter
+            if let Some(field) = &view.field {
+                settings.spots = Spots::Integrated(Known::of(&field.marginal));
+            }
             self.at_best = Some(view);
         }
         Ok(())

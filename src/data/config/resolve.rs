@@ -164,7 +164,8 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
             Hyperparameter::Fitted => {
                 values[parameter] = marginal::usual_value(parameter);
                 if something_is_free && !prior {
-                    let kind = if parameter == Parameter::SpotSlope { PriorKind::Uniform } else { PriorKind::LogUniform };
+                    let kind =
+                        if parameter == Parameter::SpotSlope { PriorKind::Uniform } else { PriorKind::LogUniform };
                     *raw.parameters.slot(parameter) = Some(PriorSection::even(kind, marginal::bounds(parameter)));
                 }
             }

@@ -3,8 +3,8 @@
 //! expand it around, until that place stays.
 
 use super::{
-    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, ROUNDS, SearchError, SearchSettings, Stage, shift,
-    within,
+    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, ROUNDS, SearchError, SearchSettings, Stage,
+    shift, within,
 };
 use crate::posterior::density::Density;
 use crate::posterior::imaging::Imager;

@@ -46,9 +46,14 @@ impl Basis {
 
     /// The same where differences of ln Z need be good to a few tenths only.
     pub fn rough(grid: &SurfaceGrid) -> Self {
+        Basis::new(grid).roughly()
+    }
+
+    /// These harmonics, differences of ln Z good to a few tenths.
+    #[must_use]
+    pub(super) fn roughly(&self) -> Self {
         let compression = Compression { left_out: 0.03 };
-        let settling = Settling { tolerance: 5e-3, compression, ..Settling::default() };
-        Basis { settling, ..Basis::new(grid) }
+        Basis { settling: Settling { tolerance: 5e-3, compression, ..Settling::default() }, ..self.clone() }
     }
 
     /// Spot filling factors (pixels, columns) of maps with these `coefficients` (H, columns).

@@ -36,8 +36,11 @@ const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
 const GAIN: f64 = 0.02;
 const STEPS: usize = 25;
 
-/// Step of the derivatives of ln Z.
-const STEP: f64 = 0.05;
+/// Step of the derivatives of ln Z: errors of ln Z of 0.03 are some 10 in its second derivative.
+const STEP: f64 = 0.1;
+
+/// Second derivatives of minus ln Z that are larger than this say something.
+const LEAST_BEND: f64 = 10.0;
 
 /// Longest step in ln amplitude, slope and ln lifetime: maps are found from those of the step before.
 const LONGEST: f64 = 0.35;
@@ -134,7 +137,11 @@ pub fn fit(
                 None => LIFETIMES_D.map(Lifetime::Days).to_vec(),
             };
             let spectrum = known.spectrum();
-            let start = |lifetime: &Lifetime| at(Field { spectrum, kernel: Kernel::of(*lifetime) }, jitter_kms, None);
+            let rough = basis.roughly();
+            let start = |lifetime: &Lifetime| {
+                let assumed = Assumed { field: Field { spectrum, kernel: Kernel::of(*lifetime) }, jitter_kms };
+                Marginal::new(imager, &rough, Arc::clone(&design), values, assumed, None)
+            };
             let tried: Vec<Result<Marginal, FieldError>> = lifetimes.par_iter().with_max_len(1).map(start).collect();
             let height = |m: &Marginal| m.settled.evidence.ln_evidence();
             let mut error = None;
@@ -146,7 +153,8 @@ pub fn fit(
                     Err(e) => error = Some(e),
                 }
             }
-            best.ok_or_else(|| error.expect("no start, so an error"))?
+            let best = best.ok_or_else(|| error.expect("no start, so an error"))?;
+            at(best.assumed.field, jitter_kms, Some(&best))?
         }
     };
     let mut marginal = climb(first, &known, &at)?;
@@ -206,7 +214,8 @@ fn climb(
 ) -> Result<Marginal, FieldError> {
     let free = free(&first.assumed.field, known);
     let height = |of: &Marginal| of.settled.evidence.ln_evidence();
-    // derivatives at fixed maps are not enough: the determinant changes with the maps, and outweighs the rest
+    // gradient, and second derivatives along each number. Derivatives at fixed maps are not enough: the determinant
+    // changes with the maps, and outweighs the rest
     let slope = |of: &Marginal| {
         let from = place(&of.assumed.field);
         let beside = |i: usize, h: f64| {
@@ -214,21 +223,27 @@ fn climb(
             to[i] += h;
             at(field_at(to, &of.assumed.field), of.assumed.jitter_kms, Some(of)).map(|there| height(&there)).ok()
         };
-        let along = |i: usize| match free[i] {
-            true => match rayon::join(|| beside(i, STEP), || beside(i, -STEP)) {
-                (Some(above), Some(below)) => (above - below) / (2.0 * STEP),
-                (Some(above), None) => (above - height(of)) / STEP,
-                (None, Some(below)) => (height(of) - below) / STEP,
-                (None, None) => 0.0,
-            },
-            false => 0.0,
+        let along = |i: usize| {
+            if !free[i] {
+                return (0.0, 0.0);
+            }
+            let here = height(of);
+            match rayon::join(|| beside(i, STEP), || beside(i, -STEP)) {
+                (Some(above), Some(below)) => {
+                    ((above - below) / (2.0 * STEP), (2.0 * here - above - below) / (STEP * STEP))
+                }
+                (Some(above), None) => ((above - here) / STEP, 0.0),
+                (None, Some(below)) => ((here - below) / STEP, 0.0),
+                (None, None) => (0.0, 0.0),
+            }
         };
-        Vector3::from_iterator((0..3).map(along))
+        let all = [0, 1, 2].map(along);
+        (Vector3::from(all.map(|a| a.0)), Vector3::from(all.map(|a| a.1)))
     };
     let mut here = first;
-    let mut gradient = slope(&here);
-    // the inverse Hessian of minus ln Z: errors of a few per cent are usual
-    let mut inverse = Matrix3::identity() * 0.01;
+    let (mut gradient, bend) = slope(&here);
+    // the inverse Hessian of minus ln Z begins with its diagonal; where that says nothing errors of 10 % are usual
+    let mut inverse = Matrix3::from_diagonal(&bend.map(|bend| if bend > LEAST_BEND { bend.recip() } else { 0.01 }));
     for _ in 0..STEPS {
         let from = place(&here.assumed.field);
         // what pushes against a bound stays there
@@ -267,7 +282,7 @@ fn shortened(
     mut step: Vector3<f64>,
     gradient: &Vector3<f64>,
     height: &impl Fn(&Marginal) -> f64,
-    slope: &impl Fn(&Marginal) -> Vector3<f64>,
+    slope: &impl Fn(&Marginal) -> (Vector3<f64>, Vector3<f64>),
     at: &impl Fn(Field, f64, Option<&Marginal>) -> Result<Marginal, FieldError>,
 ) -> Option<(Marginal, Vector3<f64>)> {
     const TRIES: usize = 6;
@@ -276,7 +291,7 @@ fn shortened(
         let to = Vector3::from_fn(|i, _| (from[i] + step[i]).clamp(limits()[i].0, limits()[i].1.max(from[i])));
         let next = at(field_at(to, &here.assumed.field), here.assumed.jitter_kms, Some(here));
         if let Some(next) = next.ok().filter(|next| height(next) > height(here) + 1e-4 * gradient.dot(&step)) {
-            let slope = slope(&next);
+            let (slope, _) = slope(&next);
             return Some((next, slope));
         }
         step *= 0.3;

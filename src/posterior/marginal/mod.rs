@@ -20,9 +20,9 @@ mod posterior;
 
 pub use change::Change;
 pub use design::{Basis, Design};
+pub use fit::{Fitted, Known, bounds, fit, usual_value};
 pub use forecast::Forecast;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
-pub use fit::{Fitted, Known, bounds, fit, usual_value};
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};
 use crate::posterior::imaging::Imager;

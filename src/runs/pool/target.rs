@@ -1,7 +1,7 @@
 //! What a run samples: the posterior, with unresolved spots counted as noise or not where one map counts.
 
-use crate::posterior::expansion::SpotsCounted;
 use crate::posterior::density::Density;
+use crate::posterior::expansion::SpotsCounted;
 use crate::posterior::objective::UnresolvedSpots;
 use crate::posterior::surrogate::Surrogate;
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
