@@ -21,8 +21,8 @@ impl Columns {
     /// Reads a table with the names of its columns in the first line.
     ///
     /// # Errors
-    /// [`FileError`]: a file that cannot be read, a line of another length, something that is no number or beyond sense,
-    /// no row.
+    /// [`FileError`]: a file that cannot be read, a line of another length, something that is no number or beyond
+    /// sense, no row.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
         let mut lines = text.lines();

@@ -96,7 +96,8 @@ pub struct Summary {
     /// How efficient each kind of move is; empty for a chain that does not name its moves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<MoveSummary>,
-    /// Effective samples per evaluation, of the steps kept: that of the parameter where it is least; null where unknown.
+    /// Effective samples per evaluation, of the steps kept: that of the parameter where it is least; null where
+    /// unknown.
     #[serde(default)]
     pub ess_per_evaluation: Option<f64>,
     /// Whether every parameter has reached the goals and no walker is stuck.
