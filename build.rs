@@ -1,7 +1,7 @@
 //! Tells `dimcmc --version` the commit that it is built from, where there is git and this is its working tree.
 //!
-//! Runs again when the tree's HEAD moves, and never otherwise. Changes that are not committed are not told: nothing would say
-//! when they come and go. A package from the registry has no commit, whatever repository it is unpacked in.
+//! Runs again when the tree's HEAD moves, and never otherwise. Changes that are not committed are not told: nothing
+//! would say when they come and go. A package from the registry has no commit, whatever repository it is unpacked in.
 
 use std::path::Path;
 use std::process::Command;

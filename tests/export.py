@@ -3,7 +3,7 @@
     python tests/export.py RUN
 
 RUN is a folder with summary.json, chain.jsonl and all exports at their default places, of a chain of four ensembles
-with a phase around 0 and autocorrelation times of some ten steps. Run by tests/export.rs.
+with a phase around 0 and autocorrelation times of some ten steps. Run by tests/commands/export.rs.
 """
 
 import json

@@ -4,10 +4,10 @@
 
 use crate::data::config::ConfigError;
 use crate::data::init::ProposalError;
+use crate::data::io::FileError;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
-use crate::data::io::zdipy::ZdipyError;
 use crate::data::scene::SceneError;
 use crate::data::search::SearchError;
 use crate::figures::plot::PlotError;
@@ -108,7 +108,7 @@ impl Failure {
     }
 
     /// A landscape of the config at `path` that cannot begin or go on.
-    pub fn survey(path: &Path, error: GridScanError) -> Self {
+    pub fn grid_scan(path: &Path, error: GridScanError) -> Self {
         match error {
             GridScanError::Origin(error) => Failure::origin(path, error),
             GridScanError::Journal(error) => error.into(),
@@ -188,8 +188,8 @@ impl From<ProposalError> for Failure {
     }
 }
 
-impl From<ZdipyError> for Failure {
-    fn from(error: ZdipyError) -> Self {
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
         Failure::of(error)
     }
 }

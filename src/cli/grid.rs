@@ -56,35 +56,35 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     remarks(&scene);
     let plan = scene.settings.require_grid()?;
     let folder = args.output.folder();
-    let failed = |e| Failure::survey(&args.config, e);
+    let failed = |e| Failure::grid_scan(&args.config, e);
     let pool = cluster::pool(global, &signals);
-    let mut survey = if resume {
+    let mut scan = if resume {
         signals.defer();
         let spinner = progress::bar(global, None, "reading the landscape, reference image");
-        let survey = GridScan::resume(&scene, plan, folder);
+        let scan = GridScan::resume(&scene, plan, folder);
         spinner.finish_and_clear();
-        survey.map_err(failed)?
+        scan.map_err(failed)?
     } else {
         let found = search(global, &args.config, &scene, &scene.space_of(&plan.free))?;
         signals.defer();
         let folder = args.output.create()?;
         let spinner = progress::bar(global, None, "images that nodes far from the best one start from");
-        let survey = GridScan::begin(&scene, plan, found, folder, args.output.replaces());
+        let scan = GridScan::begin(&scene, plan, found, folder, args.output.replaces());
         spinner.finish_and_clear();
-        survey.map_err(failed)?
+        scan.map_err(failed)?
     };
-    let mut meter = Meter::new(global, &survey.landscape);
-    let whole = survey.go(&pool, |landscape| meter.show(landscape));
+    let mut meter = Meter::new(global, &scan.landscape);
+    let whole = scan.go(&pool, |landscape| meter.show(landscape));
     meter.bar.finish_and_clear();
     let noted = Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size());
     if !whole.map_err(failed)? {
-        let (config, folder, nodes) = (args.config.display(), folder.display(), survey.landscape.nodes().len());
+        let (config, folder, nodes) = (args.config.display(), folder.display(), scan.landscape.nodes().len());
         return Err(signals.interrupted(format!(
             "interrupted after {nodes} nodes; go on with: dimcmc grid {config} --out {folder} --resume"
         )));
     }
     noted?;
-    let GridScan { header, landscape, .. } = &survey;
+    let GridScan { header, landscape, .. } = &scan;
     let truth = header.origin.truth.as_ref();
     let rule = Rule { nodes: args.fit_nodes.map(NonZeroUsize::get), radius: args.fit_radius.map(NonZeroUsize::get) };
     let found = paraboloid(landscape, rule);
@@ -92,7 +92,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     // whoever reads may stop reading
     console::print(table(landscape, truth));
     console::print(paraboloid_table(&found, landscape.grid(), truth));
-    let images = match survey.warm_starts() {
+    let images = match scan.warm_starts() {
         0 => String::new(),
         others => format!(" from {} images", others + 1),
     };

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// What a survey that is interrupted has not come to.
+/// What limits that are interrupted have not come to.
 const LIMIT: &str = "limit";
 
 /// Find out which planets would be found: injection and recovery over period, K and phase
@@ -86,7 +86,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let shortcut = shortcut.map_err(|e| failure(args, e))?;
     let orbits = orbits(args, &shortcut)?;
     let meter = Meter::new(global, orbits.count());
-    let cells = limits::survey(&shortcut, &orbits, &|done| meter.show(done));
+    let cells = limits::recovered(&shortcut, &orbits, &|done| meter.show(done));
     meter.bar.finish_and_clear();
     let found = limits::limits(&cells);
     let drawn = limits::drawn(&shortcut, &found, usize::from(args.full));

@@ -2,8 +2,9 @@
 //!
 //! The path of a profile: [`config`] names its file and says how it is used, [`io`] reads it, [`scene`] joins both with
 //! what is measured from the profiles themselves. [`search`] finds the point where a scene's commands start.
+//!
 //! [`init`] and [`import`] write a first config, [`diagnosis`] tries out why a model does not fit. `io` also holds the
-//! formats of what is written.
+//! formats of what is written, a file each.
 
 pub mod config;
 pub mod diagnosis;

@@ -1,7 +1,10 @@
-//! Maximum-entropy inversion (`docs/method.md` section 2; Skilling & Bryan 1984, Gull & Skilling 1999): the image of
-//! greatest entropy at a given chi2, or at a given Lagrange multiplier.
+//! Maximum-entropy inversion (`docs/method.md` section 2; Skilling & Bryan 1984, Gull & Skilling 1999).
 //!
-//! Knows images, data misfits and their curvature through [`Problem`] alone.
+//! In: a misfit with gradient and curvature ([`problem`]), the entropy of an image ([`entropy`]), a goal and a start
+//! ([`solution`]). Out: the image of greatest entropy at that chi2, or at that Lagrange multiplier.
+//!
+//! [`solver`] makes Newton steps; each is a linear system for `cg`, which [`preconditioner`] makes easy. `convergence`
+//! says how far the goal is, `parallelism` is Skilling & Bryan's own test.
 
 mod cg;
 mod convergence;

@@ -1,8 +1,8 @@
-//! Numbers, without a star in sight: vector instructions chosen at run time, units, the normal
-//! distribution, and text in columns.
+//! Numbers, without a star in sight.
 //!
-//! In: slices of numbers. Out: the same numbers on every machine ([`vector`]), radians and km/s from what people write
-//! ([`units`]), tables for a terminal ([`text`]), numbers from files where some are none ([`json`]).
+//! In: slices of numbers. Out: the same numbers on every machine by vector instructions chosen at run time
+//! ([`vector`]), radians and km/s from what people write ([`units`]), probabilities ([`normal`]), tables for a terminal
+//! ([`text`]), numbers from files where some are none ([`json`]).
 
 pub mod json;
 pub mod normal;

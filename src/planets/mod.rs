@@ -1,8 +1,12 @@
 //! Planets in the velocities of the profiles, wherever those come from.
 //!
-//! In: ln L as a quadratic in the velocities of the profiles ([`velocities`]). Then, in this order: the best orbit at
-//! each period ([`periodogram`]), how often chance makes as high a peak, which periods spots and nights imitate,
-//! limits. Out: a [`verdict`], with what speaks against it; every threshold on a planet stands there.
+//! In: ln L as a quadratic in the velocities of the profiles ([`velocities`]). Out: a [`verdict`] with what speaks
+//! against it. The steps between are files of [`periodogram`], in this order: `frequencies` has the trial periods,
+//! `orbits` the best orbit at each, `peaks` the highest; `false_alarm` says how often chance makes one, `rotation` and
+//! `window` which periods spots and nights imitate, `limits` what K may be. `eccentric` and `two_planets` have what is
+//! searched for on request.
+//!
+//! The thresholds (false-alarm probabilities of candidate and detection among them) are constants of [`verdict`].
 
 pub mod periodogram;
 pub mod velocities;

@@ -2,6 +2,7 @@
 //!
 //! A star that is done is left alone, one that was stopped goes on, and one that fails stops no other.
 
+use crate::data::io::FileError;
 use crate::data::io::atomic::write_json;
 use crate::data::scene::Scene;
 use crate::data::search::{self, SearchSettings};
@@ -43,45 +44,19 @@ pub enum End {
     Failed(String),
 }
 
-/// What is wrong with a list: one line that names it.
-#[derive(Debug, thiserror::Error)]
-pub enum ListError {
-    /// It cannot be read.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// The list.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A line makes no sense.
-    #[error("{}:{line}: {problem}", path.display())]
-    Line {
-        /// The list.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: String,
-    },
-    /// It has no star.
-    #[error("{}: names no config", .0.display())]
-    Empty(PathBuf),
-}
-
 /// Reads a list: the path of a config in each line, from the list's folder; `#` begins a comment. Runs go into `out`.
 ///
 /// # Errors
-/// [`ListError`].
-pub fn read_list(path: &Path, out: &Path) -> Result<Vec<Star>, ListError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ListError::Read { path: path.into(), source })?;
+/// [`FileError`].
+pub fn read_list(path: &Path, out: &Path) -> Result<Vec<Star>, FileError> {
+    let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
     let mut stars: Vec<Star> = Vec::new();
     for (k, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {
             continue;
         }
-        let wrong = |problem: String| ListError::Line { path: path.into(), line: k + 1, problem };
+        let wrong = |problem: String| FileError::Line { path: path.into(), line: k + 1, problem };
         let config = path.parent().unwrap_or(Path::new("")).join(line);
         let Some(name) = config.file_stem().map(|name| name.to_string_lossy().into_owned()) else {
             return Err(wrong(format!("{line} is no file")));
@@ -92,7 +67,7 @@ pub fn read_list(path: &Path, out: &Path) -> Result<Vec<Star>, ListError> {
         }
         stars.push(Star { folder: out.join(&name), name, config });
     }
-    if stars.is_empty() { Err(ListError::Empty(path.into())) } else { Ok(stars) }
+    if stars.is_empty() { Err(FileError::of(path, "names no config")) } else { Ok(stars) }
 }
 
 /// Samples all stars, as many at once as the pool is large; `done` is told of each that ends on this machine. What came

@@ -1,9 +1,15 @@
 //! What is done with a scene: chains and grids on disk that can be stopped and resumed, alone or many.
 //!
-//! [`origin`] and [`manifest`] are what a folder was begun with. [`run`] is a chain on disk, [`grid_scan`] a landscape,
-//! [`optimum`] the highest point, [`blind_search`] and [`limits`] searches for orbits; [`merge`] and [`batch`] are runs
-//! of one star joined and runs of many, [`comparison`] two of them side by side, [`export`] a chain for other programs,
-//! [`experiments`] the rows of the paper. [`pool`] spreads work over threads, or over the ranks of a cluster.
+//! In: a scene (`data::scene`), or a folder that an earlier command wrote. Out: files of a folder.
+//!
+//! 1. [`pool`] spreads reconstructions over threads, or over the ranks of a `cluster`.
+//! 2. [`origin`] and [`manifest`] are what a folder was begun with.
+//! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`blind_search`] and
+//!    [`limits`] searches for orbits.
+//! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] holds a chain against a
+//!    landscape, [`experiments`] has the rows of the paper.
+//! 5. [`export`] writes a chain for other programs. A new format is a file of it, and a variant of `Format` in
+//!    `export/mod.rs`.
 
 pub mod batch;
 pub mod blind_search;

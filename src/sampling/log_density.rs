@@ -80,17 +80,17 @@ pub trait LogDensity: Sync {
     /// before.
     fn evaluate(&self, theta: &[f64]) -> Evaluation;
 
-    /// Internal coordinates of `theta`.
+    /// Sampling coordinates of `theta`.
     fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         theta.to_vec()
     }
 
-    /// Written coordinates of `internal`, periodic ones wrapped into their range.
-    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
-        internal.to_vec()
+    /// Physical coordinates of a point `x` in sampling ones, periodic ones wrapped into their range.
+    fn to_physical(&self, x: &[f64]) -> Vec<f64> {
+        x.to_vec()
     }
 
-    /// ln |d(written) / d(internal)| at `theta`: what turns a density in physical coordinates into one in internal
+    /// ln |d(physical) / d(sampling)| at `theta`: what turns a density in physical coordinates into one in sampling
     /// ones.
     fn log_jacobian(&self, _theta: &[f64]) -> f64 {
         0.0

@@ -1,8 +1,18 @@
-//! The star and what it shows: surface grid, rotation, visibility, limb darkening, local line, orbit, spots and
-//! faculae, and the response that turns a brightness map into line profiles (`docs/method.md` section 1; Petit et al.
-//! 2015, section 2).
+//! The star and what it shows (`docs/method.md` section 1; Petit et al. 2015, section 2).
 //!
-//! Angles are radians here, velocities km/s, times days.
+//! In: a map of the surface, the values of star and orbit ([`StarState`]), and times. Out: line depth and continuum of
+//! every profile, by one linear [`Response`], and its transpose. Angles are radians here, velocities km/s, times days.
+//!
+//! 1. [`grid`] has the pixels, [`spots`] what a simulated map of them holds, [`brightness`] how bright that is.
+//! 2. For each observation: [`rotation`] turns the pixels, `view` finds the visible ones, [`limb_darkening`] darkens
+//!    them, `moments` gives each its weight and velocity. [`orbit`] shifts the whole profile.
+//! 3. `placement` puts pixels into cells of a velocity grid (`sorting`, `filling`, `block`), `deposit` adds their
+//!    brightness up there (`kernel`).
+//! 4. `convolution` makes bins of that (`correlate`) with the local line (`line_profile`, `voigt`).
+//! 5. [`response`] goes through these steps, and back. `nearby` has a quicker way for a star that differs little.
+//!
+//! Beside that: [`observation`] has profiles and what they measure by themselves, [`injection`] puts an orbit into
+//! them, [`planet`] says what is quoted of an orbit.
 
 mod block;
 pub mod brightness;

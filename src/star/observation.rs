@@ -110,15 +110,6 @@ impl Observations {
         self.profiles.iter().fold(None, span)
     }
 
-    /// The middle of the time base (d), half way between the first and the last profile.
-    pub fn mid_time_d(&self) -> f64 {
-        let (lo, hi) = self
-            .profiles
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| (lo.min(p.time_d), hi.max(p.time_d)));
-        0.5 * (lo + hi)
-    }
-
     /// Radial velocity of every profile by its first moment, see [`Profile::first_moment`].
     pub fn first_moments(&self) -> Vec<RadialVelocity> {
         self.profiles.iter().map(|p| p.first_moment(self.step_kms)).collect()

@@ -19,6 +19,10 @@ const README_BYTES: usize = 8000;
 /// Characters of a line.
 const LONGEST_LINE: usize = 120;
 
+/// Where people write.
+const WRITTEN: [&str; 9] =
+    ["src", "tests", "benches", "examples", ".ci", "build.rs", "Cargo.toml", "CONTRIBUTING.md", "CHANGELOG.md"];
+
 struct Page {
     /// Relative to the root.
     path: PathBuf,
@@ -129,7 +133,7 @@ fn the_readme_is_one_page() {
 #[test]
 fn lines_are_short() {
     let mut faults = Vec::new();
-    for path in sources(&["src", "tests", "benches", "examples", ".ci", "Cargo.toml", "CONTRIBUTING.md"]) {
+    for path in sources(&WRITTEN) {
         for (number, line) in std::fs::read_to_string(&path).unwrap().lines().enumerate() {
             if line.chars().count() > LONGEST_LINE && !line.starts_with('|') {
                 faults.push(format!("{}:{}: {} characters", path.display(), number + 1, line.chars().count()));
@@ -163,6 +167,25 @@ fn links_lead_somewhere() {
                 faults.push(format!("{place}: is not there"));
             } else if anchor.is_some_and(|anchor| !Page::read(&path).anchors().contains(anchor)) {
                 faults.push(format!("{place}: has no such heading"));
+            }
+        }
+    }
+    hold(faults);
+}
+
+/// Files and folders of the tree that documents and comments name.
+#[test]
+fn paths_that_are_named_are_there() {
+    let roots = ["src/", "tests/", "benches/", "examples/", "docs/", "configs/", "results/"];
+    let is_path = |span: &&str| {
+        roots.iter().any(|root| span.starts_with(root))
+            && span.chars().all(|c| c.is_alphanumeric() || ['/', '.', '_', '-'].contains(&c))
+    };
+    let mut faults = Vec::new();
+    for file in [sources(&WRITTEN), sources(&["README.md", "docs", "results"])].concat() {
+        for (number, line) in std::fs::read_to_string(&file).unwrap().lines().enumerate() {
+            for path in line.split('`').skip(1).step_by(2).filter(is_path).filter(|path| !root().join(path).exists()) {
+                faults.push(format!("{}:{}: {path} is not there", file.display(), number + 1));
             }
         }
     }

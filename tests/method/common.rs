@@ -2,8 +2,9 @@
 #![allow(dead_code)]
 
 use dimcmc::internals::maxent::entropy::Entropy;
+use dimcmc::internals::maxent::{Curvature, Problem};
 use dimcmc::internals::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use dimcmc::internals::posterior::imaging::{Data, Imager};
+use dimcmc::internals::posterior::imaging::{Data, Imager, ImagingProblem};
 use dimcmc::internals::posterior::objective::{Parameter, ParameterValues};
 use dimcmc::internals::star::{LimbDarkening, LocalLine, Sampling, StarSettings, SurfaceGrid};
 use serde_json::Value;
@@ -105,4 +106,37 @@ pub fn values(theta: &Value, rotation_period_d: f64) -> ParameterValues {
     values[Parameter::Vsini] = number("vsini");
     values[Parameter::Vsys] = number("vsys");
     values
+}
+
+/// Numbers without a pattern.
+pub fn wave(n: usize, a: f64) -> Vec<f64> {
+    (0..n).map(|i| (a * (i * i) as f64).sin()).collect()
+}
+
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Gradient and curvature of the misfit of maps of `n` pixels against differences.
+pub fn hold_derivatives(problem: &mut ImagingProblem, n: usize) {
+    let s: Vec<f64> = wave(n, 0.37).iter().map(|x| 0.3 + 0.2 * x).collect();
+    let (v, w) = (wave(n, 0.9), wave(n, 1.7));
+    let (mut gradient, mut curved) = (vec![0.0; n], vec![0.0; n]);
+    let h = 1e-5;
+    let mut at = |h: f64| {
+        let shifted: Vec<f64> = s.iter().zip(&v).map(|(s, v)| s + h * v).collect();
+        let chi2 = problem.linearise(&shifted);
+        problem.gradient(&mut gradient);
+        (chi2, dot(&gradient, &w))
+    };
+    let ((chi2_plus, slope_plus), (chi2_minus, slope_minus)) = (at(h), at(-h));
+    problem.linearise(&s);
+    problem.gradient(&mut gradient);
+    problem.curvature(Curvature::Exact, &v, &mut curved);
+    let slope = (chi2_plus - chi2_minus) / (4.0 * h);
+    // differences of chi2, which is some 1e6 and rounded at 1e-16 of itself
+    assert!((dot(&gradient, &v) / slope - 1.0).abs() < 1e-6);
+    assert!((problem.slope(&v) / slope - 1.0).abs() < 1e-6);
+    let second = (slope_plus - slope_minus) / (2.0 * h);
+    assert!((dot(&curved, &w) / second - 1.0).abs() < 1e-6, "{} {second}", dot(&curved, &w));
 }

@@ -1,8 +1,7 @@
 //! Truths about the maximum-entropy image: derivatives of the misfit, the solver's optimality conditions, and that the
 //! answer does not depend on the way to it.
 
-use crate::common::{Oracle, oracle, values};
-use dimcmc::internals::maxent::entropy::Entropy;
+use crate::common::{self, Oracle, dot, hold_derivatives, oracle, values, wave};
 use dimcmc::internals::maxent::{
     Curvature, Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
 };
@@ -12,26 +11,12 @@ use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 
 fn imager(oracle: &Oracle) -> Imager {
-    Imager {
-        grid: SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2),
-        star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
-        data: oracle.data.clone(),
-        entropy: Entropy::new(oracle.default_spot),
-    }
+    common::imager(oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2))
 }
 
 fn problem<'a>(oracle: &Oracle, imager: &'a Imager) -> ImagingProblem<'a> {
     let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
     imager.problem(imager.response(&truth.state()))
-}
-
-fn wave(n: usize, a: f64) -> Vec<f64> {
-    (0..n).map(|i| (a * (i * i) as f64).sin()).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[test]
@@ -59,27 +44,7 @@ fn chi2_is_the_sum_of_squared_residuals_over_their_errors() {
 fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
     let oracle = oracle();
     let imager = imager(&oracle);
-    let mut problem = problem(&oracle, &imager);
-    let n = imager.grid.len();
-    let s: Vec<f64> = wave(n, 0.37).iter().map(|x| 0.3 + 0.2 * x).collect();
-    let (v, w) = (wave(n, 0.9), wave(n, 1.7));
-    let (mut gradient, mut curved) = (vec![0.0; n], vec![0.0; n]);
-    let h = 1e-5;
-    let shifted = |h: f64| s.iter().zip(&v).map(|(s, v)| s + h * v).collect::<Vec<f64>>();
-    let mut at = |h: f64| {
-        let chi2 = problem.linearise(&shifted(h));
-        problem.gradient(&mut gradient);
-        (chi2, dot(&gradient, &w))
-    };
-    let ((chi2_plus, slope_plus), (chi2_minus, slope_minus)) = (at(h), at(-h));
-    problem.linearise(&s);
-    problem.gradient(&mut gradient);
-    problem.curvature(Curvature::Exact, &v, &mut curved);
-    let slope = (chi2_plus - chi2_minus) / (4.0 * h);
-    assert!((dot(&gradient, &v) / slope - 1.0).abs() < 1e-6);
-    assert!((problem.slope(&v) / slope - 1.0).abs() < 1e-6);
-    let second = (slope_plus - slope_minus) / (2.0 * h);
-    assert!((dot(&curved, &w) / second - 1.0).abs() < 1e-6, "{} {second}", dot(&curved, &w));
+    hold_derivatives(&mut problem(&oracle, &imager), imager.grid.len());
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Nuisances of line and continuum against dense algebra, differences and simulated stars whose continua wander.
 
-use crate::common::{imager, oracle, truth};
+use crate::common::{dot, hold_derivatives, imager, oracle, truth};
 use dimcmc::internals::data::config::{Config, ObservationSource};
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
+use dimcmc::internals::maxent::{Problem, SolverSettings};
 use dimcmc::internals::posterior::expansion::{Expansion, STELLAR};
 use dimcmc::internals::posterior::fit::Fit;
 use dimcmc::internals::posterior::imaging::Imager;
@@ -37,39 +37,11 @@ fn with_nuisances(pixels: usize, priors: LineAndContinuum) -> Imager {
     imager.with_nuisances(priors, &observations)
 }
 
-fn wave(n: usize, a: f64) -> Vec<f64> {
-    (0..n).map(|i| (a * (i * i) as f64).sin()).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 #[test]
 fn gradient_and_curvature_of_the_misfit_are_its_derivatives() {
     let imager = with_nuisances(1000, PRIORS);
     let mut problem = imager.problem(imager.response(&truth(&oracle()).state()));
-    let n = imager.grid.len();
-    let s: Vec<f64> = wave(n, 0.37).iter().map(|x| 0.3 + 0.2 * x).collect();
-    let (v, w) = (wave(n, 0.9), wave(n, 1.7));
-    let (mut gradient, mut curved) = (vec![0.0; n], vec![0.0; n]);
-    let h = 1e-5;
-    let mut at = |h: f64| {
-        let shifted: Vec<f64> = s.iter().zip(&v).map(|(s, v)| s + h * v).collect();
-        let chi2 = problem.linearise(&shifted);
-        problem.gradient(&mut gradient);
-        (chi2, dot(&gradient, &w))
-    };
-    let ((chi2_plus, slope_plus), (chi2_minus, slope_minus)) = (at(h), at(-h));
-    problem.linearise(&s);
-    problem.gradient(&mut gradient);
-    problem.curvature(Curvature::Exact, &v, &mut curved);
-    let slope = (chi2_plus - chi2_minus) / (4.0 * h);
-    // differences of chi2, which is some 1e6 and rounded at 1e-16 of itself
-    assert!((dot(&gradient, &v) / slope - 1.0).abs() < 1e-6);
-    assert!((problem.slope(&v) / slope - 1.0).abs() < 1e-6);
-    let second = (slope_plus - slope_minus) / (2.0 * h);
-    assert!((dot(&curved, &w) / second - 1.0).abs() < 1e-6, "{} {second}", dot(&curved, &w));
+    hold_derivatives(&mut problem, imager.grid.len());
 }
 
 /// chi2 with nuisances integrated out is the smallest chi2 over their values, each paid for by its prior.

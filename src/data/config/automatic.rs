@@ -1,7 +1,8 @@
 //! A number that may be left to the program: `"auto"`.
 
+use super::number_or_word::{self, NumberOrWord};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
 
 /// A number, or what the observations say.
@@ -23,47 +24,31 @@ impl Automatic {
     }
 }
 
+impl NumberOrWord for Automatic {
+    const EXPECTED: &'static str = "a number or \"auto\"";
+    const WORDS: &'static [(&'static str, Self)] = &[("auto", Automatic::Auto)];
+
+    fn of(number: f64) -> Self {
+        Automatic::Fixed(number)
+    }
+
+    fn number(self) -> Option<f64> {
+        match self {
+            Automatic::Fixed(number) => Some(number),
+            _ => None,
+        }
+    }
+}
+
 impl Serialize for Automatic {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Automatic::Fixed(value) => serializer.serialize_f64(*value),
-            Automatic::Auto => serializer.serialize_str("auto"),
-        }
+        number_or_word::serialize(*self, serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for Automatic {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(AutomaticVisitor)
-    }
-}
-
-struct AutomaticVisitor;
-
-impl de::Visitor<'_> for AutomaticVisitor {
-    type Value = Automatic;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str("a number or \"auto\"")
-    }
-
-    fn visit_f64<E: de::Error>(self, value: f64) -> Result<Automatic, E> {
-        Ok(Automatic::Fixed(value))
-    }
-
-    fn visit_i64<E: de::Error>(self, value: i64) -> Result<Automatic, E> {
-        Ok(Automatic::Fixed(value as f64))
-    }
-
-    fn visit_u64<E: de::Error>(self, value: u64) -> Result<Automatic, E> {
-        Ok(Automatic::Fixed(value as f64))
-    }
-
-    fn visit_str<E: de::Error>(self, value: &str) -> Result<Automatic, E> {
-        match value {
-            "auto" => Ok(Automatic::Auto),
-            _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
-        }
+        number_or_word::deserialize(deserializer)
     }
 }
 

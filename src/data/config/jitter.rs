@@ -1,7 +1,8 @@
 //! The scatter of the profiles' velocity zero points: a number, or `"fitted"`.
 
+use super::number_or_word::{self, NumberOrWord};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
 
 /// Standard deviation of the velocity zero points of the profiles.
@@ -26,47 +27,31 @@ impl VelocityJitter {
     }
 }
 
+impl NumberOrWord for VelocityJitter {
+    const EXPECTED: &'static str = "a number or \"fitted\"";
+    const WORDS: &'static [(&'static str, Self)] = &[("fitted", VelocityJitter::Fitted)];
+
+    fn of(number: f64) -> Self {
+        VelocityJitter::Known(number)
+    }
+
+    fn number(self) -> Option<f64> {
+        match self {
+            VelocityJitter::Known(number) => Some(number),
+            _ => None,
+        }
+    }
+}
+
 impl Serialize for VelocityJitter {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            VelocityJitter::Known(kms) => serializer.serialize_f64(*kms),
-            VelocityJitter::Fitted => serializer.serialize_str("fitted"),
-        }
+        number_or_word::serialize(*self, serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for VelocityJitter {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(JitterVisitor)
-    }
-}
-
-struct JitterVisitor;
-
-impl de::Visitor<'_> for JitterVisitor {
-    type Value = VelocityJitter;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str("a number or \"fitted\"")
-    }
-
-    fn visit_f64<E: de::Error>(self, value: f64) -> Result<VelocityJitter, E> {
-        Ok(VelocityJitter::Known(value))
-    }
-
-    fn visit_i64<E: de::Error>(self, value: i64) -> Result<VelocityJitter, E> {
-        Ok(VelocityJitter::Known(value as f64))
-    }
-
-    fn visit_u64<E: de::Error>(self, value: u64) -> Result<VelocityJitter, E> {
-        Ok(VelocityJitter::Known(value as f64))
-    }
-
-    fn visit_str<E: de::Error>(self, value: &str) -> Result<VelocityJitter, E> {
-        match value {
-            "fitted" => Ok(VelocityJitter::Fitted),
-            _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
-        }
+        number_or_word::deserialize(deserializer)
     }
 }
 

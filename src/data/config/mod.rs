@@ -10,6 +10,7 @@ mod draft;
 mod error;
 mod identity;
 mod jitter;
+mod number_or_word;
 mod raw;
 mod raw_parts;
 mod resolve;

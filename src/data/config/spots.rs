@@ -1,7 +1,8 @@
 //! A number that says something of the spots before they are integrated out: a number, `"fitted"`, or `"static"`.
 
+use super::number_or_word::{self, NumberOrWord};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
 
 /// A hyperparameter of the field of spots.
@@ -31,49 +32,29 @@ impl Hyperparameter {
     }
 }
 
+impl NumberOrWord for Hyperparameter {
+    const EXPECTED: &'static str = "a number, \"fitted\", or (a lifetime) \"static\"";
+    const WORDS: &'static [(&'static str, Self)] =
+        &[("fitted", Hyperparameter::Fitted), ("static", Hyperparameter::Static)];
+
+    fn of(number: f64) -> Self {
+        Hyperparameter::Known(number)
+    }
+
+    fn number(self) -> Option<f64> {
+        self.known()
+    }
+}
+
 impl Serialize for Hyperparameter {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Hyperparameter::Known(value) => serializer.serialize_f64(*value),
-            Hyperparameter::Fitted => serializer.serialize_str("fitted"),
-            Hyperparameter::Static => serializer.serialize_str("static"),
-        }
+        number_or_word::serialize(*self, serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for Hyperparameter {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Visitor)
-    }
-}
-
-struct Visitor;
-
-impl de::Visitor<'_> for Visitor {
-    type Value = Hyperparameter;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str("a number, \"fitted\", or (a lifetime) \"static\"")
-    }
-
-    fn visit_f64<E: de::Error>(self, value: f64) -> Result<Hyperparameter, E> {
-        Ok(Hyperparameter::Known(value))
-    }
-
-    fn visit_i64<E: de::Error>(self, value: i64) -> Result<Hyperparameter, E> {
-        Ok(Hyperparameter::Known(value as f64))
-    }
-
-    fn visit_u64<E: de::Error>(self, value: u64) -> Result<Hyperparameter, E> {
-        Ok(Hyperparameter::Known(value as f64))
-    }
-
-    fn visit_str<E: de::Error>(self, value: &str) -> Result<Hyperparameter, E> {
-        match value {
-            "fitted" => Ok(Hyperparameter::Fitted),
-            "static" => Ok(Hyperparameter::Static),
-            _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
-        }
+        number_or_word::deserialize(deserializer)
     }
 }
 

@@ -1,50 +1,8 @@
 //! Tables as comma-separated text. Floats are written so that they read back exactly.
 
+use super::FileError;
 use std::fmt::{Display, Write as _};
 use std::path::{Path, PathBuf};
-
-/// What is wrong with a table: one line that names the file, and the line or column.
-#[derive(Debug, thiserror::Error)]
-pub enum CsvError {
-    /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A line is not as many numbers as there are columns.
-    #[error("{}:{line}: {problem}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: String,
-    },
-    /// The table is not as long as it should be.
-    #[error("{}: {found} rows instead of {expected}: {because}", path.display())]
-    Rows {
-        /// The file.
-        path: PathBuf,
-        /// Rows that are there.
-        found: usize,
-        /// Rows that should be.
-        expected: usize,
-        /// What says so.
-        because: String,
-    },
-    /// There is no such column.
-    #[error("{}: no column {name}", path.display())]
-    Column {
-        /// The file.
-        path: PathBuf,
-        /// The column.
-        name: String,
-    },
-}
 
 /// Beyond this a finite number is no result of this program, and nothing can be drawn with it.
 const LARGEST: f64 = 1e100;
@@ -63,17 +21,17 @@ impl Columns {
     /// Reads a table with the names of its columns in the first line.
     ///
     /// # Errors
-    /// [`CsvError`]: a file that cannot be read, a line of another length, something that is no number or beyond sense,
-    /// no row.
-    pub fn read(path: &Path) -> Result<Self, CsvError> {
-        let text = std::fs::read_to_string(path).map_err(|source| CsvError::Read { path: path.into(), source })?;
+    /// [`FileError`]: a file that cannot be read, a line of another length, something that is no number or beyond
+    /// sense, no row.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
         let mut lines = text.lines();
         let names: Vec<String> =
             lines.next().unwrap_or_default().split(',').map(|name| name.trim().to_owned()).collect();
         let mut columns = vec![Vec::new(); names.len()];
         let mut rows = Vec::new();
         for (k, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-            let wrong = |problem: String| CsvError::Line { path: path.into(), line: k + 2, problem };
+            let wrong = |problem: String| FileError::Line { path: path.into(), line: k + 2, problem };
             let cells: Vec<&str> = line.split(',').collect();
             if cells.len() != names.len() {
                 return Err(wrong(format!("{} columns instead of {}", cells.len(), names.len())));
@@ -89,7 +47,7 @@ impl Columns {
             rows.push(k + 2);
         }
         if rows.is_empty() {
-            return Err(CsvError::Line { path: path.into(), line: 2, problem: "the table has no row".into() });
+            return Err(FileError::Line { path: path.into(), line: 2, problem: "the table has no row".into() });
         }
         Ok(Columns { path: path.into(), names, columns, lines: rows })
     }
@@ -97,24 +55,24 @@ impl Columns {
     /// That there are `expected` rows; `because` names who says so.
     ///
     /// # Errors
-    /// [`CsvError::Rows`].
-    pub fn check_rows(&self, expected: usize, because: &str) -> Result<(), CsvError> {
+    /// [`FileError::File`].
+    pub fn check_rows(&self, expected: usize, because: &str) -> Result<(), FileError> {
         let found = self.lines.len();
         match found == expected {
             true => Ok(()),
-            false => Err(CsvError::Rows { path: self.path.clone(), found, expected, because: because.into() }),
+            false => Err(FileError::of(&self.path, format!("{found} rows instead of {expected}: {because}"))),
         }
     }
 
     /// The numbers of a column, all of them in a range.
     ///
     /// # Errors
-    /// [`CsvError::Column`]; [`CsvError::Line`] of the first that is not in it.
-    pub fn column_within(&self, name: &str, [low, high]: [f64; 2]) -> Result<&[f64], CsvError> {
+    /// [`FileError::File`] if there is none of that name; [`FileError::Line`] of the first that is not in it.
+    pub fn column_within(&self, name: &str, [low, high]: [f64; 2]) -> Result<&[f64], FileError> {
         let column = self.column(name)?;
         match column.iter().position(|x| !(low..=high).contains(x)) {
             None => Ok(column),
-            Some(k) => Err(CsvError::Line {
+            Some(k) => Err(FileError::Line {
                 path: self.path.clone(),
                 line: self.lines[k],
                 problem: format!("{name}: {} must be from {low:e} to {high:e}", column[k]),
@@ -125,10 +83,10 @@ impl Columns {
     /// The numbers of a column.
     ///
     /// # Errors
-    /// [`CsvError::Column`] if there is none of that name.
-    pub fn column(&self, name: &str) -> Result<&[f64], CsvError> {
+    /// [`FileError::File`] if there is none of that name.
+    pub fn column(&self, name: &str) -> Result<&[f64], FileError> {
         let k = self.names.iter().position(|one| one == name);
-        let missing = || CsvError::Column { path: self.path.clone(), name: name.into() };
+        let missing = || FileError::of(&self.path, format!("no column {name}"));
         k.map(|k| self.columns[k].as_slice()).ok_or_else(missing)
     }
 }

@@ -15,3 +15,43 @@ pub mod provenance;
 pub mod truth;
 pub mod zarr;
 pub mod zdipy;
+
+use std::path::{Path, PathBuf};
+
+/// What is wrong with a table, a list or another program's file: one line that names the file, and the line in it.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It cannot be read.
+    #[error("{}: cannot read: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A line is wrong.
+    #[error("{}:{line}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// It is wrong as a whole.
+    #[error("{}: {problem}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl FileError {
+    /// A file that is wrong as a whole.
+    pub fn of(path: &Path, problem: impl Into<String>) -> Self {
+        FileError::File { path: path.into(), problem: problem.into() }
+    }
+}

@@ -2,7 +2,8 @@
 
 use super::PlotError;
 use super::symbols::label;
-use crate::data::io::csv::{Columns, CsvError};
+use crate::data::io::FileError;
+use crate::data::io::csv::Columns;
 use crate::figures::drawing::{Errors, Figure, ScatterPanel, Series, scatter};
 use crate::runs::experiments::files::{SUMMARY, SummaryFile, TABLE};
 use crate::runs::experiments::report::{self, Panel};
@@ -30,12 +31,12 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     Ok(vec![scatter(&summary.row, &panels, panels.len().min(3))])
 }
 
-fn drawn(panel: &Panel, table: &Columns) -> Result<ScatterPanel, CsvError> {
+fn drawn(panel: &Panel, table: &Columns) -> Result<ScatterPanel, FileError> {
     let shown: Vec<bool> = match &panel.only {
         Some((name, number)) => table.column(name)?.iter().map(|x| x == number).collect(),
         None => vec![true; table.column(&panel.x)?.len()],
     };
-    let column = |name: &str| -> Result<Vec<f64>, CsvError> {
+    let column = |name: &str| -> Result<Vec<f64>, FileError> {
         Ok(table.column(name)?.iter().zip(&shown).filter(|(_, shown)| **shown).map(|(x, _)| *x).collect())
     };
     let x = column(&panel.x)?;
@@ -67,8 +68,8 @@ fn drawn(panel: &Panel, table: &Columns) -> Result<ScatterPanel, CsvError> {
 fn errors(
     series: &report::Series,
     y: &[f64],
-    column: &dyn Fn(&str) -> Result<Vec<f64>, CsvError>,
-) -> Result<Errors, CsvError> {
+    column: &dyn Fn(&str) -> Result<Vec<f64>, FileError>,
+) -> Result<Errors, FileError> {
     let Some([low, high]) = &series.interval else { return Ok(Errors::None) };
     let ends = column(low)?.into_iter().zip(column(high)?);
     Ok(Errors::Asymmetric(y.iter().zip(ends).map(|(y, (low, high))| [y - low, high - y]).collect()))

@@ -28,11 +28,10 @@ pub use projection::Projection;
 pub use trace::Sampled;
 
 use crate::data::io::atomic::{self, WriteError};
-use crate::data::io::csv::CsvError;
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
 use crate::data::io::map::MAP;
-use crate::data::io::{self, truth};
+use crate::data::io::{self, FileError, truth};
 use crate::figures::drawing::Figure;
 use crate::runs::origin::OriginError;
 use crate::runs::run::CHAIN;
@@ -59,7 +58,7 @@ pub enum PlotError {
     Origin(#[from] OriginError),
     /// A table is wrong.
     #[error(transparent)]
-    Csv(#[from] CsvError),
+    Csv(#[from] FileError),
     /// A chain or a landscape is wrong.
     #[error(transparent)]
     Journal(#[from] JournalError),

@@ -12,7 +12,7 @@ pub struct Rows<W> {
     /// The pixels, and others, whose rows are zero, to make their number a multiple of [`LANES`].
     pixels: Vec<u32>,
     /// How many of them are not there to fill up.
-    active: usize,
+    pub(super) active: usize,
     /// Of [`LANES`] pixels after [`LANES`] pixels, every eigenvector.
     rows: Vec<Row<W>>,
     /// Unit in which each eigenvector is written.
@@ -64,11 +64,6 @@ impl<W: Whole> Rows<W> {
         let units = units.iter().map(|unit| *unit as f32).collect();
         pixels.resize(active.next_multiple_of(LANES), 0);
         Rows { pixels, active, rows, units }
-    }
-
-    /// Number of pixels.
-    pub fn pixels(&self) -> usize {
-        self.active
     }
 
     /// Bytes that they take in memory, all but a few.

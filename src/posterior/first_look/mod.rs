@@ -17,7 +17,7 @@ use crate::star::LimbDarkening;
 use crate::star::observation::Observations;
 
 /// What vsini owes to spots, as a share of it and in km/s: 19 of 20 simulated stars are within, polar caps of 40
-/// degrees and all (`tests/first_look.rs`).
+/// degrees and all (`tests/method/first_look.rs`).
 const SPOTS: (f64, f64) = (0.01, 0.3);
 
 /// What the centre owes to spots, as a share of vsini.

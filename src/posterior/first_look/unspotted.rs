@@ -3,9 +3,9 @@
 //!
 //! Spots that are dark at all phases, polar ones above all, fill the core of the mean profile and leave its flanks
 //! alone; so only the flanks and the continuum beside them are fitted. What remains is good to 1 % and 0.3 km/s of
-//! vsini, and to 0.4 % of vsini for the centre (`tests/first_look.rs`), where the width of the local line is known.
-//! Where it is not, it has a weak prior, and the error of vsini holds what it leaves open: the flanks of a slow rotator
-//! show it, those of a fast one hardly. Limb darkening is given.
+//! vsini, and to 0.4 % of vsini for the centre (`tests/method/first_look.rs`), where the width of the local line is
+//! known. Where it is not, it has a weak prior, and the error of vsini holds what it leaves open: the flanks of a slow
+//! rotator show it, those of a fast one hardly. Limb darkening is given.
 
 use super::mean::{HalfDepth, MeanProfile};
 use super::{LineModel, LookError};

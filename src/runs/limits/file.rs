@@ -1,4 +1,4 @@
-//! The files of a survey of limits: `limits.csv`, a line for each period and semi-amplitude, and `limits.json`; and a
+//! The files of detection limits: `limits.csv`, a line for each period and semi-amplitude, and `limits.json`; and a
 //! table.
 
 use super::full::Agreement;
@@ -110,7 +110,7 @@ impl OutcomeRecord {
 }
 
 impl LimitsFile {
-    /// Of the `limits` that a survey came to.
+    /// Of the `limits` that were found.
     pub fn new(
         shortcut: &Shortcut,
         orbits: &Orbits,

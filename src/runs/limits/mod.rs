@@ -92,7 +92,7 @@ pub fn even_in_logarithm(low: f64, high: f64, count: usize) -> Vec<f64> {
 
 /// All orbits by the shortcut, cells period after period with K rising; `progress` is called with the number done since
 /// the last call, from any thread.
-pub fn survey(shortcut: &Shortcut, orbits: &Orbits, progress: &(dyn Fn(usize) + Sync)) -> Vec<Cell> {
+pub fn recovered(shortcut: &Shortcut, orbits: &Orbits, progress: &(dyn Fn(usize) + Sync)) -> Vec<Cell> {
     let cells = orbits.porb_over_prot.len() * orbits.k_kms.len();
     let cell = |index: usize| {
         let (period, k) = (index / orbits.k_kms.len(), index % orbits.k_kms.len());

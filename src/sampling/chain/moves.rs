@@ -1,4 +1,4 @@
-//! What each kind of move is worth: how often it is accepted, and how many effective samples a reconstruction of it
+//! How efficient each kind of move is: how often it is accepted, and how many effective samples a reconstruction of it
 //! brings.
 //!
 //! Of a mix, only the correlation over the one step that a move made can be told apart. Moves are judged as if the
@@ -40,7 +40,7 @@ pub(super) fn summarise_moves(
             .collect();
         let count = made.len() as f64;
         let evaluations = made.iter().filter(|(_, now)| now.proposed != Status::OutsidePrior).count();
-        let worth = (0..sd.len()).filter(|&p| sd[p] > 0.0).map(|p| {
+        let efficiency = (0..sd.len()).filter(|&p| sd[p] > 0.0).map(|p| {
             let jump = |(before, now): &(&Record, &Record)| {
                 let jump = now.theta[p] - before.theta[p];
                 if kinds[p] == ParameterKind::Periodic { jump - jump.round() } else { jump }
@@ -48,12 +48,12 @@ pub(super) fn summarise_moves(
             let rho = 1.0 - made.iter().map(|pair| jump(pair).powi(2)).sum::<f64>() / (count * 2.0 * sd[p] * sd[p]);
             ((1.0 - rho) / (1.0 + rho)).clamp(0.0, 1.0)
         });
-        let worth = worth.reduce(f64::min).filter(|_| evaluations > 0);
+        let efficiency = efficiency.reduce(f64::min).filter(|_| evaluations > 0);
         (!made.is_empty()).then(|| MoveSummary {
             kind,
             proposals: made.len(),
             acceptance_fraction: made.iter().filter(|(_, now)| now.accepted).count() as f64 / count,
-            ess_per_evaluation: worth.map(|worth| worth * count / evaluations as f64),
+            ess_per_evaluation: efficiency.map(|efficiency| efficiency * count / evaluations as f64),
         })
     };
     MoveKind::ALL.into_iter().filter_map(of).collect()

@@ -93,10 +93,11 @@ pub struct Summary {
     pub definitions: BTreeMap<String, String>,
     /// Accepted share of the proposals, of the steps kept.
     pub acceptance_fraction: f64,
-    /// What each kind of move is worth; empty for a chain that does not name its moves.
+    /// How efficient each kind of move is; empty for a chain that does not name its moves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<MoveSummary>,
-    /// Effective samples an evaluation, of the steps kept: that of the parameter where it is least; null where unknown.
+    /// Effective samples per evaluation, of the steps kept: that of the parameter where it is least; null where
+    /// unknown.
     #[serde(default)]
     pub ess_per_evaluation: Option<f64>,
     /// Whether every parameter has reached the goals and no walker is stuck.

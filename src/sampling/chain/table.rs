@@ -79,8 +79,8 @@ fn moves(summary: &Summary) -> String {
     }
     let share = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.2}"));
     let one = |m: &MoveSummary| {
-        let (name, worth) = (m.kind.name(), share(m.ess_per_evaluation));
-        format!("{name} {:.2} (worth {worth}) of {}", m.acceptance_fraction, m.proposals)
+        let (name, efficiency) = (m.kind.name(), share(m.ess_per_evaluation));
+        format!("{name} {:.2} (efficiency {efficiency}) of {}", m.acceptance_fraction, m.proposals)
     };
     let each: Vec<String> = summary.moves.iter().map(one).collect();
     format!("{} effective samples per evaluation; accepted: {}\n", share(summary.ess_per_evaluation), each.join(", "))

@@ -2,8 +2,9 @@
 //! sqrt(2) standard deviations), Lorentzian half width (over the Gaussian one), Lande factor, limb darkening (linear),
 //! and perhaps gravity darkening. It describes one line; others that follow are not used, there neither.
 
+use super::read_text;
 use super::rows::Rows;
-use super::{ZdipyError, read_text};
+use crate::data::io::FileError;
 use std::f64::consts::{PI, SQRT_2};
 use std::path::{Path, PathBuf};
 
@@ -38,7 +39,7 @@ impl LocalLineFile {
     ///
     /// # Errors
     /// As [`super::Input::read`].
-    pub fn read(path: &Path) -> Result<Self, ZdipyError> {
+    pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let row = Rows::new(path, &text).next("the model of the line")?;
         let limb_darkening = row.number(5, "limb darkening")?;

@@ -11,6 +11,7 @@ mod rows;
 
 pub use line::{LINE_FILE, LocalLineFile};
 
+use crate::data::io::FileError;
 use rows::{Row, Rows};
 use std::path::{Path, PathBuf};
 
@@ -99,44 +100,13 @@ pub struct Input {
     pub profiles: Vec<ListedProfile>,
 }
 
-/// What is wrong with a file: one line that names it, and the line in it.
-#[derive(Debug, thiserror::Error)]
-pub enum ZdipyError {
-    /// It cannot be read.
-    #[error("{}: cannot read: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A line is wrong.
-    #[error("{}:{line}: {problem}", .path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line (from 1).
-        line: usize,
-        /// What is wrong.
-        problem: String,
-    },
-    /// It ends too early.
-    #[error("{}: ends before {what}", .path.display())]
-    Short {
-        /// The file.
-        path: PathBuf,
-        /// What should have come.
-        what: &'static str,
-    },
-}
-
 impl Input {
     /// Reads the file at `path`.
     ///
     /// # Errors
     /// A file that cannot be read or ends too early, or a line that makes no sense or names a profile that is not
     /// there.
-    pub fn read(path: &Path) -> Result<Self, ZdipyError> {
+    pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let mut rows = Rows::new(path, &text);
         let star = rows.next("inclination, vsini, period and dOmega")?;
@@ -185,12 +155,12 @@ impl Input {
     }
 }
 
-fn read_text(path: &Path) -> Result<String, ZdipyError> {
-    let bytes = std::fs::read(path).map_err(|source| ZdipyError::Read { path: path.into(), source })?;
+fn read_text(path: &Path) -> Result<String, FileError> {
+    let bytes = std::fs::read(path).map_err(|source| FileError::Read { path: path.into(), source })?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-fn flag(row: &Row, name: &str) -> Result<Field<bool>, ZdipyError> {
+fn flag(row: &Row, name: &str) -> Result<Field<bool>, FileError> {
     match row.text(0, name)? {
         "0" => Ok(row.field(false)),
         "1" => Ok(row.field(true)),
@@ -198,7 +168,7 @@ fn flag(row: &Row, name: &str) -> Result<Field<bool>, ZdipyError> {
     }
 }
 
-fn target(row: &Row) -> Result<Field<Target>, ZdipyError> {
+fn target(row: &Row) -> Result<Field<Target>, FileError> {
     match row.text(0, "kind of target")? {
         "C" => Ok(row.field(Target::Chi2(row.positive(1, "target chi^2")?))),
         "E" => Ok(row.field(Target::Entropy(row.number(1, "target entropy")?))),
@@ -206,7 +176,7 @@ fn target(row: &Row) -> Result<Field<Target>, ZdipyError> {
     }
 }
 
-fn entropy(row: &Row) -> Result<Field<BrightnessEntropy>, ZdipyError> {
+fn entropy(row: &Row) -> Result<Field<BrightnessEntropy>, FileError> {
     match row.text(0, "brightness entropy")? {
         "1" => Ok(row.field(BrightnessEntropy::Image)),
         "2" => Ok(row.field(BrightnessEntropy::FillingFactor)),
@@ -214,7 +184,7 @@ fn entropy(row: &Row) -> Result<Field<BrightnessEntropy>, ZdipyError> {
     }
 }
 
-fn velocity_range(row: &Row) -> Result<Field<(f64, f64)>, ZdipyError> {
+fn velocity_range(row: &Row) -> Result<Field<(f64, f64)>, FileError> {
     let (start, end) = (row.number(0, "vel_start")?, row.number(1, "vel_end")?);
     match start < end {
         true => Ok(row.field((start, end))),
@@ -222,7 +192,7 @@ fn velocity_range(row: &Row) -> Result<Field<(f64, f64)>, ZdipyError> {
     }
 }
 
-fn profiles(mut rows: Rows, path: &Path) -> Result<Vec<ListedProfile>, ZdipyError> {
+fn profiles(mut rows: Rows, path: &Path) -> Result<Vec<ListedProfile>, FileError> {
     let mut profiles = Vec::new();
     let folder = path.parent().unwrap_or(Path::new(""));
     while let Some(row) = rows.another() {
@@ -238,7 +208,7 @@ fn profiles(mut rows: Rows, path: &Path) -> Result<Vec<ListedProfile>, ZdipyErro
         });
     }
     match profiles.is_empty() {
-        true => Err(ZdipyError::Short { path: path.into(), what: "the list of profiles" }),
+        true => Err(FileError::of(path, "ends before the list of profiles")),
         false => Ok(profiles),
     }
 }

@@ -1,6 +1,7 @@
 //! Rows of ZDIpy's input files: what is no comment, with line numbers, taken one by one.
 
-use super::{Field, ZdipyError};
+use super::Field;
+use crate::data::io::FileError;
 use std::path::Path;
 
 /// The rows that are left.
@@ -32,8 +33,8 @@ impl<'a> Rows<'a> {
     }
 
     /// The next row, which holds `what`.
-    pub fn next(&mut self, what: &'static str) -> Result<Row<'a>, ZdipyError> {
-        self.another().ok_or(ZdipyError::Short { path: self.path.into(), what })
+    pub fn next(&mut self, what: &'static str) -> Result<Row<'a>, FileError> {
+        self.another().ok_or_else(|| FileError::of(self.path, format!("ends before {what}")))
     }
 }
 
@@ -48,17 +49,17 @@ impl<'a> Row<'a> {
         Field { value, line: self.line }
     }
 
-    pub fn fault(&self, problem: String) -> ZdipyError {
-        ZdipyError::Line { path: self.path.into(), line: self.line, problem }
+    pub fn fault(&self, problem: String) -> FileError {
+        FileError::Line { path: self.path.into(), line: self.line, problem }
     }
 
     /// The text in a column (from 0), which holds `name`.
-    pub fn text(&self, column: usize, name: &str) -> Result<&'a str, ZdipyError> {
+    pub fn text(&self, column: usize, name: &str) -> Result<&'a str, FileError> {
         let missing = || self.fault(format!("{} columns, the {name} is due in column {}", self.columns(), column + 1));
         self.fields.get(column).copied().ok_or_else(missing)
     }
 
-    pub fn number(&self, column: usize, name: &str) -> Result<f64, ZdipyError> {
+    pub fn number(&self, column: usize, name: &str) -> Result<f64, FileError> {
         let text = self.text(column, name)?;
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
@@ -66,12 +67,12 @@ impl<'a> Row<'a> {
         }
     }
 
-    pub fn positive(&self, column: usize, name: &str) -> Result<f64, ZdipyError> {
+    pub fn positive(&self, column: usize, name: &str) -> Result<f64, FileError> {
         self.within(column, name, 0.0, f64::INFINITY)
     }
 
     /// A number above `min` and up to `max`.
-    pub fn within(&self, column: usize, name: &str, min: f64, max: f64) -> Result<f64, ZdipyError> {
+    pub fn within(&self, column: usize, name: &str, min: f64, max: f64) -> Result<f64, FileError> {
         let value = self.number(column, name)?;
         match (value > min && value <= max, max.is_finite()) {
             (true, _) => Ok(value),
@@ -81,7 +82,7 @@ impl<'a> Row<'a> {
     }
 
     /// A whole number above 0.
-    pub fn count(&self, column: usize, name: &str) -> Result<usize, ZdipyError> {
+    pub fn count(&self, column: usize, name: &str) -> Result<usize, FileError> {
         let text = self.text(column, name)?;
         match text.parse() {
             Ok(value) if (1..=MOST).contains(&value) => Ok(value),
