@@ -173,7 +173,7 @@ fn a_shifted_line_has_a_shifted_first_moment() {
 #[test]
 fn brightness_of_spots_and_faculae() {
     let disc = |longitude: f64| Disc { longitude, latitude: 0.3, radius: 0.4 };
-    let spot = |longitude: f64, filling: f64| Spot { longitude, latitude: 0.3, radius: 0.4, filling };
+    let spot = |longitude: f64, filling: f64| Spot { longitude, latitude: 0.3, radius: 0.4, filling, life: None };
     let facula = |longitude: f64, excess: f64| Facula { disc: disc(longitude), excess };
     let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
     let config::ObservationSource::Simulate(mut simulation) = settings.source else { panic!() };
