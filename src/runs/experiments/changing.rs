@@ -11,6 +11,7 @@ use super::star::{paper, with};
 use crate::data::config::Config;
 use crate::data::io::lsd;
 use crate::data::scene::{Scene, SceneError};
+use crate::numerics::json::number_or_null;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::planets::verdict::{CANDIDATE_FAP, Finding, Verdict};
 use crate::posterior::detection::{Detection, DetectionSettings, Evidence};
@@ -24,6 +25,9 @@ use std::time::Instant;
 
 /// Periods closer than this many inverse time bases are the same.
 const SAME_PERIOD: f64 = 0.5;
+
+/// Periods within this share of the rotation period are near co-rotation, where sigma_K is another one.
+const NEAR: f64 = 0.15;
 
 /// Name of the row's raw results.
 const ROW: &str = "changing";
@@ -42,8 +46,16 @@ const PERIODS: (f64, f64) = (0.5, 4.0);
 const OBJECTIVES: [(&str, &str); 2] = [("spottedness", "one_map"), ("marginal-likelihood", "integrated")];
 
 /// What a column of an objective ends with. Findings: 0 that no planet is needed, 1 a candidate, 2 a detection.
-const RESULTS: [&str; 7] =
-    ["false_alarm", "log10_false_alarm", "finding", "porb_over_prot", "is_right", "k_kms", "sigma_k_kms"];
+const RESULTS: [&str; 8] = [
+    "false_alarm",
+    "log10_false_alarm",
+    "finding",
+    "porb_over_prot",
+    "is_right",
+    "k_kms",
+    "sigma_k_kms",
+    "median_sigma_k_kms",
+];
 
 /// One star to be searched.
 #[derive(Clone, Copy)]
@@ -61,6 +73,9 @@ struct Searched {
     porb_over_prot: f64,
     /// Whether that is the period of the planet, to half the inverse time base.
     is_right: bool,
+    /// sigma_K (km/s), its median over all periods away from that of the rotation.
+    #[serde(deserialize_with = "number_or_null")]
+    median_sigma_k_kms: f64,
     /// ln Z of a star that changes over that of one that does not, where they are compared.
     change: Option<f64>,
     /// Lifetime of the fitted field (d).
@@ -140,11 +155,15 @@ impl Star {
         let remarks = found.remarks(&Evidence { imager, settings: &settings, robustness: None, misfit: &[] });
         let [_, porb_over_prot, _] = self.orbit();
         let apart = (1.0 / found.best.porb_over_prot - 1.0 / porb_over_prot).abs() * imager.time_base_cycles();
+        let near = |frequency: f64| (1.0 / frequency - 1.0).abs() < NEAR;
+        let trials = found.blind.rows.iter().map(|row| row.trial).filter(|trial| !near(trial.frequency));
+        let away = trials.filter_map(|trial| Some(trial.orbit?.sigma_k_kms));
         let field = found.last().field.as_ref();
         Ok(Searched {
             verdict: found.verdict(&remarks),
             porb_over_prot: found.best.porb_over_prot,
             is_right: self.has_planet && apart < SAME_PERIOD,
+            median_sigma_k_kms: median(away.collect()).unwrap_or(f64::NAN),
             change: change.map(|change| change.ln_evidence_gain),
             lifetime_d: field.and_then(|field| field.marginal.assumed.field.kernel.lifetime.days()),
             seconds: began.elapsed().as_secs_f64(),
@@ -165,7 +184,9 @@ impl Searched {
         // what is smaller than all doubles is shown as the smallest
         let log10 = false_alarm.max(f64::MIN_POSITIVE).log10();
         let [k_kms, sigma_k_kms] = self.verdict.signal.map_or([f64::NAN; 2], |s| [s.k_kms, s.sigma_k_kms]);
-        [false_alarm, log10, finding, self.porb_over_prot, f64::from(self.is_right), k_kms, sigma_k_kms]
+        let is_right = f64::from(self.is_right);
+        let median = self.median_sigma_k_kms;
+        [false_alarm, log10, finding, self.porb_over_prot, is_right, k_kms, sigma_k_kms, median]
     }
 
     fn false_alarm(&self) -> f64 {
@@ -184,9 +205,10 @@ impl Searched {
 
 /// The stars of all lifetimes, without and with a planet, by both objectives.
 pub(super) fn changing(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
-    let seeds = laboratory.full_or_quick(1..=7, 1..=1);
+    let seeds = laboratory.full_or_quick(1..=5, 1..=1);
+    let lifetimes_d = laboratory.some(LIFETIMES_D.to_vec());
     let groups: Vec<(Option<f64>, bool)> =
-        [false, true].into_iter().flat_map(|planet| LIFETIMES_D.map(|lifetime| (lifetime, planet))).collect();
+        [false, true].into_iter().flat_map(|planet| lifetimes_d.iter().map(move |days| (*days, planet))).collect();
     let group_of = |&(lifetime_d, has_planet): &(Option<f64>, bool)| {
         seeds.clone().map(move |seed| Star { lifetime_d, has_planet, seed })
     };
@@ -206,9 +228,9 @@ pub(super) fn changing(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         for (star, result) in stars[of_group.clone()].iter().zip(&results[of_group.clone()]) {
             report.row(row(group, star, result));
         }
-        let lifetime = lifetime_d.map_or("spots for ever".to_owned(), |days| format!("spots of {days} d"));
+        let lifetime = lifetime_d.map_or("for ever".to_owned(), |days| format!("{days} d"));
         let planet = if has_planet { "planet" } else { "no planet" };
-        report.number(&format!("{lifetime}, {planet}"), sum_up(&results[of_group], has_planet));
+        report.number(&format!("spots {lifetime}, {planet}"), sum_up(&results[of_group], has_planet));
         report.figure.push(panel(group, &lifetime, has_planet));
     }
     Ok(report)
@@ -237,7 +259,7 @@ fn panel(group: usize, lifetime: &str, has_planet: bool) -> Panel {
         y: format!("{name}_{}", if has_planet { "k_kms" } else { "log10_false_alarm" }),
         interval: has_planet.then(|| ["low68", "high68"].map(|end| format!("{name}_k_kms_{end}"))),
     };
-    let label = if has_planet { "*K* (km/s)" } else { "lg false-alarm probability, no planet" };
+    let label = if has_planet { "*K* (km/s)" } else { "lg FAP, no planet" };
     Panel {
         x: "star".into(),
         label: format!("{label}, {lifetime}"),
@@ -255,7 +277,7 @@ fn sum_up(results: &[OfStar], has_planet: bool) -> Value {
         let found: Vec<&Searched> = results.iter().filter_map(|result| result[k].as_ref().ok()).collect();
         let count = |is: &dyn Fn(&Searched) -> bool| found.iter().filter(|searched| is(searched)).count();
         let lowest = found.iter().map(|searched| searched.false_alarm()).fold(f64::NAN, f64::min);
-        let sigmas = found.iter().filter_map(|searched| searched.verdict.signal).map(|signal| signal.sigma_k_kms);
+        let sigmas = found.iter().map(|searched| searched.median_sigma_k_kms).filter(|sigma| sigma.is_finite());
         let mut of_all = json!({
             "without_result": results.len() - found.len(),
             "lowest_false_alarm": lowest,
