@@ -19,7 +19,7 @@ use std::time::Instant;
 #[command(after_help = "Example:\n  dimcmc reproduce R2 --quick --out runs/reproduced --work runs/reproduce_raw\n  \
                         dimcmc reproduce --list")]
 pub struct Args {
-    /// Rows: R1 to R12, co-rotation, coverage, models
+    /// Rows: R1 to R12, co-rotation, coverage, models, changing
     #[arg(value_name = "ROW")]
     rows: Vec<String>,
     /// Folder of the results; `results`, or with --quick `runs/quick`, if not given

@@ -26,7 +26,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
     let config = Config::load(&args.config)?;
     let ObservationSource::Simulate(simulation) = config.settings()?.source else {
-        let problem = "missing, a simulation needs its spots, cycles and velocities";
+        let problem = "missing, a simulation needs its spots, times and velocities";
         return Err(Failure::input(format!("{}: observations.simulate: {problem}", args.config.display())));
     };
     let scene = Scene::new(&config)?;
@@ -37,9 +37,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     truth::write(folder, &truth)?;
     let bins = simulation.bins;
     let snr = simulation.snr.map_or("without noise".into(), |snr| format!("S/N {snr}, seed {}", simulation.seed));
+    let range = match simulation.is_changing() {
+        true => {
+            let least = truth.coverage.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = truth.coverage.iter().copied().fold(0.0, f64::max);
+            format!(" in the mean, from {least:.5} to {most:.5} as spots come and go")
+        }
+        false => String::new(),
+    };
     Report::default()
         .line("profiles", format!("{} of {bins} bins, {snr}", scene.observations.profiles.len()))
-        .line("spottedness", format!("{:.5}", truth.spottedness))
+        .line("spottedness", format!("{:.5}{range}", truth.spottedness))
         .written(folder, "observations.txt, p000.prof ..., truth.json")
         .print();
     Ok(())

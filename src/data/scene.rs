@@ -18,7 +18,7 @@ use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
-use crate::star::{BrightnessModel, Orbit, Quadrature, SurfaceGrid};
+use crate::star::{BrightnessModel, Orbit, Quadrature, Spot, SurfaceGrid};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -291,21 +291,30 @@ impl Scene {
         space(free, &self.settings, &self.imager)
     }
 
-    /// The true spot map on the pixels of the image, if the observations are simulated.
+    /// The true spot map on the pixels of the image, if the observations are simulated; of a star that changes, in the
+    /// middle of the data.
     #[doc(hidden)]
     pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
         self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
     }
 
-    /// What the image should hold on its pixels, if the observations are simulated.
+    /// What the image should hold on its pixels, if the observations are simulated; of a star that changes, in the
+    /// middle of the data.
     #[doc(hidden)]
     pub fn true_map(&self) -> Option<Vec<f64>> {
-        match self.settings.imaging.brightness {
-            BrightnessModel::Spots => self.true_spot_filling(),
-            BrightnessModel::BrightAndDark => self
-                .simulation()
-                .map(|simulation| simulation.brightness(&self.imager.grid, simulation.contrast(&self.imager.star))),
-        }
+        self.true_map_at(self.simulation()?.mid_time_d())
+    }
+
+    /// The same at a time (d).
+    #[doc(hidden)]
+    pub fn true_map_at(&self, time_d: f64) -> Option<Vec<f64>> {
+        let (simulation, grid) = (self.simulation()?, &self.imager.grid);
+        Some(match self.settings.imaging.brightness {
+            BrightnessModel::Spots => simulation.spot_filling_at(grid, time_d),
+            BrightnessModel::BrightAndDark => {
+                simulation.brightness_at(grid, simulation.contrast(&self.imager.star), time_d)
+            }
+        })
     }
 
     fn continuum_level(&self) -> f64 {
@@ -326,19 +335,26 @@ impl Scene {
     #[doc(hidden)]
     pub fn truth_of(&self, simulation: &Simulation) -> Truth {
         let grid = SurfaceGrid::equal_area(simulation.pixels, Quadrature::Gauss2x2);
-        let filling = simulation.spot_filling(&grid);
+        let coverage = match simulation.is_changing() {
+            true => simulation.coverage(&grid),
+            false => Vec::new(),
+        };
+        let spottedness = match coverage.len() {
+            0 => simulation.spot_filling(&grid).iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
+            profiles => coverage.iter().sum::<f64>() / profiles as f64,
+        };
         let state = simulation.truth.state();
         let velocity = |time: &f64| state.vsys_kms + state.orbit.velocity_kms(self.imager.star.cycle(*time));
         Truth {
             parameters: simulation.truth,
-            // as the user wrote them: degrees of radians of degrees are not
-            spots: self.settings.resolved["observations"]["simulate"]["spots"].clone(),
+            spots: simulation.spots.iter().map(Spot::written).collect(),
             faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
             contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
             continuum: simulation.nuisances(),
             zero_points_kms: simulation.zero_points_kms(),
             correlated_bins: Some(simulation.correlated_bins).filter(|bins| *bins != 1.0),
-            spottedness: filling.iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
+            spottedness,
+            coverage,
             snr: simulation.snr,
             sigma: simulation.sigma(),
             seed: simulation.seed,

@@ -3,14 +3,23 @@
 //!
 //! Spots and faculae are hard-edged discs, each pixel of the star holding the fraction of it that they cover. A spot of
 //! filling factor s leaves 1 - s of the surface free, which faculae brighten: `B = 1 - (1 - c) s + (1 - s) e`, with the
-//! largest s and the largest excess e of the discs that overlap. The same simulation gives the same numbers on every
-//! machine and with any number of threads.
+//! largest s and the largest excess e of the discs that overlap. Where spots come and go each profile has a map of its
+//! own. The same simulation gives the same numbers on every machine and with any number of threads.
+//!
+//! [`Schedule`] draws times of observation, [`RandomSpots`] spots; `maps` puts them on a grid.
+
+mod maps;
+mod random_spots;
+mod schedule;
+
+pub use random_spots::RandomSpots;
+pub use schedule::Schedule;
 
 use crate::posterior::nuisances::{LineAndContinuum, templates};
 use crate::posterior::objective::ParameterValues;
 use crate::star::observation::{Observations, Profile};
-use crate::star::spots::{excess_at, filling_at};
 use crate::star::{Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use maps::Content;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -18,13 +27,10 @@ use rand_distr::{Distribution, StandardNormal};
 /// Standard error that observations without noise are given: that of a signal-to-noise ratio of 1000.
 pub const SIGMA_WITHOUT_NOISE: f64 = 1e-3;
 
-/// Points along each side of a pixel at which it is asked whether a spot covers them.
-const COVERAGE_POINTS: usize = 8;
-
 /// Observations to be simulated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation {
-    /// The spots (radians).
+    /// The spots (radians), those that come and go among them.
     pub spots: Vec<Spot>,
     /// The faculae (radians).
     pub faculae: Vec<Facula>,
@@ -69,13 +75,20 @@ impl Simulation {
     pub fn observe(&self, star: &StarSettings) -> Observations {
         let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
         let state = self.truth.state();
-        let brightness = self.brightness(&grid, self.contrast(star));
         let zero_points = self.zero_points_kms();
         // a line that is farther to the red by its zero point is the line seen from bins that are farther to the blue
         let first = |k: usize| zero_points.get(k).map_or(self.first_velocity_kms, |v| self.first_velocity_kms - v);
         let profiles = self.times_d.iter().enumerate().map(|(k, time)| (*time, first(k), self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
-        let mut depths = Response::new(&grid, star, &state, &sampling).depths(&brightness);
+        let response = Response::new(&grid, star, &state, &sampling);
+        let contrast = self.contrast(star);
+        let mut depths = match self.is_changing() {
+            true => {
+                let content = Content::Brightness(Brightness::of_spots(contrast));
+                response.depths_of_each(&self.maps(content, &grid, &self.times_d))
+            }
+            false => response.depths(&self.brightness(&grid, contrast)),
+        };
         for (depths, nuisances) in depths.chunks_exact_mut(self.bins).zip(self.nuisances()) {
             for (j, depth) in depths.iter_mut().enumerate() {
                 let changes = templates(j, self.bins, *depth).into_iter().zip(nuisances.numbers());
@@ -92,12 +105,6 @@ impl Simulation {
         };
         let profiles = intensity.chunks_exact(self.bins).zip(&self.times_d).map(profile).collect();
         Observations { step_kms: self.step_kms, profiles }
-    }
-
-    /// The true map: spot filling factor of each pixel of `grid`, the fraction that spots cover times their own
-    /// filling.
-    pub fn spot_filling(&self, grid: &SurfaceGrid) -> Vec<f64> {
-        grid.pixel_means(COVERAGE_POINTS, |longitude, latitude| filling_at(&self.spots, longitude, latitude))
     }
 
     /// What is wrong with each profile by itself; empty if nothing is.
@@ -130,17 +137,6 @@ impl Simulation {
     /// Brightness of spots on `star` over that of the photosphere.
     pub fn contrast(&self, star: &StarSettings) -> f64 {
         star.with(&self.truth.state().surface).contrast
-    }
-
-    /// The true brightness of each pixel of `grid`, that of the photosphere being 1 and that of spots `contrast`.
-    pub fn brightness(&self, grid: &SurfaceGrid, contrast: f64) -> Vec<f64> {
-        let of_spots = Brightness::of_spots(contrast);
-        let mut brightness: Vec<f64> = self.spot_filling(grid).iter().map(|s| of_spots.at(*s)).collect();
-        if !self.faculae.is_empty() {
-            let excess = |longitude, latitude| excess_at(&self.faculae, &self.spots, longitude, latitude);
-            brightness.iter_mut().zip(grid.pixel_means(COVERAGE_POINTS, excess)).for_each(|(b, excess)| *b += excess);
-        }
-        brightness
     }
 
     /// Gaussian noise of `n` bins, all profiles one after the other. Neighbours in a profile have the correlation

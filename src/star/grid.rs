@@ -151,24 +151,36 @@ impl SurfaceGrid {
     /// Mean over each pixel of a function of (longitude, latitude), by `n` x `n` midpoints in longitude and
     /// sin(latitude): the covered fraction of a pixel at the edge of a spot.
     pub fn pixel_means(&self, n: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-        let mut means = Vec::with_capacity(self.len());
-        for ring in &self.rings {
-            let count = ring.pixels.len() as f64;
-            let ring_area: f64 = self.area[ring.pixels.clone()].iter().sum();
-            for p in ring.pixels.clone() {
-                let (sin_centre, width) = (self.latitude[p].sin(), TAU / count);
-                let offset = |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
-                let mut sum = 0.0;
-                for i in 0..n {
-                    let latitude = (sin_centre + offset(i) * 2.0 * ring_area).clamp(-1.0, 1.0).asin();
-                    for j in 0..n {
-                        sum += f(self.longitude[p] + offset(j) * width, latitude);
-                    }
-                }
-                means.push(sum / (n * n) as f64);
+        let of_ring = |ring: &Ring| ring.pixels.clone().map(|p| self.pixel_mean(ring, p, n, &f)).collect::<Vec<f64>>();
+        self.rings.iter().flat_map(of_ring).collect()
+    }
+
+    /// The same of pixel `p` of a ring.
+    pub(crate) fn pixel_mean(&self, ring: &Ring, p: usize, n: usize, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let ring_area: f64 = self.area[ring.pixels.clone()].iter().sum();
+        let (sin_centre, width) = (self.latitude[p].sin(), TAU / ring.pixels.len() as f64);
+        let offset = |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
+        let mut sum = 0.0;
+        for i in 0..n {
+            let latitude = (sin_centre + offset(i) * 2.0 * ring_area).clamp(-1.0, 1.0).asin();
+            for j in 0..n {
+                sum += f(self.longitude[p] + offset(j) * width, latitude);
             }
         }
-        means
+        sum / (n * n) as f64
+    }
+
+    /// Angular distance (rad) from the centres of a ring's pixels to their farthest corners.
+    pub(crate) fn reach(&self, ring: &Ring) -> f64 {
+        let centre = self.latitude[ring.pixels.start];
+        let ring_area: f64 = self.area[ring.pixels.clone()].iter().sum();
+        let half_width = PI / ring.pixels.len() as f64;
+        let to_corner = |sin_border: f64| {
+            let border = sin_border.clamp(-1.0, 1.0).asin();
+            let cos = centre.sin() * border.sin() + centre.cos() * border.cos() * half_width.cos();
+            cos.clamp(-1.0, 1.0).acos()
+        };
+        to_corner(centre.sin() - ring_area).max(to_corner(centre.sin() + ring_area))
     }
 }
 

@@ -45,7 +45,7 @@ pub use nearby::Nearby;
 pub use orbit::Orbit;
 pub use response::{Response, Sampling};
 pub use rotation::Rotation;
-pub use spots::{Disc, Facula, Spot};
+pub use spots::{Disc, Facula, Life, Spot};
 
 /// The star. [`Surface`] may have other values for some of it.
 #[derive(Clone, Debug, PartialEq)]

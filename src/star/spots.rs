@@ -1,4 +1,10 @@
 //! Hard-edged circular spots and faculae: the filling factor and the excess of brightness of a point of the surface.
+//!
+//! Spots may come and go: the area of one grows linearly to its largest and falls again, over twice its lifetime.
+//! Places are those of the map, whose longitudes are counted at the epoch; differential rotation carries them on. A
+//! spot that comes and goes is round at the time of its largest area, so that on the map it is wound the other way.
+
+use std::f64::consts::PI;
 
 /// A circle on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +24,14 @@ impl Disc {
             + self.latitude.cos() * latitude.cos() * (longitude - self.longitude).cos();
         cos_distance >= self.radius.cos()
     }
+
+    /// Whether something at (longitude, latitude) that extends to `reach` from there (all rad) may overlap it.
+    pub fn may_touch(&self, longitude: f64, latitude: f64, reach: f64) -> bool {
+        // more than what rounding makes of an arc cosine
+        const MARGIN: f64 = 1e-6;
+        let radius = (self.radius + reach + MARGIN).min(PI);
+        Disc { radius, ..*self }.contains(longitude, latitude)
+    }
 }
 
 /// A circular spot.
@@ -27,17 +41,84 @@ pub struct Spot {
     pub longitude: f64,
     /// Latitude of its centre (rad).
     pub latitude: f64,
-    /// Angular radius (rad).
+    /// Angular radius (rad), at its largest.
     pub radius: f64,
     /// Spot filling factor inside it, in [0, 1].
     pub filling: f64,
+    /// When it is there; `None` for ever.
+    pub life: Option<Life>,
+}
+
+/// When a spot is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Life {
+    /// Time of its largest area (d).
+    pub peak_d: f64,
+    /// Full width at half maximum of its area in time (d).
+    pub lifetime_d: f64,
+    /// By how much the equator has turned against the pole from the epoch to then (rad).
+    pub winding: f64,
+}
+
+impl Life {
+    /// Its area at a time (d) over the largest.
+    pub fn area(&self, time_d: f64) -> f64 {
+        (1.0 - (time_d - self.peak_d).abs() / self.lifetime_d).max(0.0)
+    }
 }
 
 impl Spot {
-    /// The circle that it fills.
+    /// The circle that it fills, at its largest and where it is round.
     pub fn disc(&self) -> Disc {
         Disc { longitude: self.longitude, latitude: self.latitude, radius: self.radius }
     }
+
+    /// Its radius (rad) at a time (d), 0 while it is not there. The area of a cap of radius r is 4 pi sin^2(r / 2).
+    pub fn radius_at(&self, time_d: f64) -> f64 {
+        match self.life {
+            Some(life) => 2.0 * (life.area(time_d).sqrt() * (0.5 * self.radius).sin()).asin(),
+            None => self.radius,
+        }
+    }
+
+    /// Whether it covers the point at (longitude, latitude), both rad.
+    fn covers(&self, longitude: f64, latitude: f64) -> bool {
+        self.disc().contains(longitude + self.unwinding(latitude), latitude)
+    }
+
+    /// Whether something at (longitude, latitude) that extends to `reach` from there (all rad) may overlap it.
+    pub fn may_touch(&self, longitude: f64, latitude: f64, reach: f64) -> bool {
+        let winding = self.life.map_or(0.0, |life| life.winding.abs());
+        // no latitude turns against another by more than the winding times their distance
+        self.disc().may_touch(longitude + self.unwinding(latitude), latitude, reach * (1.0 + winding))
+    }
+
+    /// What is added to longitudes at a latitude where the spot is to be round.
+    fn unwinding(&self, latitude: f64) -> f64 {
+        match self.life {
+            Some(Life { winding, .. }) if winding != 0.0 => {
+                winding * (self.latitude.sin().powi(2) - latitude.sin().powi(2))
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Its numbers as a config has them: longitude, latitude and radius (degrees), filling factor, and where it comes
+    /// and goes the time of its largest area and its lifetime (d).
+    pub fn written(&self) -> Vec<f64> {
+        // degrees of radians of degrees are not what they were in the last digit
+        let degrees = |x: f64| (1e9 * x.to_degrees()).round() / 1e9;
+        let Spot { longitude, latitude, radius, filling, life } = *self;
+        let mut numbers = vec![degrees(longitude), degrees(latitude), degrees(radius), filling];
+        numbers.extend(life.iter().flat_map(|life| [life.peak_d, life.lifetime_d]));
+        numbers
+    }
+}
+
+/// The spots that are there at a time (d), as large as they are then.
+pub fn spots_at(spots: &[Spot], time_d: f64) -> Vec<Spot> {
+    let at = spots.iter().map(|spot| Spot { radius: spot.radius_at(time_d), ..*spot });
+    at.filter(|spot| spot.radius > 0.0).collect()
 }
 
 /// A circular facula.
@@ -51,7 +132,7 @@ pub struct Facula {
 
 /// Filling factor at a point: the largest of the spots that cover it, 0 elsewhere.
 pub fn filling_at(spots: &[Spot], longitude: f64, latitude: f64) -> f64 {
-    largest(spots.iter().filter(|s| s.disc().contains(longitude, latitude)).map(|s| s.filling))
+    largest(spots.iter().filter(|s| s.covers(longitude, latitude)).map(|s| s.filling))
 }
 
 /// Excess of brightness at a point: the largest of the faculae that cover it, on the part of the surface that `spots`

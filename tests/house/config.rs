@@ -225,7 +225,8 @@ fn the_text_of_errors() {
         (
             "/observations/simulate/spots/2",
             json!([1, 2, 3]),
-            ": observations.simulate.spots[2]: expected an array of length 4, found length 3",
+            ": observations.simulate.spots[2]: 3 numbers must be 4, [longitude, latitude, radius, filling], or 6, with the \
+            time of the largest area and the lifetime",
         ),
         ("/grid/axes/phi", json!([0.1, 0.2]), ": grid.axes.phi: expected an array of length 3, found length 2"),
         ("/grid/axes/k_km", json!([0, 1, 5]), ": unknown key grid.axes.k_km: did you mean k_kms?"),
@@ -254,6 +255,37 @@ fn the_text_of_errors() {
     ];
     for (pointer, value, expected) in cases {
         assert_eq!(message(&with(demo(), pointer, value)), expected);
+    }
+}
+
+const LIFETIME: &str = "observations.simulate.random_spots.lifetime_d";
+
+/// Random spots with this value of a key.
+fn random(key: &str, value: Value) -> Value {
+    json!({ "number": 5, key: value })
+}
+
+/// Times drawn at random in place of those of the demo.
+#[test]
+fn senseless_schedules_name_their_key() {
+    let cases = [
+        ("nights", json!({ "nights": 0 })),
+        ("nights", json!({ "nights": 1000, "seasons": 100, "season_spacing_d": 1000 })),
+        ("seasons", json!({ "seasons": 0 })),
+        ("season_spacing_d", json!({ "seasons": 2, "season_spacing_d": 9 })),
+        ("season_spacing_d", json!({ "seasons": 2, "season_spacing_d": 1e300 })),
+        ("per_night", json!({ "per_night": [0, 3] })),
+        ("per_night", json!({ "per_night": [4, 3] })),
+        ("night_hours", json!({ "night_hours": 0 })),
+        ("night_hours", json!({ "night_hours": 25 })),
+        ("clouds", json!({ "clouds": 1 })),
+        ("clouds", json!({ "nights": 1, "clouds": 0.999999 })),
+    ];
+    for (key, schedule) in cases {
+        let mut config = with(demo(), "/observations/simulate/schedule", schedule.clone());
+        config["observations"]["simulate"].as_object_mut().unwrap().remove("cycles");
+        let message = message(&config);
+        assert!(message.starts_with(&format!(": observations.simulate.schedule.{key}: ")), "{schedule}: {message}");
     }
 }
 
@@ -342,6 +374,35 @@ fn senseless_values_name_their_key() {
         ("/observations/sigma_scale", json!(0.4), "observations.sigma_scale"),
         ("/observations/simulate", Value::Null, "observations"),
         ("/observations/simulate/spots/1", json!([0, 0, 10, 1.1]), "observations.simulate.spots[1]"),
+        ("/observations/simulate/spots/1", json!([0, 0, 10, 0.5, 1e300, 5]), "observations.simulate.spots[1]"),
+        ("/observations/simulate/spots/1", json!([0, 0, 10, 0.5, 3, 0]), "observations.simulate.spots[1]"),
+        ("/observations/simulate/spots/1", json!([0, 0, 10, 0.5, 3]), "observations.simulate.spots[1]"),
+        ("/observations/simulate/random_spots", json!({ "number": 0 }), "observations.simulate.random_spots.number"),
+        ("/observations/simulate/random_spots", random("lifetime_d", json!(0)), LIFETIME),
+        ("/observations/simulate/random_spots", random("lifetime_d", json!(1e-6)), LIFETIME),
+        ("/observations/simulate/random_spots", random("lifetime_d", json!(1e300)), LIFETIME),
+        (
+            "/observations/simulate/random_spots",
+            random("radius_deg", json!([0, 5])),
+            "observations.simulate.random_spots.radius_deg",
+        ),
+        (
+            "/observations/simulate/random_spots",
+            random("radius_deg", json!([9, 5])),
+            "observations.simulate.random_spots.radius_deg",
+        ),
+        (
+            "/observations/simulate/random_spots",
+            random("filling", json!([0.5, 1.1])),
+            "observations.simulate.random_spots.filling",
+        ),
+        (
+            "/observations/simulate/random_spots",
+            random("latitude_deg", json!([-91, 0])),
+            "observations.simulate.random_spots.latitude_deg",
+        ),
+        ("/observations/simulate/schedule", json!({ "nights": 9 }), "observations.simulate.schedule"),
+        ("/observations/simulate/cycles", Value::Null, "observations.simulate.cycles"),
         ("/observations/simulate/cycles", json!([]), "observations.simulate.cycles"),
         ("/observations/simulate/cycles/1", json!(1e308), "observations.simulate.cycles[1]"),
         ("/observations/simulate/snr", json!(0), "observations.simulate.snr"),

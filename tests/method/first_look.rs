@@ -32,10 +32,11 @@ fn with_line(
             latitude: rng.random_range(-0.5..1.2),
             radius: rng.random_range(0.09..0.3),
             filling: 0.8,
+            life: None,
         })
         .collect();
     if cap_deg > 0.0 {
-        spots.push(Spot { longitude: 0.5, latitude: 1.48, radius: cap_deg.to_radians(), filling: 0.9 });
+        spots.push(Spot { longitude: 0.5, latitude: 1.48, radius: cap_deg.to_radians(), filling: 0.9, life: None });
     }
     let star = StarSettings {
         rotation_period_d: 3.0,

@@ -29,7 +29,7 @@ fn profiles_of_the_oracle_star_on_20000_pixels() {
         .map(|spot| {
             let x = numbers(spot);
             let [longitude, latitude, radius] = [x[0], x[1], x[2]].map(f64::to_radians);
-            Spot { longitude, latitude, radius, filling: x[3] }
+            Spot { longitude, latitude, radius, filling: x[3], life: None }
         })
         .collect();
     let grid = SurfaceGrid::equal_area(20_000, Quadrature::Gauss2x2);

@@ -4,6 +4,7 @@ use super::automatic::Automatic;
 use super::jitter::VelocityJitter;
 use crate::posterior::noise::Weights;
 use crate::posterior::objective::Parameter;
+use crate::posterior::simulate::{RandomSpots, Schedule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -198,16 +199,27 @@ pub(super) struct ObservationsSection {
 #[serde(deny_unknown_fields)]
 pub(super) struct SimulateSection {
     /// Hard-edged circular spots `[longitude, latitude, radius, filling]`: degrees, and the filling factor from 0 to 1.
-    /// The larger filling counts where they overlap.
+    /// The larger filling counts where they overlap. Two more numbers let a spot come and go, `[longitude, latitude,
+    /// radius, filling, peak, lifetime]`: the time of its largest area, when it has that radius and is round, and the
+    /// full width at half maximum of its area, which grows linearly and falls again over twice as long (d). Longitudes
+    /// are counted at `epoch_d`.
     #[serde(default)]
-    pub spots: Vec<[f64; 4]>,
+    #[schemars(inner(length(min = 4, max = 6)))]
+    pub spots: Vec<Vec<f64>>,
+    /// Spots drawn at random, beside those that are listed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub random_spots: Option<RandomSpots>,
     /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter
     /// than the photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of
     /// filling s overlaps, the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faculae: Vec<[f64; 4]>,
-    /// Rotation cycles of the profiles, counted from `epoch_d`.
-    pub cycles: Vec<f64>,
+    /// Rotation cycles of the profiles, counted from `epoch_d`; this or `schedule`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cycles: Option<Vec<f64>>,
+    /// Times of the profiles drawn at random, in place of `cycles`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub schedule: Option<Schedule>,
     /// Velocity bins.
     pub velocity_kms: VelocitySection,
     /// Signal-to-noise ratio of each bin, above 0; null for no noise (standard errors as for 1000).

@@ -5,13 +5,14 @@ use super::error::Fault;
 use super::raw::Config;
 use super::raw_parts::{SimulateSection, VelocitySection};
 use super::resolve::{automatic, check_nuisances, check_pixels, positive};
+use super::resolve_simulation::{facula, spots, times_d};
 use super::{Automatic, ObservationSource, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::posterior::noise::ErrorSettings;
 use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::ParameterValues;
 use crate::posterior::simulate::Simulation;
-use crate::star::{Disc, Facula, Spot, StarSettings};
+use crate::star::StarSettings;
 use std::path::Path;
 
 /// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
@@ -78,17 +79,8 @@ pub(super) fn resolve_observations(
 
 fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {
     let at = |field: &str| format!("observations.simulate.{field}");
-    let spots = section.spots.iter().enumerate().map(|(k, s)| spot(s, &at(&format!("spots[{k}]"))));
     let faculae = section.faculae.iter().enumerate().map(|(k, f)| facula(f, &at(&format!("faculae[{k}]"))));
-    if section.cycles.is_empty() {
-        return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
-    }
-    let times_d: Vec<f64> = section.cycles.iter().map(|c| star.epoch_d + c * star.rotation_period_d).collect();
-    for (k, (cycle, time_d)) in section.cycles.iter().zip(&times_d).enumerate() {
-        let key = at(&format!("cycles[{k}]"));
-        check_size(&key, *cycle, most::TIME)?;
-        check_size(&format!("{key}: its time (d)"), *time_d, most::TIME)?;
-    }
+    let times_d = times_d(section, star)?;
     if let Some(snr) = section.snr {
         positive(&at("snr"), snr)?;
     }
@@ -108,7 +100,7 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         truth[parameter] = value;
     }
     Ok(Simulation {
-        spots: spots.collect::<Result<_, _>>()?,
+        spots: spots(section, star, &truth, &times_d)?,
         faculae: faculae.collect::<Result<_, _>>()?,
         truth,
         times_d,
@@ -135,38 +127,6 @@ fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
         true => Ok(()),
         false => Err(Fault::new(key, format!("{kms} must be from 0 to {LARGEST_JITTER_KMS} km/s"))),
     }
-}
-
-/// Most brightness that a facula may add, in units of the photosphere's.
-const LARGEST_EXCESS: f64 = 10.0;
-
-fn spot(&[longitude, latitude, radius, filling]: &[f64; 4], key: &str) -> Result<Spot, Fault> {
-    let Disc { longitude, latitude, radius } = disc([longitude, latitude, radius], key)?;
-    match (0.0..=1.0).contains(&filling) {
-        true => Ok(Spot { longitude, latitude, radius, filling }),
-        false => Err(Fault::new(key, format!("filling {filling} must be from 0 to 1"))),
-    }
-}
-
-fn facula(&[longitude, latitude, radius, excess]: &[f64; 4], key: &str) -> Result<Facula, Fault> {
-    let disc = disc([longitude, latitude, radius], key)?;
-    match excess > 0.0 && excess <= LARGEST_EXCESS {
-        true => Ok(Facula { disc, excess }),
-        false => Err(Fault::new(key, format!("excess {excess} must be above 0 and up to {LARGEST_EXCESS}"))),
-    }
-}
-
-/// A circle given in degrees.
-fn disc([longitude, latitude, radius]: [f64; 3], key: &str) -> Result<Disc, Fault> {
-    let problem = match () {
-        _ if latitude.abs() > 90.0 => format!("latitude {latitude} must be from -90 to 90"),
-        _ if !(radius > 0.0 && radius <= 180.0) => format!("radius {radius} must be above 0 and up to 180"),
-        _ => {
-            let [longitude, latitude, radius] = [longitude, latitude, radius].map(f64::to_radians);
-            return Ok(Disc { longitude, latitude, radius });
-        }
-    };
-    Err(Fault::new(key, problem))
 }
 
 /// Number of velocity bins; the last lies at or below `max`.

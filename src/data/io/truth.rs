@@ -16,8 +16,9 @@ pub const FILE: &str = "truth.json";
 pub struct Truth {
     /// The parameters as simulated.
     pub parameters: ParameterValues,
-    /// The spots: longitude, latitude and radius in degrees, filling factor.
-    pub spots: serde_json::Value,
+    /// The spots as a config lists them, drawn ones behind listed ones: longitude, latitude and radius in degrees,
+    /// filling factor; of those that come and go the time of the largest area and the lifetime (d).
+    pub spots: Vec<Vec<f64>>,
     /// The faculae, if there are any: longitude, latitude and radius in degrees, excess of brightness.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub faculae: Option<serde_json::Value>,
@@ -33,8 +34,11 @@ pub struct Truth {
     /// Over how many bins the noise is correlated, where it is not white.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correlated_bins: Option<f64>,
-    /// Fractional spot coverage.
+    /// Fractional spot coverage; of a star that changes, the mean over the profiles.
     pub spottedness: f64,
+    /// That at each of `times_d`, of a star that changes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coverage: Vec<f64>,
     /// Signal-to-noise ratio of each bin; null for no noise.
     pub snr: Option<f64>,
     /// Standard error written with each bin, in units of the continuum.

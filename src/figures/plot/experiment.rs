@@ -21,9 +21,14 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         summary.figure.iter().map(|panel| drawn(panel, &table)).collect::<Result<_, _>>()?;
     // one legend serves all panels of the same series
     let labels = |panel: &ScatterPanel| panel.series.iter().map(|s| s.label.clone()).collect::<Vec<_>>();
-    if let Some(first) = panels.first().map(labels) {
-        let alike = panels.iter_mut().skip(1).filter(|panel| labels(panel) == first);
-        alike.for_each(|panel| panel.series.iter_mut().for_each(|series| series.label.clear()));
+    let mut explained: Vec<Vec<String>> = Vec::new();
+    for panel in &mut panels {
+        let these = labels(panel);
+        if explained.contains(&these) {
+            panel.series.iter_mut().for_each(|series| series.label.clear());
+        } else {
+            explained.push(these);
+        }
     }
     if panels.is_empty() {
         return Ok(Vec::new());

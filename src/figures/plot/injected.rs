@@ -1,10 +1,12 @@
-//! What was injected on the star: spots and faculae of `truth.json`, or of the config that made a map.
+//! What was injected on the star: spots and faculae of `truth.json`, or of the config that made a map. Spots that come
+//! and go are as in the middle of the data.
 
 use super::PlotError;
 use crate::data::io::map::{FIT, FitFile};
 use crate::data::io::truth::{self, TruthFile};
 use crate::runs::origin;
-use crate::star::{Disc, Facula, Spot};
+use crate::star::spots::spots_at;
+use crate::star::{Disc, Facula, Life, Spot};
 use serde_json::Value;
 use std::path::Path;
 
@@ -15,6 +17,8 @@ pub(super) struct Injected {
     pub faculae: Vec<Facula>,
     /// Share of the surface that is spotted, where the file says so.
     pub coverage: Option<f64>,
+    /// Whether spots come and go.
+    pub is_changing: bool,
 }
 
 impl Injected {
@@ -27,26 +31,43 @@ impl Injected {
             return Ok(None);
         }
         let fit: FitFile = origin::read(folder, FIT)?;
-        let written = fit.provenance.config.pointer("/observations/simulate");
-        Ok(written.filter(|simulate| simulate.get("spots").is_some()).map(|simulate| Injected {
-            spots: spots(&simulate["spots"]),
-            faculae: faculae(&simulate["faculae"]),
-            coverage: None,
-        }))
+        let Some(simulate) = fit.provenance.config.pointer("/observations/simulate") else { return Ok(None) };
+        let written: Vec<Vec<f64>> = serde_json::from_value(simulate["spots"].clone()).unwrap_or_default();
+        let spots = spots(&written);
+        // the config alone does not say which spots are there
+        if simulate.get("random_spots").is_some() || spots.iter().any(|spot| spot.life.is_some()) {
+            return Ok(None);
+        }
+        Ok(Some(Injected { spots, faculae: faculae(&simulate["faculae"]), coverage: None, is_changing: false }))
     }
 
     /// Of a simulation; `None` of observed profiles that an orbit was put into.
     pub fn of_truth(truth: &TruthFile) -> Option<Self> {
         let TruthFile::Simulated(truth) = truth else { return None };
         let faculae = truth.faculae.as_ref().map(faculae).unwrap_or_default();
-        Some(Injected { spots: spots(&truth.spots), faculae, coverage: Some(truth.spottedness) })
+        let all = spots(&truth.spots);
+        let is_changing = all.iter().any(|spot| spot.life.is_some());
+        let first = truth.times_d.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = truth.times_d.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let coverage = (!is_changing).then_some(truth.spottedness);
+        Some(Injected { spots: spots_at(&all, 0.5 * (first + last)), faculae, coverage, is_changing })
     }
 }
 
-/// Spots as they are written, `[longitude, latitude, radius, filling]` in degrees; others are left out.
-fn spots(written: &Value) -> Vec<Spot> {
-    let spot = |(Disc { longitude, latitude, radius }, filling)| Spot { longitude, latitude, radius, filling };
-    discs(written).map(spot).collect()
+/// Spots as they are written: `[longitude, latitude, radius, filling]`, degrees, with the time of the largest area and
+/// the lifetime (d) where they come and go; others are left out.
+fn spots(written: &[Vec<f64>]) -> Vec<Spot> {
+    let spot = |numbers: &Vec<f64>| {
+        let (&[longitude, latitude, radius, filling], rest) = numbers.split_first_chunk()?;
+        let [longitude, latitude, radius] = [longitude, latitude, radius].map(f64::to_radians);
+        let life = match *rest {
+            [] => None,
+            [peak_d, lifetime_d] => Some(Life { peak_d, lifetime_d, winding: 0.0 }),
+            _ => return None,
+        };
+        Some(Spot { longitude, latitude, radius, filling, life })
+    };
+    written.iter().filter_map(spot).collect()
 }
 
 /// Faculae as they are written, `[longitude, latitude, radius, excess]` in degrees; others are left out.

@@ -84,7 +84,9 @@ pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     };
     let mut star = Star::injected(content, None, &injected);
     star.title = Content::Spots.title("injected", injected.coverage);
-    Ok(Some(draw(&[star], content, &cycles, format!("Map of the injected {what} at cycle 0. {HOW_TO_READ}"))))
+    let when = if injected.is_changing { ", as large as they are in the middle of the data" } else { "" };
+    let text = format!("Map of the injected {what} at cycle 0{when}. {HOW_TO_READ}");
+    Ok(Some(draw(&[star], content, &cycles, text)))
 }
 
 /// Rotation period and time of cycle 0 (d) of a resolved config.

@@ -16,7 +16,12 @@ use crate::runs::grid_scan::GridScanError;
 use crate::runs::pool::Pool;
 use crate::runs::run::RunError;
 use crate::sampling::chain::ChainError;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Runs experiments and keeps what they came to.
 pub struct Laboratory<'a> {
@@ -90,6 +95,14 @@ impl ExperimentError {
     }
 }
 
+/// A star that is done.
+#[derive(Serialize, Deserialize)]
+struct Kept<T> {
+    config: Value,
+    version: String,
+    result: T,
+}
+
 /// Name of the file of a case that is done.
 const OUTCOME: &str = "outcome.json";
 
@@ -116,6 +129,55 @@ impl Laboratory<'_> {
         let outcome = case.run(&folder, self.pool)?;
         write_json(&path, &outcome)?;
         Ok(outcome)
+    }
+
+    /// What a star of a row comes to by `work`, which is given a folder for it. It is read where it is done already
+    /// with that config.
+    ///
+    /// # Errors
+    /// [`ExperimentError`].
+    pub fn kept<T: Serialize + DeserializeOwned>(
+        &self,
+        row: &str,
+        star: &str,
+        config: &Value,
+        work: impl FnOnce(&Path) -> Result<T, ExperimentError>,
+    ) -> Result<T, ExperimentError> {
+        let folder = self.folder(&format!("{row}/{star}"))?;
+        let path = folder.join(OUTCOME);
+        let read = || serde_json::from_slice::<Kept<T>>(&std::fs::read(&path).ok()?).ok();
+        if let Some(kept) = read().filter(|kept| kept.config == *config && kept.version == env!("CARGO_PKG_VERSION")) {
+            return Ok(kept.result);
+        }
+        self.go_on()?;
+        let (config, version) = (config.clone(), env!("CARGO_PKG_VERSION").to_owned());
+        let kept = Kept { config, version, result: work(&folder)? };
+        write_json(&path, &kept)?;
+        Ok(kept.result)
+    }
+
+    /// The results of `work` on 0 up to `n`, in order; a thread takes the next when it is done with one, and has no
+    /// other threads to help it.
+    ///
+    /// # Errors
+    /// The first error, in order.
+    pub fn side_by_side<T: Send + Sync>(
+        &self,
+        n: usize,
+        work: impl Fn(usize) -> Result<T, ExperimentError> + Sync,
+    ) -> Result<Vec<T>, ExperimentError> {
+        let next = AtomicUsize::new(0);
+        let results: Vec<OnceLock<Result<T, ExperimentError>>> = (0..n).map(|_| OnceLock::new()).collect();
+        let thread = || {
+            let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be begun");
+            while let Some((k, result)) = results.iter().enumerate().nth(next.fetch_add(1, Relaxed)) {
+                let _ = result.set(alone.install(|| work(k)));
+            }
+        };
+        std::thread::scope(|scope| {
+            (0..rayon::current_num_threads().min(n)).for_each(|_| drop(scope.spawn(thread)));
+        });
+        results.into_iter().filter_map(OnceLock::into_inner).collect()
     }
 
     /// A folder for raw results, made if need be.

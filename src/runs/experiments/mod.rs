@@ -5,6 +5,7 @@
 //! done.
 
 pub mod case;
+mod changing;
 mod coverage;
 pub mod files;
 mod images;
@@ -138,5 +139,11 @@ pub const ROWS: &[Row] = &[
         title: "stars with faculae, wings and a wandering continuum, by the right model and the plain one",
         paper: "",
         run: models::models,
+    },
+    Row {
+        name: "changing",
+        title: "stars that change: blind searches with one map, and with all changing maps integrated over",
+        paper: "",
+        run: changing::changing,
     },
 ];

@@ -1,0 +1,184 @@
+//! A simulated star's spots and the times at which it is observed: listed, or drawn at random.
+
+use super::domain::{check_size, most};
+use super::error::Fault;
+use super::raw_parts::SimulateSection;
+use super::resolve::positive;
+use crate::posterior::objective::{Parameter, ParameterValues};
+use crate::posterior::simulate::{RandomSpots, Schedule};
+use crate::star::{Disc, Facula, Life, Spot, StarSettings};
+
+/// More drawn at random are a mistake: nights times profiles, and spots.
+const MOST_PROFILES: usize = 10_000;
+const MOST_SPOTS: f64 = 10_000.0;
+
+fn at(field: &str) -> String {
+    format!("observations.simulate.{field}")
+}
+
+/// Times of the profiles (d).
+pub(super) fn times_d(section: &SimulateSection, star: &StarSettings) -> Result<Vec<f64>, Fault> {
+    let cycles = match (&section.cycles, &section.schedule) {
+        (Some(cycles), None) => cycles,
+        (None, Some(schedule)) => return scheduled(schedule, star),
+        (Some(_), Some(_)) => return Err(Fault::new(at("schedule"), "give either cycles or schedule, not both")),
+        (None, None) => return Err(Fault::new(at("cycles"), "missing, give cycles or schedule")),
+    };
+    if cycles.is_empty() {
+        return Err(Fault::new(at("cycles"), "is empty, at least one profile is needed"));
+    }
+    let times_d: Vec<f64> = cycles.iter().map(|c| star.epoch_d + c * star.rotation_period_d).collect();
+    for (k, (cycle, time_d)) in cycles.iter().zip(&times_d).enumerate() {
+        let key = at(&format!("cycles[{k}]"));
+        check_size(&key, *cycle, most::TIME)?;
+        check_size(&format!("{key}: its time (d)"), *time_d, most::TIME)?;
+    }
+    Ok(times_d)
+}
+
+fn scheduled(schedule: &Schedule, star: &StarSettings) -> Result<Vec<f64>, Fault> {
+    let Schedule { nights, seasons, season_spacing_d, per_night: [fewest, largest], night_hours, clouds, .. } =
+        *schedule;
+    let key = |field: &str| at(&format!("schedule.{field}"));
+    within(&key("nights"), nights as f64, [1.0, 1000.0])?;
+    within(&key("seasons"), seasons as f64, [1.0, 100.0])?;
+    check_size(&key("season_spacing_d"), season_spacing_d, most::TIME)?;
+    if seasons > 1 && season_spacing_d < nights as f64 {
+        let problem = format!("{season_spacing_d} must be {nights} (the nights of a season) or more");
+        return Err(Fault::new(key("season_spacing_d"), problem));
+    }
+    for number in [fewest, largest] {
+        within(&key("per_night"), number as f64, [1.0, 100.0])?;
+    }
+    if fewest > largest {
+        return Err(Fault::new(key("per_night"), format!("{fewest} must not be above {largest}")));
+    }
+    if nights * seasons * largest > MOST_PROFILES {
+        let problem = format!("{seasons} seasons may have more than {MOST_PROFILES} profiles: take fewer");
+        return Err(Fault::new(key("nights"), problem));
+    }
+    if !(night_hours > 0.0 && night_hours <= 24.0) {
+        return Err(Fault::new(key("night_hours"), format!("{night_hours} must be above 0 and up to 24")));
+    }
+    if !(0.0..1.0).contains(&clouds) {
+        return Err(Fault::new(key("clouds"), format!("{clouds} must be from 0 and below 1")));
+    }
+    check_size("star.epoch_d", star.epoch_d, most::TIME)?;
+    let times_d = schedule.times_d(star.epoch_d);
+    match times_d.is_empty() {
+        true => Err(Fault::new(key("clouds"), format!("{clouds} leaves no night: take less, or another seed"))),
+        false => Ok(times_d),
+    }
+}
+
+/// The spots, listed ones first.
+pub(super) fn spots(
+    section: &SimulateSection,
+    star: &StarSettings,
+    truth: &ParameterValues,
+    times_d: &[f64],
+) -> Result<Vec<Spot>, Fault> {
+    let drawn = match &section.random_spots {
+        Some(random) => random_spots(random, truth, times_d)?,
+        None => Vec::new(),
+    };
+    let listed = section.spots.iter().enumerate().map(|(k, spot)| (spot, at(&format!("spots[{k}]"))));
+    let all = listed.chain(drawn.iter().map(|spot| (spot, at("random_spots"))));
+    all.map(|(numbers, key)| spot(numbers, star, truth, &key)).collect()
+}
+
+fn random_spots(random: &RandomSpots, truth: &ParameterValues, times_d: &[f64]) -> Result<Vec<Vec<f64>>, Fault> {
+    let key = |field: &str| at(&format!("random_spots.{field}"));
+    within(&key("number"), random.number as f64, [1.0, MOST_SPOTS])?;
+    if let Some(lifetime_d) = random.lifetime_d {
+        positive(&key("lifetime_d"), lifetime_d)?;
+        check_size(&key("lifetime_d"), lifetime_d, most::TIME)?;
+    }
+    let bounds = [
+        ("radius_deg", Some(random.radius_deg), [0.0, 180.0]),
+        ("filling", Some(random.filling), [0.0, 1.0]),
+        ("latitude_deg", random.latitude_deg, [-90.0, 90.0]),
+    ];
+    for (name, bounds, range) in bounds {
+        let Some([low, high]) = bounds else { continue };
+        within(&key(name), low, range)?;
+        within(&key(name), high, range)?;
+        if low > high {
+            return Err(Fault::new(key(name), format!("{low} must not be above {high}")));
+        }
+    }
+    if random.radius_deg[0] < SMALLEST_DEG {
+        let problem = format!("{} must be {SMALLEST_DEG} or more", random.radius_deg[0]);
+        return Err(Fault::new(key("radius_deg"), problem));
+    }
+    let first = times_d.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = times_d.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let count = random.count(last - first);
+    if count > MOST_SPOTS {
+        let problem = format!("makes {count} spots over the data, {MOST_SPOTS} at most: longer, or fewer at a time");
+        return Err(Fault::new(key("lifetime_d"), problem));
+    }
+    Ok(random.drawn(truth[Parameter::Inclination], [first, last]))
+}
+
+/// Spots drawn at random are not smaller than this (degrees): no pixel would see them.
+const SMALLEST_DEG: f64 = 0.01;
+
+fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), Fault> {
+    match (low..=high).contains(&value) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{value} must be from {low} to {high}"))),
+    }
+}
+
+/// Most brightness that a facula may add, in units of the photosphere's.
+const LARGEST_EXCESS: f64 = 10.0;
+
+fn spot(numbers: &[f64], star: &StarSettings, truth: &ParameterValues, key: &str) -> Result<Spot, Fault> {
+    let (place, filling, when) = match *numbers {
+        [longitude, latitude, radius, filling] => ([longitude, latitude, radius], filling, None),
+        [longitude, latitude, radius, filling, peak_d, lifetime_d] => {
+            ([longitude, latitude, radius], filling, Some((peak_d, lifetime_d)))
+        }
+        _ => {
+            let problem = format!(
+                "{} numbers must be 4, [longitude, latitude, radius, filling], or 6, with the time of the largest area \
+                and the lifetime",
+                numbers.len()
+            );
+            return Err(Fault::new(key, problem));
+        }
+    };
+    let Disc { longitude, latitude, radius } = disc(place, key)?;
+    if !(0.0..=1.0).contains(&filling) {
+        return Err(Fault::new(key, format!("filling {filling} must be from 0 to 1")));
+    }
+    let life = when.map(|(peak_d, lifetime_d)| {
+        check_size(&format!("{key}: time of the largest area (d)"), peak_d, most::TIME)?;
+        positive(&format!("{key}: lifetime (d)"), lifetime_d)?;
+        check_size(&format!("{key}: lifetime (d)"), lifetime_d, most::TIME)?;
+        Ok(Life { peak_d, lifetime_d, winding: truth[Parameter::DOmega] * (peak_d - star.epoch_d) })
+    });
+    Ok(Spot { longitude, latitude, radius, filling, life: life.transpose()? })
+}
+
+pub(super) fn facula(&[longitude, latitude, radius, excess]: &[f64; 4], key: &str) -> Result<Facula, Fault> {
+    let disc = disc([longitude, latitude, radius], key)?;
+    match excess > 0.0 && excess <= LARGEST_EXCESS {
+        true => Ok(Facula { disc, excess }),
+        false => Err(Fault::new(key, format!("excess {excess} must be above 0 and up to {LARGEST_EXCESS}"))),
+    }
+}
+
+/// A circle given in degrees.
+fn disc([longitude, latitude, radius]: [f64; 3], key: &str) -> Result<Disc, Fault> {
+    let problem = match () {
+        _ if latitude.abs() > 90.0 => format!("latitude {latitude} must be from -90 to 90"),
+        _ if !(radius > 0.0 && radius <= 180.0) => format!("radius {radius} must be above 0 and up to 180"),
+        _ => {
+            let [longitude, latitude, radius] = [longitude, latitude, radius].map(f64::to_radians);
+            return Ok(Disc { longitude, latitude, radius });
+        }
+    };
+    Err(Fault::new(key, problem))
+}

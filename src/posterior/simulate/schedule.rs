@@ -1,0 +1,67 @@
+//! When a star is observed: nights, clouds, seasons.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+const HOURS_A_DAY: f64 = 24.0;
+
+/// Stream of the random numbers, apart from those of spots and noise.
+const STREAM: u64 = 3;
+
+/// Times of the profiles drawn at random: nights of one season or several. The first night begins at `star.epoch_d`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Schedule {
+    /// Nights of a season, one a day, 1 to 1000.
+    pub nights: usize,
+    /// Seasons, 1 to 100.
+    pub seasons: usize,
+    /// Days from the first night of a season to that of the next.
+    pub season_spacing_d: f64,
+    /// Fewest and most profiles of a night, all numbers in between as likely, 1 to 100.
+    pub per_night: [usize; 2],
+    /// Hours of a night over which its profiles are spread at random, above 0 and up to 24.
+    pub night_hours: f64,
+    /// Probability that a night is lost to clouds, from 0 and below 1.
+    pub clouds: f64,
+    /// Seed of all this.
+    pub seed: u64,
+}
+
+impl Default for Schedule {
+    fn default() -> Self {
+        Schedule {
+            nights: 15,
+            seasons: 1,
+            season_spacing_d: 365.0,
+            per_night: [2, 4],
+            night_hours: 9.0,
+            clouds: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+impl Schedule {
+    /// The times (d) from the first night on, in order and to a second. None where clouds take all nights.
+    pub fn times_d(&self, first_d: f64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(STREAM);
+        let nights = (0..self.seasons).flat_map(|season| (0..self.nights).map(move |night| (season, night)));
+        let mut times = Vec::new();
+        for (season, night) in nights {
+            let begin_d = first_d + season as f64 * self.season_spacing_d + night as f64;
+            let is_lost = rng.random::<f64>() < self.clouds;
+            let profiles = rng.random_range(self.per_night[0]..=self.per_night[1]);
+            let since: Vec<f64> = (0..profiles).map(|_| self.night_hours / HOURS_A_DAY * rng.random::<f64>()).collect();
+            // drawn in any case: clouds do not change the other nights
+            if !is_lost {
+                times.extend(since.iter().map(|since| (1e5 * (begin_d + since)).round() / 1e5));
+            }
+        }
+        times.sort_by(f64::total_cmp);
+        times
+    }
+}
