@@ -10,7 +10,7 @@ use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, SearchError, SearchSettings};
 use crate::field::Lifetime;
 use crate::posterior::detection::Spots;
-use crate::posterior::fit::Fit;
+use crate::posterior::fit::{ChangingFit, Fit, NoField};
 use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::Known;
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
@@ -207,7 +207,15 @@ impl Scene {
     /// What becomes of the spots in a blind search.
     #[doc(hidden)]
     pub fn spots(&self) -> Spots {
-        let ImagingSettings { objective, spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.settings.imaging;
+        match self.settings.imaging.objective {
+            ObjectiveKind::MarginalLikelihood => Spots::Integrated(self.known()),
+            _ => Spots::OneMap(Some(self.known())),
+        }
+    }
+
+    /// What is known of the field of spots.
+    fn known(&self) -> Known {
+        let ImagingSettings { spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.settings.imaging;
         let jitter_kms = match self.settings.velocity_jitter {
             // a map that does not change would have said how large it is
             _ if self.measured.velocity_jitter.is_some() => None,
@@ -218,11 +226,7 @@ impl Scene {
             Hyperparameter::Static => Some(Lifetime::Static),
             days => days.known().map(Lifetime::Days),
         };
-        let known = Known { amplitude: spot_amplitude.known(), slope: spot_slope.known(), lifetime, jitter_kms };
-        match objective {
-            ObjectiveKind::MarginalLikelihood => Spots::Integrated(known),
-            _ => Spots::OneMap(Some(known)),
-        }
+        Known { amplitude: spot_amplitude.known(), slope: spot_slope.known(), lifetime, jitter_kms }
     }
 
     /// The star reconstructed at the config's values: map, model profiles, and whether they fit.
@@ -233,6 +237,16 @@ impl Scene {
         let target = self.settings.imaging.chi2_target.value();
         let reference = Reference::build(&self.imager, self.settings.values, target)?;
         Ok(Fit::new(&self.imager, &self.observations, &reference))
+    }
+
+    /// Maps of a star that may change, all maps integrated over, at the config's values: the most probable one and its
+    /// standard deviation at each of `times_d`, by default a map a night. The config's `imaging.objective` has no part
+    /// in it.
+    ///
+    /// # Errors
+    /// A field that cannot be fitted to the profiles.
+    pub fn changing_maps(&self, times_d: Option<&[f64]>) -> Result<ChangingFit, NoField> {
+        ChangingFit::new(&self.imager, &self.observations, self.settings.values, self.known(), times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.

@@ -8,16 +8,19 @@
 //! 2. [`Design`]: the profiles of each harmonic, for one star; a model application a harmonic.
 //! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
-//! 5. [`change`]: whether a star that changes explains the profiles better than one that does not.
+//! 5. [`Maps`]: the most probable maps at any times, with their errors.
+//! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
 
 pub mod change;
 mod design;
 mod expand;
 mod fit;
+mod maps;
 
 pub use change::Change;
 pub use design::{Basis, Design};
 pub use fit::{BOUNDS, Fitted, Known, NAMES, fit};
+pub use maps::Maps;
 
 use crate::field::{Field, FieldError, Settled, Sought, settle};
 use crate::posterior::imaging::Imager;
