@@ -215,7 +215,7 @@ impl ChangingFit {
             model: modelled.intensities(),
             unchanging_model: unchanging.map(|modelled| modelled.intensities()),
             velocities,
-            checks: Checks::of(&residuals, imager.data.correlated_bins),
+            checks: Checks::of_flexible(&residuals, imager.data.correlated_bins),
             warnings,
             summary,
             fitted,
