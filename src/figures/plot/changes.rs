@@ -5,7 +5,7 @@ use super::dynamic::edges;
 use super::profiles::{Line, extent};
 use crate::figures::drawing::colour::{BLACK, ColourMap, GREY};
 use crate::figures::drawing::panel::{Shade, Tile};
-use crate::figures::drawing::{Align, Axis, Figure, Font, PAGE_MM, Paint, Panel, Point, Rect, Stroke, open};
+use crate::figures::drawing::{Align, Axis, Figure, Font, PAGE_MM, Paint, Panel, Point, Rect, Stroke, open, width_pt};
 
 /// Profiles further apart than this (d) are of different nights.
 const NIGHT_GAP_D: f64 = 0.5;
@@ -29,7 +29,7 @@ pub(super) fn figure(lines: &[Line]) -> Option<Figure> {
     lines.sort_by(|a, b| a.time_d.total_cmp(&b.time_d));
     let height = (ROW * lines.len() as f64).clamp(100.0, HIGHEST);
     let mut figure = Figure::new("changes", PAGE_MM, 1.0);
-    figure.height = height + 48.0;
+    figure.height = height + 44.0;
     figure.caption = "Where the star changed. Left: observed profiles minus those of a star that does not change. \
     Right: minus those of the star that changes, each profile with its own map. In units of the standard error; rows \
     are profiles in the order of time, numbers the time of the first of a night."
@@ -43,7 +43,8 @@ pub(super) fn figure(lines: &[Line]) -> Option<Figure> {
     let shade = Shade { map: ColourMap::Diverging, low: -reach, high: reach };
     let all: Vec<Line> = lines.iter().map(|line| (*line).clone()).collect();
     let velocities = extent(&all, |line| &line.velocity_kms);
-    let (left, gap, bar) = (58.0, 14.0, 52.0);
+    let widest = lines.iter().map(|line| width_pt(&time(line), Font::SMALL.size)).fold(0.0, f64::max);
+    let (left, gap, bar) = (widest + 22.0, 14.0, 52.0);
     let width = 0.5 * (figure.width - left - gap - bar);
     for (k, (title, value)) in panels.into_iter().enumerate() {
         let frame = Rect { left: left + k as f64 * (width + gap), top: 16.0, width, height };
@@ -70,6 +71,10 @@ pub(super) fn figure(lines: &[Line]) -> Option<Figure> {
     Some(figure)
 }
 
+fn time(line: &Line) -> String {
+    format!("{:.2}", line.time_d)
+}
+
 /// What hardly any of these numbers exceeds, within [`REACH`].
 fn reach(numbers: impl Iterator<Item = f64>) -> f64 {
     let mut numbers: Vec<f64> = numbers.filter(|x| x.is_finite()).collect();
@@ -91,7 +96,7 @@ fn nights(figure: &mut Figure, panel: &Panel, lines: &[&Line], labelled: bool) {
             figure.path("night", border, Paint::stroke(Stroke::new(BLACK, 0.3)));
         }
         if labelled && last.is_none_or(|[_, above]| y - above >= LABELS) {
-            figure.text(&format!("{:.2}", line.time_d), [x - 3.0, y + 5.5], Font::SMALL, Align::Right, 0.0);
+            figure.text(&time(line), [x - 3.0, y + 5.5], Font::SMALL, Align::Right, 0.0);
             last = Some([x, y]);
         }
     }

@@ -24,7 +24,7 @@ const WIDEST: f64 = 160.0;
 const SAME_NIGHT_D: f64 = 0.5;
 
 /// Pixels of the whole star in a picture of 1 pt of radius: finer ones are not seen.
-const PIXELS_PER_PT2: f64 = 1.4;
+const PIXELS_PER_PT2: f64 = 1.0;
 
 /// What the pictures have in common.
 struct Common {
@@ -94,6 +94,8 @@ fn evenly(n: usize) -> Vec<usize> {
 fn common(folder: &Path, file: &ChangingMapFile, shown: &[usize], radius: f64) -> Result<Common, PlotError> {
     let highest = shown.iter().flat_map(|k| &file.maps[*k].spot_filling).fold(0.0, |high: f64, x| high.max(x.abs()));
     let reach = if highest > 0.5 { 1.0 } else { ((10.0 * highest).ceil() / 10.0).max(0.1) };
+    let lowest = shown.iter().flat_map(|k| &file.maps[*k].sigma_spot_filling).fold(f64::MAX, |low, x| low.min(*x));
+    let amplitude = file.field.spot_amplitude;
     let observed = match folder.join(velocities::FILE) {
         table if table.is_file() => {
             let table = Columns::read(&table)?;
@@ -106,8 +108,13 @@ fn common(folder: &Path, file: &ChangingMapFile, shown: &[usize], radius: f64) -
         // spots dark, what is brighter than the photosphere blue
         filling: Scale { shade: Shade { map: ColourMap::Brightness, low: reach, high: -reach }, photosphere: 0.0 },
         sd: Scale {
-            shade: Shade { map: ColourMap::Cividis, low: 0.0, high: file.field.spot_amplitude },
-            photosphere: file.field.spot_amplitude,
+            // from the next tenth of the amplitude below what is known best
+            shade: Shade {
+                map: ColourMap::Cividis,
+                low: amplitude * (10.0 * lowest / amplitude).floor().clamp(0.0, 9.0) / 10.0,
+                high: amplitude,
+            },
+            photosphere: amplitude,
         },
         radius,
         inclination_deg: file.parameters.state().inclination.to_degrees(),
