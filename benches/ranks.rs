@@ -140,7 +140,8 @@ impl Case {
         let draw = StartDraw { centre, covariance, scale: 1.0, ensembles: 1, walkers: BATCH, seed: 1 };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
         let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
-        Case { scene, posterior: found.posterior, target, task, points }
+        let posterior = found.posterior.mapped().expect("one map a star").clone();
+        Case { scene, posterior, target, task, points }
     }
 }
 

@@ -151,7 +151,7 @@ pub use data::config::{Config, ConfigError};
 pub use data::scene::{Scene, SceneError};
 pub use data::search::Found;
 pub use planets::verdict::{Finding, Remark, Signal, Verdict};
-pub use posterior::fit::{Fit, FitSummary};
+pub use posterior::fit::{ChangingFit, ChangingSummary, Fit, FitSummary, MapAt, NoField, VelocityWithoutSpots};
 pub use posterior::objective::{Parameter, Posterior, Prior};
 pub use runs::blind_search::BlindSearch;
 pub use runs::run::{Run, RunError};

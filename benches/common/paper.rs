@@ -143,6 +143,7 @@ impl Bulk {
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
         let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
         let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();
-        Bulk { posterior: found.posterior, target, points }
+        let posterior = found.posterior.mapped().expect("one map a star").clone();
+        Bulk { posterior, target, points }
     }
 }

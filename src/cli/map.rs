@@ -4,11 +4,12 @@ use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
 use crate::data::diagnosis::Diagnosis;
-use crate::data::io::map::{FILES, MapResult};
+use crate::data::io::map::{ChangingMapResult, FILES, MapResult};
+use crate::data::io::periodogram::FieldRecord;
 use crate::data::scene::Scene;
-use crate::posterior::fit::{Deviation, Fit, FitSummary};
+use crate::posterior::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
 use crate::posterior::noise::MeasuredErrors;
-use crate::posterior::objective::{Reference, ReferenceError};
+use crate::posterior::objective::{ObjectiveKind, Reference, ReferenceError};
 use std::path::{Path, PathBuf};
 
 /// Reconstruct the spots at the config's parameter values
@@ -16,6 +17,10 @@ use std::path::{Path, PathBuf};
 /// The map of greatest entropy whose chi2 is `imaging.chi2_target`. Writes map.json (the map), profiles.csv (observed
 /// and model profiles), rv.csv (radial velocities before and after the model is taken out of them) and fit.json (how
 /// good the fit is).
+///
+/// With `imaging.objective` set to "marginal-likelihood" the star may change: the amplitude, slope and lifetime of its
+/// spots are fitted, and map.json holds the most probable map and its standard deviation at every time asked for, by
+/// default a map a night.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
 pub struct Args {
@@ -23,6 +28,10 @@ pub struct Args {
     config: PathBuf,
     #[command(flatten)]
     output: Output,
+    /// Times (d) of the maps of a star that may change, as in the list of profiles; by default the mean time of each
+    /// night
+    #[arg(long, value_name = "D,D,...", value_delimiter = ',', allow_negative_numbers = true)]
+    times: Option<Vec<f64>>,
 }
 
 /// Runs the command.
@@ -30,16 +39,28 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
+    match (scene.settings.imaging.objective, &args.times) {
+        (ObjectiveKind::MarginalLikelihood, _) => changing(args, global, &scene),
+        (_, None) => unchanging(args, global, &scene),
+        (objective, Some(_)) => Err(Failure::input(format!(
+            "--times: the map does not change with imaging.objective {:?}; maps that do take \"marginal-likelihood\"",
+            objective.name()
+        ))),
+    }
+}
+
+/// The map of greatest entropy.
+fn unchanging(args: &Args, global: &Global, scene: &Scene) -> Result<(), Failure> {
     let spinner = progress::bar(global, None, "reconstructing");
     let reference = Reference::build(&scene.imager, scene.settings.values, scene.settings.imaging.chi2_target.value());
     if let Err(error) = reference {
         spinner.set_message("looking for the reason");
-        let failure = unreached(&args.config, &scene, error);
+        let failure = unreached(&args.config, scene, error);
         spinner.finish_and_clear();
         return Err(failure);
     }
     let misfits = scene.measured.errors.as_ref().is_some_and(MeasuredErrors::is_misfit);
-    let diagnosis = if misfits { diagnosis(&scene) } else { None };
+    let diagnosis = if misfits { diagnosis(scene) } else { None };
     spinner.finish_and_clear();
     let reference = reference.map_err(|e| Failure::reference(&args.config, e))?;
     let fit = Fit::new(&scene.imager, &scene.observations, &reference);
@@ -68,6 +89,66 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
     report.written(folder, FILES.join(", ")).print();
     Ok(())
+}
+
+/// Maps of a star that may change.
+fn changing(args: &Args, global: &Global, scene: &Scene) -> Result<(), Failure> {
+    let spinner = progress::bar(global, None, "fitting the field of spots");
+    let fit = scene.changing_maps(args.times.as_deref());
+    spinner.finish_and_clear();
+    let fit = fit.map_err(|error| match error {
+        NoField::Times(_) => Failure::input(format!("--times: {error}")),
+        error => Failure::failed(format!("{}: no map ({}): {error}", args.config.display(), error.status())),
+    })?;
+    let result = ChangingMapResult {
+        imager: &scene.imager,
+        observations: &scene.observations,
+        fit: &fit,
+        truth: scene.truth,
+        provenance: &scene.provenance(),
+    };
+    let folder = args.output.create()?;
+    result.write(folder)?;
+    let mut report = changing_report(&fit);
+    for (label, text) in scene.measured.lines() {
+        report = report.line(label, text);
+    }
+    for warning in fit.warnings.iter().chain(&fit.checks.warnings) {
+        report = report.line("warning", warning);
+    }
+    report.written(folder, FILES.join(", ")).print();
+    Ok(())
+}
+
+fn changing_report(fit: &ChangingFit) -> Report {
+    let ChangingSummary { chi2, chi2_per_datum, data, profiles, .. } = fit.summary;
+    let numbers = &fit.summary;
+    let field = FieldRecord::of(&fit.fitted);
+    let bound = |name: &str| match field.at_bounds.iter().any(|reached| reached == name) {
+        true => ", at the bound of its search",
+        false => "",
+    };
+    let lifetime = field.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2} d"));
+    let times: Vec<String> = fit.maps.iter().map(|map| format!("{:.3}", map.time_d)).collect();
+    let report = Report::default()
+        .line("amplitude", format!("{:.4} (of the spot filling factor)", field.spot_amplitude))
+        .line("slope", format!("{:.3}{}", field.spot_slope, bound("spot_slope")))
+        .line("lifetime", format!("{lifetime}{}", bound("spot_lifetime_d")))
+        .line("jitter", format!("{:.4} km/s", field.velocity_jitter_kms))
+        .line("ln evidence", format!("{:.2}", field.ln_evidence))
+        .line("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)"));
+    let report = match numbers.chi2_per_datum_unchanging {
+        Some(chi2) => report.line("unchanging", format!("{chi2:.4} per datum, had the same spots lived for ever")),
+        None => report,
+    };
+    report
+        .line(
+            "residuals",
+            format!("{:.3e} rms, {:.3e} in the line core", numbers.residual_rms, numbers.residual_rms_core),
+        )
+        .line("RV observed", format!("{:.4} km/s rms", numbers.observed_rv_rms_kms))
+        .line("RV, no spots", format!("{:.4} km/s rms, error {:.4} km/s", numbers.rv_rms_kms, numbers.rv_error_kms))
+        .line("maps at", format!("{} d", times.join(", ")))
 }
 
 /// Why no map of `scene` fits, by trying.

@@ -7,7 +7,7 @@ use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, SearchError, SearchSettings};
 use crate::posterior::detection::Spots;
-use crate::posterior::fit::Fit;
+use crate::posterior::fit::{ChangingFit, Fit, NoField};
 use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::Known;
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
@@ -204,12 +204,19 @@ impl Scene {
     /// What becomes of the spots in a blind search.
     #[doc(hidden)]
     pub fn spots(&self) -> Spots {
-        let known = self.settings.known_field();
         match self.settings.imaging.objective {
-            ObjectiveKind::MarginalLikelihood => Spots::Integrated(known),
-            // a map that does not change would have said how large the jitter is
-            _ if self.measured.velocity_jitter.is_some() => Spots::OneMap(Some(Known { jitter_kms: None, ..known })),
-            _ => Spots::OneMap(Some(known)),
+            ObjectiveKind::MarginalLikelihood => Spots::Integrated(self.known()),
+            _ => Spots::OneMap(Some(self.known())),
+        }
+    }
+
+    /// What is known of the field of spots.
+    fn known(&self) -> Known {
+        let known = self.settings.known_field();
+        match self.measured.velocity_jitter {
+            // a map that does not change would have said how large it is
+            Some(_) => Known { jitter_kms: None, ..known },
+            None => known,
         }
     }
 
@@ -221,6 +228,16 @@ impl Scene {
         let target = self.settings.imaging.chi2_target.value();
         let reference = Reference::build(&self.imager, self.settings.values, target)?;
         Ok(Fit::new(&self.imager, &self.observations, &reference))
+    }
+
+    /// Maps of a star that may change, all maps integrated over, at the config's values: the most probable one and its
+    /// standard deviation at each of `times_d`, by default a map a night. The config's `imaging.objective` has no part
+    /// in it.
+    ///
+    /// # Errors
+    /// A field that cannot be fitted to the profiles.
+    pub fn changing_maps(&self, times_d: Option<&[f64]>) -> Result<ChangingFit, NoField> {
+        ChangingFit::new(&self.imager, &self.observations, self.settings.values, self.known(), times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.

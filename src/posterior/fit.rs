@@ -1,8 +1,11 @@
 //! One reconstruction held against the data: its map and model profiles, first-moment velocities before and after the
-//! model is taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is judged.
+//! model is taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is judged. The same of a
+//! star that may change is in `changing`.
 
+mod changing;
 mod checks;
 
+pub use changing::{ChangingFit, ChangingSummary, MapAt, NoField, VelocityWithoutSpots};
 pub use checks::{Checks, ProfileCheck};
 
 use crate::maxent::entropy::Entropy;

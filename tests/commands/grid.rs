@@ -77,7 +77,12 @@ fn copy(desk: &Desk, from: &str, to: &str) {
 
 /// The posterior that `sample` would draw from.
 fn sampled(scene: &Scene) -> Posterior {
-    find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ()).unwrap().posterior
+    find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ())
+        .unwrap()
+        .posterior
+        .mapped()
+        .unwrap()
+        .clone()
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod import;
 mod init;
 mod injection;
 mod limits;
+mod maps;
 mod merge;
 mod newcomer;
 mod noise;

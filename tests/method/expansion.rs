@@ -41,6 +41,7 @@ fn wide(parameter: Parameter) -> Prior {
         Parameter::Vsys => Prior::Uniform { min: -1.0, max: 1.0 },
         Parameter::LimbDarkening | Parameter::Contrast => Prior::Uniform { min: 0.0, max: 1.0 },
         Parameter::LineSigma | Parameter::EquivalentWidth => Prior::Uniform { min: 1.0, max: 9.0 },
+        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => unreachable!("one map"),
     }
 }
 
@@ -123,13 +124,15 @@ fn stellar_parameters_one_sigma_off() {
         Parameter::LineSigma => 0.025,
         Parameter::EquivalentWidth => 0.002,
         Parameter::Contrast => 0.02,
+        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => unreachable!("one map"),
     };
     for (s, &p) in STELLAR.iter().enumerate() {
         let i = expansion.profiles() + s;
         println!("{}: {} with all else fixed", p.name(), expansion.information[(i, i)].powf(-0.5));
     }
-    for (i, &a) in Parameter::ALL.iter().enumerate() {
-        for &b in &Parameter::ALL[i..] {
+    let of_one_map: Vec<Parameter> = Parameter::ALL.into_iter().filter(|p| !p.is_of_field()).collect();
+    for (i, &a) in of_one_map.iter().enumerate() {
+        for &b in &of_one_map[i..] {
             for sign in [-1.0, 1.0] {
                 let (full, quadratic) = at(&[(a, step(a)), (b, sign * step(b))]);
                 // the third order, over steps of a standard deviation each

@@ -13,6 +13,7 @@ mod first_look;
 mod forward;
 mod imaging;
 mod lsd;
+mod maps;
 mod nuisances;
 mod objective;
 mod oracle;

@@ -47,7 +47,7 @@ fn a_surface_other_than_the_configs_is_found() {
         assert!((best - injected).abs() < 3.0 * sd, "{name}: {best} +- {sd} for {injected}");
         assert!(sd < 0.1 * (injected - start).abs(), "{name}: {sd}");
     }
-    let written = serde_json::to_value(found.posterior.reference().values).unwrap();
+    let written = serde_json::to_value(found.posterior.mapped().unwrap().reference().values).unwrap();
     assert_eq!(written.as_object().unwrap().len(), 11, "the eight and the free ones: {written}");
 }
 

@@ -1,4 +1,9 @@
-//! The files of one reconstruction: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`.
+//! The files of one reconstruction: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`. Those of a star that may change
+//! are in `changing`.
+
+mod changing;
+
+pub use changing::{ChangingFitFile, ChangingMapFile, ChangingMapResult, MapKind, UNCHANGING};
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;

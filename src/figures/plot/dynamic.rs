@@ -84,7 +84,7 @@ fn mean(lines: &[Line]) -> Vec<f64> {
 }
 
 /// Borders of bins around their centres.
-fn edges(centres: &[f64]) -> Vec<f64> {
+pub(super) fn edges(centres: &[f64]) -> Vec<f64> {
     let step = if centres.len() > 1 { centres[1] - centres[0] } else { 1.0 };
     let first = centres.first().map(|v| v - 0.5 * step);
     first.into_iter().chain(centres.iter().map(|v| v + 0.5 * step)).collect()

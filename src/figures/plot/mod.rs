@@ -3,6 +3,7 @@
 //! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`,
 //! `optimise`, `grid`, `sample`, `compare` and `reproduce`.
 
+mod changes;
 mod comparison;
 mod content;
 mod corner;
@@ -12,6 +13,7 @@ mod experiment;
 mod injected;
 mod landscape;
 mod limits;
+mod maps;
 mod optimum;
 mod paraboloid;
 mod periodogram;
@@ -30,12 +32,12 @@ pub use trace::Sampled;
 use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
-use crate::data::io::map::MAP;
+use crate::data::io::map::{MAP, MapKind};
 use crate::data::io::{self, FileError, truth};
 use crate::figures::drawing::Figure;
 use crate::runs::origin::OriginError;
 use crate::runs::run::CHAIN;
-use crate::runs::{self, grid_scan, manifest};
+use crate::runs::{self, grid_scan, manifest, origin};
 use std::path::{Path, PathBuf};
 
 /// Pixels to the inch of PNG files where nothing else is asked for.
@@ -134,13 +136,15 @@ pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotErr
 }
 
 fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
-    let mut figures = vec![star_map::figure(folder)?];
+    let changes = origin::read::<MapKind>(folder, MAP)?.is_changing();
+    let mut figures = vec![if changes { maps::figure(folder)? } else { star_map::figure(folder)? }];
     if folder.join(profiles::FILE).is_file() {
         let profiles = profiles::read(folder)?;
+        figures.extend(changes::figure(&profiles));
         figures.extend([profiles::figure(&profiles), dynamic::figure(&profiles)]);
     }
     if folder.join(velocities::FILE).is_file() {
-        figures.push(velocities::of_map(folder)?);
+        figures.push(if changes { velocities::of_changing_map(folder)? } else { velocities::of_map(folder)? });
     }
     Ok(figures)
 }

@@ -4,7 +4,7 @@ use super::star_map::ephemeris;
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::lsd::{self, ReadOptions};
-use crate::data::io::map::{FIT, FitFile};
+use crate::data::io::map::{ChangingFitFile, FIT, FitFile, MapKind, UNCHANGING};
 use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, GREY, VERMILION};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
@@ -17,12 +17,15 @@ pub(super) const FILE: &str = "profiles.csv";
 /// A profile.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Line {
+    pub time_d: f64,
     pub cycle: f64,
     pub velocity_kms: Vec<f64>,
     pub observed: Vec<f64>,
     pub sigma: Vec<f64>,
     /// Empty without a model.
     pub model: Vec<f64>,
+    /// That of a star that does not change, beside that of one that does; empty without.
+    pub unchanging: Vec<f64>,
 }
 
 impl Line {
@@ -36,23 +39,28 @@ impl Line {
 pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
     if folder.join(FIT).is_file() {
-        let fit: FitFile = origin::read(folder, FIT)?;
-        table.check_rows(fit.summary.data, &format!("the data, by {FIT}"))?;
+        let data = match origin::read::<MapKind>(folder, FIT)?.is_changing() {
+            true => origin::read::<ChangingFitFile>(folder, FIT)?.summary.data,
+            false => origin::read::<FitFile>(folder, FIT)?.summary.data,
+        };
+        table.check_rows(data, &format!("the data, by {FIT}"))?;
     }
     let numbers = table.column("profile")?;
     let [cycle, velocity] = [table.column_within("cycle", ANY)?, table.column_within("velocity_kms", ANY)?];
     let observed = table.column_within("observed", ANY)?;
     let [sigma, model] = [table.column("sigma")?, table.column("model")?];
+    let (time_d, unchanging) = (table.column_within("time_d", ANY)?, table.column(UNCHANGING).ok());
     let mut lines: Vec<Line> = Vec::new();
     for k in 0..numbers.len() {
         if k == 0 || numbers[k] != numbers[k - 1] {
-            lines.push(Line { cycle: cycle[k], ..Line::default() });
+            lines.push(Line { time_d: time_d[k], cycle: cycle[k], ..Line::default() });
         }
         let line = lines.last_mut().expect("the first row begins a profile");
         line.velocity_kms.push(velocity[k]);
         line.observed.push(observed[k]);
         line.sigma.push(sigma[k]);
         line.model.push(model[k]);
+        line.unchanging.extend(unchanging.map(|unchanging| unchanging[k]));
     }
     sorted(lines, &folder.join(FILE))
 }
@@ -64,11 +72,13 @@ pub(super) fn simulated(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let list = folder.join("observations.txt");
     let observations = lsd::read_written(&list, &ReadOptions::default())?.observations;
     let line = |profile: &crate::star::observation::Profile| Line {
+        time_d: profile.time_d,
         cycle: (profile.time_d - epoch) / period,
         velocity_kms: (0..profile.intensity.len()).map(|j| profile.velocity_kms(j, observations.step_kms)).collect(),
         observed: profile.intensity.clone(),
         sigma: profile.sigma.clone(),
         model: Vec::new(),
+        unchanging: Vec::new(),
     };
     sorted(observations.profiles.iter().map(line).collect(), &list)
 }

@@ -4,7 +4,7 @@ use super::projection::{Projection, SOUTHERNMOST_DEG};
 use crate::figures::drawing::colour::{BLACK, GREY};
 use crate::figures::drawing::panel::Shade;
 use crate::figures::drawing::{Colour, Figure, Paint, Point, Segment, Stroke, closed, ellipse, open};
-use crate::star::Disc;
+use crate::star::{Disc, Quadrature, SurfaceGrid};
 use std::collections::BTreeMap;
 
 /// Colours of what a map holds, and what it holds where there is nothing but photosphere.
@@ -34,6 +34,31 @@ impl PixelMap {
     /// Whether the rings hold all pixels.
     pub fn is_whole(&self) -> bool {
         !self.values.is_empty() && self.ring_pixels.iter().sum::<usize>() == self.values.len()
+    }
+
+    /// The same on some `pixels`, if it has more: each what the map holds at its centre.
+    pub fn coarser(&self, pixels: usize) -> PixelMap {
+        if pixels >= self.values.len() {
+            return self.clone();
+        }
+        let grid = SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2);
+        let at = |(longitude, latitude): (&f64, &f64)| self.at(longitude.to_degrees(), *latitude);
+        let values = grid.longitude.iter().zip(&grid.latitude).map(at).collect();
+        PixelMap { ring_pixels: grid.rings.iter().map(|ring| ring.pixels.len()).collect(), values }
+    }
+
+    /// What the map holds at a longitude (degrees) and latitude (rad).
+    fn at(&self, longitude_deg: f64, latitude: f64) -> f64 {
+        let share = 0.5 * (latitude.sin() + 1.0) * self.values.len() as f64;
+        let mut below = 0;
+        for &count in &self.ring_pixels {
+            if share < (below + count) as f64 || below + count == self.values.len() {
+                let pixel = (longitude_deg.rem_euclid(360.0) / 360.0 * count as f64) as usize;
+                return self.values[below + pixel.min(count - 1)];
+            }
+            below += count;
+        }
+        f64::NAN
     }
 
     /// Paints the map; neighbours of one colour are one patch, and the colour of the photosphere is the ground.

@@ -3,7 +3,7 @@
 
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
-use crate::data::io::map::{FIT, FitFile};
+use crate::data::io::map::{ChangingFitFile, FIT, FitFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, GREY, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Axis, COLUMN_MM, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
@@ -68,6 +68,38 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
                       spots taken out, with the assumed orbit. Below: the model taken out. To the right: the middle \
                       folded with \
                       the orbital period; phase 0 is the largest velocity."
+        .into();
+    Ok(figure)
+}
+
+/// The velocities of a star that may change.
+pub(super) fn of_changing_map(folder: &Path) -> Result<Figure, PlotError> {
+    let table = Columns::read(&folder.join(FILE))?;
+    let fit: ChangingFitFile = origin::read(folder, FIT)?;
+    table.check_rows(fit.summary.profiles, &format!("the profiles, by {FIT}"))?;
+    let state = fit.summary.parameters.state();
+    let column = |name: &str| Ok::<_, PlotError>(table.column(name)?.to_vec());
+    let (orbit_kms, rv_sigma) = (column("orbit_kms")?, column("rv_sigma_kms")?);
+    let rv: Vec<f64> = column("rv_kms")?.iter().map(|rv| rv + state.vsys_kms).collect();
+    let residual = rv.iter().zip(&orbit_kms).map(|(rv, orbit)| rv - orbit).collect();
+    let errors = |y, sigma, label| Series { class: "observed", label, y, sigma, marker: POINT };
+    let moments = errors(column("observed_kms")?, column("sigma_kms")?, "first moment");
+    let modelled = column("modelled_kms")?;
+    let model = Series { class: "model", label: "model", y: modelled, sigma: Vec::new(), marker: MODEL };
+    let curves = Curves {
+        cycle: table.column_within("cycle", ANY)?,
+        panels: vec![
+            ("RV (km/s)", vec![moments, model]),
+            ("RV − spots (km/s)", vec![errors(rv, rv_sigma.clone(), "")]),
+            ("residual (km/s)", vec![errors(residual, rv_sigma, "")]),
+        ],
+        orbit: state.orbit,
+        vsys_kms: state.vsys_kms,
+        orbit_is: "assumed orbit",
+        orbital: 1,
+    };
+    let mut figure = curves.draw();
+    figure.caption = "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: with     all maps integrated out, and the assumed orbit; their errors are correlated. Below: the assumed orbit taken out.     To the right, if an orbit is assumed: the middle folded with the orbital period; phase 0 is the largest velocity."
         .into();
     Ok(figure)
 }

@@ -1,7 +1,7 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, NOTHING, Table, Tone, injection, is_empty, run, verdicts};
-use crate::data::io::map::{FIT, FitFile, MAP};
+use super::{Chapter, NOTHING, Table, Tone, changing, injection, is_empty, run, verdicts};
+use crate::data::io::map::{FIT, FitFile, MAP, MapKind};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::periodogram::{self, PeakRecord, PeriodogramFile};
 use crate::data::io::truth::{self, Truth, TruthFile};
@@ -22,7 +22,10 @@ use std::path::Path;
 pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError> {
     Ok(match file {
         manifest::FILE => run::chapter(folder)?,
-        MAP => map(&origin::read(folder, FIT)?),
+        MAP => match origin::read::<MapKind>(folder, FIT)?.is_changing() {
+            true => changing::chapter(&origin::read(folder, FIT)?),
+            false => map(&origin::read(folder, FIT)?),
+        },
         periodogram::FILE => search(&origin::read(folder, file)?),
         grid_scan::HEADER => {
             let present = folder.join(PARABOLOID).is_file();
@@ -103,7 +106,7 @@ fn tone(good: bool) -> Tone {
 }
 
 /// The parameters that are given, and the injected ones where they are known.
-fn parameters(values: &ParameterValues, truth: Option<&ParameterValues>) -> Table {
+pub(super) fn parameters(values: &ParameterValues, truth: Option<&ParameterValues>) -> Table {
     let row = |parameter: Parameter| {
         let mut row = vec![label(parameter.name()), number(values.given(parameter)?, 4)];
         row.extend(truth.map(|truth| number(truth.given(parameter), 4)));

@@ -60,6 +60,16 @@ impl Checks {
     /// Of the `residuals` of every profile at its time, where noise is correlated over so many bins: they count for
     /// one.
     pub(super) fn of(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64) -> Self {
+        Checks::with(profiles, correlated_bins, false)
+    }
+
+    /// The same of maps that take up much of the noise in the core of the line, one a profile: what they leave over is
+    /// smaller there, and neighbours have opposite signs. Only the reverse of it is worth a warning.
+    pub(super) fn of_flexible(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64) -> Self {
+        Checks::with(profiles, correlated_bins, true)
+    }
+
+    fn with(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64, flexible: bool) -> Self {
         let all = || profiles.iter().flat_map(|(_, residuals)| residuals);
         let per_datum = mean(all().map(|r| r.scaled * r.scaled));
         let profile = |(time_d, residuals): &(f64, Vec<Residual>)| {
@@ -88,11 +98,12 @@ impl Checks {
             sigma_neighbour_correlation: (pairs().count() as f64).sqrt().recip(),
             warnings: Vec::new(),
         };
-        checks.warnings = checks.doubts(correlated_bins > 1.0);
+        checks.warnings = checks.doubts(correlated_bins > 1.0, flexible);
         checks
     }
 
-    fn doubts(&self, neighbours_go_together: bool) -> Vec<String> {
+    fn doubts(&self, neighbours_go_together: bool, flexible: bool) -> Vec<String> {
+        let size = |x: f64| if flexible { x } else { x.abs() };
         let mut doubts = Vec::new();
         let rare = RARE / self.profiles.len() as f64;
         for (k, profile) in self.profiles.iter().enumerate().filter(|(_, profile)| profile.p_value < rare) {
@@ -104,7 +115,7 @@ impl Checks {
                 1.0 / profile.p_value.max(1e-300)
             ));
         }
-        if self.core_excess_sigma.abs() > FAR {
+        if size(self.core_excess_sigma) > FAR {
             doubts.push(format!(
                 "chi2 is {:.2} per datum in the core of the line and {:.2} outside: errors, local line or continuum \
                 are not right \
@@ -112,7 +123,7 @@ impl Checks {
                 self.chi2_per_datum_core, self.chi2_per_datum_outside
             ));
         }
-        let correlated = self.neighbour_correlation.abs() > FAR * self.sigma_neighbour_correlation;
+        let correlated = size(self.neighbour_correlation) > FAR * self.sigma_neighbour_correlation;
         if correlated && !neighbours_go_together {
             doubts.push(format!(
                 "residuals of neighbouring bins correlate by {:.2}: what is left over is not only noise",
@@ -164,6 +175,23 @@ mod tests {
             (k as f64, residuals)
         };
         Checks::of(&(0..40).map(&mut profile).collect::<Vec<_>>(), 1.0)
+    }
+
+    #[test]
+    fn what_flexible_maps_take_up_is_no_misfit() {
+        let residual = |j: usize, scaled: f64| Residual {
+            depth: if (20..40).contains(&j) { 0.3 } else { 0.01 },
+            difference: 0.0,
+            scaled,
+        };
+        let profiles = |scaled: fn(usize) -> f64| -> Vec<(f64, Vec<Residual>)> {
+            (0..40).map(|k| (f64::from(k), (0..60).map(|j| residual(j, scaled(j))).collect())).collect()
+        };
+        let taken_up = profiles(|j| (-1.0_f64).powi(j as i32) * if (20..40).contains(&j) { 0.5 } else { 1.0 });
+        assert_eq!(Checks::of(&taken_up, 1.0).warnings.len(), 2);
+        assert!(Checks::of_flexible(&taken_up, 1.0).warnings.is_empty());
+        let left_over = profiles(|j| if (20..40).contains(&j) { 2.0 } else { 1.0 });
+        assert_eq!(Checks::of_flexible(&left_over, 1.0).warnings.len(), 2);
     }
 
     #[test]

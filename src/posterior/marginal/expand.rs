@@ -57,7 +57,12 @@ impl Marginal {
 
     /// How the depths of each profile change with its velocity and with the star's parameters, at the most probable
     /// maps (bins, 1 + parameters).
-    fn slopes(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+    pub(in crate::posterior) fn slopes(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> Vec<DMatrix<f64>> {
         let brightness = self.brightness(basis);
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
         let derivative = |parameter: Option<Parameter>| {

@@ -8,20 +8,23 @@
 //! 2. [`Design`]: the profiles of each harmonic, for one star; a model application a harmonic.
 //! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
-//! 5. [`change`]: whether a star that changes explains the profiles better than one that does not.
-//! 6. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 5. [`Maps`]: the most probable maps at any times, with their errors.
+//! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
+//! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 
 pub mod change;
 mod design;
 mod expand;
 mod fit;
 mod forecast;
+mod maps;
 mod posterior;
 
 pub use change::Change;
 pub use design::{Basis, Design};
 pub use fit::{Fitted, Known, bounds, fit, usual_value};
 pub use forecast::Forecast;
+pub use maps::Maps;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};

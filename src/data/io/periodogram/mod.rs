@@ -9,7 +9,7 @@ mod robustness;
 
 pub use alarm::{FalseAlarmRecord, LevelRecord};
 pub use quantities::QuantitiesRecord;
-pub use record::{AliasRecord, OrbitRecord, PeakRecord, PeriodogramFile};
+pub use record::{AliasRecord, FieldRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;

@@ -1,0 +1,46 @@
+//! The most probable maps of a fitted field at any times, with their errors (`docs/method.md` section 9).
+
+use super::{Basis, Marginal};
+use crate::field::{Epoch, FieldError, Settled, Sought, settle};
+use crate::posterior::imaging::Imager;
+use nalgebra::DMatrix;
+
+/// Maps at some times.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Maps {
+    /// Most probable spot filling factor (pixels, times). Below 0 it is brighter than the photosphere.
+    pub filling: DMatrix<f64>,
+    /// Its standard deviation (pixels, times), what is assumed of the field held.
+    pub sd: DMatrix<f64>,
+}
+
+impl Maps {
+    /// At any times (d), on the pixels of `basis`, from the most probable maps of the profiles.
+    pub fn at(settled: &Settled, basis: &Basis, times_d: &[f64]) -> Self {
+        let filling = basis.filling(&settled.evidence.coefficients_at(times_d));
+        let sd = settled.evidence.standard_deviations(&basis.on_pixels.transpose(), times_d);
+        Maps { filling, sd }
+    }
+}
+
+impl Marginal {
+    /// The most probable maps where the jitter is noise of the profiles. [`Marginal::settled`] knows nothing of it, so
+    /// that its maps explain zero points by spots.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn settled_with_jitter(&self, imager: &Imager, basis: &Basis) -> Result<Settled, FieldError> {
+        if self.assumed.jitter_kms == 0.0 {
+            return Ok(self.settled.clone());
+        }
+        let slopes = self.slopes(imager, basis, &[]);
+        let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
+            Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
+        };
+        let linearise =
+            |maps: &DMatrix<f64>| self.design.epochs(imager, maps).into_iter().zip(&slopes).map(jittered).collect();
+        let sought = Sought { field: self.assumed.field, degrees: &basis.degrees, watched: &basis.watched };
+        let start = self.settled.coefficients.clone();
+        settle(linearise, sought, start, Some(&self.settled.evidence), &basis.settling)
+    }
+}

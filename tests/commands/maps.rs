@@ -1,0 +1,109 @@
+//! `map` of a star that may change, and what `plot` and `report` make of it.
+
+use crate::desk::{Desk, dimcmc, says, text, two_spots};
+use crate::svg::{paths, texts};
+use dimcmc::internals::data::io::map::{ChangingFitFile, ChangingMapFile, MapKind};
+use serde_json::{Value, json};
+
+const CONFIG: &str = "config.json";
+
+fn config() -> Value {
+    let mut config = two_spots(json!({}));
+    config["imaging"]["objective"] = json!("marginal-likelihood");
+    config["imaging"].as_object_mut().unwrap().remove("unresolved_spots");
+    config
+}
+
+#[test]
+fn the_files_are_typed_and_the_figures_are_of_them() {
+    let desk = Desk::new(config());
+    let said = desk.succeed(&["map", CONFIG, "--out", "maps", "--times", "0.5,1e4,-2"]);
+    says(
+        &said,
+        &["amplitude", "slope", "lifetime", "ln evidence", "per datum", "maps at", "-2.000, 0.500, 10000.000 d"],
+    );
+    says(&said, &["tell little of the star at 10000 d", "written", "map.json, profiles.csv, rv.csv, fit.json"]);
+    // what is read is what was written
+    let map: ChangingMapFile = serde_json::from_value(desk.json("maps/map.json")).unwrap();
+    let fit: ChangingFitFile = serde_json::from_value(desk.json("maps/fit.json")).unwrap();
+    assert_eq!(serde_json::to_value(&map).unwrap(), desk.json("maps/map.json"));
+    assert_eq!(serde_json::to_value(&fit).unwrap(), desk.json("maps/fit.json"));
+    assert_eq!(map.maps.iter().map(|map| map.time_d).collect::<Vec<_>>(), [-2.0, 0.5, 10000.0]);
+    assert_eq!(map.field, fit.field);
+    assert_eq!(desk.lines("maps/rv.csv"), 1 + fit.summary.profiles);
+    assert_eq!(desk.lines("maps/profiles.csv"), 1 + fit.summary.data);
+    assert!(desk.read("maps/profiles.csv").lines().next().unwrap().ends_with(",residual,unchanging_model"));
+    // the same bytes with another number of threads
+    desk.succeed(&["map", CONFIG, "--out", "again", "--times", "0.5,1e4,-2", "--threads", "1"]);
+    for file in ["map.json", "profiles.csv", "rv.csv", "fit.json"] {
+        assert!(desk.read(&format!("maps/{file}")) == desk.read(&format!("again/{file}")), "{file}");
+    }
+
+    let said = desk.succeed(&["plot", "maps"]);
+    says(&said, &["maps.svg", "changes.svg", "profiles.svg", "residuals.svg", "rv.svg"]);
+    let strip = desk.read("maps/figures/maps.svg");
+    for label in ["-2.00 d", "0.50 d", "10000.00 d", "spot filling factor", "standard deviation of the filling factor"]
+    {
+        assert!(texts(&strip).contains(&label), "{label}: {:?}", texts(&strip));
+    }
+    // three maps and three of their errors; nothing above latitude -30 is hidden at 50 degrees
+    assert_eq!((paths(&strip, "star").len(), paths(&strip, "unseen").len()), (6, 0));
+    let changes = desk.read("maps/figures/changes.svg");
+    assert!(texts(&changes).contains(&"observed − unchanging star") && !changes.contains("NaN"));
+    desk.succeed(&["report", "maps"]);
+    let page = desk.read("maps/report.html");
+    for sentence in ["The spots live some", "Where the star changed.", "lifetime of the spots (d)"] {
+        assert!(page.contains(sentence), "{sentence}");
+    }
+}
+
+#[test]
+fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
+    let mut config = config();
+    config["star"]["inclination_deg"] = json!(20.0);
+    config["imaging"]["spot_lifetime_d"] = json!(20.0);
+    let desk = Desk::new(config);
+    let said = desk.succeed(&["map", CONFIG, "--out", "nights"]);
+    says(&said, &["lifetime     20.00 d"]);
+    // the profiles of the desk are 0.4 d apart, all of one night
+    assert_eq!(desk.json("nights/map.json")["maps"].as_array().unwrap().len(), 1);
+    desk.succeed(&["plot", "nights"]);
+    // at 20 degrees what is below latitude -20 is never seen
+    assert_eq!(paths(&desk.read("nights/figures/maps.svg"), "unseen").len(), 2);
+
+    desk.set("/imaging/spot_lifetime_d", json!("static"));
+    let said = desk.succeed(&["map", CONFIG, "--out", "static"]);
+    says(&said, &["for ever"]);
+    assert!(!said.contains("unchanging"), "{said}");
+    let map = desk.json("static/map.json");
+    assert_eq!((map["maps"].as_array().unwrap().len(), &map["field"]["spot_lifetime_d"]), (1, &Value::Null));
+    let said = desk.succeed(&["plot", "static"]);
+    assert!(said.contains("maps.svg") && !said.contains("changes.svg"), "{said}");
+    desk.succeed(&["report", "static"]);
+}
+
+#[test]
+fn what_makes_no_sense_is_one_line() {
+    let desk = Desk::new(config());
+    for times in ["nan", "1,inf", "2,2", "1e300"] {
+        says(&desk.refusal(&["map", CONFIG, "--out", "maps", "--times", times]), &["--times: "]);
+    }
+    let output = dimcmc(&["map", CONFIG, "--out", "maps", "--times", "1,x"], &desk.path(""));
+    assert_eq!(output.status.code(), Some(2));
+    desk.set("/imaging/objective", json!("entropy"));
+    let said = desk.refusal(&["map", CONFIG, "--out", "maps", "--times", "1"]);
+    says(&said, &["--times: the map does not change", "\"entropy\"", "\"marginal-likelihood\""]);
+    // maps of one kind are not taken for those of the other
+    desk.succeed(&["map", CONFIG, "--out", "map"]);
+    let kind: MapKind = serde_json::from_value(desk.json("map/map.json")).unwrap();
+    assert!(!kind.is_changing());
+
+    desk.set("/imaging/objective", json!("marginal-likelihood"));
+    let mut bare = config();
+    bare["observations"]["simulate"]["spots"] = json!([]);
+    desk.write("bare.json", &bare.to_string());
+    let output = dimcmc(&["map", "bare.json", "--out", "bare"], &desk.path(""));
+    assert_eq!((output.status.code(), text(&output.stdout)), (Some(1), String::new()));
+    says(&text(&output.stderr), &["error: bare.json: no map (amplitude-at-bound): the amplitude of the spots falls"]);
+    assert!(!desk.path("bare").exists());
+}

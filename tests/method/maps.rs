@@ -1,0 +1,154 @@
+//! Maps of stars that change: they come back at their times, and tell nothing of other times.
+
+use dimcmc::{ChangingFit, Config, NoField, Observations, Scene};
+use serde_json::json;
+
+/// Rotation cycles of the profiles: five nights of 0.9 rotations each, ten rotations in all.
+fn cycles() -> Vec<f64> {
+    (0..5).flat_map(|night| (0..5).map(move |k| 2.3 * f64::from(night) + 0.17 * f64::from(k))).collect()
+}
+
+/// A star of 10 rotations with these spots; 0.2 % noise in a bin.
+fn config(spots: &serde_json::Value, cycles: &[f64]) -> Config {
+    Config::default()
+        .with("star.rotation_period_d", 1.0)
+        .with("star.inclination_deg", 50.0)
+        .with("star.vsini_kms", 25.0)
+        .with("star.line", json!({ "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }))
+        .with("star.contrast", 0.1)
+        .with("planet", json!({ "k_kms": 0.0, "porb_over_prot": 1.7, "phi": 0.5 }))
+        .with("observations.simulate.spots", spots.clone())
+        .with("observations.simulate.cycles", cycles.to_vec())
+        .with("observations.simulate.velocity_kms", json!({ "min": -33.0, "max": 33.0, "step": 2.0 }))
+        .with("observations.simulate.snr", 500.0)
+        .with("observations.simulate.pixels", 2000)
+        .with("imaging.pixels", 600)
+}
+
+/// Where profiles are given there is nothing to simulate.
+fn with_profiles(profiles: Observations, jitter_kms: f64) -> Scene {
+    let star = json!({
+        "rotation_period_d": 1.0, "inclination_deg": 50.0, "vsini_kms": 25.0, "contrast": 0.1,
+        "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }
+    });
+    let config = Config::default()
+        .with("star", star)
+        .with("observations.path", "profiles")
+        .with("observations.velocity_jitter_kms", jitter_kms)
+        .with("imaging.pixels", 600)
+        .with("imaging.objective", "marginal-likelihood");
+    Scene::with_profiles(&config, profiles).unwrap()
+}
+
+/// Of a spot at longitude 40 that fades, and one at longitude 220 that grows, at a share of the time between.
+fn spots(share: f64) -> serde_json::Value {
+    json!([[40.0, 35.0, 22.0, 0.95 * (1.0 - share)], [220.0, 35.0, 22.0, 0.95 * share]])
+}
+
+/// Profiles of that star, one scene a profile, and the true maps of the first and the last.
+fn changing_star() -> (Scene, [Vec<f64>; 2]) {
+    let cycles = cycles();
+    let last = cycles.len() - 1;
+    let of = |k: usize| {
+        let share = cycles[k] / cycles[last];
+        let config = config(&spots(share), &[cycles[k]]).with("observations.simulate.seed", k);
+        Scene::new(&config).unwrap()
+    };
+    let scenes: Vec<Scene> = (0..cycles.len()).map(of).collect();
+    let truth = [0, last].map(|k| scenes[k].true_spot_filling().unwrap());
+    let profiles = scenes.iter().map(|scene| scene.observations.profiles[0].clone()).collect();
+    let step_kms = scenes[0].observations.step_kms;
+    (with_profiles(Observations { step_kms, profiles }, 0.0), truth)
+}
+
+/// Of the upper half of the star and a little more: what is below is hardly seen.
+fn seen(scene: &Scene, map: &[f64]) -> Vec<f64> {
+    let latitudes = &scene.imager.grid.latitude;
+    map.iter().zip(latitudes).filter(|(_, latitude)| latitude.to_degrees() > -20.0).map(|(x, _)| *x).collect()
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let (mean_a, mean_b) = (mean(a), mean(b));
+    let product = |x: &[f64], of_x: f64, y: &[f64], of_y: f64| -> f64 {
+        x.iter().zip(y).map(|(x, y)| (x - of_x) * (y - of_y)).sum()
+    };
+    product(a, mean_a, b, mean_b) / (product(a, mean_a, a, mean_a) * product(b, mean_b, b, mean_b)).sqrt()
+}
+
+fn map_at(fit: &ChangingFit, k: usize) -> &[f64] {
+    &fit.maps[k].spot_filling
+}
+
+#[test]
+fn each_night_has_its_own_map_and_far_away_there_is_none() {
+    let (scene, truth) = changing_star();
+    let far_d = 1e6;
+    let fit = scene.changing_maps(Some(&[far_d, 0.0, 9.5])).unwrap();
+    let times: Vec<f64> = fit.maps.iter().map(|map| map.time_d).collect();
+    assert_eq!(times, [0.0, 9.5, far_d], "in the order of time");
+    let correlation = |k: usize, of: usize| correlation(&seen(&scene, map_at(&fit, k)), &seen(&scene, &truth[of]));
+    for (own, other) in [(0, 1), (1, 0)] {
+        // a map of 25 profiles at S/N 500 has edges blurred and little of the far side: 0.7 to 0.8
+        assert!(correlation(own, own) > 0.6, "{own}: {}", correlation(own, own));
+        assert!(correlation(own, own) > correlation(own, other) + 0.4, "{own}: {}", correlation(own, other));
+    }
+    // a star that does not change fits worse, and one that does within the noise
+    let summary = &fit.summary;
+    assert!(summary.chi2_per_datum < 1.1 && summary.chi2_per_datum_unchanging.unwrap() > 1.5, "{summary:?}");
+    assert_eq!(fit.model.len(), 25);
+    assert_eq!(fit.unchanging_model.as_ref().unwrap().len(), 25);
+
+    // the correlation with all profiles is 0 to rounding: the field before the data, alike everywhere
+    let amplitude = fit.fitted.marginal.assumed.field.spectrum.amplitude;
+    let far = &fit.maps[2];
+    assert!(far.spot_filling.iter().all(|x| (x - 0.06).abs() < 1e-12));
+    assert!(far.sigma_spot_filling.iter().all(|sd| (sd / amplitude - 1.0).abs() < 1e-9));
+    // at the times of the data it is known better, and best where the star is seen
+    for map in &fit.maps[..2] {
+        assert!(map.sigma_spot_filling.iter().all(|sd| *sd < amplitude * (1.0 + 1e-9)));
+        assert!(map.sigma_spot_filling.iter().any(|sd| *sd < 0.8 * amplitude));
+    }
+    assert!(fit.warnings.iter().any(|warning| warning.contains("1000000 d")), "{:?}", fit.warnings);
+}
+
+#[test]
+fn velocities_are_those_of_the_orbit_and_zero_points_are_no_spots() {
+    // a star that does not change, its profiles with zero points of 1 km/s
+    let spots = json!([[40.0, 35.0, 22.0, 0.9]]);
+    let jitter_kms = 1.0;
+    let whole = config(&spots, &cycles()).with("observations.simulate.velocity_jitter_kms", jitter_kms);
+    let whole = Scene::new(&whole).unwrap();
+    let truth = whole.true_spot_filling().unwrap();
+    let fit = |jitter_kms: f64| {
+        let mut scene = with_profiles(whole.observations.clone(), 0.0);
+        scene.settings.imaging.spot_lifetime_d = dimcmc::internals::data::config::Hyperparameter::Static;
+        scene.settings.velocity_jitter = dimcmc::internals::data::config::VelocityJitter::Known(jitter_kms);
+        let fit = scene.changing_maps(None).unwrap();
+        let like = correlation(&seen(&scene, map_at(&fit, 0)), &seen(&scene, &truth));
+        (fit, like)
+    };
+    let (counted, like) = fit(jitter_kms);
+    // of a star that does not change there is one map, and nothing to compare it with
+    assert_eq!((counted.maps.len(), counted.unchanging_model.is_none()), (1, true));
+    assert_eq!(counted.zero_points_kms.len(), 25);
+    let (ignored, less_like) = fit(0.0);
+    assert!(like > less_like, "{like} {less_like}");
+    assert!(counted.summary.chi2_per_datum < ignored.summary.chi2_per_datum);
+    // velocities scatter as zero points do, whose error is theirs; 25 of them say their scatter to 15 %
+    let rms = counted.summary.rv_rms_kms;
+    assert!((rms / jitter_kms - 1.0).abs() < 0.45, "{rms}");
+    assert!(counted.summary.rv_error_kms > 0.9 * jitter_kms, "{}", counted.summary.rv_error_kms);
+}
+
+#[test]
+fn a_star_without_spots_and_times_without_sense_are_refused_by_name() {
+    let bare = Scene::new(&config(&json!([]), &cycles())).unwrap();
+    let scene = with_profiles(bare.observations, 0.0);
+    let status = |times: Option<&[f64]>| scene.changing_maps(times).map(|_| ()).map_err(|error| error.status());
+    assert_eq!(status(None), Err("amplitude-at-bound"));
+    for times in [&[][..], &[f64::NAN], &[1.0, f64::INFINITY], &[2.0, 1.0, 2.0], &[1e13]] {
+        assert_eq!(status(Some(times)), Err("no-such-times"), "{times:?}");
+    }
+    assert!(matches!(scene.changing_maps(Some(&[])), Err(NoField::Times(_))));
+}
