@@ -1,6 +1,7 @@
 """Calibration of the marginal likelihood on simulated stars whose spots come and go, beside a static objective.
 
-    python3 examples/calibration_changing.py --simulator simulate_changing.py --search target/release/examples/blind_search
+    python3 examples/calibration_changing.py --simulator target/release/dimcmc \
+        --search target/release/examples/blind_search
     python3 examples/calibration_changing.py --table
 
 The first makes stars one after the other, kinds in turn, without and with a planet, searches each, and appends a line a
@@ -10,6 +11,7 @@ Needs numpy, and what the simulator needs.
 """
 
 import argparse
+import itertools
 import json
 import math
 import subprocess
@@ -31,20 +33,25 @@ KINDS = {
     "polar spot": {"lifetime": 12, "polar-spot": True},
     "two seasons": {"lifetime": 40, "seasons": 2, "nights": 10},
     "geometry": {},
+    "shear": {"lifetime": 30},
 }
 K_KMS, PERIODS = (0.03, 0.3), (0.5, 4.0)
 # of the kind "geometry": inclination (deg), vsini (km/s), rotation period (d), lifetime (d)
 INCLINATION_DEG, VSINI_KMS, ROTATION_D, LIFETIMES_D = (20, 75), (15, 70), (1.5, 6.0), (math.inf, 60, 30, 15, 7)
+# of the kind "shear": differential rotation (rad/d)
+SHEAR_RAD_D = (0.02, 0.1)
 # bins of 1.8 km/s as far from the edge of the line as with 57 bins at 40 km/s
 STEP_KMS, MARGIN_KMS = 1.8, 11.3
 
+SIMULATOR = "dimcmc, or a script that makes a star: OUT --seed N --lifetime D --k KMS ...; several take turns"
 COLUMNS = (
     "kind planet seed profiles true_k_kms true_porb_over_prot true_phi rotation_period_d inclination_deg vsini_kms "
     "lifetime_d false_alarm finding k_kms sigma_k_kms porb_over_prot sigma_porb_over_prot phi sigma_phi on_edge "
     "median_sigma_k_kms amplitude slope fitted_lifetime_d jitter_kms at_bounds "
     "along_kms sigma_along_kms across_kms sigma_across_kms chi2_orbit k_there_kms sigma_k_there_kms phi_there "
     "sigma_phi_there seconds static_false_alarm static_finding static_k_kms static_sigma_k_kms static_porb_over_prot "
-    "static_seconds season_d error"
+    "static_seconds season_d simulator chi2_rv "
+    "chi2_below_0.3 chi2_to_0.45 chi2_half chi2_to_0.85 chi2_rotation chi2_to_2 chi2_to_4 chi2_to_8 error"
 ).split()
 
 
@@ -68,15 +75,55 @@ def star(kind, number, planet):
             "lifetime": LIFETIMES_D[random.integers(len(LIFETIMES_D))],
             "bins": math.ceil(2 * (vsini + MARGIN_KMS) / STEP_KMS) | 1,
         }
+    if kind == "shear":
+        options["shear"] = random.uniform(*SHEAR_RAD_D)
     row = {"kind": kind, "planet": planet, "seed": seed, "true_k_kms": options["k"], "true_porb_over_prot": period}
     row |= {"true_phi": phi, "rotation_period_d": options["prot"], "inclination_deg": options["inclination"]}
     return row | {"vsini_kms": options["vsini"], "lifetime_d": options["lifetime"]}, options
 
 
 def simulate(program, options, folder):
-    """Writes profiles and config.json, star parameters at the truth, by a program with these options."""
-    flags = [f"--{name}" if value is True else f"--{name}={value}" for name, value in options.items()]
-    subprocess.run([sys.executable, program, folder, *flags], check=True, capture_output=True, text=True)
+    """Writes profiles and config.json, star parameters at the truth."""
+    if not is_own(program):
+        flags = [f"--{name}" if value is True else f"--{name}={value}" for name, value in options.items()]
+        subprocess.run([sys.executable, program, folder, *flags], check=True, capture_output=True, text=True)
+        return
+    config, simulated = own(options)
+    folder.mkdir()
+    path = folder / "simulate.json"
+    path.write_text(json.dumps(config | {"observations": {"simulate": simulated}}))
+    subprocess.run([program, "simulate", path, "--out", folder, "--force"], check=True, capture_output=True, text=True)
+    config["planet"]["k_kms"] = 0.0
+    (folder / "config.json").write_text(json.dumps(config | {"observations": {"path": "observations.txt"}}))
+
+
+def is_own(program):
+    """Whether a simulator is `dimcmc` rather than a Python script."""
+    return not program.endswith(".py")
+
+
+def own(options):
+    """A config of `dimcmc simulate` for the same kind of star, and its section observations.simulate."""
+    seed, lifetime, edge = options["seed"], options["lifetime"], options.get("bins", 57) // 2 * STEP_KMS
+    star = {"rotation_period_d": options["prot"], "epoch_d": 0.0, "inclination_deg": options["inclination"]}
+    star |= {"vsini_kms": options["vsini"], "domega_rad_d": options.get("shear", 0.0), "wavelength_nm": 550.0}
+    star |= {"limb_darkening": {"law": "linear", "coefficients": [0.65]}, "photosphere_k": 5500.0, "spot_k": 3500.0}
+    star["line"] = {"shape": "gaussian", "sigma_kms": 2.5, "equivalent_width_kms": 5.8}
+    longitude = seed * 137.5 % 360
+    simulated = {
+        "spots": [[longitude, 80, 20, 0.85]] if options.get("polar-spot") else [],
+        "random_spots": {"lifetime_d": None if math.isinf(lifetime) else lifetime, "seed": seed},
+        "schedule": {"nights": options.get("nights", 15), "seasons": options.get("seasons", 1), "clouds": 0.12}
+        | {"season_spacing_d": 330.0, "seed": seed},
+        "velocity_kms": {"min": -edge, "max": edge, "step": STEP_KMS},
+        "snr": 1000.0,
+        "seed": seed,
+        "pixels": 20000,
+    }
+    planet = {"k_kms": options["k"], "porb_over_prot": options["porb-over-prot"], "phi": options["phi"]}
+    free = {"k_kms": {"prior": "uniform", "min": 0.0, "max": 0.6}, "phi": {"prior": "periodic"}}
+    free["porb_over_prot"] = {"prior": "uniform", "min": 0.5, "max": 4.0}
+    return {"star": star, "instrument": {"resolving_power": 65000.0}, "planet": planet, "parameters": free}, simulated
 
 
 def search(program, config, objective, folder):
@@ -115,6 +162,25 @@ def at_period(folder, period_d, phi):
     }, errors
 
 
+def by_period(folder, row):
+    """What is left over in the velocities without the true orbit, in squares of its errors: of all together, and the
+    part of an orbit of each period, in the mean over ranges of periods (1 is expected of each)."""
+    rv = np.genfromtxt(folder / "rv.csv", delimiter=",", names=True)
+    weight = np.linalg.inv(np.loadtxt(folder / "covariance.csv", delimiter=","))
+    scan = np.genfromtxt(folder / "periodogram.csv", delimiter=",", names=True)
+    turns = rv["time_d"] / (row["true_porb_over_prot"] * row["rotation_period_d"]) - row["true_phi"]
+    left = rv["rv_kms"] - row["true_k_kms"] * np.cos(2 * np.pi * turns)
+    angle = 2 * np.pi * scan["frequency_per_d"][:, None] * rv["time_d"]
+    x = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    slope = np.swapaxes(x, 1, 2) @ (weight @ left)
+    curvature = np.swapaxes(x, 1, 2) @ weight @ x
+    chi2 = 0.5 * np.sum(slope * np.linalg.solve(curvature, slope[..., None])[..., 0], axis=-1)
+    names = [name for name in COLUMNS if name.startswith("chi2_") and name not in ("chi2_orbit", "chi2_rv")]
+    ranges = np.digitize(scan["porb_over_prot"], calibration_table.EDGES)
+    means = {name: float(chi2[ranges == i].mean()) for i, name in enumerate(names) if np.any(ranges == i)}
+    return {"chi2_rv": left @ weight @ left / len(left)} | means
+
+
 def searched(row, folder, args):
     """The line of a simulated star."""
     config = folder / "config.json"
@@ -134,6 +200,7 @@ def searched(row, folder, args):
     there, errors = at_period(folder / "changing", period_d, row["true_phi"])
     off = np.array([there["along_kms"] - row["true_k_kms"], there["across_kms"]])
     row |= there | {"chi2_orbit": off @ np.linalg.solve(errors, off)}
+    row |= by_period(folder / "changing", row)
     found, row["static_seconds"] = search(args.search, config, "spottedness", folder / "static")
     row["static_false_alarm"] = found["false_alarm"]["probability"]
     row["static_finding"] = found["verdict"]["finding"]
@@ -142,12 +209,13 @@ def searched(row, folder, args):
     return row
 
 
-def one(kind, number, planet, args):
+def one(kind, number, planet, simulator, args):
     row, options = star(kind, number, planet)
+    row["simulator"] = Path(simulator).stem
     folder = args.work / f"{kind.replace(' ', '-')}-{row['seed']}"
     try:
         if not (folder / "config.json").exists():
-            simulate(args.simulator, options, folder)
+            simulate(simulator, options, folder)
         return searched(row, folder, args)
     except subprocess.CalledProcessError as failure:
         return row | {"error": failure.stderr.strip().splitlines()[-1]}
@@ -162,17 +230,16 @@ def run(args):
         whole = args.csv.read_text()
         args.csv.write_text(whole[: whole.rfind("\n") + 1])
     done = {(row["kind"], row["seed"]) for row in calibration_table.read(args.csv)}
-    for number in range(args.stars):
-        for planet in (0, 1):
-            for kind in KINDS:
-                if (kind, str(star(kind, number, planet)[0]["seed"])) in done:
-                    continue
-                calibration_table.append(args.csv, COLUMNS, one(kind, number, planet, args))
+    for number, planet, kind in itertools.product(range(args.stars), (0, 1), KINDS):
+        able = [program for program in args.simulator if kind != "shear" or is_own(program)]
+        if able and (kind, str(star(kind, number, planet)[0]["seed"])) not in done:
+            simulator = able[number % len(able)]
+            calibration_table.append(args.csv, COLUMNS, one(kind, number, planet, simulator, args))
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--simulator", help="program that makes a star: OUT --seed N --lifetime D --k KMS ...")
+    parser.add_argument("--simulator", action="append", help=SIMULATOR)
     parser.add_argument("--search", help="dimcmc, or the example blind_search")
     parser.add_argument("--stars", type=int, default=25, help="of each kind, without and with a planet each")
     parser.add_argument("--work", type=Path, default=Path("target/calibration-changing"), help="folder of the stars")

@@ -7,6 +7,8 @@ import numpy as np
 
 # periods within this share of the rotation period, or of its half, are near co-rotation
 NEAR = 0.15
+# ranges of periods (rotations)
+EDGES = (0.3, 0.45, 0.55, 0.85, 1.15, 2.0, 4.0, 8.0)
 # a peak of a false-alarm probability below this is a planet
 FOUND = 0.01
 # a period is right within this share of the resolution, 1 over the time base of a season
@@ -169,6 +171,22 @@ def at_true_period(rows, bare):
     return table(["stars", "number", *head], lines)
 
 
+def left_over(rows):
+    """Mean squares of what is left over in the velocities, with the error that the scatter between stars gives."""
+    names = [name for name in rows[0] if name.startswith("chi2_") and name != "chi2_orbit"]
+    lines = []
+    for name, group in groups(rows):
+        cells = []
+        for column in names:
+            values = [row[column] for row in group if row[column] != ""]
+            error = np.std(values, ddof=1) / math.sqrt(len(values)) if len(values) > 1 else math.nan
+            cells.append(f"{np.mean(values):.2f} +- {error:.2f}" if values else "-")
+        lines.append([name, len(group), *cells])
+    below = (0.0, *EDGES)
+    ranges = [f"{low} to {high}" for low, high in zip(below, EDGES)]
+    return table(["stars", "number", "all velocities", *ranges], lines)
+
+
 def of_the_found(rows):
     """Intervals of planets found at the right period."""
     good = [row for row in rows if row["planet"] and found(row, "changing") and right(row, "changing")]
@@ -240,6 +258,7 @@ def write(path, moments, out):
     sections = {
         "False alarms": false_alarms(without),
         "Orbits at the true period": at_true_period(rows, True),
+        "Velocities left over, by period in rotations": left_over(rows),
         "K and phi at the true period": at_true_period(rows, False),
         "Planets found at the right period": of_the_found(rows),
         "Planets and errors": planets_found(rows),
