@@ -7,6 +7,7 @@ use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
 use crate::data::io::{atomic, lsd};
 use crate::numerics::text::shown;
+use crate::posterior::objective::ObjectiveKind;
 use crate::star::BrightnessModel;
 use std::path::{Path, PathBuf};
 
@@ -67,6 +68,9 @@ pub struct KnownArgs {
     /// Resolving power of the spectrograph
     #[arg(long, value_name = "R")]
     resolving_power: Option<f64>,
+    /// What a reconstruction is judged by: all maps of a star that may change, or the map with the fewest spots
+    #[arg(long, value_name = "NAME", value_parser = ["marginal-likelihood", "spottedness"])]
+    objective: Option<String>,
     /// What the map may hold: brightnesses above and below that of the photosphere, or spots alone
     #[arg(long, value_name = "MODEL", value_parser = ["bright-and-dark", "spots"])]
     brightness: Option<String>,
@@ -107,6 +111,11 @@ impl KnownArgs {
                 }
                 *slot(&mut known) = Some(Given { value, by: name.to_owned() });
             }
+        }
+        if let Some(name) = &self.objective {
+            let kinds = [ObjectiveKind::MarginalLikelihood, ObjectiveKind::Spottedness];
+            let value = kinds.into_iter().find(|kind| kind.name() == name);
+            known.objective = value.map(|value| Given { value, by: "--objective".to_owned() });
         }
         if let Some(name) = &self.brightness {
             let model = |model: &BrightnessModel| model.name() == name;

@@ -8,6 +8,7 @@ use crate::data::config::EquivalentWidth;
 use crate::data::init::{Given, Known};
 use crate::data::io::zdipy::{BrightnessEntropy, Field, Input, LocalLineFile, Target};
 use crate::numerics::text::{Align, columns};
+use crate::posterior::objective::ObjectiveKind;
 use crate::star::BrightnessModel;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -91,6 +92,7 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
             },
             by: here(input.entropy.line),
         }),
+        objective: Some(Given { value: ObjectiveKind::Spottedness, by: "one map, as there".to_owned() }),
         chi2_target: chi2_target(input),
         ..Known::default()
     };

@@ -40,7 +40,8 @@ pub struct Compressed {
     directions: DMatrix<f64>,
     /// `Q^T W J c0`, which makes a residual of a misfit.
     expected: DVector<f64>,
-    /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data.
+    /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data, and what
+    /// is beside them.
     pub constant: f64,
 }
 
@@ -78,15 +79,15 @@ impl Compressed {
         rows.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
         let mut directions = DMatrix::identity(n, n);
         if how.left_out > 0.0 && n > 0 {
-            directions = leading(&rows, how)?;
-            directions = with(directions, &(&whiten * &epoch.misfit));
-            directions = with(directions, &(&whiten * &epoch.slopes));
+            directions = leading_directions(&rows, how)?;
+            directions = with_directions(directions, &(&whiten * &epoch.misfit));
+            directions = with_directions(directions, &(&whiten * &epoch.slopes));
             // nalgebra's own product with a transpose is no product of blocks: five times slower
             rows = directions.transpose() * rows;
         }
         let expected = directions.tr_mul(&(&whiten * (&epoch.jacobian * around)));
         let ln_noise = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
-        let constant = -0.5 * (ln_noise + n as f64 * TAU.ln());
+        let constant = epoch.beside - 0.5 * (ln_noise + n as f64 * TAU.ln());
         Some((Compressed { whiten, directions, expected, constant }, rows))
     }
 
@@ -112,7 +113,7 @@ impl Compressed {
 
 /// Orthonormal directions (data, kept) that hold all of `rows` (data, H) but what may be lost; `None` if that is not
 /// finite.
-fn leading(rows: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
+pub fn leading_directions(rows: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
     let n = rows.nrows();
     let eigen = (rows * rows.transpose()).try_symmetric_eigen(f64::EPSILON, MOST_ROTATIONS)?;
     let mut order: Vec<usize> = (0..n).collect();
@@ -127,7 +128,7 @@ fn leading(rows: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
 }
 
 /// Orthonormal directions that hold some more columns, too.
-fn with<C: nalgebra::Dim, S: nalgebra::Storage<f64, nalgebra::Dyn, C>>(
+pub fn with_directions<C: nalgebra::Dim, S: nalgebra::Storage<f64, nalgebra::Dyn, C>>(
     mut directions: DMatrix<f64>,
     more: &nalgebra::Matrix<f64, nalgebra::Dyn, C, S>,
 ) -> DMatrix<f64> {

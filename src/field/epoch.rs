@@ -17,6 +17,9 @@ pub struct Epoch {
     /// Change of the model by each nuisance of this epoch, per standard deviation of its prior (data, nuisances): they
     /// are integrated out. No columns: no nuisances.
     pub nuisances: DMatrix<f64>,
+    /// ln of the density of data of this time that say nothing of the field, and are not among these; 0 if there are
+    /// none.
+    pub beside: f64,
     /// D' (data, columns): change of the model by each number whose gradient and information are asked for, for example
     /// the velocity. The same number of columns, perhaps none, in every epoch.
     pub slopes: DMatrix<f64>,
@@ -37,6 +40,7 @@ impl Epoch {
     pub(super) fn is_sound(&self) -> bool {
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         self.time_d.is_finite()
+            && self.beside.is_finite()
             && finite(self.jacobian.as_slice())
             && finite(self.misfit.as_slice())
             && finite(self.nuisances.as_slice())

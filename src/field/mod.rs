@@ -35,7 +35,7 @@ mod quadratic;
 mod settle;
 mod spectrum;
 
-pub use compress::Compression;
+pub use compress::{Compression, leading_directions, with_directions};
 pub use derivatives::Derivatives;
 pub use epoch::Epoch;
 pub use evidence::Evidence;

@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Largest change of the field in a step after which the next is made by the same covariance.
-const FROZEN_BELOW: f64 = 0.1;
+const FROZEN_BELOW: f64 = 0.3;
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug)]

@@ -127,6 +127,7 @@ impl Star {
             time_d: profile.time_d,
             jacobian: of_pairs(&jacobian),
             misfit: of_pairs(&(&observed - &depth)).column(0).into_owned(),
+            beside: 0.0,
             nuisances: DMatrix::zeros(halved.len(), 0),
             variance: halved,
             slopes: of_pairs(&slope(&depth, profile.velocity_kms[1] - profile.velocity_kms[0])),

@@ -42,6 +42,7 @@ impl Problem {
                 variance: some(200 + k, n, 1).column(0).map(|x| 0.05 + 0.04 * x),
                 nuisances: some(300 + k, n, nuisances) * 0.4,
                 slopes: some(400 + k, n, columns),
+                beside: 0.0,
             }
         };
         let epochs = times_d.iter().enumerate().map(epoch).collect();

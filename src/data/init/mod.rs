@@ -17,6 +17,7 @@ use crate::data::config::{ConfigError, Draft, EquivalentWidth};
 use crate::data::io::lsd::{self, DataSet, LsdError, ReadOptions};
 use crate::numerics::units::gaussian_as_wide_as_voigt;
 use crate::posterior::first_look::LookError;
+use crate::posterior::objective::ObjectiveKind;
 use crate::star::BrightnessModel;
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
@@ -55,12 +56,18 @@ pub struct Known {
     pub resolving_power: Option<Given<f64>>,
     pub velocity_range_kms: Option<Given<(f64, f64)>>,
     pub sigma_scale: Option<Given<f64>>,
+    pub objective: Option<Given<ObjectiveKind>>,
     pub brightness: Option<Given<BrightnessModel>>,
     pub pixels: Option<Given<usize>>,
     pub chi2_target: Option<Given<f64>>,
 }
 
 impl Known {
+    /// What reconstructions are judged by: what is right for most stars, if nothing else is given.
+    fn objective(&self) -> ObjectiveKind {
+        self.objective.as_ref().map_or(ObjectiveKind::MarginalLikelihood, |given| given.value)
+    }
+
     /// Standard deviation (km/s) of the Gaussian as wide as the local line, whose Gaussian has that of `sigma_kms`.
     fn line_width_kms(&self, sigma_kms: f64) -> f64 {
         self.line_gamma_kms.as_ref().map_or(sigma_kms, |gamma| gaussian_as_wide_as_voigt(sigma_kms, gamma.value))
@@ -153,7 +160,14 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     let mut notes: Vec<String> = remarks.into_iter().map(|remark| format!("profiles: {remark}")).collect();
     notes.extend(values.notes(known));
     notes.iter().for_each(|note| say(note));
-    let trial = trial::run(&mut draft, place, Profiles { whole: &whole, cut: &cut }, &values, known)?;
+    let profiles = Profiles { whole: &whole, cut: &cut };
+    // one map that does not change has the sharper eye for what is wrong with a model
+    let mut trial = trial::run(&mut draft, place, profiles, &values, known)?;
+    draft.imaging.objective = known.objective();
+    if draft.rotation_period_d.is_some() && known.objective() == ObjectiveKind::MarginalLikelihood {
+        trial.errors = trial::errors(&draft, place.config, profiles)?;
+    }
+    values::note_objective(&draft, known, trial.change.as_ref(), &mut ledger);
     notes.extend(trial.notes(&draft));
     values.note_errors(known, trial.errors.as_ref(), &mut ledger);
     Values::note_jitter(draft.velocity_jitter, &mut ledger);

@@ -4,12 +4,15 @@
 use super::digits::rounded;
 use super::values::Values;
 use super::{Known, Place, ProposalError, to_json};
-use crate::data::config::{self, Automatic, ConfigError, Draft, VelocityJitter};
+use crate::data::config::{self, Automatic, ConfigError, Draft, ImagingSettings, VelocityJitter};
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::scene::Scene;
 use crate::data::search::{self, SearchError, SearchSettings};
+use crate::planets::periodogram::{Frequencies, FrequencySettings};
+use crate::posterior::expansion::nuisances;
+use crate::posterior::marginal::Change;
 use crate::posterior::noise::MeasuredErrors;
-use crate::posterior::objective::{Parameter, Reference, ReferenceError};
+use crate::posterior::objective::{ObjectiveKind, Parameter, Reference, ReferenceError};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
 use std::path::Path;
@@ -44,6 +47,8 @@ pub(super) struct Trial {
     pub errors: Option<MeasuredErrors>,
     /// Why no map fits as well as the errors promise, if none does.
     pub diagnosis: Option<Diagnosis>,
+    /// That the star changes, where no map fits and that is why.
+    pub change: Option<Change>,
     /// Whether the start is an orbit, since there is no fit without one.
     pub orbit: bool,
     /// Whether the measured vsini stands in place of the given one, with which nothing fits.
@@ -60,6 +65,8 @@ pub(super) enum End {
         /// How spotted the star is then.
         spottedness: f64,
     },
+    /// None does, since the star changes.
+    Changes,
     /// None does, and none will: why.
     Failed(String),
 }
@@ -91,7 +98,8 @@ pub(super) fn run(
     values: &Values,
     known: &Known,
 ) -> Result<Trial, ProposalError> {
-    let mut trial = Trial { end: End::Untried, errors: None, diagnosis: None, orbit: false, measured_vsini: false };
+    let mut trial =
+        Trial { end: End::Untried, errors: None, diagnosis: None, change: None, orbit: false, measured_vsini: false };
     if draft.rotation_period_d.is_none() {
         let stand_in = Draft {
             rotation_period_d: Some(STAND_IN_D),
@@ -117,7 +125,15 @@ pub(super) fn run(
             (*draft, attempt, trial.measured_vsini) = (measured, other, true);
         }
     }
-    if attempt.misfits && (trial.measured_vsini || !values.is_another_star(known)) {
+    let is_this_star = trial.measured_vsini || !values.is_another_star(known);
+    if attempt.misfits && is_this_star && known.objective() == ObjectiveKind::MarginalLikelihood {
+        trial.change = change(draft, config, profiles)?;
+        if trial.change.is_some() {
+            trial.end = End::Changes;
+            return Ok(trial);
+        }
+    }
+    if attempt.misfits && is_this_star {
         let mut with_orbit = draft.clone();
         if search(&mut with_orbit, config, profiles, attempt.scene.as_ref())? {
             let other = attempt_of(&with_orbit, config, profiles)?;
@@ -140,6 +156,35 @@ pub(super) fn run(
         Err(error) => End::Failed(error),
     };
     Ok(trial)
+}
+
+/// What the profiles say of their errors where all maps are integrated over.
+///
+/// # Errors
+/// As [`run`].
+pub(super) fn errors(
+    draft: &Draft,
+    config: &Path,
+    profiles: Profiles,
+) -> Result<Option<MeasuredErrors>, ProposalError> {
+    Ok(integrated(draft, config, profiles)?.measured.errors)
+}
+
+fn integrated(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Scene, ProposalError> {
+    let imaging = ImagingSettings { objective: ObjectiveKind::MarginalLikelihood, ..draft.imaging.clone() };
+    scene(&Draft { imaging, ..draft.clone() }, config, profiles)
+}
+
+/// That the star changes, if it does.
+fn change(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Option<Change>, ProposalError> {
+    let Scene { settings, imager, .. } = integrated(draft, config, profiles)?;
+    let Ok(frequencies) =
+        Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())
+    else {
+        return Ok(None);
+    };
+    let change = Change::of(&imager, settings.values, &frequencies, &nuisances(&settings.free), settings.known_field());
+    Ok(change.ok().filter(Change::is_changing))
 }
 
 /// The draft as commands see it.
@@ -203,7 +248,7 @@ fn search(draft: &mut Draft, config: &Path, profiles: Profiles, tried: Option<&S
 impl Trial {
     /// Whether a map can be made of the config as it is.
     pub fn is_complete(&self) -> bool {
-        matches!(self.end, End::Reached { .. })
+        matches!(self.end, End::Reached { .. } | End::Changes)
     }
 
     /// It in words.
@@ -240,6 +285,11 @@ impl Trial {
                     false => format!("a brightness that varies by {percent:.1} % rms fits"),
                 };
                 format!("tried out: {what} the profiles{orbit}{many}")
+            }
+            End::Changes => {
+                "tried out: no map of a star that stays as it is fits the profiles, and none need: the star \
+                             changes while it is observed"
+                    .into()
             }
             End::Failed(error) => format!("no command takes the config as it is: {error}"),
         }

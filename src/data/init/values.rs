@@ -7,6 +7,7 @@ use crate::data::config::{Automatic, Draft, EquivalentWidth, ImagingSettings, Ve
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::posterior::first_look::{Continuum, FirstLook, LineModel, LookError};
+use crate::posterior::marginal::Change;
 use crate::posterior::noise::MeasuredErrors;
 use crate::posterior::nuisances::LineAndContinuum;
 use crate::star::BrightnessModel;
@@ -345,6 +346,25 @@ fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
         ledger.note("imaging.chi2_target", given.value, "", Source::Given, given.by.as_str());
     }
     imaging
+}
+
+/// What a reconstruction is judged by, and why.
+pub(super) fn note_objective(draft: &Draft, known: &Known, change: Option<&Change>, ledger: &mut Ledger) {
+    let (source, remark) = match (&known.objective, change) {
+        (Some(given), _) => (Source::Given, given.by.clone()),
+        (None, Some(change)) => (
+            Source::Data,
+            format!(
+                "the star changes: spots that live some {:.2} d explain the profiles better",
+                change.spot_lifetime_d
+            ),
+        ),
+        (None, None) => (
+            Source::Assumed,
+            "spots of most stars change within the observations, which looks like an orbit".to_owned(),
+        ),
+    };
+    ledger.note("imaging.objective", draft.imaging.objective.name(), "", source, remark);
 }
 
 /// Upper bound of K: as far as the lines are seen to move from peak to peak, twice of what moves them if that is a

@@ -1,11 +1,13 @@
 //! The star's side of the marginal likelihood: what profiles each harmonic makes.
 
+use super::condense::Condensed;
 use super::{DEGREE, MEAN_FILLING};
 use crate::field::{Compression, Epoch, Harmonics, Settling};
 use crate::posterior::imaging::Imager;
 use crate::star::{Response, StarState, SurfaceGrid};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Pixels at which changes of the maps are watched, about.
 const WATCHED: usize = 150;
@@ -67,27 +69,34 @@ impl Basis {
     }
 }
 
-/// Line depth and continuum of every profile for each harmonic, before the division of one by the other.
+/// Line depth and continuum of every profile for each harmonic, before the division of one by the other; depths in the
+/// few numbers that hold them.
 #[derive(Clone, Debug)]
 pub struct Design {
     response: Response,
-    /// Of each profile (bins, H).
+    condensed: Arc<Condensed>,
+    /// Of each profile (numbers, H).
     line: Vec<DMatrix<f64>>,
     /// (H, profiles).
     continuum: DMatrix<f64>,
-    /// The same of a star without spots: all bins, all profiles.
-    bare_line: Vec<f64>,
+    /// The same of a star without spots.
+    bare_line: Vec<DVector<f64>>,
     bare_continuum: Vec<f64>,
 }
 
 impl Design {
     /// Of the star in `imager` at `state`. A model application a harmonic.
     pub fn new(imager: &Imager, basis: &Basis, state: &StarState) -> Self {
-        Design::of(imager.response(state), basis)
+        Design::of(imager, basis, (imager.response(state), state), None)
     }
 
-    /// Seen through `response`.
-    pub fn of(response: Response, basis: &Basis) -> Self {
+    /// Seen through a response at a state, in the numbers of a design that is `like` this one, of a star near by.
+    pub fn of(
+        imager: &Imager,
+        basis: &Basis,
+        (response, state): (Response, &StarState),
+        like: Option<&Design>,
+    ) -> Self {
         let apply = |map: &[f64]| {
             let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
             response.apply(map, &mut line, &mut continuum);
@@ -103,10 +112,25 @@ impl Design {
             }
             line
         };
-        let line = (0..response.profiles()).map(of_profile).collect();
+        let lines: Vec<DMatrix<f64>> = (0..response.profiles()).map(of_profile).collect();
         let continuum = DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]);
-        let (bare_line, bare_continuum) = apply(&vec![1.0; response.pixels()]);
-        Design { response, line, continuum, bare_line, bare_continuum }
+        let (bare, bare_continuum) = apply(&vec![1.0; response.pixels()]);
+        let condensed = match like {
+            Some(like) => Arc::clone(&like.condensed),
+            None => Arc::new(Condensed::new(imager, basis, (&response, state), &lines, &bare)),
+        };
+        let line = lines.par_iter().enumerate().map(|(k, line)| condensed.tell(k, line)).collect();
+        let bare = |k: usize| {
+            let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &bare[response.bins(k)]);
+            condensed.tell(k, &bins).column(0).into_owned()
+        };
+        let bare_line = (0..response.profiles()).map(bare).collect();
+        Design { response, condensed, line, continuum, bare_line, bare_continuum }
+    }
+
+    /// Columns over the bins of each profile in its numbers.
+    pub fn condensed(&self, columns: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+        columns.iter().enumerate().map(|(k, columns)| self.condensed.tell(k, columns)).collect()
     }
 
     /// Brightness of a spot over that of the photosphere.
@@ -119,12 +143,12 @@ impl Design {
         &self.response
     }
 
-    /// Model depth of the bins of profile `k` for a map of these coefficients, and its continuum.
+    /// Model depths of profile `k` for a map of these coefficients, and its continuum.
     fn depths(&self, k: usize, coefficients: &DVector<f64>) -> (DVector<f64>, f64) {
         let q = 1.0 - self.contrast();
         let bare = 1.0 - q * MEAN_FILLING;
         let continuum = bare * self.bare_continuum[k] - q * self.continuum.column(k).dot(coefficients);
-        let line = DVector::from_column_slice(&self.bare_line[self.response.bins(k)]) * bare;
+        let line = &self.bare_line[k] * bare;
         ((line - &self.line[k] * coefficients * q) / continuum, continuum)
     }
 
@@ -137,7 +161,6 @@ impl Design {
     }
 
     fn epoch(&self, imager: &Imager, k: usize, coefficients: &DVector<f64>) -> Epoch {
-        let (bins, data) = (self.response.bins(k), &imager.data);
         let (model, continuum) = self.depths(k, coefficients);
         let scale = -(1.0 - self.contrast()) / continuum;
         let mut jacobian = &self.line[k] * scale;
@@ -145,10 +168,11 @@ impl Design {
         Epoch {
             time_d: imager.sampling.profiles[k].0,
             jacobian,
-            misfit: DVector::from_column_slice(&data.depth[bins.clone()]) - model,
-            variance: DVector::from_iterator(bins.len(), data.inverse_variance[bins.clone()].iter().map(|w| w.recip())),
-            nuisances: data.nuisances.line_and_continuum_of(bins.clone()),
-            slopes: DMatrix::zeros(bins.len(), 0),
+            variance: DVector::repeat(model.len(), 1.0),
+            slopes: DMatrix::zeros(model.len(), 0),
+            misfit: &self.condensed.data[k] - model,
+            nuisances: self.condensed.nuisances[k].clone(),
+            beside: self.condensed.beside[k],
         }
     }
 }

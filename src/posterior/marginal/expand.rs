@@ -42,7 +42,7 @@ impl Marginal {
     }
 
     fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
-        let slopes = self.slopes(imager, basis, stellar);
+        let slopes = self.design.condensed(&self.slopes(imager, basis, stellar));
         let misfits: Vec<DVector<f64>> =
             self.design.epochs(imager, &self.settled.coefficients).into_iter().map(|epoch| epoch.misfit).collect();
         let of_all = self.settled.evidence.with(&misfits, &slopes)?;

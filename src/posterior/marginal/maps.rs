@@ -33,7 +33,7 @@ impl Marginal {
         if self.assumed.jitter_kms == 0.0 {
             return Ok(self.settled.clone());
         }
-        let slopes = self.slopes(imager, basis, &[]);
+        let slopes = self.design.condensed(&self.slopes(imager, basis, &[]));
         let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
             Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
         };

@@ -13,6 +13,7 @@
 //! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 
 pub mod change;
+mod condense;
 mod design;
 mod expand;
 mod fit;

@@ -108,7 +108,11 @@ impl MarginalPosterior {
     pub(super) fn marginal_at(&self, values: ParameterValues, star: bool) -> Result<Marginal, FieldError> {
         let MarginalPosterior { imager, basis, reference, nearby, .. } = self;
         let design = match star {
-            true => Arc::new(Design::of(imager.response_near(nearby, &values.state()), basis)),
+            true => {
+                let state = values.state();
+                let response = imager.response_near(nearby, &state);
+                Arc::new(Design::of(imager, basis, (response, &state), Some(&reference.design)))
+            }
             false => Arc::clone(&reference.design),
         };
         let assumed = Assumed::of(&values, reference.assumed.jitter_kms);

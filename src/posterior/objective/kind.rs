@@ -16,8 +16,7 @@ pub enum ObjectiveKind {
     /// `max_s [alpha S - chi2/2]` at the alpha of the reference solution; spelt `regularized-likelihood` too.
     #[serde(alias = "regularized-likelihood")]
     RegularisedLikelihood,
-    /// The likelihood with all maps integrated out, which may change with time: spots are a Gaussian field. For
-    /// `periodogram` and `limits`.
+    /// The likelihood with all maps integrated out, which may change with time: spots are a Gaussian field.
     MarginalLikelihood,
 }
 
