@@ -207,15 +207,7 @@ impl Scene {
     /// What becomes of the spots in a blind search.
     #[doc(hidden)]
     pub fn spots(&self) -> Spots {
-        match self.settings.imaging.objective {
-            ObjectiveKind::MarginalLikelihood => Spots::Integrated(self.known()),
-            _ => Spots::OneMap(Some(self.known())),
-        }
-    }
-
-    /// What is known of the field of spots.
-    fn known(&self) -> Known {
-        let ImagingSettings { spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.settings.imaging;
+        let ImagingSettings { objective, spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.settings.imaging;
         let jitter_kms = match self.settings.velocity_jitter {
             // a map that does not change would have said how large it is
             _ if self.measured.velocity_jitter.is_some() => None,
@@ -226,7 +218,11 @@ impl Scene {
             Hyperparameter::Static => Some(Lifetime::Static),
             days => days.known().map(Lifetime::Days),
         };
-        Known { amplitude: spot_amplitude.known(), slope: spot_slope.known(), lifetime, jitter_kms }
+        let known = Known { amplitude: spot_amplitude.known(), slope: spot_slope.known(), lifetime, jitter_kms };
+        match objective {
+            ObjectiveKind::MarginalLikelihood => Spots::Integrated(known),
+            _ => Spots::OneMap(Some(known)),
+        }
     }
 
     /// The star reconstructed at the config's values: map, model profiles, and whether they fit.
@@ -246,7 +242,11 @@ impl Scene {
     /// # Errors
     /// A field that cannot be fitted to the profiles.
     pub fn changing_maps(&self, times_d: Option<&[f64]>) -> Result<ChangingFit, NoField> {
-        ChangingFit::new(&self.imager, &self.observations, self.settings.values, self.known(), times_d)
+        let known = match self.spots() {
+            Spots::Integrated(known) | Spots::OneMap(Some(known)) => known,
+            Spots::OneMap(None) => Known::default(),
+        };
+        ChangingFit::new(&self.imager, &self.observations, self.settings.values, known, times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.
