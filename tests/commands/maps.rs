@@ -64,7 +64,7 @@ fn by_default_there_is_a_map_a_night_and_one_of_a_star_that_does_not_change() {
     config["imaging"]["spot_lifetime_d"] = json!(20.0);
     let desk = Desk::new(config);
     let said = desk.succeed(&["map", CONFIG, "--out", "nights"]);
-    says(&said, &["lifetime     20.00 d"]);
+    says(&said, &["lifetime", " 20.00 d"]);
     // of the profiles, 0.33 to 0.51 d apart, some are in nights of their own
     assert_eq!(desk.json("nights/map.json")["maps"].as_array().unwrap().len(), 5);
     desk.succeed(&["plot", "nights"]);

@@ -89,8 +89,7 @@ fn each_night_has_its_own_map_and_far_away_there_is_none() {
     assert_eq!(times, [0.0, 9.3, far_d], "in the order of time");
     let correlation = |k: usize, of: usize| correlation(&seen(&scene, map_at(&fit, k)), &seen(&scene, &truth[of]));
     for (own, other) in [(0, 1), (1, 0)] {
-        println!("{own}: {} {}", correlation(own, own), correlation(own, other));
-        // a map of 16 profiles at S/N 500 has edges blurred and little of the far side: 0.7 to 0.8
+        // a map of 16 profiles at S/N 500 has edges blurred and little of the far side: 0.77 and 0.83
         assert!(correlation(own, own) > 0.6, "{own}: {}", correlation(own, own));
         assert!(correlation(own, own) > correlation(own, other) + 0.4, "{own}: {}", correlation(own, other));
     }
@@ -114,7 +113,7 @@ fn each_night_has_its_own_map_and_far_away_there_is_none() {
 }
 
 #[test]
-fn velocities_are_those_of_the_orbit_and_zero_points_are_no_spots() {
+fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
     // a star that does not change, its profiles with zero points of 1 km/s
     let spots = json!([[40.0, 35.0, 22.0, 0.9]]);
     let jitter_kms = 1.0;
@@ -135,7 +134,6 @@ fn velocities_are_those_of_the_orbit_and_zero_points_are_no_spots() {
     assert_eq!((counted.maps.len(), counted.unchanging_model.is_none()), (1, true));
     assert_eq!(counted.zero_points_kms.len(), 16);
     let (ignored, less_like) = fit(0.0);
-    println!("{like} {less_like}, {} {}", counted.summary.rv_rms_kms, counted.summary.rv_error_kms);
     assert!(like > less_like, "{like} {less_like}");
     assert!(counted.summary.chi2_per_datum < ignored.summary.chi2_per_datum);
     // velocities scatter as zero points do, whose error is theirs; 16 of them say their scatter to 18 %
