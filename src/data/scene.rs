@@ -237,7 +237,11 @@ impl Scene {
     /// # Errors
     /// A field that cannot be fitted to the profiles.
     pub fn changing_maps(&self, times_d: Option<&[f64]>) -> Result<ChangingFit, NoField> {
-        ChangingFit::new(&self.imager, &self.observations, self.settings.values, self.known(), times_d)
+        let known = match self.spots() {
+            Spots::Integrated(known) | Spots::OneMap(Some(known)) => known,
+            Spots::OneMap(None) => Known::default(),
+        };
+        ChangingFit::new(&self.imager, &self.observations, self.settings.values, known, times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.

@@ -19,6 +19,7 @@ mod init;
 mod injection;
 mod limits;
 mod maps;
+mod marginal;
 mod merge;
 mod newcomer;
 mod noise;

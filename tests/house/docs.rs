@@ -295,6 +295,9 @@ fn star() -> Desk {
     std::fs::remove_dir_all(desk.path("data")).unwrap();
     desk.succeed(&["init", "observations.txt", "--rotation-period", "3", "--inclination", "38"]);
     shorten(&desk);
+    let mut changing = desk.json("star.json");
+    changing["imaging"]["objective"] = json!("marginal-likelihood");
+    desk.write("changing.json", &changing.to_string());
     desk
 }
 
@@ -390,7 +393,7 @@ impl Described {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-            let is_config = ["config.json", "star.json", "zdipy.json"].contains(&name.as_str());
+            let is_config = ["changing.json", "config.json", "star.json", "zdipy.json"].contains(&name.as_str());
             match path.extension().and_then(|e| e.to_str()) {
                 _ if path.is_dir() && name != "configs" && !name.ends_with(".zarr") => self.check(&path),
                 Some("json" | "jsonl" | "csv") if !is_config && !name.contains("schema") => self.file(&name, &path),

@@ -455,3 +455,49 @@ fn without_data_the_field_is_as_before() {
     let nothing = Evidence::new(problem.field, &problem.degrees, &[], &DMatrix::zeros(3, 0), EXACT).unwrap();
     assert_eq!((nothing.ln_evidence(), nothing.quadratic().gradient.len()), (0.0, 0));
 }
+
+/// Two epochs of a field of two coefficients, of which the model is a quotient, as a profile is of line and continuum.
+#[test]
+fn ln_z_of_a_model_that_is_not_linear_is_the_integral() {
+    let (lines, continua, sigma) = ([some(1, 6, 2), some(2, 6, 2)], [some(3, 2, 1), some(4, 2, 1)], 0.05);
+    let model = |k: usize, c: &DVector<f64>| {
+        let continuum = 1.0 + 0.4 * continua[k].column(0).dot(c);
+        ((&lines[k] * c).add_scalar(0.3) / continuum, continuum)
+    };
+    let truth = DVector::from_vec(vec![0.35, -0.2]);
+    let data: Vec<DVector<f64>> =
+        (0..2).map(|k| model(k, &truth).0 + some(5 + k, 6, 1).column(0) * (3.0 * sigma)).collect();
+    let field = field(0.4, 0.5, Lifetime::Static, 0.0);
+    let degrees = [1, 2];
+    let linearise = |maps: &DMatrix<f64>| {
+        let epoch = |k: usize| {
+            let c = maps.column(k).into_owned();
+            let (depth, continuum) = model(k, &c);
+            let jacobian = (&lines[k] - &depth * continua[k].column(0).transpose() * 0.4) / continuum;
+            let (misfit, n) = (&data[k] - depth, 6);
+            let variance = DVector::repeat(n, sigma * sigma);
+            let (nuisances, slopes) = (DMatrix::zeros(n, 0), DMatrix::zeros(n, 0));
+            Epoch { time_d: k as f64, jacobian, misfit, variance, nuisances, beside: 0.0, slopes }
+        };
+        (0..2).map(epoch).collect()
+    };
+    let watched = DMatrix::identity(2, 2);
+    let sought = Sought { field, degrees: &degrees, watched: &watched };
+    let settled = settle(linearise, sought, DMatrix::zeros(2, 2), None, &Settling::default()).unwrap();
+    // the midpoint rule over all coefficients
+    let sd: Vec<f64> = field.spectrum.variances(&degrees).into_iter().map(f64::sqrt).collect();
+    let (cells, reach) = (600, 6.0);
+    let place = |i: usize, sd: f64| sd * reach * (2.0 * (i as f64 + 0.5) / cells as f64 - 1.0);
+    let normal = |x: f64, sd: f64| (-0.5 * (x / sd).powi(2)).exp() / (sd * TAU.sqrt());
+    let mut integral = 0.0;
+    for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+        let c = DVector::from_vec(vec![place(i, sd[0]), place(j, sd[1])]);
+        let prior = normal(c[0], sd[0]) * normal(c[1], sd[1]);
+        let chance = |k: usize| (&data[k] - model(k, &c).0).iter().map(|r| normal(*r, sigma)).product::<f64>();
+        integral += prior * chance(0) * chance(1);
+    }
+    let cell = (2.0 * reach / cells as f64).powi(2) * sd[0] * sd[1];
+    let (found, wanted) = (settled.evidence.ln_evidence(), (integral * cell).ln());
+    // what the second order of the model does within the width of the integrand
+    assert!((found - wanted).abs() < 0.02, "{found}, not {wanted}");
+}

@@ -3,12 +3,12 @@
 use dimcmc::{ChangingFit, Config, NoField, Observations, Scene};
 use serde_json::json;
 
-/// Rotation cycles of the profiles: five nights of 0.9 rotations each, ten rotations in all.
+/// Rotation cycles of the profiles: four nights of four profiles.
 fn cycles() -> Vec<f64> {
-    (0..5).flat_map(|night| (0..5).map(move |k| 2.3 * f64::from(night) + 0.17 * f64::from(k))).collect()
+    (0..4).flat_map(|night| (0..4).map(move |k| 3.0 * f64::from(night) + 0.21 * f64::from(k))).collect()
 }
 
-/// A star of 10 rotations with these spots; 0.2 % noise in a bin.
+/// A star with these spots; 0.2 % noise in a bin.
 fn config(spots: &serde_json::Value, cycles: &[f64]) -> Config {
     Config::default()
         .with("star.rotation_period_d", 1.0)
@@ -19,10 +19,10 @@ fn config(spots: &serde_json::Value, cycles: &[f64]) -> Config {
         .with("planet", json!({ "k_kms": 0.0, "porb_over_prot": 1.7, "phi": 0.5 }))
         .with("observations.simulate.spots", spots.clone())
         .with("observations.simulate.cycles", cycles.to_vec())
-        .with("observations.simulate.velocity_kms", json!({ "min": -33.0, "max": 33.0, "step": 2.0 }))
+        .with("observations.simulate.velocity_kms", json!({ "min": -33.0, "max": 33.0, "step": 3.0 }))
         .with("observations.simulate.snr", 500.0)
         .with("observations.simulate.pixels", 2000)
-        .with("imaging.pixels", 600)
+        .with("imaging.pixels", 300)
 }
 
 /// Where profiles are given there is nothing to simulate.
@@ -35,7 +35,7 @@ fn with_profiles(profiles: Observations, jitter_kms: f64) -> Scene {
         .with("star", star)
         .with("observations.path", "profiles")
         .with("observations.velocity_jitter_kms", jitter_kms)
-        .with("imaging.pixels", 600)
+        .with("imaging.pixels", 300)
         .with("imaging.objective", "marginal-likelihood");
     Scene::with_profiles(&config, profiles).unwrap()
 }
@@ -84,20 +84,20 @@ fn map_at(fit: &ChangingFit, k: usize) -> &[f64] {
 fn each_night_has_its_own_map_and_far_away_there_is_none() {
     let (scene, truth) = changing_star();
     let far_d = 1e6;
-    let fit = scene.changing_maps(Some(&[far_d, 0.0, 9.5])).unwrap();
+    let fit = scene.changing_maps(Some(&[far_d, 0.0, 9.3])).unwrap();
     let times: Vec<f64> = fit.maps.iter().map(|map| map.time_d).collect();
-    assert_eq!(times, [0.0, 9.5, far_d], "in the order of time");
+    assert_eq!(times, [0.0, 9.3, far_d], "in the order of time");
     let correlation = |k: usize, of: usize| correlation(&seen(&scene, map_at(&fit, k)), &seen(&scene, &truth[of]));
     for (own, other) in [(0, 1), (1, 0)] {
-        // a map of 25 profiles at S/N 500 has edges blurred and little of the far side: 0.7 to 0.8
+        // a map of 16 profiles at S/N 500 has edges blurred and little of the far side: 0.77 and 0.83
         assert!(correlation(own, own) > 0.6, "{own}: {}", correlation(own, own));
         assert!(correlation(own, own) > correlation(own, other) + 0.4, "{own}: {}", correlation(own, other));
     }
     // a star that does not change fits worse, and one that does within the noise
     let summary = &fit.summary;
     assert!(summary.chi2_per_datum < 1.1 && summary.chi2_per_datum_unchanging.unwrap() > 1.5, "{summary:?}");
-    assert_eq!(fit.model.len(), 25);
-    assert_eq!(fit.unchanging_model.as_ref().unwrap().len(), 25);
+    assert_eq!(fit.model.len(), 16);
+    assert_eq!(fit.unchanging_model.as_ref().unwrap().len(), 16);
 
     // the correlation with all profiles is 0 to rounding: the field before the data, alike everywhere
     let amplitude = fit.fitted.marginal.assumed.field.spectrum.amplitude;
@@ -109,11 +109,11 @@ fn each_night_has_its_own_map_and_far_away_there_is_none() {
         assert!(map.sigma_spot_filling.iter().all(|sd| *sd < amplitude * (1.0 + 1e-9)));
         assert!(map.sigma_spot_filling.iter().any(|sd| *sd < 0.8 * amplitude));
     }
-    assert!(fit.warnings.iter().any(|warning| warning.contains("1000000 d")), "{:?}", fit.warnings);
+    assert!(fit.warnings.iter().any(|warning| warning.contains("1000000.00 d")), "{:?}", fit.warnings);
 }
 
 #[test]
-fn velocities_are_those_of_the_orbit_and_zero_points_are_no_spots() {
+fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
     // a star that does not change, its profiles with zero points of 1 km/s
     let spots = json!([[40.0, 35.0, 22.0, 0.9]]);
     let jitter_kms = 1.0;
@@ -123,6 +123,7 @@ fn velocities_are_those_of_the_orbit_and_zero_points_are_no_spots() {
     let fit = |jitter_kms: f64| {
         let mut scene = with_profiles(whole.observations.clone(), 0.0);
         scene.settings.imaging.spot_lifetime_d = dimcmc::internals::data::config::Hyperparameter::Static;
+        scene.settings.imaging.spot_slope = dimcmc::internals::data::config::Hyperparameter::Known(0.9);
         scene.settings.velocity_jitter = dimcmc::internals::data::config::VelocityJitter::Known(jitter_kms);
         let fit = scene.changing_maps(None).unwrap();
         let like = correlation(&seen(&scene, map_at(&fit, 0)), &seen(&scene, &truth));
@@ -131,22 +132,23 @@ fn velocities_are_those_of_the_orbit_and_zero_points_are_no_spots() {
     let (counted, like) = fit(jitter_kms);
     // of a star that does not change there is one map, and nothing to compare it with
     assert_eq!((counted.maps.len(), counted.unchanging_model.is_none()), (1, true));
-    assert_eq!(counted.zero_points_kms.len(), 25);
+    assert_eq!(counted.zero_points_kms.len(), 16);
     let (ignored, less_like) = fit(0.0);
     assert!(like > less_like, "{like} {less_like}");
     assert!(counted.summary.chi2_per_datum < ignored.summary.chi2_per_datum);
-    // velocities scatter as zero points do, whose error is theirs; 25 of them say their scatter to 15 %
+    // velocities scatter as zero points do, whose error is theirs; 16 of them say their scatter to 18 %
     let rms = counted.summary.rv_rms_kms;
     assert!((rms / jitter_kms - 1.0).abs() < 0.45, "{rms}");
     assert!(counted.summary.rv_error_kms > 0.9 * jitter_kms, "{}", counted.summary.rv_error_kms);
 }
 
 #[test]
-fn a_star_without_spots_and_times_without_sense_are_refused_by_name() {
-    let bare = Scene::new(&config(&json!([]), &cycles())).unwrap();
-    let scene = with_profiles(bare.observations, 0.0);
+fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
+    // profiles of a faster star: no spots explain them
+    let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 32.0).with("observations.simulate.snr", 5000.0);
+    let scene = with_profiles(Scene::new(&other).unwrap().observations, 0.0);
     let status = |times: Option<&[f64]>| scene.changing_maps(times).map(|_| ()).map_err(|error| error.status());
-    assert_eq!(status(None), Err("amplitude-at-bound"));
+    assert_eq!(status(None), Err("not-settled"));
     for times in [&[][..], &[f64::NAN], &[1.0, f64::INFINITY], &[2.0, 1.0, 2.0], &[1e13]] {
         assert_eq!(status(Some(times)), Err("no-such-times"), "{times:?}");
     }

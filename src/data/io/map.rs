@@ -1,5 +1,5 @@
-//! The files of one reconstruction: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`. Those of a star that may change
-//! are in `changing`.
+//! The files of one reconstruction: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`. Those of a star that may
+//! change are in `changing`.
 
 mod changing;
 

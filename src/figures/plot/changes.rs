@@ -1,5 +1,5 @@
-//! Where the star changed: what a star that does not change leaves over in the profiles, in the order of their time, and
-//! what one that changes does.
+//! Where the star changed: what a star that does not change leaves over in the profiles, in the order of their time,
+//! and what one that changes does.
 
 use super::dynamic::edges;
 use super::profiles::{Line, extent};

@@ -99,7 +99,9 @@ pub(super) fn of_changing_map(folder: &Path) -> Result<Figure, PlotError> {
         orbital: 1,
     };
     let mut figure = curves.draw();
-    figure.caption = "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: with     all maps integrated out, and the assumed orbit; their errors are correlated. Below: the assumed orbit taken out.     To the right, if an orbit is assumed: the middle folded with the orbital period; phase 0 is the largest velocity."
+    figure.caption = "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: with \
+    all maps integrated out, and the assumed orbit; their errors are correlated. Below: the assumed orbit taken out. \
+    To the right, if an orbit is assumed: the middle folded with the orbital period; phase 0 is the largest velocity."
         .into();
     Ok(figure)
 }

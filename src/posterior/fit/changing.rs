@@ -7,9 +7,9 @@ use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::numerics::json::number_or_null;
 use crate::numerics::vector::{self, Instructions, Task};
 use crate::posterior::imaging::{Data, Imager};
-use crate::posterior::marginal::{Assumed, Basis, Fitted, Known, Maps, Marginal, bounds, fit};
+use crate::posterior::marginal::{Assumed, Basis, Fitted, Known, Maps, Marginal, fit};
 use crate::posterior::nuisances::{Estimate, LineAndContinuum};
-use crate::posterior::objective::{Parameter, ParameterValues};
+use crate::posterior::objective::ParameterValues;
 use crate::sampling::log_density::Status;
 use crate::star::observation::{Observations, Profile, RadialVelocity};
 use nalgebra::DMatrix;
@@ -137,13 +137,13 @@ pub enum NoField {
     Times(&'static str),
     /// The profiles know no spots.
     #[error(
-        "the amplitude of the spots falls to the lower bound of its search, {0}: the profiles show no spots; \
+        "the amplitude of the spots falls to the lower bound of its search, {0:.2}: the profiles show no spots; \
         observations.sigma_scale may be too large"
     )]
     TooFaint(f64),
     /// No spots are like that.
     #[error(
-        "the amplitude of the spots grows to the upper bound of its search, {0}: spots stand in for something else; \
+        "the amplitude of the spots grows to the upper bound of its search, {0:.2}: spots stand in for something else; \
         star.vsini_kms, star.line or observations.sigma_scale may be wrong"
     )]
     TooLarge(f64),
@@ -226,10 +226,10 @@ impl ChangingFit {
 /// That the field is one.
 fn check(fitted: &Fitted) -> Result<(), NoField> {
     let amplitude = fitted.marginal.assumed.field.spectrum.amplitude;
-    let (low, high) = bounds(Parameter::SpotAmplitude);
-    match fitted.at_bounds.contains(&Parameter::SpotAmplitude.name()) {
-        true if amplitude < 1.0 => Err(NoField::TooFaint(low)),
-        true => Err(NoField::TooLarge(high)),
+    match fitted.at_bounds.contains(&"spot_amplitude") {
+        // the bounds are far apart
+        true if amplitude < 0.5 => Err(NoField::TooFaint(amplitude)),
+        true => Err(NoField::TooLarge(amplitude)),
         false if !fitted.ln_evidence.is_finite() => Err(NoField::NotFinite),
         false => Ok(()),
     }
@@ -251,11 +251,11 @@ fn far(times_d: &[f64], observations: &Observations, kernel: &Kernel) -> Option<
     let nearest =
         |time_d: f64| observations.profiles.iter().map(|p| (p.time_d - time_d).abs()).fold(f64::MAX, f64::min);
     let far: Vec<String> =
-        times_d.iter().filter(|t| kernel.at(nearest(**t)) < FORGOTTEN).map(|t| format!("{t}")).collect();
+        times_d.iter().filter(|t| kernel.at(nearest(**t)) < FORGOTTEN).map(|t| format!("{t:.2}")).collect();
     let [first, last] = observations.time_span_d()?;
     (!far.is_empty()).then(|| {
         format!(
-            "the profiles (from {first} to {last} d) tell little of the star at {} d: spots do not live that long",
+            "the profiles, of {first:.2} to {last:.2} d, tell little of the star at {} d: spots do not live that long",
             far.join(", ")
         )
     })

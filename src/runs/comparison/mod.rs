@@ -16,7 +16,7 @@ pub use draws::Distance;
 pub use pair::{Pair, PairError};
 
 use crate::numerics::json::number_or_null;
-use crate::posterior::objective::{Parameter, UnresolvedSpots};
+use crate::posterior::objective::{ObjectiveKind, Parameter, UnresolvedSpots};
 use crate::sampling::chain::statistics::wrap;
 use crate::sampling::chain::{ChainError, Summary};
 use crate::sampling::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
@@ -144,7 +144,9 @@ impl Comparison {
             parameters,
         };
         comparison.notes = notes::notes(&comparison, &summary);
-        if pair.settings.imaging.unresolved_spots == UnresolvedSpots::Fitted {
+        let imaging = &pair.settings.imaging;
+        let of_one_map = imaging.objective != ObjectiveKind::MarginalLikelihood;
+        if of_one_map && imaging.unresolved_spots == UnresolvedSpots::Fitted {
             comparison.notes.push("the chain counts unresolved spots as noise, the landscape does not".into());
         }
         Ok(comparison)

@@ -1,0 +1,92 @@
+//! Commands with the objective `marginal-likelihood`: a star whose spots come and go within its twelve profiles.
+
+use super::desk::{Desk, kill, says, two_spots};
+use serde_json::{Value, json};
+
+const CONFIG: &str = "config.json";
+
+/// A chain of orbit and field that takes some seconds.
+fn changing(steps: usize) -> Value {
+    let mut config = two_spots(json!({ "ensembles": 2, "walkers": 10, "steps": steps, "seed": 3, "ess": 1e6 }));
+    let simulate = &mut config["observations"]["simulate"];
+    simulate.as_object_mut().unwrap().remove("spots");
+    simulate["random_spots"] = json!({ "number": 6, "lifetime_d": 8, "seed": 2 });
+    simulate["snr"] = json!(500);
+    config["imaging"] = json!({ "pixels": 200, "objective": "marginal-likelihood" });
+    config["grid"] = json!({ "axes": { "k_kms": [0.0, 0.4, 5], "phi": [0.8, 1.2, 5] } });
+    config
+}
+
+#[test]
+fn a_chain_has_the_same_bytes_by_any_number_of_threads_and_resumed() {
+    let desk = Desk::new(changing(4));
+    for (threads, out) in [("1", "one"), ("2", "two")] {
+        desk.succeed(&["sample", CONFIG, "--out", out, "--threads", threads]);
+    }
+    let whole = desk.read("one/chain.jsonl");
+    assert_eq!(whole, desk.read("two/chain.jsonl"));
+    let first: Value = serde_json::from_str(whole.lines().next().unwrap()).unwrap();
+    for name in ["k_kms", "phi", "spot_amplitude", "spot_slope", "spot_lifetime_d", "ln_evidence"] {
+        assert!(first[name].is_number(), "{name} in {first}");
+    }
+    let sample = ["sample", CONFIG, "--out", "killed"];
+    let mut child = desk.start(&sample);
+    desk.wait_for_lines("killed/chain.jsonl", &mut child, 25);
+    kill(child);
+    desk.succeed(&[&sample[..], &["--resume"]].concat());
+    assert_eq!(whole, desk.read("killed/chain.jsonl"));
+    let manifest = desk.json("one/manifest.json");
+    assert!(manifest["reference"]["ln_evidence"].is_number());
+    assert_eq!(manifest["priors"]["spot_lifetime_d"]["prior"], "log-uniform");
+    desk.succeed(&["export", "one", "--format", "csv", "--out", "chain.csv"]);
+    assert!(desk.read("chain.csv").lines().next().unwrap().contains("spot_lifetime_d"));
+    desk.succeed(&["report", "one"]);
+}
+
+#[test]
+fn a_landscape_is_that_of_the_chain_with_the_field_held() {
+    let desk = Desk::new(changing(4));
+    let table = desk.succeed(&["grid", CONFIG, "--out", "grid"]);
+    says(&table, &["ln_evidence"]);
+    desk.succeed(&["sample", CONFIG, "--out", "run"]);
+    let said = desk.succeed(&["compare", "run", "grid", "--out", "comparison"]);
+    says(&said, &["spot_amplitude, spot_slope, spot_lifetime_d fixed in the landscape and sampled in the chain"]);
+    assert!(!said.contains("unresolved spots"), "{said}");
+    desk.succeed(&["optimise", CONFIG, "--out", "best"]);
+    let optimum = desk.json("best/optimum.json");
+    let (k, sd) = (optimum["parameters"]["k_kms"].as_f64().unwrap(), optimum["sd"]["k_kms"].as_f64().unwrap());
+    assert!((k - 0.2).abs() < 3.0 * sd, "{k} +- {sd}");
+}
+
+#[test]
+fn what_has_no_meaning_is_refused() {
+    let refused = |edit: &dyn Fn(&mut Value), parts: &[&str]| {
+        let mut config = changing(4);
+        edit(&mut config);
+        says(&Desk::new(config).refusal(&["sample", CONFIG, "--out", "run"]), parts);
+    };
+    let prior = json!({ "prior": "log-uniform", "min": 1.0, "max": 100.0 });
+    refused(
+        &|config| {
+            config["imaging"] = json!({ "pixels": 200 });
+            config["parameters"]["spot_lifetime_d"] = prior.clone();
+        },
+        &["parameters.spot_lifetime_d", "marginal-likelihood"],
+    );
+    refused(
+        &|config| {
+            config["imaging"]["spot_lifetime_d"] = json!("static");
+            config["parameters"]["spot_lifetime_d"] = prior.clone();
+        },
+        &["imaging.spot_lifetime_d", "static"],
+    );
+    refused(&|config| config["imaging"]["spot_amplitude"] = json!("static"), &["imaging.spot_amplitude"]);
+    refused(&|config| config["imaging"]["spot_amplitude"] = json!(7), &["imaging.spot_amplitude", "0.01 to 1.5"]);
+    refused(
+        &|config| {
+            config["imaging"]["spot_lifetime_d"] = json!(500);
+            config["parameters"]["spot_lifetime_d"] = prior.clone();
+        },
+        &["imaging.spot_lifetime_d", "500", "outside its prior"],
+    );
+}
