@@ -59,6 +59,7 @@ fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) 
         latitude: rng.random_range(-0.3f64..1.0).asin(),
         radius: rng.random_range(5f64..17.0).to_radians(),
         filling: rng.random_range(0.5..0.92),
+        life: None,
     };
     let spots = (0..12).map(|_| spot()).collect();
     let mut truth = scene.settings.values;
