@@ -143,15 +143,15 @@ impl Laboratory<'_> {
         config: &Value,
         work: impl FnOnce(&Path) -> Result<T, ExperimentError>,
     ) -> Result<T, ExperimentError> {
-        let folder = self.folder(&format!("{row}/{star}"))?;
-        let path = folder.join(OUTCOME);
+        let name = format!("{row}/{star}");
+        let path = self.folder.join(&name).join(OUTCOME);
         let read = || serde_json::from_slice::<Kept<T>>(&std::fs::read(&path).ok()?).ok();
         if let Some(kept) = read().filter(|kept| kept.config == *config && kept.version == env!("CARGO_PKG_VERSION")) {
             return Ok(kept.result);
         }
         self.go_on()?;
         let (config, version) = (config.clone(), env!("CARGO_PKG_VERSION").to_owned());
-        let kept = Kept { config, version, result: work(&folder)? };
+        let kept = Kept { config, version, result: work(&self.folder(&name)?)? };
         write_json(&path, &kept)?;
         Ok(kept.result)
     }
