@@ -135,7 +135,8 @@ def searched(row, folder):
     whiten = whitening(kernel, star, n)
     k, sigma_k, phi, sigma_phi = orbit(whiten @ x[:n], whiten @ star["moment_kms"][:n])
     line |= {"k_kms": k, "sigma_k_kms": sigma_k, "porb_over_prot": scan["porb_over_prot"][best], "phi": phi}
-    line |= {"sigma_phi": sigma_phi, "median_sigma_k_kms": calibration_table.median_sigma(scan["porb_over_prot"], sigma)}
+    median = calibration_table.median_sigma(scan["porb_over_prot"], sigma)
+    line |= {"sigma_phi": sigma_phi, "median_sigma_k_kms": median}
     return line | dict(zip(COLUMNS[-4:], np.exp(kernel)))
 
 

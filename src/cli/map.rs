@@ -3,13 +3,13 @@
 use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
-use crate::data::diagnosis::Diagnosis;
+use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::io::map::{ChangingMapResult, FILES, MapResult};
 use crate::data::io::periodogram::FieldRecord;
 use crate::data::scene::Scene;
 use crate::posterior::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
 use crate::posterior::noise::MeasuredErrors;
-use crate::posterior::objective::{ObjectiveKind, Reference, ReferenceError};
+use crate::posterior::objective::{ObjectiveKind, Parameter, Reference, ReferenceError};
 use std::path::{Path, PathBuf};
 
 /// Reconstruct the spots at the config's parameter values
@@ -95,10 +95,21 @@ fn unchanging(args: &Args, global: &Global, scene: &Scene) -> Result<(), Failure
 fn changing(args: &Args, global: &Global, scene: &Scene) -> Result<(), Failure> {
     let spinner = progress::bar(global, None, "fitting the field of spots");
     let fit = scene.changing_maps(args.times.as_deref());
+    let suspicious = match &fit {
+        Ok(fit) => fit.fitted.at_bounds.iter().any(|name| *name != Parameter::SpotLifetime.name()),
+        Err(error) => !matches!(error, NoField::Times(_)),
+    };
+    if suspicious {
+        spinner.set_message("looking for the reason");
+    }
+    let reason = suspicious.then(|| wrong_with_the_model(scene)).flatten();
     spinner.finish_and_clear();
     let fit = fit.map_err(|error| match error {
         NoField::Times(_) => Failure::input(format!("--times: {error}")),
-        error => Failure::failed(format!("{}: no map ({}): {error}", args.config.display(), error.status())),
+        error => {
+            let reason = reason.iter().map(|text| format!("; {text}")).collect::<String>();
+            Failure::failed(format!("{}: no map ({}): {error}{reason}", args.config.display(), error.status()))
+        }
     })?;
     let result = ChangingMapResult {
         imager: &scene.imager,
@@ -113,11 +124,16 @@ fn changing(args: &Args, global: &Global, scene: &Scene) -> Result<(), Failure> 
     for (label, text) in scene.measured.lines() {
         report = report.line(label, text);
     }
-    for warning in fit.warnings.iter().chain(&fit.checks.warnings) {
+    for warning in fit.warnings.iter().chain(&fit.checks.warnings).chain(&reason) {
         report = report.line("warning", warning);
     }
     report.written(folder, FILES.join(", ")).print();
     Ok(())
+}
+
+/// What is likely to be wrong with the model of the star, as far as a map that does not change tells.
+fn wrong_with_the_model(scene: &Scene) -> Option<String> {
+    diagnosis(scene).filter(|diagnosis| diagnosis.reason != Reason::Errors).map(|diagnosis| diagnosis.text)
 }
 
 fn changing_report(fit: &ChangingFit) -> Report {

@@ -12,8 +12,8 @@ use crate::posterior::density::Density;
 use crate::posterior::marginal::{MarginalPosterior, bounds};
 use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues, Posterior, Reference, ReferenceError};
 use crate::sampling::optimise::Optimum;
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -48,13 +48,25 @@ pub struct Origin {
 }
 
 /// What every evaluation starts from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum ReferenceRecord {
     /// A map of maximum entropy.
     Image(ImageRecord),
     /// The most probable maps, where all are integrated over.
     Field(FieldRecord),
+}
+
+/// By the key that one of them has, so that an error is about that one.
+impl<'de> Deserialize<'de> for ReferenceRecord {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(deserializer)?;
+        let read = match value.get("ln_evidence") {
+            Some(_) => serde_json::from_value(value).map(ReferenceRecord::Field),
+            None => serde_json::from_value(value).map(ReferenceRecord::Image),
+        };
+        read.map_err(D::Error::custom)
+    }
 }
 
 /// The most probable maps, one a profile.

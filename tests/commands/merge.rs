@@ -88,7 +88,7 @@ fn what_does_not_belong_together_is_not_merged() {
     for (key, from, to, what) in [
         ("data", "\"data_sha256\": \"", "\"data_sha256\": \"0", "observations are not the same"),
         ("version", "\"version\": \"", "\"version\": \"9", "versions"),
-        ("lambda", "\"lambda\": ", "\"lambda\": 1", "reference images are not the same"),
+        ("lambda", "\"lambda\": ", "\"lambda\": 1", "references are not the same"),
     ] {
         std::fs::create_dir(desk.path(key)).unwrap();
         std::fs::copy(desk.path("c/chain.jsonl"), desk.path(&format!("{key}/chain.jsonl"))).unwrap();

@@ -203,8 +203,4 @@ fn all_maps_of_a_star_that_changes_are_integrated_over() {
     assert!((number(&best["porb_over_prot"]) - 1.7).abs() < 0.2, "{best}");
     assert!((5.0..200.0).contains(&number(&field["spot_lifetime_d"])), "{field}");
     assert!(found["change"].is_null() && found["robustness"]["targets"].as_array().unwrap().is_empty());
-    for command in ["optimise", "sample"] {
-        let error = desk.refusal(&[command, "config.json", "--out", "c"]);
-        says(&error, &["imaging.objective", "dimcmc periodogram"]);
-    }
 }

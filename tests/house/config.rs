@@ -225,8 +225,8 @@ fn the_text_of_errors() {
         (
             "/observations/simulate/spots/2",
             json!([1, 2, 3]),
-            ": observations.simulate.spots[2]: 3 numbers must be 4, [longitude, latitude, radius, filling], or 6, with the \
-            time of the largest area and the lifetime",
+            ": observations.simulate.spots[2]: 3 numbers must be 4, [longitude, latitude, radius, filling], or 6, with \
+            the time of the largest area and the lifetime",
         ),
         ("/grid/axes/phi", json!([0.1, 0.2]), ": grid.axes.phi: expected an array of length 3, found length 2"),
         ("/grid/axes/k_km", json!([0, 1, 5]), ": unknown key grid.axes.k_km: did you mean k_kms?"),

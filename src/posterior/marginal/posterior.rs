@@ -1,5 +1,5 @@
-//! The log-probability of a parameter vector where all maps are integrated over: ln Z (`docs/method.md` section 9) times
-//! the prior.
+//! The log-probability of a parameter vector where all maps are integrated over: ln Z (`docs/method.md` section 9)
+//! times the prior.
 //!
 //! Every evaluation begins from the maps of one reference, so that it is a function of the vector alone. Where only the
 //! orbit is free ln Z is the quadratic of the reference. Where the field is free the maps are found anew, and the orbit

@@ -1,0 +1,98 @@
+//! All maps integrated over: what ln Z costs with a new star, a new field and a new orbit, from one reference; on one
+//! thread.
+
+mod common;
+
+use common::stopwatch::{fastest, seconds};
+use common::table::{Table, Target};
+use dimcmc::internals::posterior::marginal::{Basis, Known, MarginalPosterior, fit};
+use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, Prior};
+use dimcmc::{Config, LogDensity as _, Scene};
+use serde_json::json;
+
+/// Milliseconds of 40 profiles of 57 bins on one core.
+const NEW_STAR: Target = Target::AtMost(200.0);
+const NEW_ORBIT: Target = Target::AtMost(2.0);
+
+/// Times that everything is timed; the fastest counts.
+const ROUNDS: usize = 7;
+
+const ORBIT: [Parameter; 3] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
+
+fn main() {
+    if !common::wanted() {
+        return;
+    }
+    let star = format!("new star / ms ({NEW_STAR})");
+    let orbit = format!("new orbit / ms ({NEW_ORBIT})");
+    let columns = ["profiles", &star, "new field / ms", &orbit, "reference / ms", "fit of the field / s"];
+    let mut table = Table::new("All maps integrated over", &columns);
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be begun");
+    for profiles in [20, 40, 80] {
+        alone.install(|| measure(profiles, &mut table));
+    }
+    table.print(
+        "Profiles of 57 bins over 15 nights, 2,000 pixels, vsini 40 km/s, S/N 1000, spots that live some 30 d; one \
+        thread; the targets are for 40 profiles. New star: another vsini, inclination and orbit. New field: another \
+        amplitude, slope and lifetime, and orbit. Both find the most probable maps from those of the reference. \
+        Reference: the same from uniform maps. The fastest of 7; a fit once.",
+    );
+}
+
+/// A star of so many profiles.
+fn scene(profiles: usize) -> Scene {
+    let cycle = |k: usize| 5.0 * (k as f64 + 0.3 * (7.0 * k as f64).sin()) / profiles as f64;
+    let cycles: Vec<f64> = (0..profiles).map(cycle).collect();
+    let config = Config::default()
+        .with("star.rotation_period_d", 3.0)
+        .with("star.inclination_deg", 38.0)
+        .with("star.vsini_kms", 40.0)
+        .with("star.line", json!({ "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }))
+        .with("star.contrast", 0.1)
+        .with("instrument.resolving_power", 65_000.0)
+        .with("planet", json!({ "k_kms": 0.1, "porb_over_prot": 1.7, "phi": 0.3 }))
+        .with("observations.simulate.random_spots", json!({ "number": 16, "lifetime_d": 30, "seed": 1 }))
+        .with("observations.simulate.cycles", cycles)
+        .with("observations.simulate.velocity_kms", json!({ "min": -50.4, "max": 50.4, "step": 1.8 }))
+        .with("imaging.objective", "marginal-likelihood");
+    Scene::new(&config).expect("a star")
+}
+
+fn measure(profiles: usize, table: &mut Table) {
+    let scene = scene(profiles);
+    let mut values = scene.settings.values;
+    let field = [(Parameter::SpotAmplitude, 0.25), (Parameter::SpotSlope, 0.6), (Parameter::SpotLifetime, 30.0)];
+    field.into_iter().for_each(|(p, value)| values[p] = value);
+    let posterior = |free: &[Parameter]| {
+        let wide = |parameter: &Parameter| FreeParameter {
+            parameter: *parameter,
+            prior: Prior::Uniform { min: 0.0, max: 3000.0 },
+        };
+        let space = scene.space_of(&free.iter().map(wide).collect::<Vec<_>>());
+        MarginalPosterior::new(scene.imager.clone(), &space, values, 0.0).expect("a reference")
+    };
+    // a few parts in a hundred of the parameters away, another place each time
+    let ms = |posterior: &MarginalPosterior| {
+        let here = posterior.space().theta_of(&posterior.reference().values);
+        let round = |k: usize| {
+            let shift = |(i, x): (usize, &f64)| x * (1.0 + 0.02 * ((3 * k + 5 * i) as f64).sin());
+            let theta: Vec<f64> = here.iter().enumerate().map(shift).collect();
+            seconds(|| assert!(posterior.evaluate(&theta).is_finite()))
+        };
+        1e3 * fastest(&(0..ROUNDS).map(round).collect::<Vec<_>>())
+    };
+    let judged = |target: Target, ms: f64| if profiles == 40 { target.judge(ms, 2) } else { format!("{ms:.2}") };
+    let star = posterior(&[&ORBIT[..], &[Parameter::Inclination, Parameter::Vsini]].concat());
+    let reference = 1e3 * fastest(&(0..2).map(|_| seconds(|| posterior(&ORBIT))).collect::<Vec<_>>());
+    let basis = Basis::new(&scene.imager.grid);
+    let known = Known { jitter_kms: Some(0.0), ..Known::default() };
+    let fitted = seconds(|| fit(&scene.imager, &basis, values, known, None).expect("a field"));
+    table.row([
+        profiles.to_string(),
+        judged(NEW_STAR, ms(&star)),
+        format!("{:.0}", ms(&posterior(&[&ORBIT[..], &Parameter::FIELD].concat()))),
+        judged(NEW_ORBIT, ms(&posterior(&ORBIT))),
+        format!("{reference:.0}"),
+        format!("{fitted:.1}"),
+    ]);
+}
