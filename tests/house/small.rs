@@ -12,7 +12,7 @@ const LONGEST: Duration = Duration::from_secs(300);
 
 /// Chains that say something and have not converged.
 pub fn short_chains() -> Value {
-    json!({ "ensembles": 2, "walkers": 14, "steps": 12 })
+    json!({ "ensembles": 2, "walkers": 14, "steps": 8 })
 }
 
 pub fn root() -> PathBuf {

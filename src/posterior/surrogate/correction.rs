@@ -23,6 +23,9 @@ const REACH: f64 = 20.0;
 /// Fewest points for each coefficient that must have given a log-probability.
 const ENOUGH: f64 = 3.0;
 
+/// A share of proposals accepted that is good enough.
+const GOOD: f64 = 0.6;
+
 /// Draws on which the surrogate is tried.
 const TRIALS: usize = 64;
 
@@ -30,7 +33,20 @@ impl Surrogate {
     /// The surrogate fitted to `density`, if that is better than as it was, and the share of its proposals that are
     /// accepted.
     pub fn fitted(self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> (Self, f64) {
-        let own = (self.acceptance(density, evaluator), self);
+        let acceptance = self.acceptance(density, evaluator);
+        self.fitted_beyond(acceptance, density, evaluator)
+    }
+
+    /// The same where that is worth its evaluations: where few of its own proposals are accepted.
+    pub fn fitted_if_poor(self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> (Self, f64) {
+        match self.acceptance(density, evaluator) {
+            good if good > GOOD => (self, good),
+            poor => self.fitted_beyond(poor, density, evaluator),
+        }
+    }
+
+    fn fitted_beyond(self, acceptance: f64, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> (Self, f64) {
+        let own = (acceptance, self);
         let fitted = own.1.corrected(density, evaluator).map(|fitted| (fitted.acceptance(density, evaluator), fitted));
         let (acceptance, best) = fitted.filter(|fitted| fitted.0 > own.0).unwrap_or(own);
         (best, acceptance)

@@ -66,7 +66,12 @@ impl Target {
     /// The surrogate, if there is one, and the share of its proposals accepted on trial: a function of the density
     /// alone, so that a resumed run has the same.
     pub fn surrogate(&self, evaluator: &dyn Evaluator) -> Option<(Surrogate, f64)> {
-        Some(self.surrogate.clone()?.fitted(self, evaluator))
+        let surrogate = self.surrogate.clone()?;
+        Some(match &self.posterior {
+            Density::Mapped(_) => surrogate.fitted(self, evaluator),
+            // it is the density's own expansion
+            Density::Integrated(_) => surrogate.fitted_if_poor(self, evaluator),
+        })
     }
 }
 
