@@ -14,7 +14,12 @@ FOUND = 0.01
 # a period is right within this share of the resolution, 1 over the time base of a season
 RIGHT = 0.5
 LEVELS = ((0.68, 0.99446), (0.95, 1.95996))
-METHODS = {"changing": "maps integrated out", "static": "spottedness (0.1.0)", "moments": "quasi-periodic process"}
+METHODS = {
+    "changing": "maps integrated out",
+    "static": "spottedness (0.1.0)",
+    "moments": "quasi-periodic process",
+    "moments_refit": "the same, fitted with the orbit",
+}
 
 
 def read(path):

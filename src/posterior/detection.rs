@@ -300,13 +300,18 @@ impl Detection {
         report: &dyn Fn(Stage),
     ) -> Result<(), DetectionError> {
         let mut settings = settings.clone();
+        // of a field that is held, those of its fit
+        let mut at_bounds = None;
         while self.rounds < MOST_ROUNDS && !self.closed && !self.best.on_edge {
             self.rounds += 1;
             report(Stage::BestOrbit(self.rounds));
             values[Parameter::K] = self.best.orbit.k_kms;
             values[Parameter::PorbOverProt] = self.best.porb_over_prot;
             values[Parameter::Phi] = self.best.orbit.phi;
-            let view = View::new(imager, values, &settings, Some(self.last()))?;
+            let mut view = View::new(imager, values, &settings, Some(self.last()))?;
+            if let (Some(field), Some(before)) = (&mut view.field, at_bounds.take()) {
+                field.at_bounds = before;
+            }
             let mut next = refined(&view.quadratic, &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();
@@ -315,6 +320,7 @@ impl Detection {
             // the field with a planet in the model is another one; what moves after that is too little to matter
             if let Some(field) = &view.field {
                 settings.spots = Spots::Integrated(Known::of(&field.marginal));
+                at_bounds = Some(field.at_bounds.clone());
             }
             self.at_best = Some(view);
         }

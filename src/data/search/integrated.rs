@@ -1,18 +1,25 @@
-//! The search where all maps are integrated over: the field is fitted to the star without a planet, ln Z is expanded
-//! around it (`docs/method.md` section 9), and the highest of its peaks over all periods becomes the next place to
-//! expand it around, until that place stays.
+//! The search where all maps are integrated over: it begins at the orbit that a blind search finds, with the field and
+//! the jitter as they are with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the top of the
+//! expansion becomes the next place to expand it around, as long as ln Z rises and until that place stays.
 
 use super::{
     Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, ROUNDS, SearchError, SearchSettings, Stage,
     shift, within,
 };
+use crate::field::FieldError;
+use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::posterior::density::Density;
+use crate::posterior::detection::{Detection, DetectionSettings, Spots};
+use crate::posterior::expansion::nuisances;
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::{Basis, Forecast, MarginalPosterior, fit};
+use crate::posterior::marginal::{Basis, Fitted, Forecast, MarginalPosterior, fit};
 use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues};
 use crate::posterior::surrogate::Surrogate;
 use crate::sampling::log_density::LogDensity as _;
 use crate::sampling::optimise::climb;
+
+/// A round that is lower than the one before by this much in log-probability is not followed.
+const DOWN: f64 = 0.1;
 
 pub(super) fn find(
     imager: &Imager,
@@ -22,33 +29,96 @@ pub(super) fn find(
 ) -> Result<Found, SearchError> {
     let at = |stage| report(Progress { stage, evaluations: 0 });
     at(Stage::FirstImage);
+    let (mut theta, field, jitter_kms) = match blind(imager, space, settings) {
+        Some(start) => start,
+        None => without_search(imager, space, settings)?,
+    };
+    let mut highest: Option<Found> = None;
+    for _ in 0..ROUNDS {
+        at(Stage::Reference);
+        let values = space.clone().with_field_of(&field).values_at(&theta);
+        let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, jitter_kms) else { break };
+        let here = posterior.evaluate(&theta);
+        // a quadratic that has led astray
+        if highest.as_ref().is_some_and(|best| best.optimum.evaluation.log_prob > here.log_prob + DOWN) {
+            break;
+        }
+        at(Stage::Refining);
+        let Ok(mut next) = forecast(&posterior).and_then(|forecast| Ok(climb(&forecast, &theta, &|| ())?)) else {
+            break;
+        };
+        let moved = shift(space, &theta, &next);
+        let next_theta = next.theta.clone();
+        next.evaluation = posterior.evaluate(&next.theta);
+        if next.evaluation.log_prob < here.log_prob || !next.evaluation.log_prob.is_finite() {
+            (next.theta, next.evaluation) = (theta, here);
+        }
+        theta = next_theta;
+        let posterior = Density::Integrated(Box::new(posterior));
+        highest = Some(Found { posterior, optimum: next, attempts: Vec::new() });
+        if moved < REFERENCE_SHIFT {
+            break;
+        }
+    }
+    let mut found = highest.ok_or(SearchError::Field(FieldError::NotPositive))?;
+    if let Density::Integrated(posterior) = &found.posterior {
+        found.attempts = attempts(posterior, &found.optimum.theta)?;
+    }
+    Ok(found)
+}
+
+/// Where to begin: vector, field and jitter.
+type Start = (Vec<f64>, ParameterValues, f64);
+
+/// The orbit that a blind search finds, where an orbit is looked for and the priors allow it.
+fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Option<Start> {
+    let orbit = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
+    orbit.iter().all(|p| space.free().iter().any(|f| f.parameter == *p)).then_some(())?;
+    let usual = FrequencySettings::default();
+    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok()?;
+    let wanted = DetectionSettings {
+        spots: Spots::Integrated(settings.known),
+        ..DetectionSettings::of(settings.chi2_target, nuisances(space.free()))
+    };
+    let values = space.values_at(&space.start());
+    let found = Detection::find(imager, values, frequencies, &wanted, &|_| ()).ok()?;
+    let marginal = &found.last().field.as_ref()?.marginal;
+    let mut values = marginal.values;
+    values[Parameter::K] = found.best.orbit.k_kms;
+    values[Parameter::PorbOverProt] = found.best.porb_over_prot;
+    values[Parameter::Phi] = found.best.orbit.phi;
+    let mut theta = with_field(space, space.theta_of(&values), &values);
+    // phi as its prior has it
+    theta = space.to_physical(&space.to_sampling(&theta));
+    space.log_prior(&theta).is_finite().then_some((theta, values, marginal.assumed.jitter_kms))
+}
+
+/// The highest of the maxima that the expansion around the star without a planet has, the field fitted anew there.
+fn without_search(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Result<Start, SearchError> {
+    let basis = Basis::new(&imager.grid);
     let start = space.start();
-    let fitted = fit(imager, &Basis::new(&imager.grid), without_planet(space, &start), settings.known, None)?;
+    let fitted = fit(imager, &basis, without_planet(space, &start), settings.known, None)?;
     let (field, jitter_kms) = (fitted.marginal.values, fitted.marginal.assumed.jitter_kms);
-    let posterior_at = |values: ParameterValues| MarginalPosterior::new(imager.clone(), space, values, jitter_kms);
-    let first = posterior_at(field)?;
+    let first = MarginalPosterior::new(imager.clone(), space, field, jitter_kms)?;
     // where the field is free its best values are the start
-    let start = with_field(space, start, &field);
-    let attempts: Vec<Attempt> = starts(&first, &start)?
-        .into_iter()
-        .map(|start| Ok(Attempt { end: climb(&forecast(&first)?, &start, &|| ()), start }))
-        .collect::<Result<_, SearchError>>()?;
+    let attempts = attempts(&first, &with_field(space, start, &field))?;
     let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
     let best = attempts.iter().max_by(|a, b| height(a).total_cmp(&height(b))).expect("at least the config's values");
-    let mut optimum = best.end.clone()?;
-    for round in 0.. {
-        at(Stage::Reference);
-        let posterior = posterior_at(first.space().values_at(&optimum.theta))?;
-        at(Stage::Refining);
-        let mut next = climb(&forecast(&posterior)?, &optimum.theta, &|| ())?;
-        let moved = shift(space, &optimum.theta, &next);
-        if moved < REFERENCE_SHIFT || round + 1 == ROUNDS {
-            next.evaluation = posterior.evaluate(&next.theta);
-            return Ok(Found { posterior: Density::Integrated(Box::new(posterior)), optimum: next, attempts });
+    let theta = best.end.clone()?.theta;
+    // with the planet in the model the field and the jitter are others
+    let with_orbit = first.space().values_at(&theta);
+    Ok(match fit(imager, &basis, with_orbit, settings.known, Some(&fitted.marginal)) {
+        Ok(Fitted { marginal, .. }) => {
+            (with_field(space, theta, &marginal.values), marginal.values, marginal.assumed.jitter_kms)
         }
-        optimum = next;
-    }
-    unreachable!("the loop returns")
+        Err(_) => (theta, field, jitter_kms),
+    })
+}
+
+/// Climbs by the expansion around `posterior`, from `first` and from the peaks over the periods.
+fn attempts(posterior: &MarginalPosterior, first: &[f64]) -> Result<Vec<Attempt>, SearchError> {
+    let climbed = |start: Vec<f64>| Ok(Attempt { end: climb(&forecast(posterior)?, &start, &|| ()), start });
+    starts(posterior, first)?.into_iter().map(climbed).collect()
 }
 
 fn forecast(posterior: &MarginalPosterior) -> Result<Forecast<'_>, SearchError> {

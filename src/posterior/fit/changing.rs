@@ -185,7 +185,7 @@ impl ChangingFit {
         let fitted = fit(imager, &basis, values, known, None)?;
         check(&fitted)?;
         let marginal = &fitted.marginal;
-        let settled = marginal.settled_with_jitter(imager, &basis)?;
+        let settled = &marginal.settled;
         let modelled = Modelled::of(imager, &basis, marginal, &settled.coefficients);
         let unchanging = unchanging(imager, &basis, marginal);
         let residuals = residuals(observations, &modelled.depths());
@@ -193,7 +193,7 @@ impl ChangingFit {
             true => vec![mean(&observations.times_d())],
             false => nights(&observations.times_d()),
         });
-        let maps = Maps::at(&settled, &basis, &times_d);
+        let maps = Maps::at(settled, &basis, &times_d);
         let map = |(k, time_d): (usize, &f64)| MapAt {
             time_d: *time_d,
             cycle: imager.star.cycle(*time_d),
@@ -357,8 +357,7 @@ fn unchanging(imager: &Imager, basis: &Basis, marginal: &Marginal) -> Option<Mod
     let field = Field { kernel: Kernel::of(Lifetime::Static), ..assumed.field };
     let assumed = Assumed { field, ..*assumed };
     let still = Marginal::new(imager, basis, Arc::clone(design), *values, assumed, None).ok()?;
-    let settled = still.settled_with_jitter(imager, basis).ok()?;
-    Some(Modelled::of(imager, basis, &still, &settled.coefficients))
+    Some(Modelled::of(imager, basis, &still, &still.settled.coefficients))
 }
 
 fn velocities(

@@ -124,7 +124,7 @@ fn shortened(
         let at =
             |nearby| Marginal::new(imager, basis, Arc::clone(design), *values, Assumed { field, ..*assumed }, nearby);
         let Ok(marginal) = at(Some(&last)).or_else(|_| at(None)) else { continue };
-        let gain = marginal.ln_evidence(imager, basis)? - still.ln_evidence;
+        let gain = marginal.ln_evidence() - still.ln_evidence;
         last = marginal.clone();
         match &best {
             // a little change already is too much

@@ -11,14 +11,8 @@ use rayon::prelude::*;
 
 impl Marginal {
     /// ln Z, the jitter counted.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn ln_evidence(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
-        match self.assumed.jitter_kms {
-            0.0 => Ok(self.settled.evidence.ln_evidence()),
-            _ => Ok(self.quadratic(imager, basis, &[])?.ln_evidence),
-        }
+    pub fn ln_evidence(&self) -> f64 {
+        self.settled.evidence.ln_evidence()
     }
 
     /// ln Z around the values, at the most probable maps. As the maps are fixed in the derivatives, the information is
@@ -46,13 +40,7 @@ impl Marginal {
         let misfits: Vec<DVector<f64>> =
             self.design.epochs(imager, &self.settled.coefficients).into_iter().map(|epoch| epoch.misfit).collect();
         let of_all = self.settled.evidence.with(&misfits, &slopes)?;
-        let summed = summed(&of_all, misfits.len(), stellar.len());
-        if self.assumed.jitter_kms == 0.0 {
-            return Ok(summed);
-        }
-        let mut sd = vec![self.assumed.jitter_kms; misfits.len()];
-        sd.resize(summed.gradient.len(), 0.0);
-        summed.jittered(&sd).ok_or(FieldError::NotPositive)
+        Ok(summed(&of_all, misfits.len(), stellar.len()))
     }
 
     /// How the depths of each profile change with its velocity and with the star's parameters, at the most probable

@@ -5,7 +5,7 @@ use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::{Parameter, ParameterValues};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix4, Vector4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -31,6 +31,10 @@ fn place_of(parameter: Parameter) -> usize {
 }
 
 const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
+const USUAL_JITTER_KMS: f64 = 0.1;
+
+/// Bounds of a jitter (km/s); that of none is 0.
+const JITTER_KMS: (f64, f64) = (1e-3, 3.0);
 
 /// A search ends when a step would gain less than this in ln Z, or after so many.
 const GAIN: f64 = 0.02;
@@ -106,7 +110,7 @@ pub(super) fn usual(
     let assumed = Assumed { field: Field { spectrum, kernel }, jitter_kms: known.jitter_kms.unwrap_or(0.0) };
     let design = Arc::new(Design::new(imager, basis, &values.state()));
     let marginal = Marginal::new(imager, basis, design, values, assumed, near)?;
-    let ln_evidence = marginal.ln_evidence(imager, basis)?;
+    let ln_evidence = marginal.ln_evidence();
     Ok(Fitted { marginal, ln_evidence, at_bounds: Vec::new() })
 }
 
@@ -122,106 +126,137 @@ pub fn fit(
     near: Option<&Marginal>,
 ) -> Result<Fitted, FieldError> {
     let design = Arc::new(Design::new(imager, basis, &values.state()));
-    let at = |field: Field, jitter_kms: f64, nearby: Option<&Marginal>| {
-        Marginal::new(imager, basis, Arc::clone(&design), values, Assumed { field, jitter_kms }, nearby)
+    let at = |assumed: Assumed, nearby: Option<&Marginal>| {
+        Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
-    let jitter_kms = known.jitter_kms.unwrap_or(0.0);
     let first = match near {
-        Some(near) => at(near.assumed.field, near.assumed.jitter_kms, Some(near)).or_else(|_| {
+        Some(near) => at(near.assumed, Some(near)).or_else(|_| {
             // maps of another orbit may be too far away
-            at(near.assumed.field, near.assumed.jitter_kms, None)
+            at(near.assumed, None)
         })?,
         None => {
-            let lifetimes: Vec<Lifetime> = match known.lifetime {
-                Some(lifetime) => vec![lifetime],
-                None => LIFETIMES_D.map(Lifetime::Days).to_vec(),
-            };
-            let spectrum = known.spectrum();
             let rough = basis.roughly();
-            let start = |lifetime: &Lifetime| {
-                let assumed = Assumed { field: Field { spectrum, kernel: Kernel::of(*lifetime) }, jitter_kms };
-                Marginal::new(imager, &rough, Arc::clone(&design), values, assumed, None)
-            };
-            let tried: Vec<Result<Marginal, FieldError>> = lifetimes.par_iter().with_max_len(1).map(start).collect();
-            let height = |m: &Marginal| m.settled.evidence.ln_evidence();
-            let mut error = None;
-            let mut best: Option<Marginal> = None;
-            for tried in tried {
-                match tried {
-                    Ok(next) if best.as_ref().is_none_or(|best| height(&next) > height(best)) => best = Some(next),
-                    Ok(_) => {}
-                    Err(e) => error = Some(e),
-                }
-            }
-            let best = best.ok_or_else(|| error.expect("no start, so an error"))?;
-            at(best.assumed.field, jitter_kms, Some(&best))?
+            let start = |assumed: &Assumed| Marginal::new(imager, &rough, Arc::clone(&design), values, *assumed, None);
+            let best = highest(starts(&known).par_iter().with_max_len(1).map(start).collect())?;
+            at(best.assumed, Some(&best))?
         }
     };
     let mut marginal = climb(first, &known, &at)?;
     if known.jitter_kms.is_none() {
-        marginal.assumed.jitter_kms = likeliest_jitter(imager, basis, &marginal)?;
+        marginal = with_or_without_jitter(marginal, &known, &at)?;
     }
-    let ln_evidence = marginal.ln_evidence(imager, basis)?;
-    let at_bounds = reached(&marginal.assumed.field, &known);
+    let ln_evidence = marginal.ln_evidence();
+    let at_bounds = reached(&marginal.assumed, &known);
     Ok(Fitted { marginal, ln_evidence, at_bounds })
 }
 
-/// ln amplitude, slope, ln lifetime.
-fn place(field: &Field) -> Vector3<f64> {
+/// Where a fit may start: several lifetimes, with and without a jitter, as far as they are not known.
+fn starts(known: &Known) -> Vec<Assumed> {
+    let lifetimes: Vec<Lifetime> = match known.lifetime {
+        Some(lifetime) => vec![lifetime],
+        None => LIFETIMES_D.map(Lifetime::Days).to_vec(),
+    };
+    let jitters = known.jitter_kms.map_or(vec![0.0, USUAL_JITTER_KMS], |kms| vec![kms]);
+    let spectrum = known.spectrum();
+    let field = |lifetime: &Lifetime| Field { spectrum, kernel: Kernel::of(*lifetime) };
+    let assumed = |lifetime: &Lifetime| {
+        let field = field(lifetime);
+        jitters.iter().map(move |jitter_kms| Assumed { field, jitter_kms: *jitter_kms }).collect::<Vec<_>>()
+    };
+    lifetimes.iter().flat_map(assumed).collect()
+}
+
+/// The one with the highest ln Z, or the last error.
+fn highest(tried: Vec<Result<Marginal, FieldError>>) -> Result<Marginal, FieldError> {
+    let mut best: Option<Result<Marginal, FieldError>> = None;
+    for next in tried {
+        let is_better = match (&next, &best) {
+            (Ok(next), Some(Ok(best))) => next.ln_evidence() > best.ln_evidence(),
+            (Err(_), Some(Ok(_))) => false,
+            _ => true,
+        };
+        if is_better {
+            best = Some(next);
+        }
+    }
+    best.expect("a start at least")
+}
+
+/// The fit with a jitter in place of one without, or the other way round, where that is better.
+fn with_or_without_jitter(
+    fitted: Marginal,
+    known: &Known,
+    at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
+) -> Result<Marginal, FieldError> {
+    let jitter_kms = if fitted.assumed.jitter_kms == 0.0 { USUAL_JITTER_KMS / 2.0 } else { 0.0 };
+    let Ok(other) = at(Assumed { jitter_kms, ..fitted.assumed }, Some(&fitted)) else { return Ok(fitted) };
+    // without one it is simpler
+    let needed = if jitter_kms == 0.0 { -GAIN } else { GAIN };
+    if other.ln_evidence() < fitted.ln_evidence() + needed {
+        return Ok(fitted);
+    }
+    climb(other, known, at)
+}
+
+/// ln amplitude, slope, ln lifetime, ln jitter.
+fn place(Assumed { field, jitter_kms }: &Assumed) -> Vector4<f64> {
     let lifetime_d = match field.kernel.lifetime {
         Lifetime::Days(days) => days,
         Lifetime::Static => f64::INFINITY,
     };
-    Vector3::new(field.spectrum.amplitude.ln(), field.spectrum.slope, lifetime_d.ln())
+    Vector4::new(field.spectrum.amplitude.ln(), field.spectrum.slope, lifetime_d.ln(), jitter_kms.ln())
 }
 
-fn field_at(place: Vector3<f64>, like: &Field) -> Field {
-    let lifetime = match like.kernel.lifetime {
+fn assumed_at(place: Vector4<f64>, like: &Assumed) -> Assumed {
+    let lifetime = match like.field.kernel.lifetime {
         Lifetime::Static => Lifetime::Static,
         Lifetime::Days(_) => Lifetime::Days(place[2].exp()),
     };
-    Field {
+    let field = Field {
         spectrum: Spectrum { amplitude: place[0].exp(), slope: place[1] },
-        kernel: Kernel { lifetime, ..like.kernel },
-    }
+        kernel: Kernel { lifetime, ..like.field.kernel },
+    };
+    Assumed { field, jitter_kms: if like.jitter_kms == 0.0 { 0.0 } else { place[3].exp() } }
 }
 
 /// Bounds in the coordinates of [`place`].
-fn limits() -> [(f64, f64); 3] {
-    Parameter::FIELD.map(|p| {
+fn limits() -> [(f64, f64); 4] {
+    let [amplitude, slope, lifetime] = Parameter::FIELD.map(|p| {
         let (low, high) = bounds(p);
         (p.to_sampling(low), p.to_sampling(high))
-    })
+    });
+    [amplitude, slope, lifetime, (JITTER_KMS.0.ln(), JITTER_KMS.1.ln())]
 }
 
 /// Which of the fitted numbers lie on a bound.
-fn reached(field: &Field, known: &Known) -> Vec<&'static str> {
-    let (place, free) = (place(field), free(field, known));
+fn reached(assumed: &Assumed, known: &Known) -> Vec<&'static str> {
+    let (place, free) = (place(assumed), free(assumed, known));
     let on = |i: &usize| free[*i] && (place[*i] <= limits()[*i].0 + 1e-9 || place[*i] >= limits()[*i].1 - 1e-9);
     (0..3).filter(on).map(|i| Parameter::FIELD[i].name()).collect()
 }
 
-fn free(field: &Field, known: &Known) -> [bool; 3] {
-    let lives = known.lifetime.is_none() && field.kernel.lifetime != Lifetime::Static;
-    [known.amplitude.is_none(), known.slope.is_none(), lives]
+fn free(assumed: &Assumed, known: &Known) -> [bool; 4] {
+    let lives = known.lifetime.is_none() && assumed.field.kernel.lifetime != Lifetime::Static;
+    let jitters = known.jitter_kms.is_none() && assumed.jitter_kms > 0.0;
+    [known.amplitude.is_none(), known.slope.is_none(), lives, jitters]
 }
 
 /// The way up from `first` by quasi-Newton steps (BFGS; Nocedal & Wright 2006, chapter 6), within the bounds.
 fn climb(
     first: Marginal,
     known: &Known,
-    at: &(impl Fn(Field, f64, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
+    at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
 ) -> Result<Marginal, FieldError> {
-    let free = free(&first.assumed.field, known);
-    let height = |of: &Marginal| of.settled.evidence.ln_evidence();
+    let free = free(&first.assumed, known);
+    let height = Marginal::ln_evidence;
     // gradient, and second derivatives along each number. Derivatives at fixed maps are not enough: the determinant
     // changes with the maps, and outweighs the rest
     let slope = |of: &Marginal| {
-        let from = place(&of.assumed.field);
+        let from = place(&of.assumed);
         let beside = |i: usize, h: f64| {
             let mut to = from;
             to[i] += h;
-            at(field_at(to, &of.assumed.field), of.assumed.jitter_kms, Some(of)).map(|there| height(&there)).ok()
+            at(assumed_at(to, &of.assumed), Some(of)).map(|there| height(&there)).ok()
         };
         let along = |i: usize| {
             if !free[i] {
@@ -237,36 +272,36 @@ fn climb(
                 (None, None) => (0.0, 0.0),
             }
         };
-        let all = [0, 1, 2].map(along);
-        (Vector3::from(all.map(|a| a.0)), Vector3::from(all.map(|a| a.1)))
+        let all = [0, 1, 2, 3].map(along);
+        (Vector4::from(all.map(|a| a.0)), Vector4::from(all.map(|a| a.1)))
     };
     let mut here = first;
     let (mut gradient, bend) = slope(&here);
     // the inverse Hessian of minus ln Z begins with its diagonal; where that says nothing errors of 10 % are usual
-    let mut inverse = Matrix3::from_diagonal(&bend.map(|bend| if bend > LEAST_BEND { bend.recip() } else { 0.01 }));
+    let mut inverse = Matrix4::from_diagonal(&bend.map(|bend| if bend > LEAST_BEND { bend.recip() } else { 0.01 }));
     for _ in 0..STEPS {
-        let from = place(&here.assumed.field);
+        let from = place(&here.assumed);
         // what pushes against a bound stays there
         let pushes = |i: usize| {
             let (low, high) = limits()[i];
             (from[i] <= low + 1e-9 && gradient[i] < 0.0) || (from[i] >= high - 1e-9 && gradient[i] > 0.0)
         };
-        let inside = Vector3::from_fn(|i, _| if pushes(i) { 0.0 } else { gradient[i] });
+        let inside = Vector4::from_fn(|i, _| if pushes(i) { 0.0 } else { gradient[i] });
         let mut step = inverse * inside;
-        step = Vector3::from_fn(|i, _| if pushes(i) || !free[i] { 0.0 } else { step[i] });
+        step = Vector4::from_fn(|i, _| if pushes(i) || !free[i] { 0.0 } else { step[i] });
         if inside.dot(&step) < 2.0 * GAIN {
             break;
         }
         step *= (LONGEST / step.amax()).min(1.0);
         let Some((next, slope_there)) = shortened(&here, step, &gradient, &height, &slope, at) else { break };
-        let moved = Vector3::from_fn(|i, _| if free[i] { place(&next.assumed.field)[i] - from[i] } else { 0.0 });
+        let moved = Vector4::from_fn(|i, _| if free[i] { place(&next.assumed)[i] - from[i] } else { 0.0 });
         let bent = gradient - slope_there;
         let gained = height(&next) - height(&here);
         (here, gradient) = (next, slope_there);
         let curved = moved.dot(&bent);
         if curved > 0.0 {
             let rho = 1.0 / curved;
-            let left = Matrix3::identity() - moved * bent.transpose() * rho;
+            let left = Matrix4::identity() - moved * bent.transpose() * rho;
             inverse = left * inverse * left.transpose() + moved * moved.transpose() * rho;
         }
         if gained < 0.1 * GAIN {
@@ -279,17 +314,18 @@ fn climb(
 /// The first of ever shorter steps that leads up, and the gradient there; `None` where none does.
 fn shortened(
     here: &Marginal,
-    mut step: Vector3<f64>,
-    gradient: &Vector3<f64>,
+    mut step: Vector4<f64>,
+    gradient: &Vector4<f64>,
     height: &impl Fn(&Marginal) -> f64,
-    slope: &impl Fn(&Marginal) -> (Vector3<f64>, Vector3<f64>),
-    at: &impl Fn(Field, f64, Option<&Marginal>) -> Result<Marginal, FieldError>,
-) -> Option<(Marginal, Vector3<f64>)> {
+    slope: &impl Fn(&Marginal) -> (Vector4<f64>, Vector4<f64>),
+    at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
+) -> Option<(Marginal, Vector4<f64>)> {
     const TRIES: usize = 6;
-    let from = place(&here.assumed.field);
+    let from = place(&here.assumed);
     for _ in 0..TRIES {
-        let to = Vector3::from_fn(|i, _| (from[i] + step[i]).clamp(limits()[i].0, limits()[i].1.max(from[i])));
-        let next = at(field_at(to, &here.assumed.field), here.assumed.jitter_kms, Some(here));
+        let to = Vector4::from_fn(|i, _| (from[i] + step[i]).clamp(limits()[i].0, limits()[i].1.max(from[i])));
+        let to = Vector4::from_fn(|i, _| if step[i] == 0.0 { from[i] } else { to[i] });
+        let next = at(assumed_at(to, &here.assumed), Some(here));
         if let Some(next) = next.ok().filter(|next| height(next) > height(here) + 1e-4 * gradient.dot(&step)) {
             let (slope, _) = slope(&next);
             return Some((next, slope));
@@ -297,30 +333,4 @@ fn shortened(
         step *= 0.3;
     }
     None
-}
-
-/// The jitter (km/s) for which ln Z is largest, the field as it is; 0 where none gains.
-fn likeliest_jitter(imager: &Imager, basis: &Basis, marginal: &Marginal) -> Result<f64, FieldError> {
-    const LARGEST_KMS: f64 = 3.0;
-    const RATIO: f64 = 1.25;
-    let mut bare = marginal.clone();
-    bare.assumed.jitter_kms = 0.0;
-    let expansion = bare.expansion(imager, basis, &[])?;
-    let n = expansion.gradient.len();
-    let quadratic = crate::field::Quadratic {
-        ln_evidence: expansion.log_likelihood,
-        gradient: expansion.gradient,
-        information: expansion.information,
-    };
-    let height = |sd: f64| quadratic.jittered(&vec![sd; n]).map_or(f64::NEG_INFINITY, |q| q.ln_evidence);
-    let mut best = (0.0, quadratic.ln_evidence);
-    let mut sd = 1e-3;
-    while sd < LARGEST_KMS {
-        let here = height(sd);
-        if here > best.1 {
-            best = (sd, here);
-        }
-        sd *= RATIO;
-    }
-    Ok(best.0)
 }

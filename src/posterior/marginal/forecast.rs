@@ -113,7 +113,7 @@ impl MarginalPosterior {
         let star = moves.iter().any(|(p, _)| STELLAR.contains(p));
         let here: Marginal = self.marginal_at(values, star)?;
         match slopes {
-            None => Ok(Displaced { ln_evidence: here.ln_evidence(&self.imager, &self.basis)?, slopes: None }),
+            None => Ok(Displaced { ln_evidence: here.ln_evidence(), slopes: None }),
             Some(star) => {
                 let expansion = here.expansion(&self.imager, &self.basis, star)?;
                 Ok(Displaced { ln_evidence: expansion.log_likelihood, slopes: Some(expansion.gradient) })

@@ -24,15 +24,12 @@ impl Maps {
 }
 
 impl Marginal {
-    /// The most probable maps where the jitter is noise of the profiles. [`Marginal::settled`] knows nothing of it, so
-    /// that its maps explain zero points by spots.
+    /// The same where the jitter is noise of the profiles, along their slopes at the most probable maps so far. Maps
+    /// that know nothing of it explain zero points by spots that change.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn settled_with_jitter(&self, imager: &Imager, basis: &Basis) -> Result<Settled, FieldError> {
-        if self.assumed.jitter_kms == 0.0 {
-            return Ok(self.settled.clone());
-        }
+    pub(super) fn with_jitter(self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
         let slopes = self.design.condensed(&self.slopes(imager, basis, &[]));
         let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
             Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
@@ -41,6 +38,7 @@ impl Marginal {
             |maps: &DMatrix<f64>| self.design.epochs(imager, maps).into_iter().zip(&slopes).map(jittered).collect();
         let sought = Sought { field: self.assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         let start = self.settled.coefficients.clone();
-        settle(linearise, sought, start, Some(&self.settled.evidence), &basis.settling)
+        let settled = settle(linearise, sought, start, Some(&self.settled.evidence), &basis.settling)?;
+        Ok(Marginal { settled, ..self })
     }
 }

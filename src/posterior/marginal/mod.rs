@@ -103,7 +103,11 @@ impl Marginal {
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
         let by = nearby.map(|nearby| &nearby.settled.evidence);
         let settled = settle(linearise, sought, start, by, &basis.settling)?;
-        Ok(Marginal { values: assumed.among(values), assumed, design, settled })
+        let marginal = Marginal { values: assumed.among(values), assumed, design, settled };
+        match assumed.jitter_kms {
+            0.0 => Ok(marginal),
+            _ => marginal.with_jitter(imager, basis),
+        }
     }
 
     /// The brightness of each pixel (rows) in the most probable map of each profile (columns).

@@ -139,7 +139,7 @@ impl MarginalPosterior {
             Anew::Maps => (self.with_maps_anew(&values), SLOPES),
             Anew::Star => {
                 let here = self.marginal_at(values, true);
-                (here.and_then(|here| here.ln_evidence(&self.imager, &self.basis)), harmonics)
+                (here.map(|here| here.ln_evidence()), harmonics)
             }
         };
         match ln_evidence {

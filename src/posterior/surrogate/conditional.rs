@@ -77,7 +77,12 @@ impl LinearModel {
         }
         let linear: Vec<usize> = polar.into_iter().chain(others).collect();
         let normal = |&i: &usize| match space.free()[i].prior {
-            Prior::Normal { mean, sd, .. } if !polar.contains(&i) => (sd.powi(-2), mean * sd.powi(-2)),
+            Prior::Normal { mean, sd, .. } if !polar.contains(&i) => {
+                // in the coordinate that is sampled, to first order
+                let p = space.free()[i].parameter;
+                let sd = sd * (-p.log_jacobian(mean)).exp();
+                (sd.powi(-2), p.to_sampling(mean) * sd.powi(-2))
+            }
             _ => (0.0, 0.0),
         };
         let normals: Vec<(f64, f64)> = linear.iter().map(normal).collect();
