@@ -52,6 +52,8 @@ pub struct Settings {
 }
 
 /// Where the profiles come from.
+// there is one of them in a config
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum ObservationSource {
     /// Files.

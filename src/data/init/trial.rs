@@ -129,6 +129,9 @@ pub(super) fn run(
     if attempt.misfits && is_this_star && known.objective() == ObjectiveKind::MarginalLikelihood {
         trial.change = change(draft, config, profiles)?;
         if trial.change.is_some() {
+            // a line that is wrong may look like a star that changes
+            let wrong = attempt.scene.as_ref().and_then(|scene| Diagnosis::of(scene, Some(profiles.whole)));
+            trial.diagnosis = wrong.filter(|diagnosis| diagnosis.reason != Reason::Errors);
             trial.end = End::Changes;
             return Ok(trial);
         }

@@ -213,11 +213,12 @@ pub(super) fn changing(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         seeds.clone().map(move |seed| Star { lifetime_d, has_planet, seed })
     };
     let stars: Vec<Star> = groups.iter().flat_map(group_of).collect();
-    let results = laboratory.side_by_side(stars.len(), |k| {
-        let (star, config) = (&stars[k], stars[k].simulated(laboratory));
+    let searched = |(k, star): (usize, &Star)| {
+        let config = star.simulated(laboratory);
         (laboratory.report)(&format!("{ROW}, star {} of {}: {}", k + 1, stars.len(), star.name()));
         laboratory.kept(ROW, &star.name(), &config, |folder| star.searched(&config, folder))
-    })?;
+    };
+    let results = stars.iter().enumerate().map(searched).collect::<Result<Vec<_>, _>>()?;
     let of_stars = ["group", "lifetime_d", "star", "true_k_kms", "true_porb_over_prot"].map(str::to_owned);
     let of_searches = OBJECTIVES.iter().flat_map(|(_, name)| RESULTS.map(|result| format!("{name}_{result}")));
     let of_change = ["change_ln_evidence_gain", "integrated_lifetime_d"].map(str::to_owned);

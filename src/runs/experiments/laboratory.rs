@@ -20,8 +20,6 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Runs experiments and keeps what they came to.
 pub struct Laboratory<'a> {
@@ -154,30 +152,6 @@ impl Laboratory<'_> {
         let kept = Kept { config, version, result: work(&self.folder(&name)?)? };
         write_json(&path, &kept)?;
         Ok(kept.result)
-    }
-
-    /// The results of `work` on 0 up to `n`, in order; a thread takes the next when it is done with one, and has no
-    /// other threads to help it.
-    ///
-    /// # Errors
-    /// The first error, in order.
-    pub fn side_by_side<T: Send + Sync>(
-        &self,
-        n: usize,
-        work: impl Fn(usize) -> Result<T, ExperimentError> + Sync,
-    ) -> Result<Vec<T>, ExperimentError> {
-        let next = AtomicUsize::new(0);
-        let results: Vec<OnceLock<Result<T, ExperimentError>>> = (0..n).map(|_| OnceLock::new()).collect();
-        let thread = || {
-            let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be begun");
-            while let Some((k, result)) = results.iter().enumerate().nth(next.fetch_add(1, Relaxed)) {
-                let _ = result.set(alone.install(|| work(k)));
-            }
-        };
-        std::thread::scope(|scope| {
-            (0..rayon::current_num_threads().min(n)).for_each(|_| drop(scope.spawn(thread)));
-        });
-        results.into_iter().filter_map(OnceLock::into_inner).collect()
     }
 
     /// A folder for raw results, made if need be.
