@@ -16,10 +16,12 @@ use crate::field::{FieldError, Lifetime};
 use crate::maxent::Termination;
 use crate::planets::periodogram::eccentric::keplerian;
 use crate::planets::periodogram::offset::{Offset, offset};
+use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::peaks::refined;
 use crate::planets::periodogram::two_planets::{both, without};
 use crate::planets::periodogram::{
-    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
+    CircularOrbit, Frequencies, Jitters, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
+    co_rotation_penalty,
 };
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
@@ -231,6 +233,22 @@ impl View {
         Ok(View { seen, expansion, quadratic, regularised })
     }
 
+    /// The likelihood of the velocities beside jitters of several sizes, where the profiles say how large it is.
+    fn jitters(&self, imager: &Imager, settings: &DetectionSettings) -> Result<Jitters, DetectionError> {
+        match (&self.seen, settings.spots) {
+            (Seen::Integrated(fitted), Spots::Integrated(Known { jitter_kms: None, .. }))
+                if fitted.marginal.assumed.jitter_kms > 0.0 =>
+            {
+                let basis = Basis::new(&imager.grid);
+                let expansion = fitted.marginal.without_jitter(imager, &basis)?;
+                let expansion = expansion.expansion(imager, &basis, &self.expansion.stellar)?;
+                let without = expansion.velocities(&settings.nuisances);
+                Ok(Jitters::new(&without, fitted.marginal.assumed.jitter_kms))
+            }
+            _ => Ok(Jitters::none(&self.quadratic)),
+        }
+    }
+
     /// The map of maximum entropy, where there is one.
     pub fn image(&self) -> Option<&Image> {
         match &self.seen {
@@ -246,6 +264,12 @@ impl View {
             Seen::Integrated(fitted) => Some(fitted),
         }
     }
+}
+
+/// Delta ln L of the best orbit at the trial periods.
+fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
+    let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+    trials.iter().filter_map(|trial| Some(trial.orbit?.delta_ln_l)).fold(0.0, f64::max)
 }
 
 impl Detection {
@@ -265,12 +289,16 @@ impl Detection {
         alone[Parameter::K] = 0.0;
         let planet_free = View::new(imager, alone, settings, None)?;
         report(Stage::Search);
-        let blind = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
+        let jitters = planet_free.jitters(imager, settings)?;
+        let blind = Search::with_jitter(&jitters, &frequencies, settings.search)?;
         let blind = match settings.spots {
             Spots::OneMap(_) => blind,
             Spots::Integrated(_) => blind.without_multiples(),
         };
-        let best = blind.best().orbit.delta_ln_l;
+        let best = match jitters.is_none() {
+            true => blind.best().orbit.delta_ln_l,
+            false => highest(&planet_free.quadratic, &frequencies),
+        };
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
         let change =
@@ -290,8 +318,7 @@ impl Detection {
             co_rotation_penalty: None,
         };
         found.close(imager, values, settings, report)?;
-        found.co_rotation_penalty =
-            co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies, &found.blind.rows);
+        found.co_rotation_penalty = co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies);
         if settings.eccentric {
             found.keplerian = found.eccentric();
         }

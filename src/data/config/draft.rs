@@ -5,6 +5,7 @@ use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Pla
 use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
 use super::{Automatic, EquivalentWidth, ImagingSettings, VelocityJitter};
 use crate::posterior::noise::Weights;
+use crate::posterior::objective::ObjectiveKind;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -89,6 +90,7 @@ impl Draft {
     }
 
     fn sections(&self) -> Sections {
+        let integrated = self.imaging.objective == ObjectiveKind::MarginalLikelihood;
         Sections {
             schema: self.schema.clone(),
             star: self.star(),
@@ -100,7 +102,7 @@ impl Draft {
                 sigma_scale: Some(self.sigma_scale),
                 continuum_level: self.continuum_level,
                 weights: Weights::default(),
-                velocity_jitter_kms: self.velocity_jitter,
+                velocity_jitter_kms: Some(self.velocity_jitter).filter(|jitter| integrated || !jitter.is_default()),
                 simulate: None,
             },
             imaging: self.imaging.clone(),

@@ -22,7 +22,8 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
     let source = resolve_observations(&mut raw, &star, &values, path)?;
-    check_imaging(&raw.imaging, raw.observations.velocity_jitter_kms)?;
+    let velocity_jitter = resolve_jitter(&mut raw);
+    check_imaging(&raw.imaging, velocity_jitter)?;
     resolve_field(&mut raw, &mut values)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
@@ -45,7 +46,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         equivalent_width: raw.star.line.equivalent_width_kms,
         values,
         source,
-        velocity_jitter: raw.observations.velocity_jitter_kms,
+        velocity_jitter,
         imaging: raw.imaging,
         free,
         sampler: raw.sampler,
@@ -53,6 +54,16 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         sha256: fingerprint(&resolved),
         resolved,
     })
+}
+
+/// The velocity jitter, its default filled in. A field takes zero points that nobody told it of for spots that change
+/// or for planets.
+fn resolve_jitter(raw: &mut Config) -> VelocityJitter {
+    let integrated = raw.imaging.objective == ObjectiveKind::MarginalLikelihood;
+    let usual = if integrated { VelocityJitter::Fitted } else { VelocityJitter::default() };
+    let jitter = raw.observations.velocity_jitter_kms.unwrap_or(usual);
+    raw.observations.velocity_jitter_kms = Some(jitter).filter(|jitter| integrated || !jitter.is_default());
+    jitter
 }
 
 /// The parameters as the config gives them; those of the surface where they are free or on an axis.

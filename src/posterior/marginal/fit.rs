@@ -341,7 +341,10 @@ fn climb(
         let beside = |i: usize, h: f64| {
             let mut to = from;
             to[i] += h;
-            at(assumed_at(to, &of.assumed), Some(of)).map(|there| height(&there)).ok().filter(|height| height.is_finite())
+            at(assumed_at(to, &of.assumed), Some(of))
+                .map(|there| height(&there))
+                .ok()
+                .filter(|height| height.is_finite())
         };
         let along = |i: usize| {
             if !free[i] {
@@ -378,7 +381,9 @@ fn climb(
             break;
         }
         step *= (LONGEST / step.amax()).min(1.0);
-        let Some((next, slope_there)) = shortened(&here, step, &gradient, (&limits, &height), &slope, at) else { break };
+        let Some((next, slope_there)) = shortened(&here, step, &gradient, (&limits, &height), &slope, at) else {
+            break;
+        };
         let moved = Vector4::from_fn(|i, _| if free[i] { place(&next.assumed)[i] - from[i] } else { 0.0 });
         let bent = gradient - slope_there;
         let gained = height(&next) - height(&here);
