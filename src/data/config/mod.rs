@@ -27,7 +27,7 @@ pub use crate::sampling::ensemble::SamplerSettings;
 pub use automatic::Automatic;
 pub use draft::Draft;
 pub use error::ConfigError;
-pub use identity::{Difference, first_difference, jitter_difference, model_difference, section_difference};
+pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use jitter::VelocityJitter;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
