@@ -12,6 +12,7 @@ fn changing(steps: usize) -> Value {
     simulate.as_object_mut().unwrap().remove("spots");
     simulate["random_spots"] = json!({ "number": 6, "lifetime_d": 8, "seed": 2 });
     simulate["snr"] = json!(500);
+    config["observations"]["velocity_jitter_kms"] = json!(0);
     config["imaging"] = json!({ "pixels": 200, "objective": "marginal-likelihood" });
     config["grid"] = json!({ "axes": { "k_kms": [0.0, 0.4, 5], "phi": [0.8, 1.2, 5] } });
     config
