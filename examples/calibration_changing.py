@@ -130,6 +130,7 @@ def search(program, config, objective, folder):
     """periodogram.json of a blind search with that objective, and its seconds."""
     changed = json.loads(config.read_text())
     changed["imaging"] = changed.get("imaging", {}) | {"objective": objective}
+    changed["observations"]["velocity_jitter_kms"] = 0.0
     path = config.with_name(f"{objective}.json")
     path.write_text(json.dumps(changed))
     began = time.monotonic()

@@ -5,9 +5,6 @@ use crate::field::{Epoch, Evidence, FieldError, Settled, Sought, settle};
 use crate::posterior::imaging::Imager;
 use nalgebra::DMatrix;
 
-/// Times that maps are found with a jitter along the slopes of those before.
-const JITTERED: usize = 2;
-
 /// Maps at some times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maps {
@@ -41,14 +38,14 @@ impl Marginal {
     }
 
     /// The same where the jitter is noise of the profiles, along their slopes at the most probable maps. Maps that know
-    /// nothing of it explain zero points by spots, so slopes and maps are found [`JITTERED`] times in turn: slopes of
-    /// other maps than these would seem to tell the velocities of the profiles from their zero points.
+    /// nothing of it explain zero points by spots, so slopes and maps are found in turn, so many times: slopes of other
+    /// maps than these would seem to tell the velocities of the profiles from their zero points.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub(super) fn with_jitter(mut self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
+    pub(super) fn with_jitter(mut self, imager: &Imager, basis: &Basis, times: usize) -> Result<Self, FieldError> {
         let sought = Sought { field: self.assumed.field, degrees: &basis.degrees, watched: &basis.watched };
-        for _ in 0..JITTERED {
+        for _ in 0..times {
             let slopes = self.design.condensed(&self.slopes(imager, basis, &[]));
             let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
                 Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
