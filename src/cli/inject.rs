@@ -10,7 +10,7 @@ use crate::data::scene::Scene;
 use crate::posterior::objective::Parameter;
 use crate::star::Orbit;
 use crate::star::injection::inject;
-use crate::star::observation::Observations;
+use crate::star::observation::{Observations, Profile};
 use std::path::PathBuf;
 
 /// Name of the config that is written beside the profiles.
@@ -82,8 +82,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// The orbit asked for, which leaves the line in the data.
 fn orbit(args: &Args, whole: &Observations) -> Result<Orbit, Failure> {
     let Args { k_kms, porb_over_prot, phi, .. } = *args;
-    let bins = whole.profiles.iter().map(|p| p.intensity.len()).min().unwrap_or(0);
-    let most = 0.25 * bins as f64 * whole.step_kms;
+    let width_kms = |p: &Profile| p.intensity.len() as f64 * p.step_kms;
+    let most = 0.25 * whole.profiles.iter().map(width_kms).fold(f64::INFINITY, f64::min);
     let wrong = |option: &str, value: f64, must: String| {
         Err(Failure::input(format!("--{option}: must be {must}, not {value}")))
     };

@@ -298,7 +298,7 @@ impl Scene {
         let mut observations = self.observations.clone();
         let injected = inject(whole, &self.imager.star, orbits).over_continuum(self.continuum_level());
         for (cut, whole) in observations.profiles.iter_mut().zip(&injected.profiles) {
-            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / injected.step_kms).round() as usize;
+            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / cut.step_kms).round() as usize;
             for (intensity, shifted) in cut.intensity.iter_mut().zip(whole.intensity.iter().skip(first)) {
                 *intensity = *shifted;
             }
@@ -404,7 +404,7 @@ impl Scene {
 /// # Errors
 /// Settings that make no sense with these observations.
 pub fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
-    settings.check_velocity_grid(&settings.values, observations.step_kms)?;
+    settings.check_velocity_grid(&settings.values, observations.step_kms())?;
     let star = settings.star_for(observations)?;
     let imager = Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy());
     Ok(match settings.imaging.nuisances {
@@ -487,14 +487,14 @@ fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> Parame
 /// SHA-256 (hex) of the numbers of `observations`, little-endian: the step, then for each profile time, number of bins,
 /// and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
-    let step = observations.step_kms;
+    let step = observations.step_kms();
     let mut hash = Sha256::new();
     hash.update(step.to_le_bytes());
     for profile in &observations.profiles {
         hash.update(profile.time_d.to_le_bytes());
         hash.update((profile.intensity.len() as u64).to_le_bytes());
         for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
-            for number in [profile.velocity_kms(j, step), *intensity, *sigma] {
+            for number in [profile.velocity_kms(j), *intensity, *sigma] {
                 hash.update(number.to_le_bytes());
             }
         }

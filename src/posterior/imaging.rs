@@ -13,7 +13,7 @@ use crate::numerics::vector::linear::combine;
 use crate::numerics::vector::{self, Number};
 use crate::posterior::nuisances::{LineAndContinuum, Nuisances};
 use crate::star::observation::Observations;
-use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid};
 use profile::{Bend, Misfit, Pull};
 
 pub use data::Data;
@@ -25,8 +25,9 @@ pub struct Imager {
     pub grid: SurfaceGrid,
     /// The star, but for the parameters.
     pub star: StarSettings,
-    /// Times and velocity bins.
-    pub sampling: Sampling,
+    /// The data sets, whose profiles follow each other: times and velocity bins, and what of the star looks different
+    /// through each.
+    pub sets: Vec<Seen>,
     /// Observed depths and their weights.
     pub data: Data,
     /// Entropy of a map.
@@ -39,7 +40,7 @@ impl Imager {
         Imager {
             grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
             star,
-            sampling: Sampling::of(observations),
+            sets: vec![Sampling::of(observations).into()],
             data: Data::of(observations),
             entropy,
         }
@@ -63,54 +64,72 @@ impl Imager {
 
     /// The same without some of the profiles.
     pub fn without(&self, profiles: &[usize]) -> Self {
-        let (mut rest, mut kept) = (Vec::new(), Vec::new());
-        for (k, (profile, bins)) in self.sampling.profiles.iter().zip(self.bins()).enumerate() {
-            if !profiles.contains(&k) {
-                rest.push(*profile);
-                kept.push(bins);
-            }
+        let mut first = 0;
+        let mut sets = self.sets.clone();
+        for set in &mut sets {
+            let all = &mut set.sampling.profiles;
+            let before = first;
+            first += all.len();
+            let mut k = before..first;
+            all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
-        let sampling = Sampling { profiles: rest, ..self.sampling };
-        Imager { sampling, data: self.data.of_profiles(&kept), ..self.clone() }
+        let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
+        Imager { sets, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
+    }
+
+    /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
+    pub fn profiles(&self) -> impl Iterator<Item = (f64, f64, usize)> {
+        self.sets.iter().flat_map(|set| set.sampling.profiles.iter().copied())
+    }
+
+    /// Times of all profiles (d).
+    pub fn times_d(&self) -> Vec<f64> {
+        self.profiles().map(|profile| profile.0).collect()
     }
 
     /// Bins of every profile within the data.
     fn bins(&self) -> Vec<std::ops::Range<usize>> {
         let mut end = 0;
-        let next = |profile: &(f64, f64, usize)| {
+        let next = |profile: (f64, f64, usize)| {
             end += profile.2;
             end - profile.2..end
         };
-        self.sampling.profiles.iter().map(next).collect()
+        self.profiles().map(next).collect()
     }
 
     /// The response at one state of star and planet.
     pub fn response(&self, state: &StarState) -> Response {
-        Response::new(&self.grid, &self.star, state, &self.sampling)
+        Response::of_sets(&self.grid, &self.star, state, &self.sets)
     }
 
     /// What responses close to a state have in common.
     pub fn nearby(&self, state: &StarState) -> Nearby {
-        Nearby::new(&self.grid, &self.star, state, &self.sampling)
+        Nearby::new(&self.grid, &self.star, state, &self.sets)
     }
 
     /// The response at a state, in half the time if it is close to another.
     pub fn response_near(&self, nearby: &Nearby, state: &StarState) -> Response {
-        nearby.response(&self.grid, &self.star, state, &self.sampling).unwrap_or_else(|| self.response(state))
+        nearby.response(&self.grid, &self.star, state, &self.sets).unwrap_or_else(|| self.response(state))
+    }
+
+    /// That of `response` at a state that differs from its own by orbit and systemic velocity alone.
+    pub fn with_velocities(&self, response: &Response, state: &StarState) -> Response {
+        response.with_velocities(&self.star, state, &self.sets)
     }
 
     /// The misfit of maps seen through `response`.
     pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
-        let brightness = match self.entropy {
-            Entropy::Spots { .. } => Brightness::of_spots(response.contrast()),
+        let brightness = |k: usize| match self.entropy {
+            Entropy::Spots { .. } => Brightness::of_spots(response.contrast(k)),
             Entropy::BrightAndDark => Brightness::ITSELF,
         };
+        let brightness = (0..response.profiles()).map(brightness).collect();
         ImagingProblem::of_brightness(&self.grid.area, &self.data, response, brightness)
     }
 
     /// Rotation cycle of each profile.
     pub fn cycles(&self) -> Vec<f64> {
-        self.sampling.profiles.iter().map(|profile| self.star.cycle(profile.0)).collect()
+        self.profiles().map(|profile| self.star.cycle(profile.0)).collect()
     }
 
     /// Middle of the time base in rotation cycles.
@@ -136,7 +155,7 @@ pub struct ImagingProblem<'a> {
     area: &'a [f64],
     data: &'a Data,
     response: Response,
-    brightness_of: Brightness,
+    brightness_of: Vec<Brightness>,
     model_applications: u32,
     single_applications: u32,
     /// Model depth of every bin at the current map.
@@ -155,12 +174,13 @@ impl<'a> ImagingProblem<'a> {
     /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness
     /// `contrast`.
     pub fn new(area: &'a [f64], data: &'a Data, response: Response, contrast: f64) -> Self {
-        ImagingProblem::of_brightness(area, data, response, Brightness::of_spots(contrast))
+        let brightness = vec![Brightness::of_spots(contrast); response.profiles()];
+        ImagingProblem::of_brightness(area, data, response, brightness)
     }
 
     /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the
-    /// `brightness`.
-    fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Brightness) -> Self {
+    /// brightness as each profile sees it.
+    fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Vec<Brightness>) -> Self {
         let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
         ImagingProblem {
             area,
@@ -215,7 +235,7 @@ impl<'a> ImagingProblem<'a> {
 
     /// What profile `k` hands to the transpose for such a residual: its bins, and the constant that comes with them.
     fn pull(&self, k: usize, weighted_residual: &[f64], back: &mut [f64]) -> f64 {
-        let (bins, scale) = (self.response.bins(k), self.brightness_of.slope / self.continuum[k]);
+        let (bins, scale) = (self.response.bins(k), self.brightness_of[k].slope / self.continuum[k]);
         let (model, weighted_residual) = (&self.model[bins.clone()], &weighted_residual[bins.clone()]);
         vector::run(Pull { scale, model, weighted_residual, back: &mut back[bins] })
     }
@@ -225,7 +245,7 @@ impl<'a> ImagingProblem<'a> {
         self.model_applications += 1;
         self.response.apply(v, out, &mut self.constants);
         for k in 0..self.response.profiles() {
-            let scale = self.brightness_of.slope / self.continuum[k];
+            let scale = self.brightness_of[k].slope / self.continuum[k];
             for j in self.response.bins(k) {
                 out[j] = scale * (out[j] - self.model[j] * self.constants[k]);
             }
@@ -249,9 +269,11 @@ impl Problem for ImagingProblem<'_> {
 
     fn linearise(&mut self, s: &[f64]) -> f64 {
         self.model_applications += 1;
-        let brightness_of = self.brightness_of;
-        combine(&mut self.brightness, s, |_, s| brightness_of.at(s));
-        self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
+        let ImagingProblem { response, brightness_of, brightness, model, continuum, .. } = self;
+        response.apply_each(brightness, model, continuum, |first, map| {
+            let brightness_of = brightness_of[first];
+            combine(map, s, |_, s| brightness_of.at(s));
+        });
         let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
         let chi2_of = |(k, continuum): (usize, &f64)| {
             let (bins, continuum) = (response.bins(k), *continuum);
@@ -274,11 +296,19 @@ impl Problem for ImagingProblem<'_> {
         self.model_applications += 2;
         self.single_applications += if N::SINGLE { 2 } else { 0 };
         let exact = which == Curvature::Exact;
-        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, bins: weighed, .. } =
-            self;
-        let slope = self.brightness_of.slope;
+        let ImagingProblem {
+            response,
+            data,
+            brightness_of,
+            model,
+            weighted_residual,
+            continuum,
+            differences,
+            bins: weighed,
+            ..
+        } = self;
         response.apply_and_back(v, out, |k, line, d_continuum| {
-            let (bins, scale) = (response.bins(k), slope / continuum[k]);
+            let (bins, scale) = (response.bins(k), brightness_of[k].slope / continuum[k]);
             vector::run(Bend {
                 data,
                 bins,

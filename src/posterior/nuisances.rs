@@ -183,15 +183,14 @@ impl Nuisances {
 
 /// Templates of every bin of a profile.
 fn templates_of(profile: &Profile, observations: &Observations) -> Vec<[f64; 3]> {
-    let step = observations.step_kms;
     let bins = profile.intensity.len();
     let mean = |j: usize| {
-        let velocity = profile.velocity_kms(j, step);
+        let velocity = profile.velocity_kms(j);
         let (sum, count) = observations.profiles.iter().fold((0.0, 0.0), |(sum, count), other| {
             // rounding of VRAD does not lose the last bin
-            let position = (velocity - other.first_velocity_kms) / step;
+            let position = (velocity - other.first_velocity_kms) / other.step_kms;
             match position > -1e-6 && position < other.intensity.len() as f64 - 1.0 + 1e-6 {
-                true => (sum + 1.0 - other.intensity_at(velocity, step), count + 1.0),
+                true => (sum + 1.0 - other.intensity_at(velocity), count + 1.0),
                 false => (sum, count),
             }
         });

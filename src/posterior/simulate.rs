@@ -100,11 +100,12 @@ impl Simulation {
         let profile = |(intensity, time_d): (&[f64], &f64)| Profile {
             time_d: *time_d,
             first_velocity_kms: self.first_velocity_kms,
+            step_kms: self.step_kms,
             intensity: intensity.to_vec(),
             sigma: vec![self.sigma(); self.bins],
         };
         let profiles = intensity.chunks_exact(self.bins).zip(&self.times_d).map(profile).collect();
-        Observations { step_kms: self.step_kms, profiles }
+        Observations { profiles }
     }
 
     /// What is wrong with each profile by itself; empty if nothing is.

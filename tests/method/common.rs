@@ -70,7 +70,7 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
     Imager {
         grid,
         star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
+        sets: vec![oracle.sampling.clone().into()],
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     }

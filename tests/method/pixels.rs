@@ -15,7 +15,7 @@ fn vsini(pixels: usize) -> (f64, f64) {
     let imager = Imager {
         grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
         star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
+        sets: vec![oracle.sampling.clone().into()],
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     };

@@ -12,7 +12,7 @@ use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, Param
 use crate::posterior::simulate::Simulation;
 use crate::sampling::landscape::Grid;
 use crate::star::observation::Observations;
-use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
+use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN, velocity_grid};
 use crate::star::{BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -203,7 +203,7 @@ impl Settings {
         for profile in &observations.profiles {
             let bins = profile.intensity.len();
             let centre = self.values[Parameter::Vsys];
-            let distance = |j: usize| profile.velocity_kms(j, observations.step_kms) - centre;
+            let distance = |j: usize| profile.velocity_kms(j) - centre;
             let area = |depth: &dyn Fn(usize) -> f64| {
                 let side = |sign: f64| {
                     let beyond: Vec<f64> = (0..bins).filter(|j| sign * distance(*j) > reach_kms).map(depth).collect();
@@ -224,7 +224,7 @@ impl Settings {
     /// # Errors
     /// If the local line is so narrow, or the star so fast, that the velocity grid grows out of hand.
     pub fn check_velocity_grid(&self, values: &ParameterValues, step_kms: f64) -> Result<(), ConfigError> {
-        let (steps, nodes) = Response::velocity_grid(&self.star, &values.state(), step_kms);
+        let (steps, nodes) = velocity_grid(&self.star, &values.state(), step_kms);
         if steps.is_nan() || steps > MOST_STEPS_PER_BIN {
             let sigma = self.star.line.sigma_kms;
             let problem = format!("{sigma} (with the instrument) is too narrow for velocity bins of {step_kms} km/s");
@@ -294,7 +294,7 @@ const FEWEST_BESIDE: usize = 2;
 /// How much of its line an unspotted star shows within the velocities of `observations`.
 fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
     let depths = unspotted(star, values, observations);
-    let areas = depths.iter().sum::<f64>() * observations.step_kms / observations.profiles.len() as f64;
+    let areas = depths.iter().sum::<f64>() * observations.step_kms() / observations.profiles.len() as f64;
     areas / star.line.equivalent_width_kms
 }
 

@@ -229,7 +229,7 @@ fn level(patient: &Patient) -> Option<f64> {
     let (centre, reach) = line(patient);
     let side = |sign: f64| {
         let beside = |profile: &Profile| -> Vec<f64> {
-            let distance = |j: usize| sign * (profile.velocity_kms(j, profiles.step_kms) - centre);
+            let distance = |j: usize| sign * (profile.velocity_kms(j) - centre);
             let bins = profile.intensity.iter().enumerate();
             bins.filter(|(j, _)| (reach..=2.0 * reach).contains(&distance(*j))).map(|(_, i)| *i).collect()
         };
@@ -244,9 +244,9 @@ fn level(patient: &Patient) -> Option<f64> {
 fn range(patient: &Patient) -> Option<(f64, f64)> {
     const WIDE: f64 = 1.5;
     let (centre, reach) = line(patient);
-    let step = patient.observations.step_kms;
+    let step = patient.observations.step_kms();
     let first = |p: &Profile| p.first_velocity_kms;
-    let last = |p: &Profile| p.velocity_kms(p.intensity.len() - 1, step);
+    let last = |p: &Profile| p.velocity_kms(p.intensity.len() - 1);
     let profiles = &patient.observations.profiles;
     let from = profiles.iter().map(first).fold(f64::NEG_INFINITY, f64::max);
     let to = profiles.iter().map(last).fold(f64::INFINITY, f64::min);
@@ -258,10 +258,10 @@ fn range(patient: &Patient) -> Option<(f64, f64)> {
 /// The observations within other velocities, errors scaled as those that are used.
 fn within(patient: &Patient, from: f64, to: f64) -> Option<Observations> {
     const FEWEST: usize = 5;
-    let step = patient.observations.step_kms;
+    let step = patient.observations.step_kms();
     let source = patient.whole.unwrap_or(&patient.observations);
     let cut = |(profile, used): (&Profile, &Profile)| {
-        let inside = |j: &usize| (from..=to).contains(&profile.velocity_kms(*j, step));
+        let inside = |j: &usize| (from..=to).contains(&profile.velocity_kms(*j));
         let bins: Vec<usize> = (0..profile.intensity.len()).filter(inside).collect();
         let first = *bins.first().filter(|_| bins.len() >= FEWEST)?;
         // the factor on the errors of a profile is that of its first bin in use
@@ -269,11 +269,12 @@ fn within(patient: &Patient, from: f64, to: f64) -> Option<Observations> {
         let scale = used.sigma.first()? / profile.sigma.get(same)?;
         Some(Profile {
             time_d: profile.time_d,
-            first_velocity_kms: profile.velocity_kms(first, step),
+            first_velocity_kms: profile.velocity_kms(first),
+            step_kms: step,
             intensity: bins.iter().map(|&j| profile.intensity[j]).collect(),
             sigma: bins.iter().map(|&j| scale * profile.sigma[j]).collect(),
         })
     };
     let profiles = source.profiles.iter().zip(&patient.observations.profiles).map(cut).collect::<Option<Vec<_>>>()?;
-    Some(Observations { step_kms: step, profiles })
+    Some(Observations { profiles })
 }

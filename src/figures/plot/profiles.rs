@@ -74,7 +74,7 @@ pub(super) fn simulated(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let line = |profile: &crate::star::observation::Profile| Line {
         time_d: profile.time_d,
         cycle: (profile.time_d - epoch) / period,
-        velocity_kms: (0..profile.intensity.len()).map(|j| profile.velocity_kms(j, observations.step_kms)).collect(),
+        velocity_kms: (0..profile.intensity.len()).map(|j| profile.velocity_kms(j)).collect(),
         observed: profile.intensity.clone(),
         sigma: profile.sigma.clone(),
         model: Vec::new(),

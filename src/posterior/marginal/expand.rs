@@ -75,7 +75,7 @@ impl Marginal {
 
     fn response(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
         match moved {
-            None => self.design.response().with_velocities(&imager.star, &values.state(), &imager.sampling),
+            None => imager.with_velocities(self.design.response(), &values.state()),
             Some(_) => imager.response(&values.state()),
         }
     }

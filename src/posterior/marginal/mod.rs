@@ -98,7 +98,7 @@ impl Marginal {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         let start = match nearby {
             Some(nearby) => nearby.settled.coefficients.clone(),
-            None => DMatrix::zeros(basis.degrees.len(), imager.sampling.profiles.len()),
+            None => DMatrix::zeros(basis.degrees.len(), imager.profiles().count()),
         };
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
         let by = nearby.map(|nearby| &nearby.settled.evidence);
@@ -112,6 +112,6 @@ impl Marginal {
 
     /// The brightness of each pixel (rows) in the most probable map of each profile (columns).
     pub fn brightness(&self, basis: &Basis) -> DMatrix<f64> {
-        basis.brightness(&self.settled.coefficients, self.design.contrast())
+        self.design.brightness(basis, &self.settled.coefficients)
     }
 }
