@@ -50,6 +50,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| name == CONFIG || lsd::is_written(name) || name == truth::FILE)?;
+    if scene.settings.sets.len() > 1 {
+        let problem = "several data sets: put the orbit into each of them, by a config with that one alone";
+        return Err(Failure::input(format!("{}: observations: {problem}", args.config.display())));
+    }
     let (whole, labels) = scene.whole()?;
     let orbit = orbit(args, &whole)?;
     let star = &scene.imager.star;

@@ -84,6 +84,9 @@ pub struct View {
     /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over
     /// count as noise.
     pub quadratic: VelocityQuadratic,
+    /// The same with those zero points of data sets held that are otherwise integrated out, for tables of velocities;
+    /// `None` where there are none.
+    pub zero_points_held: Option<VelocityQuadratic>,
     /// The same with spots as the entropy sees them: the regularised likelihood itself.
     pub regularised: VelocityQuadratic,
     /// How many times larger than the entropy expects the unresolved spots are, in variance.
@@ -200,14 +203,33 @@ impl View {
             let fitted = fit(imager, &basis, values, known, near)?;
             let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
             let quadratic = expansion.velocities(nuisances);
-            let (regularised, field) = (quadratic.clone(), Some(Box::new(fitted)));
-            return Ok(View { reference, expansion, quadratic, regularised, unresolved_spots: 1.0, on_target, field });
+            let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
+            let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
+            return Ok(View {
+                reference,
+                expansion,
+                regularised: quadratic.clone(),
+                quadratic,
+                zero_points_held: held.map(|held| held.velocities(nuisances)),
+                unresolved_spots: 1.0,
+                on_target,
+                field: Some(Box::new(fitted)),
+            });
         }
         let expansion = Expansion::of(imager, &reference, &stellar);
         let regularised = expansion.velocities(nuisances);
         let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
         let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
-        Ok(View { reference, expansion, quadratic, regularised, unresolved_spots, on_target, field: None })
+        Ok(View {
+            reference,
+            expansion,
+            quadratic,
+            zero_points_held: None,
+            regularised,
+            unresolved_spots,
+            on_target,
+            field: None,
+        })
     }
 }
 

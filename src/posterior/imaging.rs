@@ -18,6 +18,17 @@ use profile::{Bend, Misfit, Pull};
 
 pub use data::Data;
 
+/// What is assumed of the velocity zero point of a data set beyond where it is held: a Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZeroPointPrior {
+    /// The data set.
+    pub set: usize,
+    /// Mean (km/s).
+    pub mean_kms: f64,
+    /// Standard deviation (km/s).
+    pub sd_kms: f64,
+}
+
 /// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
 #[derive(Clone, Debug)]
 pub struct Imager {
@@ -32,6 +43,8 @@ pub struct Imager {
     pub data: Data,
     /// Entropy of a map.
     pub entropy: Entropy,
+    /// The data sets whose velocity zero points are integrated out; mostly none.
+    pub zero_points: Vec<ZeroPointPrior>,
 }
 
 impl Imager {
@@ -43,7 +56,20 @@ impl Imager {
             sets: vec![Sampling::of(observations).into()],
             data: Data::of(observations),
             entropy,
+            zero_points: Vec::new(),
         }
+    }
+
+    /// The same for several data sets, whose profiles follow each other in `observations`; the first sees the `star` as
+    /// it is.
+    pub fn of_sets(
+        star: StarSettings,
+        sets: Vec<Seen>,
+        observations: &Observations,
+        pixels: usize,
+        entropy: Entropy,
+    ) -> Self {
+        Imager { sets, ..Imager::new(star, observations, pixels, entropy) }
     }
 
     /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard
@@ -51,6 +77,38 @@ impl Imager {
     pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
         self.data.nuisances = Nuisances::new(priors, observations);
         self
+    }
+
+    /// The same of several data sets, each with its own priors.
+    pub fn with_nuisances_of(mut self, sets: &[(LineAndContinuum, &Observations)]) -> Self {
+        self.data.nuisances = Nuisances::of_sets(sets);
+        self
+    }
+
+    /// Moves the velocities at which the profiles of a data set are expected, by `kms` to the red.
+    pub fn move_set(&mut self, set: usize, kms: f64) {
+        self.sets[set].sampling.profiles.iter_mut().for_each(|profile| profile.1 -= kms);
+    }
+
+    /// Holds a zero point that is integrated out farther to the red, by `kms`.
+    pub fn move_zero_point(&mut self, z: usize, kms: f64) {
+        self.move_set(self.zero_points[z].set, kms);
+        self.zero_points[z].mean_kms -= kms;
+    }
+
+    /// Number of each profile's data set, from 1; empty where there is only one.
+    pub fn set_of_each(&self) -> Vec<usize> {
+        let of_set = |(s, set): (usize, &Seen)| vec![s + 1; set.sampling.profiles.len()];
+        match self.sets.len() {
+            1 => Vec::new(),
+            _ => self.sets.iter().enumerate().flat_map(of_set).collect(),
+        }
+    }
+
+    /// The profiles of a data set.
+    pub fn profiles_of(&self, set: usize) -> std::ops::Range<usize> {
+        let count = |sets: &[Seen]| sets.iter().map(|set| set.sampling.profiles.len()).sum::<usize>();
+        count(&self.sets[..set])..count(&self.sets[..=set])
     }
 
     /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
@@ -73,8 +131,14 @@ impl Imager {
             let mut k = before..first;
             all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
+        // a data set of which nothing is left is none
+        let mut zero_points = self.zero_points.clone();
+        let is_left = |set: &Seen| !set.sampling.profiles.is_empty();
+        zero_points.retain(|prior| is_left(&sets[prior.set]));
+        zero_points.iter_mut().for_each(|prior| prior.set = sets[..prior.set].iter().filter(|s| is_left(s)).count());
+        sets.retain(is_left);
         let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
-        Imager { sets, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
+        Imager { sets, zero_points, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
     }
 
     /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.

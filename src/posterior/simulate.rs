@@ -54,6 +54,8 @@ pub struct Simulation {
     pub continuum: LineAndContinuum,
     /// Standard deviation of the velocity zero points of the profiles (km/s).
     pub velocity_jitter_kms: f64,
+    /// Velocity that is added to all profiles (km/s).
+    pub zero_point_kms: f64,
     /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for
     /// white noise.
     pub correlated_bins: f64,
@@ -77,7 +79,8 @@ impl Simulation {
         let state = self.truth.state();
         let zero_points = self.zero_points_kms();
         // a line that is farther to the red by its zero point is the line seen from bins that are farther to the blue
-        let first = |k: usize| zero_points.get(k).map_or(self.first_velocity_kms, |v| self.first_velocity_kms - v);
+        let own = self.first_velocity_kms - self.zero_point_kms;
+        let first = |k: usize| zero_points.get(k).map_or(own, |v| own - v);
         let profiles = self.times_d.iter().enumerate().map(|(k, time)| (*time, first(k), self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
         let response = Response::new(&grid, star, &state, &sampling);

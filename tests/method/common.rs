@@ -71,6 +71,7 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
         grid,
         star: oracle.star.clone(),
         sets: vec![oracle.sampling.clone().into()],
+        zero_points: Vec::new(),
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     }

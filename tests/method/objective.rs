@@ -21,6 +21,7 @@ fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
         grid: SurfaceGrid::equal_area(1200, Quadrature::Gauss2x2),
         star: oracle.star.clone(),
         sets: vec![oracle.sampling.clone().into()],
+        zero_points: Vec::new(),
         data: oracle.data.clone(),
         entropy: entropy.unwrap_or(Entropy::new(oracle.default_spot)),
     };

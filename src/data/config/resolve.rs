@@ -6,7 +6,7 @@ use super::identity::fingerprint;
 use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
-use super::resolve_observations::resolve_observations;
+use super::resolve_sets::resolve_sets;
 use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
 use crate::posterior::marginal;
@@ -21,8 +21,9 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
-    let source = resolve_observations(&mut raw, &star, &values, path)?;
-    check_imaging(&raw.imaging, raw.observations.velocity_jitter_kms)?;
+    let sets = resolve_sets(&mut raw, &star, &values, path)?;
+    let velocity_jitter = raw.observations.sections[0].velocity_jitter_kms;
+    check_imaging(&raw.imaging, velocity_jitter)?;
     resolve_field(&mut raw, &mut values)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
@@ -42,10 +43,9 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         path: path.into(),
         star,
         mass_msun: raw.star.mass_msun,
-        equivalent_width: raw.star.line.equivalent_width_kms,
         values,
-        source,
-        velocity_jitter: raw.observations.velocity_jitter_kms,
+        sets,
+        velocity_jitter,
         imaging: raw.imaging,
         free,
         sampler: raw.sampler,

@@ -59,20 +59,20 @@ impl Change {
         let Patient { settings, .. } = patient;
         let mut all: Vec<Change> = VSINI.map(Change::Vsini).into();
         all.extend(LINE_WIDTH.map(Change::LineWidth));
-        if settings.star.line.gamma_kms == 0.0 && settings.values.given(Parameter::LineSigma).is_none() {
+        if settings.sets[0].star.line.gamma_kms == 0.0 && settings.values.given(Parameter::LineSigma).is_none() {
             all.extend(WINGS.map(|(gamma, sigma)| Change::Wings(gamma, sigma)));
         }
         if settings.imaging.brightness == BrightnessModel::Spots {
             all.push(Change::BrightAndDark);
         }
         all.extend(PERIOD.map(Change::Period));
-        if settings.equivalent_width != EquivalentWidth::Auto
+        if settings.sets[0].equivalent_width != EquivalentWidth::Auto
             && settings.values.given(Parameter::EquivalentWidth).is_none()
         {
             all.push(Change::MeasuredStrength);
         }
         all.extend(level(patient).map(Change::Level));
-        if settings.imaging.nuisances.is_none() {
+        if settings.sets[0].nuisances.is_none() {
             all.push(Change::Offsets);
         }
         all.extend(range(patient).map(|(from, to)| Change::Range(from, to)));
@@ -153,13 +153,13 @@ impl Change {
         match self {
             Change::Vsini(factor) => settings.values[Parameter::Vsini] *= factor,
             Change::LineWidth(factor) => {
-                settings.star.line.sigma_kms *= factor;
+                settings.sets[0].star.line.sigma_kms *= factor;
                 if settings.values.given(Parameter::LineSigma).is_some() {
                     settings.values[Parameter::LineSigma] *= factor;
                 }
             }
             Change::Wings(gamma, sigma) => {
-                let line = &mut settings.star.line;
+                let line = &mut settings.sets[0].star.line;
                 let (total, instrument) = (line.sigma_kms, line.instrumental_sigma_kms);
                 line.gamma_kms = gamma * total;
                 line.sigma_kms = before_spectrograph(sigma * total, instrument).hypot(instrument);
@@ -167,10 +167,11 @@ impl Change {
             Change::BrightAndDark => settings.imaging.brightness = BrightnessModel::BrightAndDark,
             // the orbit, if there is one, keeps its period in days
             Change::Period(factor) => settings.values[Parameter::OmegaEq] /= factor,
-            Change::MeasuredStrength => settings.equivalent_width = EquivalentWidth::Auto,
+            Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::Auto,
             Change::Level(level) => changed.observations = changed.observations.over_continuum(*level),
             Change::Offsets => {
-                settings.imaging.nuisances = Some(LineAndContinuum { continuum_offset: OFFSET, ..Default::default() });
+                let offsets = LineAndContinuum { continuum_offset: OFFSET, ..Default::default() };
+                settings.sets[0].nuisances = Some(offsets);
             }
             Change::Range(from, to) => changed.observations = within(patient, *from, *to)?,
         }
@@ -209,7 +210,7 @@ fn before_spectrograph(total_kms: f64, instrument_kms: f64) -> f64 {
 
 /// Width of the local line (km/s) before the spectrograph, to two decimals.
 fn local_sigma(patient: &Patient) -> f64 {
-    let line = &patient.settings.star.line;
+    let line = &patient.settings.sets[0].star.line;
     let local = (line.sigma_kms.powi(2) - line.instrumental_sigma_kms.powi(2)).max(0.0).sqrt();
     let sigma = patient.settings.values.given(Parameter::LineSigma).unwrap_or(local);
     (100.0 * sigma).round() / 100.0

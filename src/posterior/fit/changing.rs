@@ -367,7 +367,7 @@ fn velocities(
     marginal: &Marginal,
     modelled: &Modelled,
 ) -> Result<Vec<VelocityWithoutSpots>, FieldError> {
-    let free = marginal.expansion(imager, basis, &[])?.velocities(&[]).radial_velocities().ok();
+    let free = marginal.known_zero_points(imager, basis, &[])?.velocities(&[]).radial_velocities().ok();
     let state = marginal.values.state();
     let velocity = |(k, (profile, depth)): (usize, (&Profile, &[f64]))| {
         let cycle = imager.star.cycle(profile.time_d);
