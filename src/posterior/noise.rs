@@ -147,7 +147,8 @@ pub fn by_continuum(
         Weights::PerProfile => relative(&scatter)?,
     };
     let counts = settings.measured && continuum.is_some();
-    let correlated_bins = if counts { rounded(all.correlated_bins(star.line.sigma_kms / whole.step_kms())) } else { 1.0 };
+    let correlated_bins =
+        if counts { rounded(all.correlated_bins(star.line.sigma_kms / whole.step_kms())) } else { 1.0 };
     let sigma_scale = continuum.filter(|_| settings.measured).map(|scale| rounded(scale * correlated_bins.sqrt()));
     Ok(MeasuredErrors { sigma_scale, continuum, residual: None, correlated_bins, profiles })
 }

@@ -73,8 +73,7 @@ impl Response {
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the lines are
     /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
-        let shifted =
-            |(part, set): (&Part, &Seen)| part.with_velocities(&set.star(star), state, &set.sampling);
+        let shifted = |(part, set): (&Part, &Seen)| part.with_velocities(&set.star(star), state, &set.sampling);
         Response::stacked(self.parts.iter().zip(sets).map(shifted).collect())
     }
 

@@ -163,7 +163,7 @@ fn an_orbit_is_found_under_wandering_continua() {
     assert!(fit.summary.residual_rms < 1.05e-3, "{}", fit.summary.residual_rms);
     // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth
     // of the prior
-    let ObservationSource::Simulate(simulation) = &scene.settings.source else { panic!() };
+    let ObservationSource::Simulate(simulation) = &scene.settings.sets[0].source else { panic!() };
     for i in 0..3 {
         let (found, injected): (Vec<f64>, Vec<f64>) =
             fit.nuisances.iter().zip(simulation.nuisances()).map(|(a, b)| (a.numbers()[i], b.numbers()[i])).unzip();

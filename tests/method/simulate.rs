@@ -15,7 +15,7 @@ use std::path::Path;
 /// The demo's star, which is the oracle's, with `change` made to its simulation.
 fn demo(change: impl Fn(&mut Simulation)) -> Observations {
     let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
-    let config::ObservationSource::Simulate(mut simulation) = settings.source else { panic!() };
+    let config::ObservationSource::Simulate(mut simulation) = settings.sets[0].source.clone() else { panic!() };
     change(&mut simulation);
     simulation.observe(&settings.star)
 }
@@ -110,7 +110,7 @@ fn zero_points_are_velocities_of_their_own() {
         })
     };
     let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
-    let config::ObservationSource::Simulate(simulation) = settings.source else { panic!() };
+    let config::ObservationSource::Simulate(simulation) = settings.sets[0].source.clone() else { panic!() };
     assert!(simulation.zero_points_kms().is_empty());
     let zero_points = Simulation { velocity_jitter_kms: 0.5, ..simulation }.zero_points_kms();
     // fifty numbers know their scatter to 10 %
@@ -181,7 +181,7 @@ fn brightness_of_spots_and_faculae() {
     let spot = |longitude: f64, filling: f64| Spot { longitude, latitude: 0.3, radius: 0.4, filling, life: None };
     let facula = |longitude: f64, excess: f64| Facula { disc: disc(longitude), excess };
     let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
-    let config::ObservationSource::Simulate(mut simulation) = settings.source else { panic!() };
+    let config::ObservationSource::Simulate(mut simulation) = settings.sets[0].source.clone() else { panic!() };
     let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
     simulation.spots = vec![spot(1.0, 0.6), spot(3.0, 1.0)];
     let spots_alone = simulation.brightness(&grid, 0.1);
@@ -228,7 +228,7 @@ fn passing(peak_d: f64, lifetime_d: f64, winding: f64) -> Spot {
 
 fn demo_simulation() -> (Simulation, config::Settings) {
     let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
-    let config::ObservationSource::Simulate(simulation) = settings.source.clone() else { panic!() };
+    let config::ObservationSource::Simulate(simulation) = settings.sets[0].source.clone() else { panic!() };
     (simulation, settings)
 }
 
@@ -356,7 +356,7 @@ fn of_config(change: impl Fn(&mut serde_json::Value)) -> Scene {
 }
 
 fn simulation_of(scene: &Scene) -> Simulation {
-    let config::ObservationSource::Simulate(simulation) = &scene.settings.source else { panic!() };
+    let config::ObservationSource::Simulate(simulation) = &scene.settings.sets[0].source else { panic!() };
     simulation.clone()
 }
 

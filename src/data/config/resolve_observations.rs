@@ -97,7 +97,8 @@ fn simulation(
     check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
     check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
     if !(section.zero_point_kms.abs() <= LARGEST_JITTER_KMS) {
-        let problem = format!("{} must be from -{LARGEST_JITTER_KMS} to {LARGEST_JITTER_KMS} km/s", section.zero_point_kms);
+        let problem =
+            format!("{} must be from -{LARGEST_JITTER_KMS} to {LARGEST_JITTER_KMS} km/s", section.zero_point_kms);
         return Err(Fault::new(at("zero_point_kms"), problem));
     }
     if !(section.correlated_bins >= 1.0 && section.correlated_bins <= MOST_CORRELATED_BINS) {

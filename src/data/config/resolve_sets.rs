@@ -156,7 +156,9 @@ fn names(sets: &[DataSetSettings]) -> Result<(), Fault> {
     for (s, set) in sets.iter().enumerate() {
         let fault = |problem: String| Err(Fault::new(format!("{}.name", set.key), problem));
         let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-        if set.name.is_empty() || set.name.len() > LONGEST_NAME || !set.name.chars().all(plain)
+        if set.name.is_empty()
+            || set.name.len() > LONGEST_NAME
+            || !set.name.chars().all(plain)
             || set.name.starts_with('.')
         {
             let problem = format!("{:?} must be 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'", set.name);

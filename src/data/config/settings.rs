@@ -282,14 +282,14 @@ impl Settings {
         Ok(())
     }
 
-    /// The config with other observations in place of its own, those of a list at `path`; cut and errors of observed
+    /// The config, of one data set, with other observations in place of its own, those of a list at `path`; cut and errors of observed
     /// ones stay.
     pub fn with_observations(&self, path: &str) -> serde_json::Value {
         let mut config = self.resolved.clone();
         if let Some(top) = config.as_object_mut() {
             top.remove("$schema");
         }
-        let Some(section) = config.get_mut("observations").filter(|section| section.is_object()) else { return config };
+        let section = &mut config["observations"];
         match section.as_object_mut().filter(|section| !section.contains_key("simulate")) {
             Some(section) => {
                 section.insert("path".into(), path.into());

@@ -60,9 +60,10 @@ pub struct MeasuredSet {
 impl MeasuredSet {
     /// It in words.
     pub fn line(&self) -> String {
-        let zero_point = self.zero_point.as_ref().map(|held| {
-            format!(", zero point {:.4} +- {:.4} km/s, integrated out", held.value_kms, held.sigma_kms)
-        });
+        let zero_point = self
+            .zero_point
+            .as_ref()
+            .map(|held| format!(", zero point {:.4} +- {:.4} km/s, integrated out", held.value_kms, held.sigma_kms));
         let errors = self.errors.as_ref().map(|errors| format!(", errors {}", errors.line()));
         let (name, profiles) = (&self.name, self.profiles);
         format!("{name}: {profiles} profiles{}{}", zero_point.unwrap_or_default(), errors.unwrap_or_default())

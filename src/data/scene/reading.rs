@@ -92,10 +92,13 @@ fn leave_out(
     let fewest = if settings.sets.len() > 1 { 1 } else { 2 };
     match left < all && left < fewest {
         true => {
-            let problem = format!("leaves {left} of {all} profiles, {fewest} at least {} needed", match fewest {
-                1 => "is",
-                _ => "are",
-            });
+            let problem = format!(
+                "leaves {left} of {all} profiles, {fewest} at least {} needed",
+                match fewest {
+                    1 => "is",
+                    _ => "are",
+                }
+            );
             Err(settings.fault(&format!("{}.exclude", set.key), &problem))
         }
         false => Ok((all - left, all)),

@@ -40,8 +40,7 @@ impl Continuum {
     /// Of profiles whose line reaches `reach_kms` to either side of `centre_kms`; `None` where hardly any continuum is
     /// beside it.
     pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Option<Self> {
-        let scatter: Scatter =
-            observations.profiles.iter().map(|p| Scatter::of(p, centre_kms, reach_kms)).sum();
+        let scatter: Scatter = observations.profiles.iter().map(|p| Scatter::of(p, centre_kms, reach_kms)).sum();
         // bins of which several are correlated are so many fewer, and quoted errors may be wrong
         let larger = scatter.ratio(1).unwrap_or(1.0).powi(2) * scatter.correlated_bins(f64::INFINITY);
         let sides = |profile| sides(profile, centre_kms, reach_kms, larger);

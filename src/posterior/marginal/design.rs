@@ -62,7 +62,6 @@ impl Basis {
     pub fn filling(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
         (&self.on_pixels * coefficients).add_scalar(MEAN_FILLING)
     }
-
 }
 
 /// Line depth and continuum of every profile for each harmonic, before the division of one by the other; depths in the
