@@ -106,6 +106,9 @@ pub struct View {
     /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over
     /// count as noise.
     pub quadratic: VelocityQuadratic,
+    /// The same with those zero points of data sets held that are otherwise integrated out, for tables of velocities;
+    /// `None` where there are none.
+    pub zero_points_held: Option<VelocityQuadratic>,
     /// The same with spots as the entropy sees them: the regularised likelihood itself.
     pub regularised: VelocityQuadratic,
 }
@@ -220,8 +223,15 @@ impl View {
             let fitted = fit(imager, &basis, values, known, near)?;
             let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
             let quadratic = expansion.velocities(nuisances);
-            let (regularised, seen) = (quadratic.clone(), Seen::Integrated(Box::new(fitted)));
-            return Ok(View { seen, expansion, quadratic, regularised });
+            let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
+            let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
+            return Ok(View {
+                expansion,
+                regularised: quadratic.clone(),
+                quadratic,
+                zero_points_held: held.map(|held| held.velocities(nuisances)),
+                seen: Seen::Integrated(Box::new(fitted)),
+            });
         }
         let reference = Reference::provisional(imager, values, settings.chi2_target)?;
         let on_target = reference.solution.termination == Termination::Converged;
@@ -230,7 +240,7 @@ impl View {
         let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
         let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
         let seen = Seen::OneMap(Box::new(Image { reference, unresolved_spots, on_target }));
-        Ok(View { seen, expansion, quadratic, regularised })
+        Ok(View { seen, expansion, quadratic, zero_points_held: None, regularised })
     }
 
     /// The likelihood of the velocities beside jitters of several sizes, where the profiles say how large it is.

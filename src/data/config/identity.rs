@@ -33,7 +33,11 @@ pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
 /// Whether two resolved configs count velocity zero points alike.
 pub fn jitter_difference(first: &Value, second: &Value) -> Option<Difference> {
     const KEY: &str = "velocity_jitter_kms";
-    let [first, second] = [first, second].map(|resolved| &resolved["observations"][KEY]);
+    // of several data sets it is one for all
+    let [first, second] = [first, second].map(|resolved| {
+        let observations = &resolved["observations"];
+        &observations.get(0).unwrap_or(observations)[KEY]
+    });
     difference(&format!("observations.{KEY}"), first, second)
 }
 

@@ -10,7 +10,8 @@
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
 //! 5. [`Maps`]: the most probable maps at any times, with their errors.
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
-//! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 7. [`zero_points`]: the velocity zero points of data sets, before anything else.
+//! 8. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 
 pub mod change;
 mod condense;
@@ -20,6 +21,7 @@ mod fit;
 mod forecast;
 mod maps;
 mod posterior;
+pub mod zero_points;
 
 pub use change::Change;
 pub use design::{Basis, Design};
@@ -101,7 +103,7 @@ impl Marginal {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         let start = match nearby {
             Some(nearby) => nearby.settled.coefficients.clone(),
-            None => DMatrix::zeros(basis.degrees.len(), imager.sampling.profiles.len()),
+            None => DMatrix::zeros(basis.degrees.len(), imager.profiles().count()),
         };
         let values = assumed.among(values);
         if let Some(nearby) = nearby.filter(|_| assumed.jitter_kms > 0.0) {
@@ -121,6 +123,6 @@ impl Marginal {
 
     /// The brightness of each pixel (rows) in the most probable map of each profile (columns).
     pub fn brightness(&self, basis: &Basis) -> DMatrix<f64> {
-        basis.brightness(&self.settled.coefficients, self.design.contrast())
+        self.design.brightness(basis, &self.settled.coefficients)
     }
 }
