@@ -62,8 +62,8 @@ pub struct Told {
 
 impl Compressed {
     /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`;
-    /// and its `Q^T W J S^(1/2)` (kept, H). `None` where the covariance of the noise has no Cholesky factor.
-    pub fn new(epoch: &Epoch, around: DVectorView<f64>, sd: &[f64], how: Compression) -> Option<(Self, DMatrix<f64>)> {
+    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers). `None` where the covariance of the noise has no Cholesky factor.
+    pub fn new(epoch: &Epoch, around: DVectorView<f64>, sd: &[f64], how: Compression) -> Option<(Self, [DMatrix<f64>; 2])> {
         let factor = epoch.noise().cholesky()?.unpack();
         let n = epoch.len();
         let whiten = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
@@ -77,18 +77,21 @@ impl Compressed {
             _ => &whiten * &epoch.jacobian,
         };
         rows.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
+        let mut common = &whiten * &epoch.common;
         let mut directions = DMatrix::identity(n, n);
         if how.left_out > 0.0 && n > 0 {
             directions = leading_directions(&rows, how)?;
             directions = with_directions(directions, &(&whiten * &epoch.misfit));
             directions = with_directions(directions, &(&whiten * &epoch.slopes));
+            directions = with_directions(directions, &common);
+            common = directions.tr_mul(&common);
             // nalgebra's own product with a transpose is no product of blocks: five times slower
             rows = directions.transpose() * rows;
         }
         let expected = directions.tr_mul(&(&whiten * (&epoch.jacobian * around)));
         let ln_noise = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let constant = epoch.beside - 0.5 * (ln_noise + n as f64 * TAU.ln());
-        Some((Compressed { whiten, directions, expected, constant }, rows))
+        Some((Compressed { whiten, directions, expected, constant }, [rows, common]))
     }
 
     /// Misfit (data) and slopes (data, columns) of this epoch, those of which it was made or others.

@@ -1,6 +1,8 @@
 //! The data of one time, linear in the field: `r = J c + noise`.
 
-use nalgebra::{DMatrix, DVector};
+use super::FieldError;
+use nalgebra::allocator::Allocator;
+use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix, OMatrix, Storage};
 
 /// What was measured at one time, and how it depends on the coefficients of the field there: `data - model(c)` is
 /// `misfit - J (c - c0)` to first order, for the coefficients c0 around which the model was made linear.
@@ -23,6 +25,10 @@ pub struct Epoch {
     /// D' (data, columns): change of the model by each number whose gradient and information are asked for, for example
     /// the velocity. The same number of columns, perhaps none, in every epoch.
     pub slopes: DMatrix<f64>,
+    /// Change of the model by each number that epochs have in common, per standard deviation of its prior (data,
+    /// numbers): they are integrated out, one of each for all epochs. The same number of columns in every epoch that
+    /// has any.
+    pub common: DMatrix<f64>,
 }
 
 impl Epoch {
@@ -45,6 +51,7 @@ impl Epoch {
             && finite(self.misfit.as_slice())
             && finite(self.nuisances.as_slice())
             && finite(self.slopes.as_slice())
+            && finite(self.common.as_slice())
             && self.variance.iter().all(|v| v.is_finite() && *v > 0.0)
     }
 
@@ -62,13 +69,21 @@ impl Epoch {
         self
     }
 
-    /// `J^T N^-1 misfit` (H); `None` where that is not finite, or the covariance of the noise has no Cholesky factor.
-    pub(super) fn pulled(&self) -> Option<DVector<f64>> {
-        let weighed = match self.nuisances.ncols() {
-            0 => self.misfit.component_div(&self.variance),
-            _ => self.noise().cholesky()?.solve(&self.misfit),
-        };
-        Some(self.jacobian.tr_mul(&weighed)).filter(|pulled| pulled.iter().all(|x| x.is_finite()))
+    /// `N^-1` times columns (data, columns), N without what epochs have in common; `None` where that has no Cholesky
+    /// factor.
+    pub(super) fn weighed<C: Dim, S: Storage<f64, Dyn, C>>(
+        &self,
+        columns: &Matrix<f64, Dyn, C, S>,
+    ) -> Option<OMatrix<f64, Dyn, C>>
+    where
+        DefaultAllocator: Allocator<Dyn, C>,
+    {
+        if self.nuisances.ncols() > 0 {
+            return Some(self.noise().cholesky()?.solve(columns));
+        }
+        let mut weighed = columns.clone_owned();
+        weighed.column_iter_mut().for_each(|mut column| column.component_div_assign(&self.variance));
+        Some(weighed)
     }
 
     /// Panics where shapes do not go together: that is a mistake of the program.
@@ -78,9 +93,10 @@ impl Epoch {
         assert_eq!(self.variance.len(), n, "variances of an epoch");
         assert_eq!(self.nuisances.nrows(), n, "nuisances of an epoch");
         assert_eq!(self.slopes.nrows(), n, "slopes of an epoch");
+        assert_eq!(self.common.nrows(), n, "what an epoch has in common with others");
     }
 
-    /// Covariance of the noise, nuisances included.
+    /// Covariance of the noise, nuisances of this epoch included.
     pub(super) fn noise(&self) -> DMatrix<f64> {
         let mut noise = &self.nuisances * self.nuisances.transpose();
         for (j, variance) in self.variance.iter().enumerate() {
@@ -88,4 +104,46 @@ impl Epoch {
         }
         noise
     }
+}
+
+/// `J^T N^-1 misfit` of all epochs (H, epochs), what they have in common being among the noise.
+///
+/// With N0 the noise of the epochs apart and B their common columns, `N^-1 = N0^-1 - V (1 + B^T V)^-1 V^T`, `V = N0^-1
+/// B`.
+///
+/// # Errors
+/// [`FieldError::NotFinite`] where that is not finite, or a covariance of noise has no Cholesky factor.
+pub(super) fn pulled(epochs: &[Epoch]) -> Result<DMatrix<f64>, FieldError> {
+    let not_finite = |epoch: usize| FieldError::NotFinite { epoch };
+    let weighed = |(k, epoch): (usize, &Epoch)| epoch.weighed(&epoch.misfit).ok_or(not_finite(k));
+    let mut weighed: Vec<DVector<f64>> = epochs.iter().enumerate().map(weighed).collect::<Result<_, _>>()?;
+    let numbers = in_common(epochs);
+    if numbers > 0 {
+        let mut inner = DMatrix::identity(numbers, numbers);
+        let mut along = DVector::zeros(numbers);
+        let mut sharing = Vec::new();
+        for (k, epoch) in epochs.iter().enumerate().filter(|(_, epoch)| epoch.common.ncols() > 0) {
+            let own = epoch.weighed(&epoch.common).ok_or(not_finite(k))?;
+            inner += epoch.common.tr_mul(&own);
+            along += own.tr_mul(&epoch.misfit);
+            sharing.push((k, own));
+        }
+        let first = sharing[0].0;
+        let found = inner.cholesky().ok_or(not_finite(first))?.solve(&along);
+        sharing.iter().for_each(|(k, own)| weighed[*k] -= own * &found);
+    }
+    let mut all = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.ncols()), epochs.len());
+    for (k, (epoch, weighed)) in epochs.iter().zip(&weighed).enumerate() {
+        let pulled = epoch.jacobian.tr_mul(weighed);
+        if !pulled.iter().all(|x| x.is_finite()) {
+            return Err(not_finite(k));
+        }
+        all.set_column(k, &pulled);
+    }
+    Ok(all)
+}
+
+/// How many numbers the epochs have in common.
+pub(super) fn in_common(epochs: &[Epoch]) -> usize {
+    epochs.iter().map(|epoch| epoch.common.ncols()).max().unwrap_or(0)
 }

@@ -6,6 +6,7 @@
 //! back. Where the field hardly changes any more, steps by the covariance of an earlier one come nearer as fast as by
 //! one of their own, and cost next to nothing.
 
+use super::epoch::pulled;
 use super::{Compression, Epoch, Evidence, Field, FieldError};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -108,13 +109,4 @@ pub fn settle(
 /// Whether steps by the covariance of an earlier one come nearer.
 fn converges([before, last]: [f64; 2]) -> bool {
     last < FROZEN_BELOW && last < 0.5 * before
-}
-
-/// `J^T N^-1 misfit` (H, epochs).
-fn pulled(epochs: &[Epoch]) -> Result<DMatrix<f64>, FieldError> {
-    let mut all = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.ncols()), epochs.len());
-    for (k, epoch) in epochs.iter().enumerate() {
-        all.set_column(k, &epoch.pulled().ok_or(FieldError::NotFinite { epoch: k })?);
-    }
-    Ok(all)
 }

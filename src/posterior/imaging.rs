@@ -12,6 +12,7 @@ use crate::maxent::{Curvature, Problem};
 use crate::numerics::vector::linear::combine;
 use crate::numerics::vector::{self, Number};
 use crate::posterior::nuisances::{LineAndContinuum, Nuisances};
+use crate::posterior::photometry::LightCurve;
 use crate::star::observation::Observations;
 use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid};
 use profile::{Bend, Misfit, Pull};
@@ -45,6 +46,8 @@ pub struct Imager {
     pub entropy: Entropy,
     /// The data sets whose velocity zero points are integrated out; mostly none.
     pub zero_points: Vec<ZeroPointPrior>,
+    /// Light curves beside the profiles, of which only integrated maps know; mostly none.
+    pub light_curves: Vec<LightCurve>,
 }
 
 impl Imager {
@@ -57,6 +60,7 @@ impl Imager {
             data: Data::of(observations),
             entropy,
             zero_points: Vec::new(),
+            light_curves: Vec::new(),
         }
     }
 
@@ -144,6 +148,11 @@ impl Imager {
     /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
     pub fn profiles(&self) -> impl Iterator<Item = (f64, f64, usize)> {
         self.sets.iter().flat_map(|set| set.sampling.profiles.iter().copied())
+    }
+
+    /// Number of times at which the star is seen: profiles, and bins of light curves.
+    pub fn epochs(&self) -> usize {
+        self.profiles().count() + self.light_curves.iter().map(|curve| curve.bins.len()).sum::<usize>()
     }
 
     /// Times of all profiles (d).

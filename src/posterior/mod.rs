@@ -2,7 +2,7 @@
 //!
 //! The path of a vector of parameters: [`objective`] resolves it into values of star and orbit, [`imaging`] joins the
 //! star's response with the profiles, the maximum-entropy solver makes the image, and `objective` its
-//! log-probability. [`nuisances`] are what profiles have beside the star. Where stars change, [`marginal`] takes the
+//! log-probability. [`nuisances`] are what profiles have beside the star, [`photometry`] are light curves. Where stars change, [`marginal`] takes the
 //! place of the image: all maps are integrated over.
 //!
 //! Around one image: [`fit`] is the map with its checks, [`expansion`] the quadratic in the velocities of the profiles
@@ -22,6 +22,7 @@ pub mod marginal;
 pub mod noise;
 pub mod nuisances;
 pub mod objective;
+pub mod photometry;
 pub mod simulate;
 pub mod surrogate;
 pub mod zero_points;

@@ -12,7 +12,7 @@
 //! 5. [`response`] goes through these steps, and back, for one data set, `stacked` for several. `nearby` has a quicker
 //!    way for a star that differs little.
 //!
-//! Beside that: [`observation`] has profiles and what they measure by themselves, [`injection`] puts an orbit into
+//! Beside that: [`Band`] has the flux of the star, [`observation`] has profiles and what they measure by themselves, [`injection`] puts an orbit into
 //! them, [`planet`] says what is quoted of an orbit.
 
 mod block;
@@ -30,6 +30,7 @@ mod moments;
 mod nearby;
 pub mod observation;
 pub mod orbit;
+mod photometry;
 mod placement;
 pub mod planet;
 pub mod response;
@@ -45,6 +46,7 @@ pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;
 pub use orbit::Orbit;
+pub use photometry::Band;
 pub use response::Sampling;
 pub use rotation::Rotation;
 pub use spots::{Disc, Facula, Life, Spot};

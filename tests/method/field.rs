@@ -129,6 +129,7 @@ impl Star {
             misfit: of_pairs(&(&observed - &depth)).column(0).into_owned(),
             beside: 0.0,
             nuisances: DMatrix::zeros(halved.len(), 0),
+            common: DMatrix::zeros(halved.len(), 0),
             variance: halved,
             slopes: of_pairs(&slope(&depth, profile.velocity_kms[1] - profile.velocity_kms[0])),
         }

@@ -43,6 +43,7 @@ impl Problem {
                 nuisances: some(300 + k, n, nuisances) * 0.4,
                 slopes: some(400 + k, n, columns),
                 beside: 0.0,
+                common: DMatrix::zeros(n, 0),
             }
         };
         let epochs = times_d.iter().enumerate().map(epoch).collect();
@@ -91,11 +92,27 @@ impl Problem {
         self.epochs.iter().map(|epoch| epoch.time_d).collect()
     }
 
+    /// With numbers that all epochs but the first have in common.
+    fn with_common(mut self, numbers: usize) -> Self {
+        for (k, epoch) in self.epochs.iter_mut().enumerate().skip(1) {
+            epoch.common = some(500 + k, epoch.len(), numbers) * 2.0;
+        }
+        self
+    }
+
     fn noise(&self) -> DMatrix<f64> {
         let nuisances = self.apart(|epoch| epoch.nuisances.clone());
         let variances =
             DVector::from_iterator(self.data(), self.epochs.iter().flat_map(|e| e.variance.iter().copied()));
-        DMatrix::from_diagonal(&variances) + &nuisances * nuisances.transpose()
+        let numbers = self.epochs.iter().map(|epoch| epoch.common.ncols()).max().unwrap_or(0);
+        let mut common = DMatrix::zeros(self.data(), numbers);
+        let mut row = 0;
+        for epoch in &self.epochs {
+            let columns = epoch.common.ncols();
+            common.view_mut((row, 0), (epoch.len(), columns)).copy_from(&epoch.common);
+            row += epoch.len();
+        }
+        DMatrix::from_diagonal(&variances) + &nuisances * nuisances.transpose() + &common * common.transpose()
     }
 
     /// `J K J^T + N`.
@@ -476,8 +493,8 @@ fn ln_z_of_a_model_that_is_not_linear_is_the_integral() {
             let jacobian = (&lines[k] - &depth * continua[k].column(0).transpose() * 0.4) / continuum;
             let (misfit, n) = (&data[k] - depth, 6);
             let variance = DVector::repeat(n, sigma * sigma);
-            let (nuisances, slopes) = (DMatrix::zeros(n, 0), DMatrix::zeros(n, 0));
-            Epoch { time_d: k as f64, jacobian, misfit, variance, nuisances, beside: 0.0, slopes }
+            let [nuisances, slopes, common] = [0; 3].map(|columns| DMatrix::zeros(n, columns));
+            Epoch { time_d: k as f64, jacobian, misfit, variance, nuisances, beside: 0.0, slopes, common }
         };
         (0..2).map(epoch).collect()
     };

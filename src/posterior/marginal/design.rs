@@ -1,6 +1,7 @@
 //! The star's side of the marginal likelihood: what profiles each harmonic makes.
 
 use super::condense::Condensed;
+use super::light::Light;
 use super::{DEGREE, MEAN_FILLING};
 use crate::field::{Compression, Epoch, Harmonics, Settling};
 use crate::posterior::imaging::Imager;
@@ -80,6 +81,7 @@ pub struct Design {
     /// The same of a star without spots.
     bare_line: Vec<DVector<f64>>,
     bare_continuum: Vec<f64>,
+    light: Light,
 }
 
 impl Design {
@@ -123,7 +125,8 @@ impl Design {
             condensed.tell(k, &bins).column(0).into_owned()
         };
         let bare_line = (0..response.profiles()).map(bare).collect();
-        Design { response, condensed, line, continuum, bare_line, bare_continuum }
+        let light = Light::new(imager, basis, state);
+        Design { response, condensed, line, continuum, bare_line, bare_continuum, light }
     }
 
     /// Columns over the bins of each profile in its numbers.
@@ -131,10 +134,10 @@ impl Design {
         columns.iter().enumerate().map(|(k, columns)| self.condensed.tell(k, columns)).collect()
     }
 
-    /// Brightness over that of the photosphere (pixels, profiles) of maps with these `coefficients` (H, profiles), as
-    /// each profile sees it.
+    /// Brightness over that of the photosphere (pixels, profiles) of maps with these `coefficients` (H, epochs), as each
+    /// profile sees it.
     pub fn brightness(&self, basis: &Basis, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut brightness = basis.filling(coefficients);
+        let mut brightness = basis.filling(&coefficients.columns(0, self.response.profiles()).into_owned());
         for (k, mut map) in brightness.column_iter_mut().enumerate() {
             let contrast = self.response.contrast(k);
             map.apply(|filling| *filling = 1.0 - (1.0 - contrast) * *filling);
@@ -156,13 +159,15 @@ impl Design {
         ((line - &self.line[k] * coefficients * q) / continuum, continuum)
     }
 
-    /// The profiles linearised around maps of these coefficients (H, profiles), without slopes.
+    /// The profiles, then the bins of light curves, linearised around maps of these coefficients (H, epochs), without
+    /// slopes.
     pub fn epochs(&self, imager: &Imager, maps: &DMatrix<f64>) -> Vec<Epoch> {
         let times_d = imager.times_d();
-        (0..self.response.profiles())
-            .into_par_iter()
-            .map(|k| self.epoch(times_d[k], k, &maps.column(k).into_owned()))
-            .collect()
+        let profiles = self.response.profiles();
+        let mut epochs: Vec<Epoch> =
+            (0..profiles).into_par_iter().map(|k| self.epoch(times_d[k], k, &maps.column(k).into_owned())).collect();
+        epochs.extend(self.light.epochs(imager, maps.columns_range(profiles..)));
+        epochs
     }
 
     fn epoch(&self, time_d: f64, k: usize, coefficients: &DVector<f64>) -> Epoch {
@@ -175,6 +180,7 @@ impl Design {
             jacobian,
             variance: DVector::repeat(model.len(), 1.0),
             slopes: DMatrix::zeros(model.len(), 0),
+            common: DMatrix::zeros(model.len(), 0),
             misfit: &self.condensed.data[k] - model,
             nuisances: self.condensed.nuisances[k].clone(),
             beside: self.condensed.beside[k],

@@ -74,11 +74,19 @@ impl Marginal {
     }
 
     fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
-        let slopes = self.design.condensed(&self.slopes(imager, basis, stellar));
+        let slopes = self.slopes_of_epochs(imager, basis, stellar);
         let misfits: Vec<DVector<f64>> =
             self.design.epochs(imager, &self.settled.coefficients).into_iter().map(|epoch| epoch.misfit).collect();
         let of_all = self.settled.evidence.with(&misfits, &slopes)?;
-        Ok(summed(&of_all, misfits.len(), stellar.len()))
+        Ok(summed(&of_all, misfits.len(), self.design.response().profiles(), stellar.len()))
+    }
+
+    /// How the numbers of each epoch change with a velocity and with the star's parameters, at the most probable maps
+    /// (numbers, 1 + parameters).
+    pub(super) fn slopes_of_epochs(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+        let mut slopes = self.design.condensed(&self.slopes(imager, basis, stellar));
+        slopes.extend(self.flux_slopes(imager, basis, stellar));
+        slopes
     }
 
     /// How the depths of each profile change with its velocity and with the star's parameters, at the most probable
@@ -119,14 +127,16 @@ impl Marginal {
     }
 }
 
-/// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of all epochs and the
-/// parameters, which are those of all epochs.
-fn summed(of_all: &Quadratic, epochs: usize, stellar: usize) -> Quadratic {
-    let mut sums = DMatrix::zeros(epochs * (1 + stellar), epochs + stellar);
+/// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of the profiles, which
+/// are the first epochs, and the parameters, which are those of all epochs.
+fn summed(of_all: &Quadratic, epochs: usize, profiles: usize, stellar: usize) -> Quadratic {
+    let mut sums = DMatrix::zeros(epochs * (1 + stellar), profiles + stellar);
     for k in 0..epochs {
-        sums[(k * (1 + stellar), k)] = 1.0;
+        if k < profiles {
+            sums[(k * (1 + stellar), k)] = 1.0;
+        }
         for s in 0..stellar {
-            sums[(k * (1 + stellar) + 1 + s, epochs + s)] = 1.0;
+            sums[(k * (1 + stellar) + 1 + s, profiles + s)] = 1.0;
         }
     }
     Quadratic {

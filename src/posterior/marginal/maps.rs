@@ -46,7 +46,7 @@ impl Marginal {
     pub(super) fn with_jitter(mut self, imager: &Imager, basis: &Basis, times: usize) -> Result<Self, FieldError> {
         let sought = Sought { field: self.assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         for _ in 0..times {
-            let slopes = self.design.condensed(&self.slopes(imager, basis, &[]));
+            let slopes = self.slopes_of_epochs(imager, basis, &[]);
             let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
                 Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
             };

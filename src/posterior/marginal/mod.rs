@@ -5,7 +5,8 @@
 //! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
 //! parameters, as an expansion like that of maximum entropy. The order:
 //! 1. [`Basis`]: the harmonics on the pixels of the map, once.
-//! 2. [`Design`]: the profiles of each harmonic, for one star; a model application a harmonic.
+//! 2. [`Design`]: the profiles of each harmonic, for one star, a model application a harmonic; and its light curves.
+//!    Both are epochs of the field, profiles first.
 //! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
 //! 5. [`Maps`]: the most probable maps at any times, with their errors.
@@ -19,6 +20,7 @@ mod design;
 mod expand;
 mod fit;
 mod forecast;
+mod light;
 mod maps;
 mod posterior;
 pub mod zero_points;
@@ -27,6 +29,7 @@ pub use change::Change;
 pub use design::{Basis, Design};
 pub use fit::{Fitted, Known, NoFit, bounds, fit, usual_value};
 pub use forecast::Forecast;
+pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
 
@@ -82,7 +85,8 @@ pub struct Marginal {
     pub assumed: Assumed,
     /// The star's response.
     pub design: Arc<Design>,
-    /// The most probable maps (their coefficients, a column a profile), and the evidence there.
+    /// The most probable maps (their coefficients, a column a profile and then a bin of light curves), and the evidence
+    /// there.
     pub settled: Settled,
 }
 
@@ -103,7 +107,7 @@ impl Marginal {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         let start = match nearby {
             Some(nearby) => nearby.settled.coefficients.clone(),
-            None => DMatrix::zeros(basis.degrees.len(), imager.profiles().count()),
+            None => DMatrix::zeros(basis.degrees.len(), imager.epochs()),
         };
         let values = assumed.among(values);
         if let Some(nearby) = nearby.filter(|_| assumed.jitter_kms > 0.0) {
