@@ -151,6 +151,7 @@ impl From<SceneError> for Failure {
         match error {
             SceneError::Config(error) => error.into(),
             SceneError::Observations(error) => error.into(),
+            SceneError::LightCurve(error) => Failure::of(error),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::output::Output;
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
 use crate::data::diagnosis::{Diagnosis, Reason};
-use crate::data::io::map::{ChangingMapResult, FILES, MapResult};
+use crate::data::io::map::{ChangingMapResult, FILES, LIGHT_CURVES, MapResult};
 use crate::data::io::periodogram::FieldRecord;
 use crate::data::scene::Scene;
 use crate::posterior::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 ///
 /// With `imaging.objective` set to "marginal-likelihood" the star may change: the amplitude, slope and lifetime of its
 /// spots are fitted, and map.json holds the most probable map and its standard deviation at every time asked for, by
-/// default a map a night.
+/// default a map a night. With light curves (`photometry`), lightcurve.csv has them and what the maps make of them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc map configs/demo.json --out demo_map")]
 pub struct Args {
@@ -38,7 +38,7 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
-    args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
+    args.output.spare(&scene.files(), |name| FILES.contains(&name) || name == LIGHT_CURVES)?;
     match (scene.settings.imaging.objective, &args.times) {
         (ObjectiveKind::MarginalLikelihood, _) => changing(args, global, &scene),
         (_, None) => unchanging(args, global, &scene),
@@ -127,7 +127,9 @@ fn changing(args: &Args, global: &Global, scene: &Scene) -> Result<(), Failure> 
     for warning in fit.warnings.iter().chain(&fit.checks.warnings).chain(&reason) {
         report = report.line("warning", warning);
     }
-    report.written(folder, FILES.join(", ")).print();
+    let light = if fit.light.is_empty() { None } else { Some(LIGHT_CURVES) };
+    let files: Vec<&str> = FILES.into_iter().chain(light).collect();
+    report.written(folder, files.join(", ")).print();
     Ok(())
 }
 
@@ -156,6 +158,13 @@ fn changing_report(fit: &ChangingFit) -> Report {
     let report = match numbers.chi2_per_datum_unchanging {
         Some(chi2) => report.line("unchanging", format!("{chi2:.4} per datum, had the same spots lived for ever")),
         None => report,
+    };
+    let report = match fit.light.len() {
+        0 => report,
+        bins => {
+            let squares: f64 = fit.light.iter().map(|fit| ((fit.bin.flux - fit.model) / fit.bin.sigma).powi(2)).sum();
+            report.line("flux", format!("chi2 {squares:.2} for {bins} bins ({:.4} per bin)", squares / bins as f64))
+        }
     };
     report
         .line(

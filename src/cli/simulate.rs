@@ -3,7 +3,8 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
-use crate::data::config::{Config, DataSetSettings, ObservationSource};
+use crate::data::config::{Config, DataSetSettings, LightSource, ObservationSource};
+use crate::data::io::light_curve;
 use crate::data::io::lsd;
 use crate::data::io::truth::{self, Truth};
 use crate::data::scene::Scene;
@@ -15,7 +16,7 @@ use std::path::PathBuf;
 ///
 /// Reads `observations.simulate` of the config. Writes observations.txt and the profiles it lists, which other commands
 /// read by `observations.path`, and truth.json: what they were made with. Of several data sets each has these in a
-/// folder of its name.
+/// folder of its name. Light curves (`photometry.simulate`) are written to NAME.csv, which `photometry.path` reads.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc simulate configs/demo.json --out demo_data")]
 pub struct Args {
@@ -39,7 +40,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::input(format!("{}: {}.simulate: {problem}", args.config.display(), sets[0].key)));
     };
     let scene = Scene::new(&config)?;
-    args.output.spare(&scene.files(), |name| lsd::is_written(name) || name == truth::FILE)?;
+    let light_curves = &scene.settings.light_curves;
+    let light_files: Vec<String> = light_curves.iter().map(|curve| format!("{}.csv", curve.name)).collect();
+    if let Some(curve) = light_curves.iter().find(|curve| matches!(curve.source, LightSource::File(_))) {
+        let problem = "a table beside profiles that are simulated: give simulate in its place, or leave it out";
+        return Err(Failure::input(format!("{}: {}.path: {problem}", args.config.display(), curve.key)));
+    }
+    let writes = |name: &str| lsd::is_written(name) || name == truth::FILE || light_files.iter().any(|f| f == name);
+    args.output.spare(&scene.files(), writes)?;
     let truths: Vec<Truth> = simulations.iter().map(|simulation| scene.truth_of(simulation)).collect();
     let folder = args.output.create()?;
     let mut report = Report::default();
@@ -57,6 +65,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             report = report.line("data set", &set.name);
         }
         report = lines(report, simulation, truth, observations.profiles.len());
+    }
+    for (curve, file) in scene.settings.light_curves.iter().zip(&light_files) {
+        let measured = scene.light_curve(curve)?;
+        light_curve::write_to(&folder.join(file), &measured)?;
+        report = report.line("light curve", format!("{file}: {} measurements", measured.len()));
     }
     let files = "observations.txt, p000.prof ..., truth.json";
     let files = match sets.len() {

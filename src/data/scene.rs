@@ -1,11 +1,13 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
+mod light_curves;
 mod reading;
 
 use crate::data::config::{
-    Automatic, Config, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter, ZeroPoint,
+    Automatic, Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings, VelocityJitter, ZeroPoint,
 };
+use crate::data::io::FileError;
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::data::io::truth::Truth;
@@ -19,6 +21,7 @@ use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::posterior::objective::{
     FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
 };
+use crate::posterior::photometry::Flux;
 use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
@@ -66,6 +69,9 @@ pub enum SceneError {
     /// The observations are.
     #[error(transparent)]
     Observations(#[from] LsdError),
+    /// A light curve is.
+    #[error(transparent)]
+    LightCurve(#[from] FileError),
 }
 
 impl Scene {
@@ -95,7 +101,8 @@ impl Scene {
             Some(_) => config.clone(),
             None => config.clone().with("observations.path", IN_MEMORY),
         };
-        let settings = config.settings()?;
+        let mut settings = config.settings()?;
+        light_curves::read(&mut settings)?;
         let fault = |problem: String| settings.fault("observations", &problem);
         profiles.check().map_err(fault)?;
         let [set] = &settings.sets[..] else {
@@ -115,7 +122,8 @@ impl Scene {
     }
 
     /// Reads or simulates the observations of `settings`.
-    fn read(settings: Settings) -> Result<Self, SceneError> {
+    fn read(mut settings: Settings) -> Result<Self, SceneError> {
+        light_curves::read(&mut settings)?;
         let parts = settings.sets.iter().map(|set| Part::read(&settings, set)).collect::<Result<Vec<_>, _>>()?;
         let several = parts.len() > 1;
         let mut remarks = Vec::new();
@@ -134,6 +142,7 @@ impl Scene {
                 format!("{:x}", Sha256::digest(all))
             }
         };
+        let data_sha256 = light_curves::fingerprint(data_sha256, &settings);
         let (observations, errors) = parts.into_iter().map(|part| (part.observations, part.errors)).unzip();
         let mut scene = Scene::with_noise(settings, observations, errors)?;
         scene.measured.profiles = remarks;
@@ -181,7 +190,7 @@ impl Scene {
         let mut imager = imager(&settings, &parts)?;
         let correlated_bins = errors.iter().flatten().map(|errors| errors.correlated_bins).fold(1.0, f64::max);
         imager.data.correlated_bins = correlated_bins;
-        let mut measured = Measured::default();
+        let mut measured = Measured { light_curves: light_curves::remarks(&settings), ..Measured::default() };
         settings.imaging.chi2_target = match settings.imaging.chi2_target {
             Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
             Automatic::Auto => {
@@ -212,7 +221,7 @@ impl Scene {
         }
         let observations = Observations { profiles: parts.into_iter().flat_map(|part| part.profiles).collect() };
         let space = space(&settings.free, &settings, &imager);
-        let data_sha256 = fingerprint(&observations);
+        let data_sha256 = light_curves::fingerprint(fingerprint(&observations), &settings);
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
     }
 
@@ -283,6 +292,15 @@ impl Scene {
         Ok(all)
     }
 
+    /// The measurements of a light curve of the config, errors as quoted.
+    ///
+    /// # Errors
+    /// A table that is no longer what it was.
+    #[doc(hidden)]
+    pub fn light_curve(&self, curve: &LightCurveSettings) -> Result<Vec<Flux>, SceneError> {
+        light_curves::measured(&self.settings, curve)
+    }
+
     /// The files that it was read from: config, list, profiles.
     #[doc(hidden)]
     pub fn files(&self) -> Vec<PathBuf> {
@@ -290,6 +308,11 @@ impl Scene {
         for set in &self.settings.sets {
             if let ObservationSource::Files { path, .. } = &set.source {
                 files.extend(lsd::files(path));
+            }
+        }
+        for curve in &self.settings.light_curves {
+            if let LightSource::File(path) = &curve.source {
+                files.push(path.clone());
             }
         }
         files
@@ -442,6 +465,7 @@ pub fn imager(settings: &Settings, parts: &[Observations]) -> Result<Imager, Con
         let priors = settings.sets.iter().map(|set| set.nuisances.unwrap_or_default());
         imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
     }
+    imager.light_curves = light_curves::near(settings, &all)?;
     for (s, set) in settings.sets.iter().enumerate() {
         match set.zero_point {
             ZeroPoint::Known(0.0) => {}

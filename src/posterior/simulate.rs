@@ -17,12 +17,14 @@ pub use schedule::Schedule;
 
 use crate::posterior::nuisances::{LineAndContinuum, templates};
 use crate::posterior::objective::ParameterValues;
+use crate::posterior::photometry::Flux;
 use crate::star::observation::{Observations, Profile};
-use crate::star::{Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
+use crate::star::{Band, Brightness, Facula, Quadrature, Response, Sampling, Spot, StarSettings, SurfaceGrid};
 use maps::Content;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 
 /// Standard error that observations without noise are given: that of a signal-to-noise ratio of 1000.
 pub const SIGMA_WITHOUT_NOISE: f64 = 1e-3;
@@ -67,6 +69,9 @@ const CONTINUUM_STREAM: u64 = 1;
 /// Stream of the random numbers of the velocity zero points.
 const ZERO_POINT_STREAM: u64 = 2;
 
+/// Stream of the random numbers of light curves.
+const FLUX_STREAM: u64 = 5;
+
 impl Simulation {
     /// Standard error of each bin, in units of the continuum.
     pub fn sigma(&self) -> f64 {
@@ -109,6 +114,32 @@ impl Simulation {
         };
         let profiles = intensity.chunks_exact(self.bins).zip(&self.times_d).map(profile).collect();
         Observations { profiles }
+    }
+
+    /// The flux of `star` in a band at `times_d`, over that of its bare photosphere, with errors of a standard deviation
+    /// and seed.
+    pub fn fluxes(&self, star: &StarSettings, band: &Band, times_d: &[f64], (sigma, seed): (f64, u64)) -> Vec<Flux> {
+        /// Maps that are held at a time.
+        const MAPS: usize = 64;
+        let grid = SurfaceGrid::equal_area(self.pixels, Quadrature::Gauss2x2);
+        let state = self.truth.state();
+        let content = Content::Brightness(Brightness::of_spots(band.contrast(star, &state)));
+        let still = self.maps(content, &grid, &times_d[..1]);
+        let mut fluxes = Vec::with_capacity(times_d.len());
+        for times_d in times_d.chunks(MAPS) {
+            let changing = self.is_changing().then(|| self.maps(content, &grid, times_d));
+            let flux = |(k, time_d): (usize, &f64)| {
+                let map = changing.as_ref().map_or(still.column(0), |maps| maps.column(k));
+                let shares = band.shares(&grid, star, &state, &[*time_d]);
+                shares.iter().zip(&map).map(|(share, brightness)| share * brightness).sum::<f64>()
+            };
+            fluxes.par_extend(times_d.par_iter().enumerate().map(flux));
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(FLUX_STREAM);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+        let measured = |(time_d, flux): (&f64, f64)| Flux { time_d: *time_d, flux: flux + sigma * draw(), sigma };
+        times_d.iter().zip(fluxes).map(measured).collect()
     }
 
     /// What is wrong with each profile by itself; empty if nothing is.

@@ -205,6 +205,13 @@ fn everything_agrees_with_dense_algebra() {
         let (evidence, dense) = (problem.evidence(EXACT), problem.dense());
         assert!(difference(evidence.quadratic(), &dense) < 1e-11, "{kernel:?}");
         check_maps(&problem, &evidence);
+        // with numbers that epochs have in common, compressed and not
+        let shared = problem.with_common(3);
+        let evidence = shared.evidence(EXACT);
+        assert!(difference(evidence.quadratic(), &shared.dense()) < 1e-11, "{kernel:?}");
+        check_maps(&shared, &evidence);
+        let compressed = shared.evidence(Compression { left_out: 1e-9 });
+        assert!(difference(compressed.quadratic(), &shared.dense()) < 1e-6, "{kernel:?}");
     }
 }
 

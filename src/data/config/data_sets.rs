@@ -1,80 +1,19 @@
 //! `observations`: one data set, or a list of them; and the zero point of a set's velocities.
 
+use super::listed::{Listed, Section};
 use super::number_or_word::{self, NumberOrWord};
 use super::raw_parts::ObservationsSection;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::value::MapAccessDeserializer;
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
 
-/// The data sets as written. A list of one is written as that one.
-#[derive(Clone, Debug)]
-pub(super) struct DataSets {
-    pub sections: Vec<ObservationsSection>,
-    /// Whether keys have the number of the set in them.
-    listed: bool,
-}
+/// The data sets as written.
+pub(super) type DataSets = Listed<ObservationsSection>;
 
-impl DataSets {
-    /// Where set `s` stands in the config.
-    pub fn key(&self, s: usize) -> String {
-        if self.listed { format!("observations[{s}]") } else { "observations".into() }
-    }
-}
-
-impl Serialize for DataSets {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match &self.sections[..] {
-            [one] => one.serialize(serializer),
-            several => several.serialize(serializer),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for DataSets {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Visitor)
-    }
-}
-
-struct Visitor;
-
-impl<'de> de::Visitor<'de> for Visitor {
-    type Value = DataSets;
-
-    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str("an object in braces, or a list of them")
-    }
-
-    fn visit_map<A: de::MapAccess<'de>>(self, map: A) -> Result<DataSets, A::Error> {
-        let one = ObservationsSection::deserialize(MapAccessDeserializer::new(map))?;
-        Ok(DataSets { sections: vec![one], listed: false })
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut list: A) -> Result<DataSets, A::Error> {
-        let mut sections = Vec::new();
-        while let Some(section) = list.next_element()? {
-            sections.push(section);
-        }
-        match sections.is_empty() {
-            true => Err(de::Error::custom("the list is empty, one data set at least is needed")),
-            false => Ok(DataSets { sections, listed: true }),
-        }
-    }
-}
-
-impl JsonSchema for DataSets {
-    fn schema_name() -> Cow<'static, str> {
-        "DataSets".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let section = generator.subschema_for::<ObservationsSection>();
-        json_schema!({
-            "description": "One data set, or a list of several of one star.",
-            "anyOf": [section, { "type": "array", "items": section, "minItems": 1 }]
-        })
-    }
+impl Section for ObservationsSection {
+    const KEY: &'static str = "observations";
+    const SCHEMA: [&'static str; 2] = ["DataSets", "One data set, or a list of several of one star."];
+    const EMPTY: &'static str = "the list is empty, one data set at least is needed";
 }
 
 /// The velocity zero point of a data set.

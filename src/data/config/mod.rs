@@ -11,12 +11,15 @@ mod draft;
 mod error;
 mod identity;
 mod jitter;
+mod listed;
 mod number_or_word;
+mod photometry;
 mod raw;
 mod raw_parts;
 mod resolve;
 mod resolve_grid;
 mod resolve_observations;
+mod resolve_photometry;
 mod resolve_sets;
 mod resolve_simulation;
 mod resolve_star;
@@ -32,8 +35,11 @@ pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use jitter::VelocityJitter;
+pub use photometry::SimulatedLight;
 pub use resolve_grid::MOST_NODES;
-pub use settings::{DataSetSettings, GridSettings, ImagingSettings, ObservationSource, Settings};
+pub use settings::{
+    DataSetSettings, GridSettings, ImagingSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
+};
 pub use spots::Hyperparameter;
 pub use written::Config;
 

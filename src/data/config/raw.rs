@@ -5,6 +5,8 @@
 use super::EquivalentWidth;
 use super::data_sets::DataSets;
 use super::raw_parts::{Grid, PerParameter, PriorSection};
+use super::listed::Listed;
+use super::photometry::PhotometrySection;
 use super::{ImagingSettings, SamplerSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,6 +29,9 @@ pub(super) struct Config {
     pub planet: Planet,
     /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its own.
     pub observations: DataSets,
+    /// Light curves of the star, with objective "marginal-likelihood": one, or a list.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photometry: Option<Listed<PhotometrySection>>,
     /// The Doppler image.
     #[serde(default)]
     pub imaging: ImagingSettings,

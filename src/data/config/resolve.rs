@@ -6,6 +6,7 @@ use super::identity::fingerprint;
 use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
+use super::resolve_photometry::resolve_photometry;
 use super::resolve_sets::resolve_sets;
 use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
@@ -22,6 +23,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
     let sets = resolve_sets(&mut raw, &star, &values, path)?;
+    let light_curves = resolve_photometry(&raw, path)?;
     let velocity_jitter = resolve_jitter(&mut raw);
     check_imaging(&raw.imaging, velocity_jitter)?;
     resolve_field(&mut raw, &mut values)?;
@@ -45,6 +47,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         mass_msun: raw.star.mass_msun,
         values,
         sets,
+        light_curves,
         velocity_jitter,
         imaging: raw.imaging,
         free,

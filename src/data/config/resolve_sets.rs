@@ -57,7 +57,7 @@ pub(super) fn resolve_sets(
             key,
         });
     }
-    names(&sets)?;
+    names(&sets.iter().map(|set| (&*set.key, &*set.name)).collect::<Vec<_>>())?;
     of_one_star(raw, &mut sets)?;
     Ok(sets)
 }
@@ -151,21 +151,17 @@ fn exclude(section: &ObservationsSection, key: &str) -> Result<Vec<[f64; 2]>, Fa
     Ok(section.exclude.clone())
 }
 
-/// Names are folders of `simulate`, and labels.
-fn names(sets: &[DataSetSettings]) -> Result<(), Fault> {
-    for (s, set) in sets.iter().enumerate() {
-        let fault = |problem: String| Err(Fault::new(format!("{}.name", set.key), problem));
+/// Names are folders and files of `simulate`, and labels: of things that stand at these keys and have these names.
+pub(super) fn names(all: &[(&str, &str)]) -> Result<(), Fault> {
+    for (s, (key, name)) in all.iter().enumerate() {
+        let fault = |problem: String| Err(Fault::new(format!("{key}.name"), problem));
         let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-        if set.name.is_empty()
-            || set.name.len() > LONGEST_NAME
-            || !set.name.chars().all(plain)
-            || set.name.starts_with('.')
-        {
-            let problem = format!("{:?} must be 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'", set.name);
+        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) || name.starts_with('.') {
+            let problem = format!("{name:?} must be 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'");
             return fault(problem);
         }
-        if let Some(other) = sets[..s].iter().find(|other| other.name.eq_ignore_ascii_case(&set.name)) {
-            return fault(format!("{:?} is the name of {} already: each set needs its own", set.name, other.key));
+        if let Some((other, _)) = all[..s].iter().find(|(_, other)| other.eq_ignore_ascii_case(name)) {
+            return fault(format!("{name:?} is the name of {other} already: each needs its own"));
         }
     }
     Ok(())

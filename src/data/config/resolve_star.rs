@@ -37,7 +37,7 @@ pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<S
     })
 }
 
-fn limb_darkening(section: &LimbDarkeningSection) -> Result<LimbDarkening, Fault> {
+pub(super) fn limb_darkening(section: &LimbDarkeningSection) -> Result<LimbDarkening, Fault> {
     let fault = |problem: String| Err(Fault::new("star.limb_darkening.coefficients", problem));
     match (section.law, &section.coefficients[..]) {
         (LimbLaw::Linear, &[u]) if (0.0..=1.0).contains(&u) => Ok(LimbDarkening::Linear(u)),
@@ -51,7 +51,7 @@ fn limb_darkening(section: &LimbDarkeningSection) -> Result<LimbDarkening, Fault
     }
 }
 
-fn contrast(star: &Star) -> Result<f64, Fault> {
+pub(super) fn contrast(star: &Star) -> Result<f64, Fault> {
     let (photosphere, spot) = match (star.contrast, star.photosphere_k, star.spot_k) {
         (Some(contrast), None, None) => {
             return match (0.0..1.0).contains(&contrast) {

@@ -2,7 +2,7 @@
 
 use super::data_sets::ZeroPoint;
 use super::spots::Hyperparameter;
-use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
+use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, SimulatedLight, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
@@ -11,11 +11,12 @@ use crate::posterior::marginal::zero_points::HeldZeroPoint;
 use crate::posterior::noise::ErrorSettings;
 use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, UnresolvedSpots};
+use crate::posterior::photometry::LightCurve;
 use crate::posterior::simulate::Simulation;
 use crate::sampling::landscape::Grid;
 use crate::star::observation::Observations;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN, velocity_grid};
-use crate::star::{BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
+use crate::star::{Band, BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -33,6 +34,8 @@ pub struct Settings {
     pub values: ParameterValues,
     /// The data sets, one at least.
     pub sets: Vec<DataSetSettings>,
+    /// The light curves, mostly none.
+    pub light_curves: Vec<LightCurveSettings>,
     /// Scatter of the profiles' velocity zero points.
     pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
@@ -82,6 +85,34 @@ impl DataSetSettings {
             ObservationSource::Simulate(_) => 1.0,
         }
     }
+}
+
+/// A light curve.
+#[derive(Clone, Debug)]
+pub struct LightCurveSettings {
+    /// Where it stands in the config.
+    pub key: String,
+    /// Its name.
+    pub name: String,
+    /// What of the star looks different in it.
+    pub band: Band,
+    /// Where it comes from.
+    pub source: LightSource,
+    /// Gaps longer than this (d) part segments.
+    pub segment_gap_d: f64,
+    /// Factor on the standard errors.
+    pub sigma_scale: f64,
+    /// The bins, once it is read.
+    pub binned: Option<LightCurve>,
+}
+
+/// Where a light curve comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightSource {
+    /// A table, relative to the working directory.
+    File(PathBuf),
+    /// The star that is simulated.
+    Simulate(SimulatedLight),
 }
 
 /// Where the profiles come from.
@@ -289,6 +320,7 @@ impl Settings {
         if let Some(top) = config.as_object_mut() {
             top.remove("$schema");
         }
+        self.with_light_curves_from_here(&mut config);
         let section = &mut config["observations"];
         match section.as_object_mut().filter(|section| !section.contains_key("simulate")) {
             Some(section) => {
@@ -301,6 +333,23 @@ impl Settings {
             }
         }
         config
+    }
+
+    /// Tables of light curves by paths that hold from anywhere; simulated ones, which go with simulated profiles, are
+    /// left out.
+    fn with_light_curves_from_here(&self, config: &mut serde_json::Value) {
+        let Some(written) = config.get("photometry").cloned() else { return };
+        let sections = written.as_array().cloned().unwrap_or_else(|| vec![written]);
+        let tables = sections.into_iter().zip(&self.light_curves).filter_map(|(mut section, curve)| {
+            let LightSource::File(path) = &curve.source else { return None };
+            section["path"] = std::path::absolute(path).unwrap_or_else(|_| path.clone()).to_str()?.into();
+            Some(section)
+        });
+        let tables: Vec<serde_json::Value> = tables.collect();
+        match (tables.is_empty(), config.as_object_mut()) {
+            (true, Some(top)) => drop(top.remove("photometry")),
+            _ => config["photometry"] = tables.into(),
+        }
     }
 
     /// The faculae of a simulated star, as the config has them.

@@ -2,8 +2,10 @@
 //! change are in `changing`.
 
 mod changing;
+mod light;
 
 pub use changing::{ChangingFitFile, ChangingMapFile, ChangingMapResult, MapKind, UNCHANGING};
+pub use light::LIGHT_CURVES;
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;

@@ -6,6 +6,7 @@ pub mod csv;
 pub mod effort;
 pub mod journal;
 pub mod landscape;
+pub mod light_curve;
 pub mod lines;
 pub mod lsd;
 pub mod map;

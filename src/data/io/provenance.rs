@@ -37,6 +37,9 @@ pub struct Measured {
     /// Each of several data sets, in the order of the profiles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<MeasuredSet>,
+    /// What was made of the light curves, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub light_curves: Vec<String>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
@@ -89,6 +92,7 @@ impl Measured {
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("velocity jitter", jitter.line()));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
-        profiles.chain(sets).chain(errors).chain(jitter).chain(target).collect()
+        let light = self.light_curves.iter().map(|remark| ("light curve", remark.clone()));
+        profiles.chain(sets).chain(light).chain(errors).chain(jitter).chain(target).collect()
     }
 }

@@ -12,6 +12,7 @@ mod dynamic;
 mod experiment;
 mod injected;
 mod landscape;
+mod light;
 mod limits;
 mod maps;
 mod optimum;
@@ -32,7 +33,7 @@ pub use trace::Sampled;
 use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
-use crate::data::io::map::{MAP, MapKind};
+use crate::data::io::map::{LIGHT_CURVES, MAP, MapKind};
 use crate::data::io::{self, FileError, truth};
 use crate::figures::drawing::Figure;
 use crate::runs::origin::OriginError;
@@ -145,6 +146,9 @@ fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, Plot
     }
     if folder.join(velocities::FILE).is_file() {
         figures.push(if changes { velocities::of_changing_map(folder)? } else { velocities::of_map(folder)? });
+    }
+    if changes && folder.join(LIGHT_CURVES).is_file() {
+        figures.push(light::figure(folder)?);
     }
     Ok(figures)
 }

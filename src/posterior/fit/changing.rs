@@ -7,7 +7,7 @@ use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::numerics::json::number_or_null;
 use crate::numerics::vector::{self, Instructions, Task};
 use crate::posterior::imaging::{Data, Imager};
-use crate::posterior::marginal::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
+use crate::posterior::marginal::{Assumed, Basis, Fitted, FluxFit, Known, Maps, Marginal, NoFit, fit};
 use crate::posterior::nuisances::{Estimate, LineAndContinuum};
 use crate::posterior::objective::ParameterValues;
 use crate::sampling::log_density::Status;
@@ -37,6 +37,9 @@ pub struct ChangingFit {
     pub nuisances: Vec<LineAndContinuum>,
     /// Posterior mean of each profile's velocity zero point (km/s), given its map; empty where there is no jitter.
     pub zero_points_kms: Vec<f64>,
+    /// Light curves, and what the most probable maps make of them; mostly none.
+    #[doc(hidden)]
+    pub light: Vec<FluxFit>,
     /// What has to be known of field and times.
     pub warnings: Vec<String>,
     /// The field.
@@ -202,6 +205,7 @@ impl ChangingFit {
             maps: times_d.iter().enumerate().map(map).collect(),
             nuisances: counted(nuisances.has_line_and_continuum()).map(|found| found.line_and_continuum).collect(),
             zero_points_kms: counted(marginal.assumed.jitter_kms > 0.0).map(|found| found.zero_point_kms).collect(),
+            light: marginal.light_curves(imager),
             model: modelled.intensities(),
             unchanging_model: unchanging.map(|modelled| modelled.intensities()),
             velocities,

@@ -1,6 +1,7 @@
 //! The files of the maps of a star that may change, under the names of those of one that does not: `map.json`,
-//! `profiles.csv`, `rv.csv` and `fit.json`.
+//! `profiles.csv`, `rv.csv` and `fit.json`; where there are light curves `lightcurve.csv`, too.
 
+use super::light::{LIGHT_CURVES, table};
 use super::{CONVENTIONS, FILES};
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
@@ -118,7 +119,11 @@ impl ChangingMapResult<'_> {
         write_json(&map, &self.map())?;
         write(&profiles, &self.profiles().into_bytes())?;
         write(&rv, &self.velocities().into_bytes())?;
-        write_json(&fit, &self.fit())
+        write_json(&fit, &self.fit())?;
+        match self.fit.light.is_empty() {
+            true => Ok(()),
+            false => write(&folder.join(LIGHT_CURVES), &table(&self.fit.light).into_bytes()),
+        }
     }
 
     fn map(&self) -> ChangingMapFile {

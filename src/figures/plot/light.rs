@@ -1,0 +1,90 @@
+//! Light curves: measurements and what the most probable maps make of them, and what is left over.
+
+use super::{ANY, PlotError};
+use crate::data::io::csv::Columns;
+use crate::data::io::map::LIGHT_CURVES;
+use crate::figures::drawing::colour::{BLACK, Colour, GREY, VERMILION};
+use crate::figures::drawing::panel::Sides;
+use crate::figures::drawing::{
+    Axis, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Scale, Stroke, range_of,
+};
+use std::path::Path;
+
+const POINT: (Marker, f64, Colour) = (Marker::Disc, 2.0, BLACK);
+const MODEL: Stroke = Stroke::new(VERMILION, 0.9);
+const BAR: Stroke = Stroke::new(GREY, 0.6);
+
+/// A bin of the table.
+struct Bin {
+    time_d: f64,
+    flux: f64,
+    sigma: f64,
+    model: f64,
+    residual: f64,
+    /// Band and segment.
+    part: [f64; 2],
+}
+
+/// The figure of all bands, two panels each.
+pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
+    let table = Columns::read(&folder.join(LIGHT_CURVES))?;
+    let of = |name: &str| table.column_within(name, ANY);
+    let (time_d, flux, sigma, model) = (of("time_d")?, of("flux")?, of("sigma")?, of("model")?);
+    let (residual, segment, band) = (of("residual")?, of("segment")?, of("band")?);
+    let bin = |k: usize| Bin {
+        time_d: time_d[k],
+        flux: flux[k],
+        sigma: sigma[k],
+        model: model[k],
+        residual: residual[k],
+        part: [band[k], segment[k]],
+    };
+    let bins: Vec<Bin> = (0..time_d.len()).map(bin).collect();
+    let bands: Vec<&[Bin]> = bins.chunk_by(|a, b| a.part[0] == b.part[0]).collect();
+    let mut figure = Figure::new("lightcurve", PAGE_MM, 20.0 + 52.0 * bands.len() as f64);
+    figure.caption = "Light curves, binned, in units of the mean flux of a segment. Above: measurements, and the flux \
+    of the most probable maps with the level and slope of each segment. Below: the difference."
+        .into();
+    let (left, top, gap) = (46.0, 16.0, 8.0);
+    let width = figure.width - left - 10.0;
+    let height = (figure.height - top - 28.0) / bands.len() as f64 - gap;
+    let span = range_of(bins.iter().map(|bin| bin.time_d), Scale::Linear, 0.02);
+    let last = bands.len() - 1;
+    for (b, bins) in bands.into_iter().enumerate() {
+        let above = Rect { left, top: top + b as f64 * (height + gap), width, height: 0.64 * (height - gap) };
+        let below = Rect { top: above.bottom() + gap, height: 0.36 * (height - gap), ..above };
+        draw(&mut figure, bins, span, [above, below], b == last);
+    }
+    let mut legend = Legend::default();
+    legend.add(Key::Point(POINT.0, POINT.2), "flux");
+    legend.add(Key::Line(MODEL), "most probable maps");
+    let middle = left + 0.5 * width;
+    legend.row(&mut figure, [middle, 8.0]);
+    Ok(figure)
+}
+
+fn draw(figure: &mut Figure, bins: &[Bin], span: [f64; 2], [above, below]: [Rect; 2], is_last: bool) {
+    let ends = |y: fn(&Bin) -> f64| bins.iter().flat_map(move |bin| [y(bin) - bin.sigma, y(bin) + bin.sigma]);
+    let fluxes = range_of(ends(|bin| bin.flux).chain(bins.iter().map(|bin| bin.model)), Scale::Linear, 0.06);
+    let panel = Panel { frame: above, x: Axis::linear("time (d)", span), y: Axis::linear("relative flux", fluxes) };
+    bars(figure, &panel, bins, |bin| bin.flux);
+    for segment in bins.chunk_by(|a, b| a.part == b.part) {
+        let line: Vec<[f64; 2]> = segment.iter().map(|bin| [bin.time_d, bin.model]).collect();
+        panel.line(figure, "model", &line, MODEL);
+    }
+    panel.frame(figure, Sides { below: false, left: true });
+    let left_over = range_of(ends(|bin| bin.residual), Scale::Linear, 0.1);
+    let panel = Panel { frame: below, x: Axis::linear("time (d)", span), y: Axis::linear("residual", left_over) };
+    panel.horizontal(figure, "zero", 0.0, BAR.dashed());
+    bars(figure, &panel, bins, |bin| bin.residual);
+    panel.frame(figure, Sides { below: is_last, left: true });
+}
+
+fn bars(figure: &mut Figure, panel: &Panel, bins: &[Bin], y: fn(&Bin) -> f64) {
+    for bin in bins {
+        let ends = [[bin.time_d, y(bin) - bin.sigma], [bin.time_d, y(bin) + bin.sigma]];
+        panel.bar(figure, "error-bar", ends, 0.0, BAR);
+    }
+    let points: Vec<[f64; 2]> = bins.iter().map(|bin| [bin.time_d, y(bin)]).collect();
+    panel.points(figure, "observed", &points, POINT);
+}
