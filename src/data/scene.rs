@@ -5,7 +5,8 @@ mod light_curves;
 mod reading;
 
 use crate::data::config::{
-    Automatic, Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings, VelocityJitter, ZeroPoint,
+    Automatic, Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
+    VelocityJitter, ZeroPoint,
 };
 use crate::data::io::FileError;
 use crate::data::io::lsd::{self, Label, LsdError};

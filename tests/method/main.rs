@@ -13,6 +13,7 @@ mod figure;
 mod first_look;
 mod forward;
 mod imaging;
+mod light;
 mod lsd;
 mod maps;
 mod nuisances;

@@ -4,9 +4,9 @@
 
 use super::EquivalentWidth;
 use super::data_sets::DataSets;
-use super::raw_parts::{Grid, PerParameter, PriorSection};
 use super::listed::Listed;
 use super::photometry::PhotometrySection;
+use super::raw_parts::{Grid, PerParameter, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

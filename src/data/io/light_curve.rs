@@ -19,7 +19,8 @@ const LARGEST: [f64; 2] = [1e9, 1e30];
 pub fn read(path: &Path) -> Result<Vec<Flux>, FileError> {
     let table = Columns::read(path)?;
     let missing = |name: &str| {
-        let problem = format!("no column {name}: the first line must name the columns, {} among them", COLUMNS.join(", "));
+        let problem =
+            format!("no column {name}: the first line must name the columns, {} among them", COLUMNS.join(", "));
         FileError::of(path, problem)
     };
     for name in COLUMNS {

@@ -76,8 +76,7 @@ pub(super) fn near(settings: &Settings, observations: &Observations) -> Result<V
     let mut curves = Vec::new();
     for curve in &settings.light_curves {
         let Some(binned) = &curve.binned else { continue };
-        let away =
-            |bin: &FluxBin| times_d.iter().map(|t| (t - bin.time_d).abs()).fold(f64::INFINITY, f64::min);
+        let away = |bin: &FluxBin| times_d.iter().map(|t| (t - bin.time_d).abs()).fold(f64::INFINITY, f64::min);
         let nearest = binned.bins.iter().map(away).fold(f64::INFINITY, f64::min);
         if nearest > FORGOTTEN * lifetime_d {
             let [first, last] = [binned.bins[0].time_d, binned.bins[binned.bins.len() - 1].time_d];

@@ -5,9 +5,7 @@ use crate::data::io::csv::Columns;
 use crate::data::io::map::LIGHT_CURVES;
 use crate::figures::drawing::colour::{BLACK, Colour, GREY, VERMILION};
 use crate::figures::drawing::panel::Sides;
-use crate::figures::drawing::{
-    Axis, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Scale, Stroke, range_of,
-};
+use crate::figures::drawing::{Axis, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Scale, Stroke, range_of};
 use std::path::Path;
 
 const POINT: (Marker, f64, Colour) = (Marker::Disc, 2.0, BLACK);

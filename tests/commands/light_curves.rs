@@ -1,0 +1,108 @@
+//! Light curves beside profiles: simulated, read from a table, mapped and drawn; and what is refused.
+
+use super::desk::{Desk, says};
+use serde_json::{Value, json};
+
+const CONFIG: &str = "config.json";
+
+/// A star with profiles of a week and a light curve, simulated.
+fn star() -> Value {
+    let cycles: Vec<f64> = (0..7).map(|k| 0.37 * f64::from(k)).collect();
+    json!({
+        "star": { "rotation_period_d": 3.0, "inclination_deg": 60.0, "vsini_kms": 22.0,
+                  "photosphere_k": 4500, "spot_k": 3400, "line": { "sigma_kms": 3.0, "equivalent_width_kms": 6.0 } },
+        "imaging": { "pixels": 200, "objective": "marginal-likelihood", "spot_amplitude": 0.2, "spot_slope": 0.9,
+                     "spot_lifetime_d": 15 },
+        "observations": { "velocity_jitter_kms": 0.0, "simulate": {
+            "random_spots": { "number": 8, "lifetime_d": 20, "seed": 4 }, "cycles": cycles,
+            "velocity_kms": { "min": -33.0, "max": 33.0, "step": 3.0 }, "pixels": 1000 } },
+        "photometry": { "name": "tess", "wavelength_nm": 790, "segment_gap_d": 1.0,
+                        "limb_darkening": { "law": "quadratic", "coefficients": [0.4, 0.2] },
+                        "simulate": { "cadence_d": 0.05, "sigma": 3e-4 } }
+    })
+}
+
+/// The same read from the files that `simulate` has written to `data`.
+fn from_files() -> Value {
+    let mut config = star();
+    config["observations"] = json!({ "path": "data/observations.txt", "velocity_jitter_kms": 0.0 });
+    let light = config["photometry"].as_object_mut().unwrap();
+    light.remove("simulate");
+    light.insert("path".into(), json!("data/tess.csv"));
+    config
+}
+
+#[test]
+fn a_light_curve_from_its_table_to_a_figure() {
+    let desk = Desk::new(star());
+    says(&desk.succeed(&["simulate", CONFIG, "--out", "data"]), &["tess.csv: 134 measurements"]);
+    let table = desk.read("data/tess.csv");
+    assert!(table.starts_with("time,flux,sigma\n"));
+    // two days are lost, and the flux is in counts, rising and falling where the instrument does
+    let kept = table.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>());
+    let drift = |t: f64| if t < 2.0 { 1000.0 } else { 1500.0 * (1.0 + 0.01 * (t - 5.0)) };
+    let kept = kept.filter(|row| !(2.0..4.0).contains(&row[0]));
+    let rows: String =
+        kept.map(|row| format!("{},{},{}\n", row[0], row[1] * drift(row[0]), row[2] * drift(row[0]))).collect();
+    desk.write("data/tess.csv", &format!("time,flux,sigma\n{rows}"));
+    desk.write("star.json", &from_files().to_string());
+    let said = desk.succeed(&["map", "star.json", "--out", "map"]);
+    says(&said, &["light curve", "tess: ", "in 2 segments", "flux", "per bin", "lightcurve.csv"]);
+    let table = desk.read("map/lightcurve.csv");
+    let mut lines = table.lines();
+    assert_eq!(lines.next(), Some("time_d,flux,sigma,model,residual,segment,band"));
+    let bins: Vec<Vec<f64>> = lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    // level and drift are no spots: what is left over is noise
+    let chi2: f64 = bins.iter().map(|bin| (bin[4] / bin[2]).powi(2)).sum();
+    assert!(chi2 < 1.6 * bins.len() as f64, "{chi2} of {} bins", bins.len());
+    let spread = |column: usize| {
+        let values = || bins.iter().map(|bin| bin[column]);
+        values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+    };
+    assert!(spread(3) > 0.005 && bins.iter().any(|bin| bin[5] == 2.0), "spots are seen in the flux");
+    desk.succeed(&["plot", "map"]);
+    assert!(desk.read("map/lightcurve.svg").contains("most probable maps"));
+    says(&desk.read("map/fit.json"), &["light_curves"]);
+}
+
+#[test]
+fn what_is_no_light_curve_is_refused_by_key_file_or_line() {
+    let refused = |edit: &dyn Fn(&mut Value), parts: &[&str]| {
+        let mut config = star();
+        edit(&mut config);
+        says(&Desk::new(config).refusal(&["map", CONFIG, "--out", "map"]), parts);
+    };
+    let set = |key: &'static str, value: Value| move |c: &mut Value| c["photometry"][key] = value.clone();
+    refused(&set("colour", json!("red")), &["unknown key photometry.colour"]);
+    refused(&set("contrast", json!(0.5)), &["photometry.wavelength_nm", "not both"]);
+    refused(&set("wavelength_nm", json!(-5)), &["photometry.wavelength_nm", "above 0"]);
+    refused(&set("sigma_scale", json!(0)), &["photometry.sigma_scale", "above 0"]);
+    refused(&set("segment_gap_d", json!(-1)), &["photometry.segment_gap_d", "0 to 1000"]);
+    refused(&set("path", json!("tess.csv")), &["photometry", "not both"]);
+    refused(
+        &set("limb_darkening", json!({ "law": "linear", "coefficients": [2.0] })),
+        &["photometry.limb_darkening.coefficients", "0 to 1"],
+    );
+    refused(&|c| c["photometry"]["simulate"]["sigma"] = json!(0), &["photometry.simulate.sigma", "above 0"]);
+    refused(&|c| c["photometry"]["simulate"]["cadence_d"] = json!(1e-7), &["photometry.simulate.cadence_d", "over"]);
+    refused(&|c| c["photometry"] = json!([c["photometry"], c["photometry"]]), &["photometry[1].name", "photometry[0]"]);
+    refused(&|c| c["photometry"] = json!([]), &["photometry", "empty"]);
+    refused(
+        &|c| c["imaging"] = json!({ "pixels": 200, "objective": "spottedness" }),
+        &["photometry", "\"spottedness\"", "marginal-likelihood"],
+    );
+    let desk = Desk::new(star());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    desk.write("star.json", &from_files().to_string());
+    let table = |text: &str, parts: &[&str]| {
+        desk.write("data/tess.csv", text);
+        says(&desk.refusal(&["map", "star.json", "--out", "map"]), parts);
+    };
+    table("time,flux\n1,2\n", &["tess.csv", "no column sigma", "time, flux, sigma"]);
+    table("time,flux,sigma\n1,-2,0.1\n", &["tess.csv:2", "flux"]);
+    table("time,flux,sigma\n1,2,0.1\n2,2,0\n", &["tess.csv:3", "sigma"]);
+    table("time,flux,sigma\n1,nan,0.1\n", &["tess.csv:2", "flux"]);
+    table("time,flux,sigma\nnoon,2,0.1\n", &["tess.csv:2", "noon"]);
+    table("time,flux,sigma\n2457000,2,0.1\n", &["photometry", "from any profile", "zero point"]);
+    says(&desk.refusal(&["simulate", "star.json", "--out", "x"]), &["observations.simulate"]);
+}
