@@ -62,7 +62,8 @@ pub struct Told {
 
 impl Compressed {
     /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`;
-    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers). `None` where the covariance of the noise has no Cholesky factor.
+    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers). `None` where
+    /// the covariance of the noise has no Cholesky factor.
     pub fn new(
         epoch: &Epoch,
         around: DVectorView<f64>,

@@ -3,7 +3,7 @@
 //! With `C = J K J^T + N` over all epochs, `K = S_h k(t - t')`, and residual `r = misfit + J c0`: `ln Z = -1/2 r^T C^-1
 //! r - 1/2 ln |C| - n/2 ln 2 pi` (n data), the density of the data with all fields and nuisances integrated out;
 //! gradient and information of numbers that change the model by D' are `D'^T C^-1 r` and `D'^T C^-1 D'`. All of it in
-//! units of the noise and compressed, where N is 1, but for what epochs have in common: that adds `B B^T` over all rows.
+//! units of the noise and compressed, where N is 1, but for what epochs have in common, which adds `B B^T` over all.
 //!
 //! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers a profile (`benches/field.rs`:
 //! 0.06 s for 40 profiles, 0.3 s for 100, 4.4 s for 300). Seasons that are 13 lifetimes apart, with k below 1e-8, are

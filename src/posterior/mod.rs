@@ -2,8 +2,8 @@
 //!
 //! The path of a vector of parameters: [`objective`] resolves it into values of star and orbit, [`imaging`] joins the
 //! star's response with the profiles, the maximum-entropy solver makes the image, and `objective` its
-//! log-probability. [`nuisances`] are what profiles have beside the star, [`photometry`] are light curves. Where stars change, [`marginal`] takes the
-//! place of the image: all maps are integrated over.
+//! log-probability. [`nuisances`] are what profiles have beside the star, [`photometry`] are light curves. Where stars
+//! change, [`marginal`] takes the place of the image: all maps are integrated over.
 //!
 //! Around one image: [`fit`] is the map with its checks, [`expansion`] the quadratic in the velocities of the profiles
 //! and [`detection`] the search of it, [`surrogate`] the posterior that follows from it. Before any: [`first_look`] at

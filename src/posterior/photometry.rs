@@ -1,5 +1,5 @@
-//! Light curves: measurements of the star's flux, brought to few bins and to segments of a level and slope of their own,
-//! in units of the mean flux of a segment (`docs/method.md` section 9).
+//! Light curves: measurements of the star's flux, brought to few bins and to segments of a level and slope of their
+//! own, in units of the mean flux of a segment (`docs/method.md` section 9).
 
 use crate::star::Band;
 

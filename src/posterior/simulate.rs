@@ -116,8 +116,8 @@ impl Simulation {
         Observations { profiles }
     }
 
-    /// The flux of `star` in a band at `times_d`, over that of its bare photosphere, with errors of a standard deviation
-    /// and seed.
+    /// The flux of `star` in a band at `times_d`, over that of its bare photosphere, with errors of a standard
+    /// deviation and seed.
     pub fn fluxes(&self, star: &StarSettings, band: &Band, times_d: &[f64], (sigma, seed): (f64, u64)) -> Vec<Flux> {
         /// Maps that are held at a time.
         const MAPS: usize = 64;

@@ -12,8 +12,8 @@
 //! 5. [`response`] goes through these steps, and back, for one data set, `stacked` for several. `nearby` has a quicker
 //!    way for a star that differs little.
 //!
-//! Beside that: [`Band`] has the flux of the star, [`observation`] has profiles and what they measure by themselves, [`injection`] puts an orbit into
-//! them, [`planet`] says what is quoted of an orbit.
+//! Beside that: [`Band`] has the flux of the star, [`observation`] has profiles and what they measure by themselves,
+//! [`injection`] puts an orbit into them, [`planet`] says what is quoted of an orbit.
 
 mod block;
 pub mod brightness;

@@ -41,8 +41,8 @@ mod tests {
     use super::*;
     use crate::star::{LocalLine, Orbit, Quadrature, Rotation, Surface};
 
-    /// Shares of single pixels by the formula, on a grid so fine that a pixel is a point; and the limb darkening is that
-    /// of the band, whatever a free parameter says of the star's.
+    /// Shares of single pixels by the formula, on a grid so fine that a pixel is a point; and the limb darkening is
+    /// that of the band, whatever a free parameter says of the star's.
     #[test]
     fn shares_are_area_times_mu_times_limb_darkening() {
         let grid = SurfaceGrid::equal_area(20_000, Quadrature::Gauss2x2);

@@ -23,15 +23,15 @@ pub(super) struct PhotometrySection {
     /// given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contrast: Option<f64>,
-    /// Wavelength (nm) of this band, at which the star's temperatures give the brightness of a spot: about 790 for TESS,
-    /// 640 for Kepler.
+    /// Wavelength (nm) of this band, at which the star's temperatures give the brightness of a spot: about 790 for
+    /// TESS, 640 for Kepler.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wavelength_nm: Option<f64>,
     /// Limb darkening in this band; that of the star if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limb_darkening: Option<LimbDarkeningSection>,
-    /// A gap longer than this (d), from 0 to 1000, begins a new segment. Each segment has a level and a slope of its own,
-    /// which are integrated out. Nights must not be segments.
+    /// A gap longer than this (d), from 0 to 1000, begins a new segment. Each segment has a level and a slope of its
+    /// own, which are integrated out. Nights must not be segments.
     #[serde(default = "default_gap_d")]
     pub segment_gap_d: f64,
     /// Factor on the standard errors, above 0.

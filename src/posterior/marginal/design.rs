@@ -134,8 +134,8 @@ impl Design {
         columns.iter().enumerate().map(|(k, columns)| self.condensed.tell(k, columns)).collect()
     }
 
-    /// Brightness over that of the photosphere (pixels, profiles) of maps with these `coefficients` (H, epochs), as each
-    /// profile sees it.
+    /// Brightness over that of the photosphere (pixels, profiles) of maps with these `coefficients` (H, epochs), as
+    /// each profile sees it.
     pub fn brightness(&self, basis: &Basis, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
         let mut brightness = basis.filling(&coefficients.columns(0, self.response.profiles()).into_owned());
         for (k, mut map) in brightness.column_iter_mut().enumerate() {
