@@ -3,7 +3,8 @@
 use serde_json::{Map, Value};
 
 /// Sections in the order in which one thinks of a star; others come after them.
-const ORDER: &[&str] = &["star", "instrument", "planet", "observations", "imaging", "parameters", "sampler", "grid"];
+const ORDER: &[&str] =
+    &["star", "instrument", "planet", "observations", "photometry", "imaging", "parameters", "sampler", "grid"];
 
 /// Units by the end of a key; the longest that fits counts.
 const UNITS: &[(&str, &str)] = &[
