@@ -61,7 +61,7 @@ fn a_light_curve_from_its_table_to_a_figure() {
     };
     assert!(spread(3) > 0.005 && bins.iter().any(|bin| bin[5] == 2.0), "spots are seen in the flux");
     desk.succeed(&["plot", "map"]);
-    assert!(desk.read("map/lightcurve.svg").contains("most probable maps"));
+    assert!(desk.read("map/figures/lightcurve.svg").contains("most probable maps"));
     says(&desk.read("map/fit.json"), &["light_curves"]);
 }
 

@@ -72,6 +72,7 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
         star: oracle.star.clone(),
         sets: vec![oracle.sampling.clone().into()],
         zero_points: Vec::new(),
+        light_curves: Vec::new(),
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     }

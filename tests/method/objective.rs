@@ -22,6 +22,7 @@ fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
         star: oracle.star.clone(),
         sets: vec![oracle.sampling.clone().into()],
         zero_points: Vec::new(),
+        light_curves: Vec::new(),
         data: oracle.data.clone(),
         entropy: entropy.unwrap_or(Entropy::new(oracle.default_spot)),
     };

@@ -17,6 +17,7 @@ fn vsini(pixels: usize) -> (f64, f64) {
         star: oracle.star.clone(),
         sets: vec![oracle.sampling.clone().into()],
         zero_points: Vec::new(),
+        light_curves: Vec::new(),
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     };
