@@ -409,28 +409,32 @@ fn bent(problem: &Problem, coefficients: &DMatrix<f64>) -> Vec<Epoch> {
 
 #[test]
 fn the_most_probable_field_is_where_its_gradient_vanishes() {
-    let problem = Problem::of_degree_3(field(0.3, 0.8, Lifetime::Days(4.0), 0.1));
+    check_settled(&Problem::of_degree_3(field(0.3, 0.8, Lifetime::Days(4.0), 0.1)));
+    check_settled(&Problem::of_degree_3(field(0.3, 0.8, Lifetime::Days(4.0), 0.1)).with_common(2));
+}
+
+fn check_settled(problem: &Problem) {
     let watched = some(7, 15, 20);
     let sought = Sought { field: problem.field, degrees: &problem.degrees, watched: &watched };
     let start = DMatrix::zeros(15, 5);
     let settings = Settling { tolerance: 1e-11, ..Settling::default() };
-    let found = settle(|c| bent(&problem, c), sought, start.clone(), None, &settings).unwrap();
+    let found = settle(|c| bent(problem, c), sought, start.clone(), None, &settings).unwrap();
     // c = K J^T N^-1 misfit
     let mut there = Problem::of_degree_3(problem.field);
-    (there.epochs, there.around) = (bent(&problem, &found.coefficients), found.coefficients.clone());
+    (there.epochs, there.around) = (bent(problem, &found.coefficients), found.coefficients.clone());
     let misfit: Vec<f64> = there.epochs.iter().flat_map(|epoch| epoch.misfit.data.as_vec().clone()).collect();
     let pulled = there.design().tr_mul(&there.noise().cholesky().unwrap().solve(&DVector::from_vec(misfit)));
     let c = there.prior(&there.times(), &there.times()) * pulled;
     assert!((c - DVector::from_column_slice(found.coefficients.as_slice())).amax() < 1e-9);
     // from another field's maps and covariance
     let other = Sought { field: field(0.35, 0.7, Lifetime::Days(3.0), 0.0), ..sought };
-    let other = settle(|c| bent(&problem, c), other, start.clone(), None, &settings).unwrap();
-    let nearby = settle(|c| bent(&problem, c), sought, other.coefficients, Some(&other.evidence), &settings).unwrap();
+    let other = settle(|c| bent(problem, c), other, start.clone(), None, &settings).unwrap();
+    let nearby = settle(|c| bent(problem, c), sought, other.coefficients, Some(&other.evidence), &settings).unwrap();
     assert!((nearby.coefficients - &found.coefficients).amax() < 1e-9);
     assert!((nearby.evidence.ln_evidence() - found.evidence.ln_evidence()).abs() < 1e-9);
-    let again = settle(|c| bent(&problem, c), sought, found.coefficients, Some(&found.evidence), &settings).unwrap();
+    let again = settle(|c| bent(problem, c), sought, found.coefficients, Some(&found.evidence), &settings).unwrap();
     assert_eq!(again.steps, [1, 0]);
-    let few = settle(|c| bent(&problem, c), sought, start, None, &Settling { steps: 1, ..settings });
+    let few = settle(|c| bent(problem, c), sought, start, None, &Settling { steps: 1, ..settings });
     assert!(matches!(few, Err(FieldError::NotSettled { steps: 1, change }) if change > 0.0));
 }
 
