@@ -12,7 +12,7 @@
 //! 5. [`response`] goes through these steps, and back. `nearby` has a quicker way for a star that differs little.
 //!
 //! Beside that: [`observation`] has profiles and what they measure by themselves, [`injection`] puts an orbit into
-//! them, [`planet`] says what is quoted of an orbit.
+//! them, [`planet`] says what is quoted of an orbit ([`kepler`] has its anomalies), [`stability`] whether two can last.
 
 mod block;
 pub mod brightness;
@@ -22,6 +22,7 @@ mod deposit;
 mod filling;
 pub mod grid;
 pub mod injection;
+pub mod kepler;
 mod kernel;
 pub mod limb_darkening;
 mod line_profile;
@@ -35,6 +36,7 @@ pub mod response;
 pub mod rotation;
 mod sorting;
 pub mod spots;
+pub mod stability;
 mod view;
 mod voigt;
 
@@ -42,7 +44,7 @@ pub use brightness::{Brightness, BrightnessModel};
 pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;
-pub use orbit::Orbit;
+pub use orbit::{Eccentric, Motion, Orbit, Shape};
 pub use response::{Response, Sampling};
 pub use rotation::Rotation;
 pub use spots::{Disc, Facula, Life, Spot};
@@ -135,8 +137,8 @@ pub struct StarState {
     pub vsini_kms: f64,
     /// Systemic velocity (km/s).
     pub vsys_kms: f64,
-    /// Orbit of the planet.
-    pub orbit: Orbit,
+    /// Orbit of the planet, or orbits of both.
+    pub motion: Motion,
     /// What differs from the star's settings.
     pub surface: Surface,
 }

@@ -8,7 +8,6 @@ mod draws;
 pub mod eccentric;
 pub mod false_alarm;
 pub mod frequencies;
-pub mod kepler;
 pub mod limits;
 pub mod offset;
 pub mod orbits;

@@ -37,7 +37,7 @@ impl Expansion {
         let (sd, offset) = self.priors(nuisances);
         let weight = sd.map(|sd| sd.powi(-2));
         // at orbital velocities 0, all else as in the centre
-        let orbit = self.values.state().orbit;
+        let orbit = self.values.motion();
         let mut back = DVector::zeros(all);
         back.iter_mut().zip(orbit.velocities_kms(&self.cycles)).for_each(|(v, orbit)| *v = orbit);
         let gradient = &self.gradient + &self.information * &back;
