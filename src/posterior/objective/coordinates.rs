@@ -48,6 +48,22 @@ struct Polar {
     of: &'static Elements,
 }
 
+/// The prior of a planet's period over the rotation period among free parameters.
+pub fn period_prior(free: &[FreeParameter], of: &Elements, clock: Clock) -> Option<Prior> {
+    let prior = |p: Parameter| free.iter().find(|f| f.parameter == p).map(|f| f.prior);
+    prior(of.ratio).or_else(|| Some(prior(of.period)?.in_units_of(clock.rotation_period_d)))
+}
+
+/// Values for a blind search: circles, and none of a second planet that is looked for as well.
+pub fn for_blind_search(mut values: ParameterValues, free: &[FreeParameter]) -> ParameterValues {
+    let [first, second] = &Elements::PLANETS;
+    first.shape.into_iter().for_each(|p| values[p] = f64::NAN);
+    if free.iter().any(|f| second.all().contains(&f.parameter)) {
+        second.all().into_iter().for_each(|p| values[p] = f64::NAN);
+    }
+    values
+}
+
 /// Smallest K (km/s) at which the Jacobian of the polar coordinates is told apart from that at K = 0.
 const SMALLEST_K_KMS: f64 = 1e-9;
 
@@ -95,6 +111,12 @@ impl ParameterSpace {
     /// What ephemerides are counted with.
     pub fn clock(&self) -> Clock {
         self.clock
+    }
+
+    /// The prior of a planet's period over the rotation period, whichever way the period is free; `None` where it is
+    /// fixed.
+    pub fn period_prior(&self, of: &Elements) -> Option<Prior> {
+        period_prior(&self.free, of, self.clock)
     }
 
     /// Whether two planets can last beside each other; a single one always does.

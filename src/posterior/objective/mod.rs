@@ -16,7 +16,7 @@ pub mod target;
 pub mod tradeoff;
 mod warm_start;
 
-pub use coordinates::{FreeParameter, ParameterSpace};
+pub use coordinates::{FreeParameter, ParameterSpace, for_blind_search, period_prior};
 pub use elements::{Clock, Elements};
 pub use kind::{ObjectiveKind, UnresolvedSpots};
 pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
