@@ -8,6 +8,7 @@
 
 pub mod config;
 pub mod diagnosis;
+pub mod ephemeris;
 pub mod import;
 pub mod init;
 pub mod io;

@@ -2,6 +2,7 @@
 //! with.
 
 use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter};
+use crate::data::ephemeris::Ephemeris;
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;
@@ -178,6 +179,9 @@ impl Scene {
         observations: Observations,
         errors: Option<MeasuredErrors>,
     ) -> Result<Self, ConfigError> {
+        if let Some(span_d) = observations.time_span_d() {
+            Ephemeris::check(&settings, span_d)?;
+        }
         let mut imager = imager(&settings, &observations)?;
         let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
         imager.data.correlated_bins = correlated_bins;

@@ -4,6 +4,7 @@
 //! An optimum or a chain takes a planet for granted and says which one; whether there is one is told by how often stars
 //! without a planet show as much. So their results hold the search beside them, and its verdict heads them.
 
+use super::known_planet::{KnownPlanet, known_planets};
 use crate::data::scene::Scene;
 use crate::planets::periodogram::{
     CircularOrbit, Frequencies, FrequencyError, FrequencySettings, Imitation, RotationPeriods, Row,
@@ -12,7 +13,7 @@ use crate::planets::verdict::{Finding, Remark, Signal, Verdict};
 use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, robustness};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::fit::Fit;
-use crate::posterior::objective::{Parameter, ParameterValues, Prior};
+use crate::posterior::objective::{Elements, Parameter, ParameterValues, Prior, for_blind_search, period_prior};
 use serde::{Deserialize, Serialize};
 
 /// Frequencies closer than this many inverse time bases are the same.
@@ -53,17 +54,22 @@ impl BlindSearch {
             spots: scene.spots(),
             ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), nuisances(&scene.settings.free))
         };
-        let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ())?;
+        let values = for_blind_search(scene.settings.values, &scene.settings.free);
+        let found = Detection::find(&scene.imager, values, frequencies, &settings, &|_| ())?;
         let fit = Fit::new(&scene.imager, &scene.observations, &found.last().reference);
         let misfit: Vec<String> = fit.checks.warnings.iter().cloned().chain(scene.measured.misfit_text()).collect();
         // of what is no candidate it would say nothing
-        let choices = found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, &found));
+        let choices = found.is_candidate().then(|| robustness(&scene.imager, values, &settings, &found));
         let evidence =
             Evidence { imager: &scene.imager, settings: &settings, robustness: choices.as_ref(), misfit: &misfit };
         let mut remarks = found.remarks(&evidence);
+        let of_the_star: Vec<Remark> =
+            remarks.iter().filter(|remark| !found.of_the_period().contains(remark)).cloned().collect();
         let mut verdict = found.verdict(&remarks);
         let prior = |p: Parameter| scene.settings.free.iter().find(|f| f.parameter == p).map(|f| f.prior);
-        let periods = Periods::of(prior(Parameter::PorbOverProt), &scene.settings.values, &found);
+        let [planet, _] = &Elements::PLANETS;
+        let of_period = period_prior(&scene.settings.free, planet, scene.space.clock());
+        let periods = Periods::of(of_period, &scene.settings.values, &found);
         if !periods.contain(found.best.porb_over_prot) {
             remarks.retain(|remark| !found.of_the_period().contains(remark));
             remarks.push(Remark::against(
@@ -89,6 +95,8 @@ impl BlindSearch {
             verdict = verdict.with(std::slice::from_ref(&outside));
             remarks.push(outside);
         }
+        let (verdict, remarks) =
+            with_known(known_planets(scene, &settings, &found, &of_the_star), verdict, remarks, of_the_star);
         Ok(BlindSearch { verdict, rotation: Some(found.blind.rotation.clone()), remarks })
     }
 
@@ -96,6 +104,27 @@ impl BlindSearch {
         let verdict = Verdict::not_judged(format!("the blind search failed ({error})"));
         BlindSearch { verdict, remarks: Vec::new(), rotation: None }
     }
+}
+
+/// The verdict is that on a planet of known ephemeris where the config looks for one first; what else is found is said
+/// beside it.
+pub fn with_known(
+    known: Vec<KnownPlanet>,
+    verdict: Verdict,
+    mut remarks: Vec<Remark>,
+    of_the_star: Vec<Remark>,
+) -> (Verdict, Vec<Remark>) {
+    let mut head = verdict.clone();
+    for KnownPlanet { is_first, verdict: known } in known {
+        if is_first {
+            remarks = of_the_star.clone();
+            remarks.push(Remark::note(format!("the blind search, beside the known planet: {}", verdict.sentence)));
+            head = known;
+        } else {
+            remarks.push(Remark::note(format!("the planet of known ephemeris: {}", known.sentence)));
+        }
+    }
+    (head, remarks)
 }
 
 /// The periods that a config allows.

@@ -19,6 +19,7 @@ pub mod comparison;
 pub mod experiments;
 pub mod export;
 pub mod grid_scan;
+pub mod known_planet;
 pub mod limits;
 pub mod manifest;
 pub mod merge;

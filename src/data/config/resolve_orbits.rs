@@ -47,6 +47,9 @@ fn has_axis(raw: &mut Config, p: Parameter) -> bool {
     raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(p).is_some())
 }
 
+/// Where eccentricities that are free begin, in units of the square root of the largest.
+const START_SHAPE: [f64; 2] = [0.2, 0.1];
+
 fn resolve_orbit(
     raw: &mut Config,
     of: &'static Elements,
@@ -85,7 +88,15 @@ fn resolve_orbit(
     let shape = [given(of.shape[0], raw)?, given(of.shape[1], raw)?];
     let any = shape.iter().any(Option::is_some) || free.contains(&true) || of.shape.iter().any(|p| has_axis(raw, *p));
     if any {
-        of.shape.into_iter().zip(shape).for_each(|(p, value)| values[p] = value.unwrap_or(0.0));
+        // where it is looked for a search does not begin at the circle, which is a saddle
+        let largest = raw.parameters.slot(of.shape[0]).as_ref().and_then(|section| section.max).unwrap_or(1.0);
+        let begin = if free == [true, true] && shape == [None, None] {
+            START_SHAPE.map(|x| x * largest.abs().min(1.0).sqrt())
+        } else {
+            [0.0; 2]
+        };
+        let given = shape.into_iter().zip(begin).map(|(value, begin)| value.unwrap_or(begin));
+        of.shape.into_iter().zip(given).for_each(|(p, value)| values[p] = value);
         let e = of.shape(values).eccentricity();
         if e >= 1.0 {
             return Err(Fault::new(key(of.shape[0]), format!("makes an eccentricity of {e}, it must be below 1")));

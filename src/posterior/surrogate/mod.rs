@@ -253,7 +253,6 @@ type Tables = (f64, Vec<(usize, PeriodTable)>);
 
 fn pair(table: &dyn Fn(usize, &[f64]) -> Option<(PeriodTable, f64)>, centre: &[f64]) -> Option<Tables> {
     let order = |first: usize, second: usize| -> Option<Tables> {
-        // the second far from where it matters would do as well: it is at K = 0 by what the data say, all but
         let mut beside = centre.to_vec();
         beside[first] = table(first, &beside)?.0.highest().0;
         beside[second] = table(second, &beside)?.0.highest().0;
