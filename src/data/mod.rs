@@ -9,6 +9,7 @@
 pub mod config;
 pub mod diagnosis;
 pub mod ephemeris;
+pub mod evidence;
 pub mod import;
 pub mod init;
 pub mod io;

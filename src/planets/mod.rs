@@ -8,6 +8,7 @@
 //!
 //! The thresholds (false-alarm probabilities of candidate and detection among them) are constants of [`verdict`].
 
+pub mod evidence;
 pub mod periodogram;
 pub mod velocities;
 pub mod verdict;

@@ -5,6 +5,7 @@
 //! without a planet show as much. So their results hold the search beside them, and its verdict heads them.
 
 use super::known_planet::{KnownPlanet, known_planets};
+use crate::data::evidence::EvidenceRecord;
 use crate::data::scene::Scene;
 use crate::planets::periodogram::{
     CircularOrbit, Frequencies, FrequencyError, FrequencySettings, Imitation, RotationPeriods, Row,
@@ -29,6 +30,10 @@ pub struct BlindSearch {
     /// The star's own periods under this sampling; null where there was no search.
     #[doc(hidden)]
     pub rotation: Option<RotationPeriods>,
+    /// Bayes factors of no, one and two planets; absent where the config has no priors for them.
+    #[doc(hidden)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<EvidenceRecord>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -95,14 +100,16 @@ impl BlindSearch {
             verdict = verdict.with(std::slice::from_ref(&outside));
             remarks.push(outside);
         }
-        let (verdict, remarks) =
+        let planets = EvidenceRecord::of(&scene.settings, &found.planet_free.quadratic);
+        let (verdict, mut remarks) =
             with_known(known_planets(scene, &settings, &found, &of_the_star), verdict, remarks, of_the_star);
-        Ok(BlindSearch { verdict, rotation: Some(found.blind.rotation.clone()), remarks })
+        remarks.extend(planets.iter().map(|planets| Remark::note(planets.sentence.clone())));
+        Ok(BlindSearch { verdict, rotation: Some(found.blind.rotation.clone()), remarks, evidence: planets })
     }
 
     fn failed(error: &SearchError) -> Self {
         let verdict = Verdict::not_judged(format!("the blind search failed ({error})"));
-        BlindSearch { verdict, remarks: Vec::new(), rotation: None }
+        BlindSearch { verdict, remarks: Vec::new(), rotation: None, evidence: None }
     }
 }
 

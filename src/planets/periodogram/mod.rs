@@ -15,7 +15,7 @@ pub mod peaks;
 mod refine;
 pub mod rotation;
 #[cfg(test)]
-mod sample;
+pub mod sample;
 pub mod two_planets;
 pub mod window;
 

@@ -275,3 +275,6 @@ fn is_orbit_free(space: &ParameterSpace) -> bool {
     let mut sought = Elements::PLANETS.iter().filter(sought).peekable();
     sought.peek().is_some() && sought.all(|of| is_free(of.k) && (is_free(of.phi) || is_free(of.conjunction)))
 }
+
+#[cfg(test)]
+mod tests;
