@@ -64,7 +64,7 @@ pub(super) struct Star {
     #[serde(default)]
     pub domega_rad_d: f64,
     /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It
-    /// decides nothing else, and may be added to a run that is there.
+    /// decides nothing else, and may be added to a run that is there; but two planets must be stable by it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass_msun: Option<f64>,
     /// Limb darkening; linear with coefficient 0.65 if not given.
