@@ -50,7 +50,9 @@ impl Ephemeris {
             if error > LARGEST_PHASE_ERROR {
                 let Elements { conjunction, phi, .. } = ephemeris.of;
                 let problem = format!(
-                    "this ephemeris tells the phase at {worst:.2} d to {error:.2} orbits only, and the limit is                      {LARGEST_PHASE_ERROR}: give a conjunction nearer to the data, a better period, or {} with a                      periodic prior",
+                    "this ephemeris tells the phase at {worst:.2} d to {error:.2} orbits only, and the limit is \
+                     {LARGEST_PHASE_ERROR}: give a conjunction nearer to the data, a better period, or {} with a \
+                     periodic prior",
                     phi.name()
                 );
                 return Err(settings.fault(&format!("parameters.{}", conjunction.name()), &problem));

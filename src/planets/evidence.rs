@@ -210,6 +210,9 @@ impl Periodogram {
         cells.sort_by(|a, b| within(*b).total_cmp(&within(*a)));
         let mut told: Vec<usize> = Vec::new();
         for cell in cells {
+            // of all intervals that hold a peak that in whose middle it is
+            let around = cell.saturating_sub(half)..(cell + half + 1).min(posterior.len());
+            let cell = around.max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(cell);
             if told.len() < TOLD && told.iter().all(|other| other.abs_diff(cell) > 2 * half) {
                 told.push(cell);
             }

@@ -258,7 +258,7 @@ mod tests {
             upper95(-3.0, 1.0) > 0.0
                 && upper95(-60.0, 1.0) > 0.0
                 && upper95(-60.0, 1.0) < 0.06
-                && (upper95(-36.0, 1.0) * 36.0 - 3.0).abs() < 0.01
+                && (upper95(-36.0, 1.0) * 36.0 - 3.0).abs() < 0.02
         );
         let verdict = Verdict::of_known([0.1, 0.01], SIGNAL, &[]);
         assert_eq!(verdict.finding, Finding::Detection);

@@ -177,7 +177,8 @@ pub(super) fn check_orbits(
             if max - min > shortest {
                 let name = of.conjunction.name();
                 let problem = format!(
-                    "{min} to {max} holds more than one conjunction of an orbit of {shortest:.4} d, which its prior                      allows: take a smaller range, or {} with a periodic prior",
+                    "{min} to {max} holds more than one conjunction of an orbit of {shortest:.4} d, which its prior \
+                     allows: take a smaller range, or {} with a periodic prior",
                     of.phi.name()
                 );
                 return Err(Fault::new(format!("parameters.{name}.max"), problem));

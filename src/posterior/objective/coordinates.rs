@@ -415,11 +415,12 @@ mod tests {
         let named = of(vec![k, (Period, days), (Phi, Prior::Periodic)]);
         for period in [1.69, 1.7, 1.72] {
             let (a, b) = ([0.1, period, 0.4], [0.1, 3.0 * period, 0.4]);
-            assert_eq!(named.values_at(&b), internal.values_at(&a));
+            let (one, other) = (named.values_at(&b), internal.values_at(&a));
+            assert!((one[PorbOverProt] - other[PorbOverProt]).abs() < 1e-15 && one[Phi] == other[Phi]);
             assert!((named.log_prior(&b) - internal.log_prior(&a) + 3f64.ln()).abs() < 1e-9);
             assert!((named.log_jacobian(&b) - internal.log_jacobian(&a)).abs() < 1e-12);
             let (x, y) = (named.to_sampling(&b), internal.to_sampling(&a));
-            assert_eq!((x[0], x[2]), (y[0], y[2]));
+            assert!((x[0] - y[0]).abs() < 1e-14 && (x[2] - y[2]).abs() < 1e-14);
         }
         // a conjunction that may be anywhere in one orbit is a phase that may be anything
         let phase = of(vec![k, (Phi, Prior::Periodic)]);

@@ -114,7 +114,8 @@ fn without_data_draws_follow_the_prior() {
             let error = (variance / DRAWS as f64).sqrt() * 2f64.sqrt();
             assert!((a - b).abs() < 4.0 * error, "{kind:?} {what}: {a} {b} +- {error}");
         };
-        for (i, f) in space.free().iter().enumerate() {
+        // of the systemic velocity all profiles together say something
+        for (i, f) in space.free().iter().enumerate().filter(|(_, f)| f.parameter != Vsys) {
             check(&|theta| theta[i], f.parameter.name());
             check(&|theta| theta[i] * theta[i], f.parameter.name());
         }
