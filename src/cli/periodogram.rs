@@ -2,7 +2,6 @@
 
 use super::output::Output;
 use super::{Failure, Global, console, progress};
-use crate::data::evidence::EvidenceRecord;
 use crate::data::io::periodogram::{FILES, PeriodogramResult};
 use crate::data::scene::Scene;
 use crate::numerics::text::shown;
@@ -89,7 +88,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         remarks.iter().filter(|remark| !detection.of_the_period().contains(remark)).cloned().collect();
     let known = known_planets(&scene, &settings, &detection, &of_the_star);
     let (verdict, remarks) = with_known(known, detection.verdict(&remarks), remarks, of_the_star);
-    let planets = EvidenceRecord::of(&scene.settings, &detection.planet_free.quadratic);
+    let planets = scene.evidence(&detection.planet_free.quadratic);
     let result = PeriodogramResult {
         imager: &scene.imager,
         detection: &detection,

@@ -1,11 +1,10 @@
 //! The evidence for planets under the priors of a config: what is said of it beside a blind search.
 
-use crate::data::config::Settings;
 use crate::planets::evidence::{Density, Evidence, Inclusion, LnBayes, PlanetPrior, evidence};
 use crate::planets::periodogram::eccentric::LARGEST_ECCENTRICITY;
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::probability;
-use crate::posterior::objective::{Clock, Elements, Parameter, Prior, period_prior};
+use crate::posterior::objective::{Clock, Elements, FreeParameter, Parameter, Prior, period_prior};
 use serde::{Deserialize, Serialize};
 
 /// A prior of K that reaches so many times farther than the error of K is said to be wide.
@@ -52,15 +51,14 @@ struct Assumed {
 }
 
 impl EvidenceRecord {
-    /// Under the priors of `settings`, from a star's `quadratic` without a planet. `None` where K or the period of the
-    /// planet has no prior, or the profiles bound no orbit.
-    pub fn of(settings: &Settings, quadratic: &VelocityQuadratic) -> Option<Self> {
-        let clock = Clock { rotation_period_d: settings.star.rotation_period_d, epoch_d: settings.star.epoch_d };
+    /// Under the priors of `free` parameters, from a star's `quadratic` without a planet. `None` where K or the period
+    /// of the planet has no prior, or the profiles bound no orbit.
+    pub fn of(free: &[FreeParameter], clock: Clock, seed: u64, quadratic: &VelocityQuadratic) -> Option<Self> {
         let [first, second] = &Elements::PLANETS;
-        let one = Assumed::of(settings, first, clock)?;
+        let one = Assumed::of(free, first, clock)?;
         // of a second planet nothing else is assumed unless the config says so
-        let two = Assumed::of(settings, second, clock).unwrap_or(one);
-        let found = one.with(|one| two.with(|two| evidence(quadratic, [one, two], settings.sampler.seed)))?;
+        let two = Assumed::of(free, second, clock).unwrap_or(one);
+        let found = one.with(|one| two.with(|two| evidence(quadratic, [one, two], seed)))?;
         let error_kms = quadratic.information.trace().sqrt().recip() * 2f64.sqrt();
         Some(EvidenceRecord::new(found, [one, two], error_kms, clock.rotation_period_d))
     }
@@ -104,11 +102,11 @@ impl EvidenceRecord {
 }
 
 impl Assumed {
-    fn of(settings: &Settings, of: &Elements, clock: Clock) -> Option<Self> {
-        let prior = |p: Parameter| settings.free.iter().find(|f| f.parameter == p).map(|f| f.prior);
+    fn of(free: &[FreeParameter], of: &Elements, clock: Clock) -> Option<Self> {
+        let prior = |p: Parameter| free.iter().find(|f| f.parameter == p).map(|f| f.prior);
         // of a known ephemeris there is nothing to choose
         prior(of.phi)?;
-        let (k, period) = (prior(of.k)?, period_prior(&settings.free, of, clock)?);
+        let (k, period) = (prior(of.k)?, period_prior(free, of, clock)?);
         let largest_e = match prior(of.shape[0]) {
             Some(Prior::Disc { max_eccentricity }) => max_eccentricity,
             _ => LARGEST_ECCENTRICITY,

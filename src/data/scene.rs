@@ -3,10 +3,12 @@
 
 use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter};
 use crate::data::ephemeris::Ephemeris;
+use crate::data::evidence::EvidenceRecord;
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, SearchError, SearchSettings};
+use crate::planets::velocities::VelocityQuadratic;
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
 use crate::posterior::imaging::Imager;
@@ -389,6 +391,12 @@ impl Scene {
             times_d: simulation.times_d.clone(),
             provenance: self.provenance(),
         }
+    }
+
+    /// Bayes factors of planets under the priors of the config, from the star's quadratic without a planet.
+    #[doc(hidden)]
+    pub fn evidence(&self, quadratic: &VelocityQuadratic) -> Option<EvidenceRecord> {
+        EvidenceRecord::of(&self.settings.free, self.space.clock(), self.settings.sampler.seed, quadratic)
     }
 
     /// The simulated values by name, ephemerides among them where the config names them.

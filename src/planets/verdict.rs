@@ -114,8 +114,8 @@ pub fn upper95(value: f64, sigma: f64) -> f64 {
 }
 
 impl Verdict {
-    /// Of a planet of known ephemeris: `alone` is K with its error where there is no planet in the model, `signal` where
-    /// there is. The false-alarm probability is that of one period, one-sided.
+    /// Of a planet of known ephemeris: `alone` is K with its error where there is no planet in the model, `signal`
+    /// where there is. The false-alarm probability is that of one period, one-sided.
     pub fn of_known(alone: [f64; 2], signal: Signal, remarks: &[Remark]) -> Self {
         let significance = alone[0] / alone[1];
         if !significance.is_finite() {

@@ -100,7 +100,7 @@ impl BlindSearch {
             verdict = verdict.with(std::slice::from_ref(&outside));
             remarks.push(outside);
         }
-        let planets = EvidenceRecord::of(&scene.settings, &found.planet_free.quadratic);
+        let planets = scene.evidence(&found.planet_free.quadratic);
         let (verdict, mut remarks) =
             with_known(known_planets(scene, &settings, &found, &of_the_star), verdict, remarks, of_the_star);
         remarks.extend(planets.iter().map(|planets| Remark::note(planets.sentence.clone())));

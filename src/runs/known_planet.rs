@@ -1,9 +1,9 @@
 //! A planet of known ephemeris: its mass is a question of one number, K.
 //!
-//! No other period is searched for it, so that the false-alarm probability is that of one period and one sign: how often
-//! a star without a planet has a K as many standard errors above zero. The limit is that of K with the planet in the
-//! model. Errors of the ephemeris, at most a tenth of an orbit, change K by less than 2 % and are left out here; a chain
-//! has them.
+//! No other period is searched for it, so that the false-alarm probability is that of one period and one sign: how
+//! often a star without a planet has a K as many standard errors above zero. The limit is that of K with the planet in
+//! the model. Errors of the ephemeris, at most a tenth of an orbit, change K by less than 2 % and are left out here; a
+//! chain has them.
 
 use crate::data::ephemeris::Ephemeris;
 use crate::data::scene::Scene;
@@ -22,7 +22,8 @@ pub struct KnownPlanet {
     pub verdict: Verdict,
 }
 
-/// The planets of known ephemeris in the config of `scene`, beside what a blind search found. `remarks` are on the star.
+/// The planets of known ephemeris in the config of `scene`, beside what a blind search found. `remarks` are on the
+/// star.
 pub fn known_planets(
     scene: &Scene,
     settings: &DetectionSettings,

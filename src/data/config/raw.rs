@@ -157,7 +157,8 @@ pub(super) struct Instrument {
 /// Period over rotation period where none is given.
 pub(super) const DEFAULT_PORB_OVER_PROT: f64 = 2.0;
 
-/// The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a parameter is free, its value here is the start.
+/// The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a parameter is
+/// free, its value here is the start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Planet {
@@ -181,8 +182,8 @@ pub(super) struct Planet {
     /// The same with the sine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sqrt_e_sin_omega: Option<f64>,
-    /// Semi-amplitude of the star's radial velocity by a second planet (km/s), 0 or more; without any key of its there is
-    /// none.
+    /// Semi-amplitude of the star's radial velocity by a second planet (km/s), 0 or more; without any key of its there
+    /// is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub k2_kms: Option<f64>,
     /// Orbital period of the second planet over the rotation period, above 0.

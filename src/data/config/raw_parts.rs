@@ -27,8 +27,8 @@ pub(super) struct PerParameter<T> {
     /// velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phi: Option<T>,
-    /// Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in place of `phi`. A
-    /// normal prior is an ephemeris: at the time of the data it must tell the phase to a tenth of an orbit.
+    /// Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in place of `phi`.
+    /// A normal prior is an ephemeris: at the time of the data it must tell the phase to a tenth of an orbit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t_conjunction_d: Option<T>,
     /// Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's orbit; free

@@ -180,8 +180,8 @@ impl OrbitQuantities {
         value.filter(|value| value.is_finite())
     }
 
-    /// The value for a circle with its error to first order, for errors of K, period over rotation period and phi of that
-    /// covariance. The error of an event is at most that of one of which nothing but the period is known.
+    /// The value for a circle with its error to first order, for errors of K, period over rotation period and phi of
+    /// that covariance. The error of an event is at most that of one of which nothing but the period is known.
     pub fn estimate(&self, quantity: OrbitQuantity, orbit: &Orbit, covariance: &[[f64; 3]; 3]) -> Option<Estimate> {
         let value = self.value(quantity, &(*orbit).into(), None)?;
         let (prot, period) = (self.rotation_period_d, self.period_d(orbit));

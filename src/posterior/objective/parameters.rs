@@ -255,9 +255,9 @@ impl Parameter {
 
 /// Values of all parameters in the units of their names, free or not; index by [`Parameter`]. Those of the surface are
 /// NaN where they are not given: they are those of the star's settings then. Those of the field are NaN where no maps
-/// are integrated over, the lifetime where spots live for ever. Those of a second planet are NaN where there is none, and
-/// those of eccentricity where the orbit is a circle. Periods in days and conjunctions are always NaN: what they stand
-/// for is there.
+/// are integrated over, the lifetime where spots live for ever. Those of a second planet are NaN where there is none,
+/// and those of eccentricity where the orbit is a circle. Periods in days and conjunctions are always NaN: what they
+/// stand for is there.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterValues(pub [f64; Parameter::ALL.len()]);
 

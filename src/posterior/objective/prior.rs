@@ -42,8 +42,8 @@ pub enum Prior {
         /// Upper bound (degrees).
         max: f64,
     },
-    /// Of one of the two coordinates of a point in a disc around 0, which may be anywhere in it alike. The density of both
-    /// is not the product: [`super::ParameterSpace`] has it.
+    /// Of one of the two coordinates of a point in a disc around 0, which may be anywhere in it alike. The density of
+    /// both is not the product: [`super::ParameterSpace`] has it.
     Disc {
         /// Square of the disc's radius: the largest eccentricity.
         max_eccentricity: f64,

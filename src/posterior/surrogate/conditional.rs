@@ -59,8 +59,8 @@ pub(super) struct Conditional {
 }
 
 impl LinearModel {
-    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where no planet's velocities
-    /// are linear in some of its free parameters.
+    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where no planet's
+    /// velocities are linear in some of its free parameters.
     pub fn new(expansion: &Expansion, space: &ParameterSpace, mid_cycle: f64) -> Option<Self> {
         let (n, all) = (expansion.profiles(), expansion.centre.len());
         let is_free = |of: &Elements| space.free().iter().any(|f| of.all().contains(&f.parameter));

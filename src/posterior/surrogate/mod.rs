@@ -203,8 +203,8 @@ impl Surrogate {
         Some(self.walk(self.walk(first, rng), rng).position)
     }
 
-    /// Maxima over the periods of one planet that lie within `drop` of the best in ln L, highest first, at most so many;
-    /// a second one is at its best.
+    /// Maxima over the periods of one planet that lie within `drop` of the best in ln L, highest first, at most so
+    /// many; a second one is at its best.
     pub fn peaks(&self, drop: f64, most: usize) -> Vec<Peak> {
         let planets = self.model.planets();
         let Some(which) = self.periods.iter().position(Option::is_some) else {

@@ -92,7 +92,8 @@ fn its_likelihood_is_that_of_the_expansion() {
     }
 }
 
-/// Draws are those of the prior, weighted by the likelihood: the densities of all proposals and the Jacobians are right.
+/// Draws are those of the prior, weighted by the likelihood: the densities of all proposals and the Jacobians are
+/// right.
 #[test]
 fn draws_are_those_of_prior_and_likelihood() {
     for kind in KINDS {
