@@ -128,7 +128,7 @@ fn a_planet_is_included_where_it_is() {
 
 /// Gradients without a planet scatter with the information: of 200 such stars hardly any has a Bayes factor above 150.
 #[test]
-#[ignore = "200 stars with all models, a minute"]
+#[ignore = "200 stars with all models, tens of minutes of one core"]
 fn chance_hardly_makes_a_bayes_factor_of_150() {
     let above = |model: fn(&Evidence) -> f64| {
         let star = |seed: u64| {
