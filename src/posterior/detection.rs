@@ -10,7 +10,7 @@ mod remarks;
 mod robustness;
 
 pub use remarks::Evidence;
-pub use robustness::{AtTarget, Robustness, WithoutNight, robustness};
+pub use robustness::{AtTarget, Robustness, WithoutNight, nights, robustness};
 
 use crate::field::{FieldError, Lifetime};
 use crate::maxent::Termination;

@@ -29,6 +29,7 @@ pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, model_difference, section_difference};
 pub use jitter::VelocityJitter;
+pub use raw_parts::PlanSection;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
 pub use spots::Hyperparameter;

@@ -3,7 +3,7 @@
 //! Fields of `PerParameter` and the observations are in `raw_parts`.
 
 use super::EquivalentWidth;
-use super::raw_parts::{Grid, ObservationsSection, PerParameter, PriorSection};
+use super::raw_parts::{Grid, ObservationsSection, PerParameter, PlanSection, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,6 +26,9 @@ pub(super) struct Config {
     pub planet: Planet,
     /// The line profiles, observed or simulated: either `path` or `simulate`.
     pub observations: ObservationsSection,
+    /// What is planned beside the observations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<PlanSection>,
     /// The Doppler image.
     #[serde(default)]
     pub imaging: ImagingSettings,

@@ -7,6 +7,7 @@ use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
 use super::resolve_observations::resolve_observations;
+use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
 use crate::posterior::marginal;
@@ -22,6 +23,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
     let source = resolve_observations(&mut raw, &star, &values, path)?;
+    raw.plan.as_ref().map_or(Ok(()), check_plan)?;
     check_imaging(&raw.imaging, raw.observations.velocity_jitter_kms)?;
     resolve_field(&mut raw, &mut values)?;
     let free = resolve_free(&mut raw, &mut values)?;
@@ -45,6 +47,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         equivalent_width: raw.star.line.equivalent_width_kms,
         values,
         source,
+        plan: raw.plan,
         velocity_jitter: raw.observations.velocity_jitter_kms,
         imaging: raw.imaging,
         free,

@@ -1,7 +1,7 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
 use super::spots::Hyperparameter;
-use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
+use super::{Automatic, ConfigError, EquivalentWidth, PlanSection, SamplerSettings, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
@@ -34,6 +34,8 @@ pub struct Settings {
     pub values: ParameterValues,
     /// Where the profiles come from.
     pub source: ObservationSource,
+    /// What is planned beside them.
+    pub plan: Option<PlanSection>,
     /// Scatter of the profiles' velocity zero points.
     pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
@@ -47,7 +49,7 @@ pub struct Settings {
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
-    /// `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    /// `plan`, `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
     pub sha256: String,
 }
 

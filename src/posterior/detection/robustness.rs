@@ -108,7 +108,7 @@ pub fn robustness(
 }
 
 /// Profiles night by night, in order of time.
-fn nights(times_d: &[f64]) -> Vec<Vec<usize>> {
+pub fn nights(times_d: &[f64]) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..times_d.len()).collect();
     order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
     order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= NIGHT_GAP_D).map(<[usize]>::to_vec).collect()

@@ -11,6 +11,7 @@
 //! 5. [`Maps`]: the most probable maps at any times, with their errors.
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
 //! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 8. [`Planned`]: what profiles that are not yet taken will say of velocities.
 
 pub mod change;
 mod condense;
@@ -19,6 +20,7 @@ mod expand;
 mod fit;
 mod forecast;
 mod maps;
+mod planned;
 mod posterior;
 
 pub use change::Change;
@@ -26,6 +28,7 @@ pub use design::{Basis, Design};
 pub use fit::{Fitted, Known, bounds, fit, usual_value};
 pub use forecast::Forecast;
 pub use maps::Maps;
+pub use planned::Planned;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};
