@@ -81,7 +81,8 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
             legend.add(Key::Line(of_k95(colour(k))), &schedule.name);
         }
     }
-    legend.row(&mut figure, [0.5 * figure.width, periods.bottom() + 42.0]);
+    let middle = 0.5 * figure.width;
+    legend.row(&mut figure, [middle, periods.bottom() + 42.0]);
     Ok(figure)
 }
 

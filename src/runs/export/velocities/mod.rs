@@ -79,7 +79,7 @@ impl Velocities {
         let covariance = matrix(&folder.join("covariance.csv"), times_d.len())?;
         if !kms.iter().chain(covariance.as_slice()).all(|x| x.is_finite()) {
             let problem = "the profiles do not bound all velocities: there is nothing to pass on";
-            return Err(FileError::of(&path, problem.into()).into());
+            return Err(FileError::of(&path, problem).into());
         }
         Ok(Velocities { times_d, kms: DVector::from_vec(kms), covariance })
     }
