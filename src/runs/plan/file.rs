@@ -1,6 +1,6 @@
 //! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
 
-use super::{Campaign, Expected, Outlook, PlanSettings};
+use super::{Campaign, Expected, Outlook, PlanSettings, SpotsSource};
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
@@ -64,8 +64,8 @@ pub struct ScheduleRecord {
 /// The spots that are integrated out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpotsRecord {
-    /// Whether they were fitted to profiles that have been taken; otherwise those of the config, or usual ones.
-    pub fitted: bool,
+    /// Where they are from.
+    pub source: SpotsSource,
     /// Standard deviation of the filling factor.
     pub spot_amplitude: f64,
     /// Slope of the spectrum.
@@ -229,7 +229,7 @@ impl ScheduleRecord {
             rotation_period_d: prot,
             snr: 1.0 / campaign.sigma,
             spots: SpotsRecord {
-                fitted: campaign.taken.is_some(),
+                source: campaign.source,
                 spot_amplitude: spectrum.amplitude,
                 spot_slope: spectrum.slope,
                 spot_lifetime_d: campaign.assumed.field.kernel.lifetime.days(),
@@ -249,12 +249,12 @@ impl ScheduleRecord {
 
     /// Spots, and what there is after more and more nights and at some periods.
     fn table(&self) -> String {
-        let SpotsRecord { fitted, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms } = self.spots;
+        let SpotsRecord { source, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms } = self.spots;
         let lives = spot_lifetime_d.map_or("that do not change".into(), |d| format!("that live {d:.1} d"));
-        let source = if fitted { "fitted to the profiles there are" } else { "imaging.spot_..." };
         let mut text = format!(
-            "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({source}); velocity jitter \
+            "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); velocity jitter \
             {velocity_jitter_kms} km/s; S/N {:.0}\n\n",
+            source.words(),
             self.snr
         );
         let head = ["nights", "profiles", "sigma_K", "K 50 %", "K 95 %"].map(str::to_owned).to_vec();

@@ -12,7 +12,7 @@ mod campaign;
 mod file;
 mod outlook;
 
-pub use campaign::{Campaign, CampaignError};
+pub use campaign::{Campaign, CampaignError, SpotsSource};
 pub use file::{AfterRecord, CSV, ExpectedRecord, JSON, PlanFile, ScheduleRecord, SpotsRecord, WindowRecord};
 pub use outlook::{Expected, Outlook};
 

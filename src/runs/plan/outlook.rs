@@ -8,6 +8,7 @@ use crate::planets::periodogram::{FalseAlarm, Frequencies, RotationPeriods};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// What profiles say after some nights.
 #[derive(Clone, Debug)]
@@ -71,7 +72,7 @@ impl Outlook {
         let of_maps: Vec<Vec<[Option<f64>; 3]>> = self
             .quadratics
             .iter()
-            .map(|quadratic| scan(quadratic, frequencies).iter().map(|trial| self.of_trial(trial)).collect())
+            .map(|quadratic| scan(quadratic, frequencies).par_iter().map(|trial| self.of_trial(trial)).collect())
             .collect();
         let expected = |(k, frequency): (usize, &f64)| {
             let [sigma_k_kms, k50_kms, k95_kms] =
