@@ -114,7 +114,8 @@ fn main() {
         let prot = campaign.imager.star.rotation_period_d;
         let periods = compared_d(std::slice::from_ref(&campaign), range);
         let per_cycle: Vec<f64> = periods.iter().map(|period_d| prot / period_d).collect();
-        let (sigma, assumed) = achieved(&config, &per_cycle, before.as_ref().and_then(|text| fitted_before(text, seed)));
+        let (sigma, assumed) =
+            achieved(&config, &per_cycle, before.as_ref().and_then(|text| fitted_before(text, seed)));
         let Assumed { field: Field { spectrum, kernel }, jitter_kms } = assumed;
         let lifetime_d = kernel.lifetime.days().unwrap_or(f64::INFINITY);
         println!(
@@ -133,8 +134,7 @@ fn main() {
         slope: of(|assumed| assumed.field.spectrum.slope),
     };
     let lifetime = of(|assumed| assumed.field.kernel.lifetime.days().unwrap_or(f64::INFINITY));
-    let typical =
-        Assumed { field: Field { spectrum, kernel: Kernel::of(Lifetime::Days(lifetime)) }, jitter_kms: 0.0 };
+    let typical = Assumed { field: Field { spectrum, kernel: Kernel::of(Lifetime::Days(lifetime)) }, jitter_kms: 0.0 };
     println!("typical spots: {typical:?}");
     println!("achieved over forecast sigma_K: median over stars of the median over periods, scatter of the stars,");
     println!("largest deviation of a period's median over stars");

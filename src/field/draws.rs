@@ -11,9 +11,8 @@ const ROUNDING: f64 = 1e-13;
 impl Field {
     /// Coefficients (H, times) of a field of harmonics of these `degrees` (H) at some times (d), before any data.
     pub fn drawn(&self, degrees: &[usize], times_d: &[f64], rng: &mut impl Rng) -> DMatrix<f64> {
-        let correlation = DMatrix::from_fn(times_d.len(), times_d.len(), |j, k| {
-            self.kernel.at(times_d[j] - times_d[k])
-        });
+        let correlation =
+            DMatrix::from_fn(times_d.len(), times_d.len(), |j, k| self.kernel.at(times_d[j] - times_d[k]));
         // the symmetric root does not hang on the signs of eigenvectors
         let mut eigen = correlation.symmetric_eigen();
         let least = ROUNDING * eigen.eigenvalues.amax();
@@ -46,7 +45,8 @@ impl Evidence {
         let simulated = |(k, epoch): (usize, &Epoch)| {
             let mut normal = |n: usize| DVector::from_fn(n, |_, _| rng.sample::<f64, _>(StandardNormal));
             let noise = normal(epoch.len()).component_mul(&epoch.variance.map(f64::sqrt));
-            let misfit = &epoch.jacobian * before.column(k) + noise + &epoch.nuisances * normal(epoch.nuisances.ncols());
+            let misfit =
+                &epoch.jacobian * before.column(k) + noise + &epoch.nuisances * normal(epoch.nuisances.ncols());
             Epoch { misfit, slopes: DMatrix::zeros(epoch.len(), 0), ..epoch.clone() }
         };
         let simulated: Vec<Epoch> = epochs.iter().enumerate().map(simulated).collect();
@@ -100,7 +100,8 @@ mod tests {
             beside: 0.0,
             slopes: DMatrix::zeros(2, 0),
         };
-        let epochs: Vec<Epoch> = [normal(2, 5), normal(2, 5), normal(2, 5)].into_iter().enumerate().map(epoch).collect();
+        let epochs: Vec<Epoch> =
+            [normal(2, 5), normal(2, 5), normal(2, 5)].into_iter().enumerate().map(epoch).collect();
         let how = Compression { left_out: 0.0 };
         let evidence = Evidence::new(field, &degrees, &epochs, &DMatrix::zeros(3, 3), how).unwrap();
         let times = [1.0, 4.0];

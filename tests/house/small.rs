@@ -50,10 +50,11 @@ fn demo() -> Value {
     demo
 }
 
-/// `configs/plan.json` with few pixels.
+/// `configs/plan.json` with few pixels and profiles.
 fn planned() -> Value {
     let mut plan: Value = serde_json::from_slice(&std::fs::read(root().join("configs/plan.json")).unwrap()).unwrap();
     plan["imaging"]["pixels"] = json!(300);
+    plan["observations"]["simulate"]["schedule"]["per_night"] = json!([1, 2]);
     plan
 }
 

@@ -29,10 +29,7 @@ fn planned_information_is_that_of_dense_algebra() {
     let scene = scene();
     let (imager, mut values) = (&scene.imager, scene.settings.values);
     values[Parameter::K] = 0.0;
-    let field = Field {
-        spectrum: Spectrum { amplitude: 0.15, slope: 0.9 },
-        kernel: Kernel::of(Lifetime::Days(5.0)),
-    };
+    let field = Field { spectrum: Spectrum { amplitude: 0.15, slope: 0.9 }, kernel: Kernel::of(Lifetime::Days(5.0)) };
     for jitter_kms in [0.0, 0.05] {
         let planned = Planned::new(imager, values, Assumed { field, jitter_kms }, &[], None);
         for maps in [planned.mean_maps(), planned.drawn_maps(4).unwrap()] {
@@ -85,8 +82,13 @@ fn dense(scene: &Scene, field: &Field, jitter_kms: f64, maps: &DMatrix<f64>, par
         let jitter = if j / bins == k / bins { jitter_kms * jitter_kms * slopes[j] * slopes[k] } else { 0.0 };
         spatial[(j, k)] * field.kernel.at(time_d(j) - time_d(k)) + noise + jitter
     });
-    let columns = DMatrix::from_fn(rows.len(), part.len(), |a, epoch| {
-        if rows[a] / bins == part[epoch] { slopes[rows[a]] } else { 0.0 }
-    });
+    let columns =
+        DMatrix::from_fn(
+            rows.len(),
+            part.len(),
+            |a, epoch| {
+                if rows[a] / bins == part[epoch] { slopes[rows[a]] } else { 0.0 }
+            },
+        );
     columns.tr_mul(&covariance.cholesky().unwrap().solve(&columns))
 }

@@ -54,7 +54,7 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
     let beside = Panel {
         frame: nights,
         x: Axis::linear("nights", [0.0, 1.08 * most.max(1) as f64]),
-        y: Axis { label: "median *K* (km/s)".into(), ..above.y.clone() },
+        y: Axis::log("median *K* (km/s)", range_of(medians(file), Scale::Log, 0.08)),
     };
     for (k, schedule) in file.schedules.iter().enumerate() {
         let of = |number: fn(&AfterRecord) -> Option<f64>| -> Vec<[f64; 2]> {
@@ -66,7 +66,8 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
             ("k95", of(|after| after.k95_kms), of_k95(colour(k))),
         ] {
             beside.line(&mut figure, class, &points, stroke);
-            beside.points(&mut figure, class, &points, (Marker::Disc, 3.0, colour(k)));
+            let known: Vec<[f64; 2]> = points.into_iter().filter(|point| point[1].is_finite()).collect();
+            beside.points(&mut figure, class, &known, (Marker::Disc, 3.0, colour(k)));
         }
     }
     beside.frame(&mut figure, Sides::BOTH);
@@ -84,6 +85,11 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
     let middle = 0.5 * figure.width;
     legend.row(&mut figure, [middle, periods.bottom() + 42.0]);
     Ok(figure)
+}
+
+/// All that is drawn against nights.
+fn medians(file: &PlanFile) -> impl Iterator<Item = f64> {
+    file.schedules.iter().flat_map(|s| &s.after).flat_map(|after| [after.sigma_k_kms, after.k95_kms]).flatten()
 }
 
 /// The rotation period of the first star and its fractions.

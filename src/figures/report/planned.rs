@@ -23,7 +23,10 @@ pub(super) fn chapter(file: &PlanFile) -> Chapter {
         counts.into_iter().chain(numbers).collect()
     };
     let rows = best.after.iter().map(row).collect();
-    tables.push((format!("{}: medians over all periods.", best.name), Table { head: head(&["nights", "profiles"]), rows }));
+    tables.push((
+        format!("{}: medians over all periods.", best.name),
+        Table { head: head(&["nights", "profiles"]), rows },
+    ));
     let row = |at: &ExpectedRecord| {
         let numbers = [at.sigma_k_kms, at.k50_kms, at.k95_kms].map(|k| number(k, DIGITS));
         std::iter::once(at.period_d.to_string()).chain(numbers).collect()

@@ -78,11 +78,7 @@ impl<'a> Planned<'a> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn velocities(
-        &self,
-        maps: &DMatrix<f64>,
-        parts: &[Vec<usize>],
-    ) -> Result<Vec<VelocityQuadratic>, FieldError> {
+    pub fn velocities(&self, maps: &DMatrix<f64>, parts: &[Vec<usize>]) -> Result<Vec<VelocityQuadratic>, FieldError> {
         let epochs = self.epochs(maps, 0..maps.ncols());
         parts.iter().map(|part| self.of_part(maps, &epochs, part)).collect()
     }
@@ -104,12 +100,7 @@ impl<'a> Planned<'a> {
         all.skip(profiles.start).take(profiles.len()).map(noisy).collect()
     }
 
-    fn of_part(
-        &self,
-        maps: &DMatrix<f64>,
-        epochs: &[Epoch],
-        part: &[usize],
-    ) -> Result<VelocityQuadratic, FieldError> {
+    fn of_part(&self, maps: &DMatrix<f64>, epochs: &[Epoch], part: &[usize]) -> Result<VelocityQuadratic, FieldError> {
         let some: Vec<Epoch> = part.iter().map(|k| epochs[*k].clone()).collect();
         let around = maps.select_columns(part);
         let (field, degrees) = (self.assumed.field, &self.basis.degrees);

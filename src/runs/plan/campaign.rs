@@ -223,11 +223,7 @@ impl Campaign {
     ///
     /// # Errors
     /// [`FrequencyError`].
-    pub(super) fn frequencies(
-        &self,
-        part: &[usize],
-        wanted: FrequencySettings,
-    ) -> Result<Frequencies, FrequencyError> {
+    pub(super) fn frequencies(&self, part: &[usize], wanted: FrequencySettings) -> Result<Frequencies, FrequencyError> {
         let all = self.imager.cycles();
         let cycles: Vec<f64> = part.iter().map(|k| all[*k]).collect();
         Frequencies::new(&cycles, self.imager.star.rotation_period_d, wanted)
@@ -248,8 +244,7 @@ fn taken(config: &Config) -> Result<Taken, CampaignError> {
 /// A usual field, but for what is known.
 fn usual(known: Known) -> Assumed {
     let (amplitude, slope, lifetime_d) = USUAL;
-    let spectrum =
-        Spectrum { amplitude: known.amplitude.unwrap_or(amplitude), slope: known.slope.unwrap_or(slope) };
+    let spectrum = Spectrum { amplitude: known.amplitude.unwrap_or(amplitude), slope: known.slope.unwrap_or(slope) };
     let lifetime = known.lifetime.unwrap_or(Lifetime::Days(lifetime_d));
     Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms: known.jitter_kms.unwrap_or(0.0) }
 }

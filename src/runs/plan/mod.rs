@@ -55,12 +55,6 @@ pub enum PlanError {
     /// Periods that make no sense, or too few profiles.
     #[error(transparent)]
     Frequencies(#[from] FrequencyError),
-    /// No orbit is bounded.
-    #[error("{name}: the profiles would not bound an orbit at most periods: take more nights")]
-    Unbounded {
-        /// The schedule.
-        name: String,
-    },
 }
 
 /// Shortest and longest period (d) at which all of the campaigns are looked at.
@@ -86,7 +80,8 @@ pub fn outlook(campaign: &Campaign, range_d: [f64; 2], settings: &PlanSettings) 
     let nuisances = if settings.fixed { Vec::new() } else { nuisances(&campaign.settings.free) };
     let values = campaign.settings.values;
     let planned = Planned::new(&campaign.imager, values, campaign.assumed, &nuisances, campaign.taken.as_deref());
-    let wanted = FrequencySettings { min_period_d: Some(range_d[0]), max_period_d: Some(range_d[1]), oversampling: None };
+    let wanted =
+        FrequencySettings { min_period_d: Some(range_d[0]), max_period_d: Some(range_d[1]), oversampling: None };
     let looks: Vec<(usize, Vec<usize>, Frequencies)> = campaign
         .looks(LOOKS)
         .into_iter()

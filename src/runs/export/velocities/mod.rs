@@ -6,8 +6,8 @@
 
 mod loss;
 
-use super::place::{begins_with, check_folder, check_name, create_parent};
 use super::ExportError;
+use super::place::{begins_with, check_folder, check_name, create_parent};
 use crate::data::io::FileError;
 use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::csv::Columns;
