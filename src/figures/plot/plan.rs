@@ -66,8 +66,7 @@ fn figure(file: &PlanFile, table: &Columns) -> Result<Figure, PlotError> {
             ("k95", of(|after| after.k95_kms), of_k95(colour(k))),
         ] {
             beside.line(&mut figure, class, &points, stroke);
-            let known: Vec<[f64; 2]> = points.into_iter().filter(|point| point[1].is_finite()).collect();
-            beside.points(&mut figure, class, &known, (Marker::Disc, 3.0, colour(k)));
+            beside.points(&mut figure, class, &points, (Marker::Disc, 3.0, colour(k)));
         }
     }
     beside.frame(&mut figure, Sides::BOTH);
