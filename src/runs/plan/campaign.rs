@@ -18,6 +18,9 @@ use std::sync::Arc;
 /// from 7 d to for ever (`results/calibration-changing.md`). Those of LO Peg have 0.23, 0.81 and 106 d.
 const USUAL: (f64, f64, f64) = (0.25, 0.55, 28.0);
 
+/// Planned profiles that are farther apart (d) are of two nights: those of one night may be hours apart.
+const NIGHT_GAP_D: f64 = 0.5;
+
 /// A star, and when it is observed.
 #[derive(Clone, Debug)]
 pub struct Campaign {
@@ -142,7 +145,7 @@ impl Campaign {
             }
             _ => unreachable!("observed profiles have a plan"),
         };
-        let mut nights = nights(&planned.times_d());
+        let mut nights = nights(&planned.times_d(), NIGHT_GAP_D);
         if let Some(wanted) = wanted.filter(|_| schedule_of(config).is_none()) {
             if wanted > nights.len() {
                 return Err(CampaignError::Nights { path: own.path.clone(), wanted, listed: nights.len() });
@@ -150,7 +153,7 @@ impl Campaign {
             nights.truncate(wanted);
             let kept: Vec<usize> = nights.iter().flatten().copied().collect();
             planned.profiles = kept.iter().map(|k| planned.profiles[*k].clone()).collect();
-            nights = self::nights(&planned.times_d());
+            nights = self::nights(&planned.times_d(), NIGHT_GAP_D);
         }
         let before = taken.map_or(0, |taken| taken.observations.profiles.len());
         nights.iter_mut().flatten().for_each(|k| *k += before);

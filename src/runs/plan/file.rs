@@ -14,8 +14,11 @@ pub const CSV: &str = "plan.csv";
 /// See [`CSV`].
 pub const JSON: &str = "plan.json";
 
-/// Periods (d) of which the table and sentences speak, those within the search.
+/// Periods (d) of the table, those within the search.
 const ROUND_D: [f64; 14] = [0.3, 0.5, 0.7, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 100.0];
+
+/// Those of which sentences speak.
+const SPOKEN_D: [f64; 6] = [0.5, 2.0, 5.0, 10.0, 20.0, 50.0];
 
 /// The content of `plan.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -275,7 +278,7 @@ impl ScheduleRecord {
     /// It in plain words.
     pub fn sentences(&self, false_alarm_probability: f64) -> Vec<String> {
         let mut sentences = Vec::new();
-        for at in self.periods.iter().filter(|at| at.imitated.is_none()) {
+        for at in self.periods.iter().filter(|at| SPOKEN_D.contains(&at.period_d)) {
             if let (Some(k50), Some(k95)) = (at.k50_kms, at.k95_kms) {
                 sentences.push(format!(
                     "A planet of K = {} km/s and {} d would be detected with 95 % probability, one of {} km/s with 50 \

@@ -158,7 +158,7 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
             text,
             "sigma_K at {:.4} d (circular orbit, constant velocity free), over that with the full covariance:\n  \
             as such a package would quote it: {quoted:.2}\n  as it would truly be: {achieved:.2}\n\
-            reduced chi2 of the best orbit that it would find on average: {reduced_chi2:.2} instead of 1",
+            reduced chi2 of the best orbit that it would find on average: {reduced_chi2:.3} instead of 1",
             search.best.period_d
         );
     }
