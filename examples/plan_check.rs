@@ -76,6 +76,7 @@ fn fitted_before(output: &str, seed: u64) -> Option<Known> {
         slope: Some(row[3]),
         lifetime: Some(Lifetime::Days(row[4])),
         jitter_kms: Some(row[5]),
+        ..Known::default()
     })
 }
 

@@ -61,7 +61,7 @@ fn dense(scene: &Scene, field: &Field, jitter_kms: f64, maps: &DMatrix<f64>, par
     };
     let h = 1e-3;
     let slopes = (depths(h, maps) - depths(-h, maps)) / (2.0 * h);
-    let bins = slopes.len() / imager.sampling.profiles.len();
+    let bins = slopes.len() / imager.profiles().count();
     let mut jacobian = DMatrix::zeros(slopes.len(), basis.degrees.len());
     for harmonic in 0..basis.degrees.len() {
         let moved = |h: f64| {
@@ -75,7 +75,8 @@ fn dense(scene: &Scene, field: &Field, jitter_kms: f64, maps: &DMatrix<f64>, par
     let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |j, c| jacobian[(j, c)] * variances[c].sqrt());
     let spatial = &scaled * scaled.transpose();
     let rows: Vec<usize> = part.iter().flat_map(|k| k * bins..(k + 1) * bins).collect();
-    let time_d = |row: usize| imager.sampling.profiles[row / bins].0;
+    let times_d = imager.times_d();
+    let time_d = |row: usize| times_d[row / bins];
     let covariance = DMatrix::from_fn(rows.len(), rows.len(), |a, b| {
         let (j, k) = (rows[a], rows[b]);
         let noise = if j == k { SIGMA * SIGMA } else { 0.0 };

@@ -12,12 +12,14 @@ use crate::star::{Disc, Facula, Life, Spot, StarSettings};
 const MOST_PROFILES: usize = 10_000;
 const MOST_SPOTS: f64 = 10_000.0;
 
-fn at(field: &str) -> String {
-    format!("observations.simulate.{field}")
+/// Where a key of the simulation of a data set stands.
+fn at(set: &str, field: &str) -> String {
+    format!("{set}.simulate.{field}")
 }
 
 /// Times of the profiles (d).
-pub(super) fn times_d(section: &SimulateSection, star: &StarSettings) -> Result<Vec<f64>, Fault> {
+pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str) -> Result<Vec<f64>, Fault> {
+    let at = |field: &str| at(set, field);
     let cycles = match (&section.cycles, &section.schedule) {
         (Some(cycles), None) => cycles,
         (None, Some(schedule)) => {
@@ -107,9 +109,11 @@ pub(super) fn spots(
     star: &StarSettings,
     truth: &ParameterValues,
     times_d: &[f64],
+    set: &str,
 ) -> Result<Vec<Spot>, Fault> {
+    let at = |field: &str| at(set, field);
     let drawn = match &section.random_spots {
-        Some(random) => random_spots(random, truth, times_d)?,
+        Some(random) => random_spots(random, truth, times_d, set)?,
         None => Vec::new(),
     };
     let listed = section.spots.iter().enumerate().map(|(k, spot)| (spot, at(&format!("spots[{k}]"))));
@@ -117,8 +121,13 @@ pub(super) fn spots(
     all.map(|(numbers, key)| spot(numbers, star, truth, &key)).collect()
 }
 
-fn random_spots(random: &RandomSpots, truth: &ParameterValues, times_d: &[f64]) -> Result<Vec<Vec<f64>>, Fault> {
-    let key = |field: &str| at(&format!("random_spots.{field}"));
+fn random_spots(
+    random: &RandomSpots,
+    truth: &ParameterValues,
+    times_d: &[f64],
+    set: &str,
+) -> Result<Vec<Vec<f64>>, Fault> {
+    let key = |field: &str| at(set, &format!("random_spots.{field}"));
     within(&key("number"), random.number as f64, [1.0, MOST_SPOTS])?;
     if let Some(lifetime_d) = random.lifetime_d {
         positive(&key("lifetime_d"), lifetime_d)?;

@@ -68,7 +68,7 @@ pub fn robustness(
     found: &Detection,
 ) -> Robustness {
     let peak = &found.best;
-    let field = found.last().field.as_ref();
+    let field = found.last().field();
     let spots = field.map_or(settings.spots, |field| Spots::Integrated(Known::of(&field.marginal)));
     let settings = &DetectionSettings { spots, ..settings.clone() };
     values[Parameter::K] = peak.orbit.k_kms;
@@ -80,12 +80,13 @@ pub fn robustness(
         let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
         AtTarget {
             chi2_target,
-            on_target: view.as_ref().is_ok_and(|view| view.on_target),
+            on_target: view.as_ref().is_ok_and(|view| view.image().is_none_or(|image| image.on_target)),
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };
+    let times_d = imager.times_d();
     let without = |night: &Vec<usize>| {
-        let times = || night.iter().map(|&k| imager.sampling.profiles[k].0);
+        let times = || night.iter().map(|&k| times_d[k]);
         let view: Result<View, DetectionError> = View::new(&imager.without(night), values, settings, None);
         WithoutNight {
             span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
@@ -93,9 +94,8 @@ pub fn robustness(
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };
-    let times: Vec<f64> = imager.sampling.profiles.iter().map(|profile| profile.0).collect();
-    let mut nights = nights(&times, NIGHT_GAP_D);
-    nights.retain(|night| times.len() - night.len() >= FEWEST);
+    let mut nights = nights(&times_d, NIGHT_GAP_D);
+    nights.retain(|night| times_d.len() - night.len() >= FEWEST);
     if nights.len() < 2 {
         nights.clear();
     }

@@ -49,7 +49,7 @@ impl<'a> Planned<'a> {
 
     /// Coefficients (H, profiles) of unspotted stars: the mean of the field.
     pub fn mean_maps(&self) -> DMatrix<f64> {
-        DMatrix::zeros(self.basis.degrees.len(), self.imager.sampling.profiles.len())
+        DMatrix::zeros(self.basis.degrees.len(), self.imager.profiles().count())
     }
 
     /// Coefficients (H, profiles) of a map drawn for the time of each profile: the most probable ones where profiles
@@ -60,7 +60,7 @@ impl<'a> Planned<'a> {
     pub fn drawn_maps(&self, seed: u64) -> Result<DMatrix<f64>, FieldError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
-        let times_d: Vec<f64> = self.imager.sampling.profiles.iter().map(|profile| profile.0).collect();
+        let times_d: Vec<f64> = self.imager.times_d();
         let Some(taken) = self.taken else {
             return Ok(self.assumed.field.drawn(&self.basis.degrees, &times_d, &mut rng));
         };
@@ -85,7 +85,7 @@ impl<'a> Planned<'a> {
 
     /// Those of some profiles, linear around maps of these coefficients, with slopes and without misfits.
     fn epochs(&self, maps: &DMatrix<f64>, profiles: std::ops::Range<usize>) -> Vec<Epoch> {
-        let brightness = self.basis.brightness(maps, self.design.contrast());
+        let brightness = self.design.brightness(&self.basis, maps);
         let slopes = self.design.slopes(self.imager, &self.values, &brightness, &self.stellar());
         let slopes = self.design.condensed(&slopes);
         let noisy = |(epoch, slopes): (Epoch, DMatrix<f64>)| {

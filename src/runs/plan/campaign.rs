@@ -3,11 +3,11 @@
 use crate::data::config::{Config, ConfigError, ObservationSource, PlanSection, Settings};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::{Scene, SceneError, fingerprint, imager};
-use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
+use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
 use crate::posterior::detection::{Spots, nights};
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::{Assumed, Basis, Known, Marginal, fit};
+use crate::posterior::marginal::{Assumed, Basis, Known, Marginal, NoFit, fit};
 use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::star::observation::{Observations, Profile};
 use serde::{Deserialize, Serialize};
@@ -79,7 +79,7 @@ pub enum CampaignError {
         /// The config.
         path: PathBuf,
         /// What is wrong.
-        source: FieldError,
+        source: NoFit,
     },
     /// More nights are asked for than there are.
     #[error("--nights {wanted}: {} lists {listed} nights", path.display())]
@@ -115,7 +115,10 @@ impl Campaign {
         // whatever the config's own objective: a plan integrates maps out
         let config = &config.clone().with("imaging.objective", "marginal-likelihood");
         let settings = config.settings()?;
-        let simulated = matches!(settings.source, ObservationSource::Simulate(_));
+        let [set] = &settings.sets[..] else {
+            return Err(own.fault("observations", "a list of data sets: a plan is of a single one").into());
+        };
+        let simulated = matches!(set.source, ObservationSource::Simulate(_));
         let taken = match (&settings.plan, simulated) {
             (None, true) => None,
             (None, false) => return Err(own.fault("plan", "missing: when is the star to be observed next?").into()),
@@ -135,10 +138,10 @@ impl Campaign {
         wanted: Option<usize>,
     ) -> Result<Self, CampaignError> {
         let settings = with_nights(config, wanted)?.settings()?;
-        let mut planned = match (&settings.source, &settings.plan, taken) {
+        let mut planned = match (&settings.sets[0].source, &settings.plan, taken) {
             (_, Some(plan), Some(taken)) => next(plan, &taken.observations),
             (ObservationSource::Simulate(simulation), ..) => {
-                let mut observations = simulation.observe(&settings.star);
+                let mut observations = simulation.observe(&settings.sets[0].star);
                 let inflation = simulation.correlated_bins.sqrt();
                 observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= inflation);
                 observations
@@ -172,7 +175,7 @@ impl Campaign {
         let assumed = taken.map_or_else(|| usual(known), |taken| taken.marginal.assumed);
         Ok(Campaign {
             name: wanted.map_or(stem.clone(), |nights| format!("{stem}, {nights} nights")),
-            imager: imager(&settings, &all)?,
+            imager: imager(&settings, std::slice::from_ref(&all))?,
             taken: taken.map(|taken| Arc::clone(&taken.marginal)),
             assumed,
             source,
@@ -191,12 +194,12 @@ impl Campaign {
 
     /// Number of profiles that have been taken.
     pub fn before(&self) -> usize {
-        self.imager.sampling.profiles.len() - self.nights.iter().map(Vec::len).sum::<usize>()
+        self.imager.profiles().count() - self.nights.iter().map(Vec::len).sum::<usize>()
     }
 
     /// All profiles.
     pub fn all(&self) -> Vec<usize> {
-        (0..self.imager.sampling.profiles.len()).collect()
+        (0..self.imager.profiles().count()).collect()
     }
 
     /// Time base (d).
@@ -206,8 +209,8 @@ impl Campaign {
 
     /// First and last time (d).
     pub fn span_d(&self) -> [f64; 2] {
-        let times = || self.imager.sampling.profiles.iter().map(|profile| profile.0);
-        [times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)]
+        let span = |[first, last]: [f64; 2], time: (f64, f64, usize)| [first.min(time.0), last.max(time.0)];
+        self.imager.profiles().fold([f64::INFINITY, f64::NEG_INFINITY], span)
     }
 
     /// The profiles there are after some of the nights, `looks` times as the campaign grows; before the first night
@@ -285,7 +288,7 @@ fn next(plan: &PlanSection, taken: &Observations) -> Observations {
     let like = &taken.profiles[taken.profiles.len() - 1];
     let profile = |time_d: f64| Profile { time_d, sigma: vec![sigma; like.sigma.len()], ..like.clone() };
     let profiles = plan.schedule.times_d(first_d).into_iter().map(profile).collect();
-    Observations { step_kms: taken.step_kms, profiles }
+    Observations { profiles }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -4,7 +4,7 @@ use super::PlanSettings;
 use crate::planets::periodogram::limits::detection_limit_kms;
 use crate::planets::periodogram::orbits::{Trial, scan};
 use crate::planets::periodogram::window::{WindowPeak, window_peaks};
-use crate::planets::periodogram::{FalseAlarm, Frequencies, RotationPeriods};
+use crate::planets::periodogram::{FalseAlarm, Frequencies, Jitters, RotationPeriods};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use nalgebra::{DMatrix, DVector};
@@ -53,8 +53,9 @@ impl Outlook {
         settings: &PlanSettings,
     ) -> Self {
         let mean = mean(&quadratics);
-        let trials = scan(&mean, &frequencies.per_cycle);
-        let level = FalseAlarm::draw(&mean, &trials, settings.draws, settings.seed).level(CANDIDATE_FAP);
+        let alone = Jitters::none(&mean);
+        let false_alarm = FalseAlarm::draw(&alone, &frequencies.per_cycle, settings.draws, settings.seed);
+        let level = false_alarm.level(CANDIDATE_FAP);
         let window = window_peaks(&mean.cycles, &frequencies);
         let Frequencies { rotation_period_d, time_base_cycles, .. } = frequencies;
         let rotation = RotationPeriods::new(&mean.cycles, rotation_period_d, &window, time_base_cycles);
