@@ -30,7 +30,7 @@ pub use automatic::Automatic;
 pub use data_sets::ZeroPoint;
 pub use draft::Draft;
 pub use error::ConfigError;
-pub use identity::{Difference, first_difference, jitter_difference, model_difference, section_difference};
+pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use jitter::VelocityJitter;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{DataSetSettings, GridSettings, ImagingSettings, ObservationSource, Settings};

@@ -192,10 +192,11 @@ pub(super) struct ObservationsSection {
     #[serde(default, skip_serializing_if = "Weights::is_default")]
     pub weights: Weights,
     /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
-    /// beside that of the bins; 0 if not given. It should be small against the width of the local line. "fitted": as
-    /// large as the profiles say at the config's values, before anything else.
-    #[serde(default, skip_serializing_if = "VelocityJitter::is_default")]
-    pub velocity_jitter_kms: VelocityJitter,
+    /// beside that of the bins. It should be small against the width of the local line. "fitted": as large as the
+    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the objective
+    /// "marginal-likelihood", and 0 with others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_jitter_kms: Option<VelocityJitter>,
     /// Resolving power of this set's spectrograph, in place of `instrument.resolving_power`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resolving_power: Option<f64>,

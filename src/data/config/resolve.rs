@@ -22,7 +22,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
     let sets = resolve_sets(&mut raw, &star, &values, path)?;
-    let velocity_jitter = raw.observations.sections[0].velocity_jitter_kms;
+    let velocity_jitter = resolve_jitter(&mut raw);
     check_imaging(&raw.imaging, velocity_jitter)?;
     resolve_field(&mut raw, &mut values)?;
     let free = resolve_free(&mut raw, &mut values)?;
@@ -53,6 +53,20 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         sha256: fingerprint(&resolved),
         resolved,
     })
+}
+
+/// The velocity jitter, its default filled in. A field takes zero points that nobody told it of for spots that change
+/// or for planets.
+fn resolve_jitter(raw: &mut Config) -> VelocityJitter {
+    let integrated = raw.imaging.objective == ObjectiveKind::MarginalLikelihood;
+    let usual = if integrated { VelocityJitter::Fitted } else { VelocityJitter::default() };
+    let sections = &mut raw.observations.sections;
+    // all data sets have the same
+    let jitter = sections[0].velocity_jitter_kms.unwrap_or(usual);
+    for section in sections {
+        section.velocity_jitter_kms = Some(jitter).filter(|jitter| integrated || !jitter.is_default());
+    }
+    jitter
 }
 
 /// The parameters as the config gives them; those of the surface where they are free or on an axis.

@@ -27,7 +27,7 @@ pub(super) fn resolve_observations(
     config: &Path,
 ) -> Result<ObservationSource, Fault> {
     let at = |field: &str| format!("{key}.{field}");
-    if let VelocityJitter::Known(kms) = section.velocity_jitter_kms {
+    if let Some(VelocityJitter::Known(kms)) = section.velocity_jitter_kms {
         check_jitter(&at("velocity_jitter_kms"), kms)?;
     }
     let path = match (&section.path, &section.simulate) {

@@ -23,6 +23,8 @@ pub struct Basis {
     pub(super) watched: DMatrix<f64>,
     /// How exactly maps are found.
     pub(super) settling: Settling,
+    /// Times that maps are found with a jitter, along their slopes from time to time.
+    pub(super) jittered: usize,
 }
 
 impl Basis {
@@ -37,13 +39,14 @@ impl Basis {
             watched: on_pixels.select_columns(&watched),
             on_pixels: on_pixels.transpose(),
             settling: Settling { tolerance: 1e-3, ..Settling::default() },
+            jittered: 1,
         }
     }
 
     /// The same where ln Z is compared with that of neighbours: good to some 0.003.
     pub fn exact(grid: &SurfaceGrid) -> Self {
         let settling = Settling { tolerance: 2e-4, ..Settling::default() };
-        Basis { settling, ..Basis::new(grid) }
+        Basis { settling, jittered: 2, ..Basis::new(grid) }
     }
 
     /// The same where differences of ln Z need be good to a few tenths only.
