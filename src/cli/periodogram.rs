@@ -2,13 +2,18 @@
 
 use super::output::Output;
 use super::{Failure, Global, console, progress};
+use crate::data::evidence::EvidenceRecord;
 use crate::data::io::periodogram::{FILES, PeriodogramResult};
 use crate::data::scene::Scene;
 use crate::numerics::text::shown;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::planets::verdict::Remark;
 use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::fit::Explained;
+use crate::posterior::objective::for_blind_search;
+use crate::runs::blind_search::with_known;
+use crate::runs::known_planet::known_planets;
 use std::path::{Path, PathBuf};
 
 /// Search for a planet at every period, the star's spots marginalised out
@@ -66,10 +71,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let settings = settings(args, &scene);
     let spinner = progress::bar(global, None, "reconstructing");
     let report = |stage| spinner.set_message(message(stage));
-    let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &report);
+    let values = for_blind_search(scene.settings.values, &scene.settings.free);
+    let found = Detection::find(&scene.imager, values, frequencies, &settings, &report);
     let choices = found.as_ref().map(|found| {
         spinner.set_message("other targets, without each night");
-        robustness(&scene.imager, scene.settings.values, &settings, found)
+        robustness(&scene.imager, values, &settings, found)
     });
     spinner.finish_and_clear();
     let choices = choices.map_err(|e| failure(&args.config, *e))?;
@@ -79,11 +85,17 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
     let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
     let remarks = detection.remarks(&evidence);
+    let of_the_star: Vec<Remark> =
+        remarks.iter().filter(|remark| !detection.of_the_period().contains(remark)).cloned().collect();
+    let known = known_planets(&scene, &settings, &detection, &of_the_star);
+    let (verdict, remarks) = with_known(known, detection.verdict(&remarks), remarks, of_the_star);
+    let planets = EvidenceRecord::of(&scene.settings, &detection.planet_free.quadratic);
     let result = PeriodogramResult {
         imager: &scene.imager,
         detection: &detection,
-        verdict: &detection.verdict(&remarks),
+        verdict: &verdict,
         remarks: &remarks,
+        evidence: planets.as_ref(),
         robustness: &choices,
         settings: &settings,
         planet_free: &explained(&detection.planet_free),

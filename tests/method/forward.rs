@@ -11,7 +11,7 @@ fn state() -> StarState {
         inclination: 38.0_f64.to_radians(),
         vsini_kms: 40.0,
         vsys_kms: 0.0,
-        orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.7, phi: 0.5 },
+        motion: Orbit { k_kms: 0.0, porb_over_prot: 1.7, phi: 0.5 }.into(),
         surface: Default::default(),
     }
 }
