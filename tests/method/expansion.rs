@@ -130,7 +130,8 @@ fn stellar_parameters_one_sigma_off() {
         let i = expansion.profiles() + s;
         println!("{}: {} with all else fixed", p.name(), expansion.information[(i, i)].powf(-0.5));
     }
-    let of_one_map: Vec<Parameter> = Parameter::ALL.into_iter().filter(|p| reference.values.given(*p).is_some()).collect();
+    let of_one_map: Vec<Parameter> =
+        Parameter::ALL.into_iter().filter(|p| reference.values.given(*p).is_some()).collect();
     for (i, &a) in of_one_map.iter().enumerate() {
         for &b in &of_one_map[i..] {
             for sign in [-1.0, 1.0] {

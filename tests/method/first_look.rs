@@ -53,7 +53,6 @@ fn with_line(
     truth[Parameter::Vsys] = VSYS_KMS;
     let reach = vsini_kms + beyond_kms;
     let simulation = Simulation {
-        zero_point_kms: 0.0,
         spots,
         faculae: Vec::new(),
         truth,
