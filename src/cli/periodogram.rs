@@ -9,7 +9,7 @@ use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings
 use crate::planets::verdict::Remark;
 use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
 use crate::posterior::expansion::nuisances;
-use crate::posterior::fit::Fit;
+use crate::posterior::fit::Explained;
 use crate::posterior::objective::for_blind_search;
 use crate::runs::blind_search::with_known;
 use crate::runs::known_planet::known_planets;
@@ -79,9 +79,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     spinner.finish_and_clear();
     let choices = choices.map_err(|e| failure(&args.config, *e))?;
     let detection = found.map_err(|e| failure(&args.config, e))?;
-    let fit = |view: &View| Fit::new(&scene.imager, &scene.observations, &view.reference);
-    let mut misfit = fit(detection.last()).checks.warnings;
-    misfit.extend(scene.measured.misfit_text());
+    let explained = |view: &View| Explained::new(&scene.imager, &scene.observations, view);
+    let at_best = explained(detection.last());
+    let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
     let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
     let remarks = detection.remarks(&evidence);
     let of_the_star: Vec<Remark> =
@@ -97,7 +97,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         evidence: planets.as_ref(),
         robustness: &choices,
         settings: &settings,
-        fit: &fit(&detection.planet_free),
+        planet_free: &explained(&detection.planet_free),
+        at_best: &at_best,
         truth: scene.truth,
         mass_msun: scene.settings.mass_msun,
         provenance: &scene.provenance(),

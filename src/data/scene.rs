@@ -1,11 +1,16 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
-use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter};
+mod imaging;
+mod reading;
+
+use crate::data::config::{
+    Automatic, Config, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter,
+};
 use crate::data::ephemeris::Ephemeris;
 use crate::data::evidence::EvidenceRecord;
-use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
-use crate::data::io::provenance::{Measured, Provenance};
+use crate::data::io::lsd::{self, Label, LsdError};
+use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, SearchError, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
@@ -22,6 +27,10 @@ use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
 use crate::star::{BrightnessModel, Orbit, Quadrature, Spot, SurfaceGrid};
+use imaging::hold_zero_points;
+use reading::Part;
+
+pub use imaging::imager;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -35,7 +44,7 @@ pub struct Scene {
     /// The config, resolved.
     #[doc(hidden)]
     pub settings: Settings,
-    /// The line profiles, read or simulated.
+    /// The line profiles, read or simulated; of several data sets one after the other.
     pub observations: Observations,
     /// SHA-256 (hex) of the observations: of the bytes of their files, or of the numbers simulated.
     #[doc(hidden)]
@@ -96,7 +105,10 @@ impl Scene {
         let settings = config.settings()?;
         let fault = |problem: String| settings.fault("observations", &problem);
         profiles.check().map_err(fault)?;
-        let ObservationSource::Files { options, continuum_level, .. } = &settings.source else {
+        let [set] = &settings.sets[..] else {
+            return Err(fault("profiles at hand are one data set: give one".into()).into());
+        };
+        let ObservationSource::Files { options, continuum_level, .. } = &set.source else {
             return Err(fault("profiles are given and simulated: leave out `simulate`".into()).into());
         };
         let whole = profiles.over_continuum(*continuum_level);
@@ -111,47 +123,38 @@ impl Scene {
 
     /// Reads or simulates the observations of `settings`.
     fn read(settings: Settings) -> Result<Self, SceneError> {
-        let (mut errors, mut remarks) = (None, Vec::new());
-        let (observations, data_sha256, truth) = match &settings.source {
-            ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
-                let mut data = lsd::read(path, options)?;
-                remarks = std::mem::take(&mut data.remarks);
-                let as_quoted = *wanted == ErrorSettings::default();
-                if as_quoted && *continuum_level == 1.0 {
-                    (data.observations, data.sha256, None)
-                } else {
-                    let mut observations = data.observations.over_continuum(*continuum_level);
-                    if !as_quoted {
-                        let whole = lsd::read(path, &ReadOptions::default())?.observations;
-                        let whole = whole.over_continuum(*continuum_level);
-                        let measured = measured_errors(&settings, *wanted, &whole, &observations)?;
-                        measured.apply(&mut observations);
-                        errors = Some(measured);
-                    }
-                    let sha256 = fingerprint(&observations);
-                    (observations, sha256, None)
-                }
-            }
-            ObservationSource::Simulate(simulation) => {
-                settings.check_velocity_grid(&simulation.truth, simulation.step_kms)?;
-                let observations = simulation.observe(&settings.star);
-                let sha256 = fingerprint(&observations);
-                (observations, sha256, Some(simulation.truth))
+        let parts = settings.sets.iter().map(|set| Part::read(&settings, set)).collect::<Result<Vec<_>, _>>()?;
+        let several = parts.len() > 1;
+        let mut remarks = Vec::new();
+        for (set, part) in settings.sets.iter().zip(&parts) {
+            let of = |remark: &String| if several { format!("{}: {remark}", set.name) } else { remark.clone() };
+            remarks.extend(part.remarks.iter().map(of));
+        }
+        let truth = settings.sets.iter().find_map(|set| match &set.source {
+            ObservationSource::Simulate(simulation) => Some(simulation.truth),
+            ObservationSource::Files { .. } => None,
+        });
+        let data_sha256 = match &parts[..] {
+            [one] => one.sha256.clone(),
+            several => {
+                let all: String = several.iter().map(|part| part.sha256.as_str()).collect();
+                format!("{:x}", Sha256::digest(all))
             }
         };
+        let (observations, errors) = parts.into_iter().map(|part| (part.observations, part.errors)).unzip();
         let mut scene = Scene::with_noise(settings, observations, errors)?;
         scene.measured.profiles = remarks;
         Ok(Scene { data_sha256, truth, ..scene })
     }
 
-    /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left
-    /// to them is chosen.
+    /// The scene of observations at hand, of one data set, whatever `settings` say of where they come from. A target
+    /// chi2 that is left to them is chosen.
     ///
     /// # Errors
     /// Settings that make no sense with these observations.
     #[doc(hidden)]
     pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
-        Scene::with_noise(settings, observations, None)
+        Scene::with_noise(settings, vec![observations], vec![None])
     }
 
     /// The same of profiles in their `whole` width and `cut` to the config's velocity range, both in units of their
@@ -161,7 +164,7 @@ impl Scene {
     /// Settings that make no sense with these observations, and errors that cannot be measured.
     #[doc(hidden)]
     pub fn of_whole(settings: Settings, whole: &Observations, cut: &Observations) -> Result<Self, ConfigError> {
-        let ObservationSource::Files { options, errors: wanted, .. } = &settings.source else {
+        let ObservationSource::Files { options, errors: wanted, .. } = &settings.sets[0].source else {
             return Scene::of(settings, cut.clone());
         };
         let (scale, wanted) = (options.sigma_scale, *wanted);
@@ -170,24 +173,26 @@ impl Scene {
         if wanted == ErrorSettings::default() {
             return Scene::of(settings, observations);
         }
-        let measured = measured_errors(&settings, wanted, whole, &observations)?;
+        let measured = measured_errors(&settings, &settings.sets[0], wanted, whole, &observations)?;
         measured.apply(&mut observations);
-        Scene::with_noise(settings, observations, Some(measured))
+        Scene::with_noise(settings, vec![observations], vec![Some(measured)])
     }
 
-    /// The same where the errors were measured: a target chi2 is then that of independent data.
+    /// The same of the data sets of `parts` where their errors were measured: a target chi2 is then that of independent
+    /// data.
     fn with_noise(
         mut settings: Settings,
-        observations: Observations,
-        errors: Option<MeasuredErrors>,
+        parts: Vec<Observations>,
+        errors: Vec<Option<MeasuredErrors>>,
     ) -> Result<Self, ConfigError> {
-        if let Some(span_d) = observations.time_span_d() {
-            Ephemeris::check(&settings, span_d)?;
+        let times = || parts.iter().flat_map(|part| part.times_d());
+        if let Some(first) = times().reduce(f64::min).zip(times().reduce(f64::max)) {
+            Ephemeris::check(&settings, [first.0, first.1])?;
         }
-        let mut imager = imager(&settings, &observations)?;
-        let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        let mut imager = imager(&settings, &parts)?;
+        let correlated_bins = errors.iter().flatten().map(|errors| errors.correlated_bins).fold(1.0, f64::max);
         imager.data.correlated_bins = correlated_bins;
-        let mut measured = Measured { errors, ..Measured::default() };
+        let mut measured = Measured::default();
         settings.imaging.chi2_target = match settings.imaging.chi2_target {
             Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
             Automatic::Auto => {
@@ -203,6 +208,20 @@ impl Scene {
             imager = zero_points.counted_in(imager);
         }
         measured.velocity_jitter = jitter;
+        hold_zero_points(&mut settings, &mut imager)?;
+        match settings.sets.len() {
+            1 => measured.errors = errors.into_iter().next().flatten(),
+            _ => {
+                let of_set = |((set, part), errors): ((&DataSetSettings, &Observations), _)| MeasuredSet {
+                    name: set.name.clone(),
+                    profiles: part.profiles.len(),
+                    errors,
+                    zero_point: set.held,
+                };
+                measured.sets = settings.sets.iter().zip(&parts).zip(errors).map(of_set).collect();
+            }
+        }
+        let observations = Observations { profiles: parts.into_iter().flat_map(|part| part.profiles).collect() };
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
@@ -266,24 +285,23 @@ impl Scene {
     /// Files that are no longer what they were.
     #[doc(hidden)]
     pub fn whole(&self) -> Result<(Observations, Vec<Label>), LsdError> {
-        match &self.settings.source {
-            ObservationSource::Files { path, .. } => {
-                Ok((lsd::read(path, &ReadOptions::default())?.observations, lsd::labels(path)?))
-            }
-            ObservationSource::Simulate(_) => {
-                let name = |k: usize| Label { file: format!("simulated profile {k}"), vrad_kms: 0.0 };
-                let profiles = self.observations.profiles.len();
-                Ok((self.observations.clone(), (0..profiles).map(name).collect()))
-            }
+        let mut all = (Observations { profiles: Vec::new() }, Vec::new());
+        for set in &self.settings.sets {
+            let (whole, labels) = reading::whole(&self.settings, set)?;
+            all.0.profiles.extend(whole.profiles);
+            all.1.extend(labels);
         }
+        Ok(all)
     }
 
     /// The files that it was read from: config, list, profiles.
     #[doc(hidden)]
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = vec![self.settings.path.clone()];
-        if let ObservationSource::Files { path, .. } = &self.settings.source {
-            files.extend(lsd::files(path));
+        for set in &self.settings.sets {
+            if let ObservationSource::Files { path, .. } = &set.source {
+                files.extend(lsd::files(path));
+            }
         }
         files
     }
@@ -292,7 +310,7 @@ impl Scene {
     /// longer there.
     #[doc(hidden)]
     pub fn whole_over_continuum(&self) -> Option<Observations> {
-        self.whole().ok().map(|(whole, _)| whole.over_continuum(self.continuum_level()))
+        self.whole().ok().map(|(whole, _)| self.over_continua(whole))
     }
 
     /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors
@@ -303,14 +321,26 @@ impl Scene {
     #[doc(hidden)]
     pub fn injected(&self, whole: &Observations, orbits: &[Orbit]) -> Result<Self, ConfigError> {
         let mut observations = self.observations.clone();
-        let injected = inject(whole, &self.imager.star, orbits).over_continuum(self.continuum_level());
+        let injected = self.over_continua(inject(whole, &self.imager.star, orbits));
         for (cut, whole) in observations.profiles.iter_mut().zip(&injected.profiles) {
-            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / injected.step_kms).round() as usize;
+            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / cut.step_kms).round() as usize;
             for (intensity, shifted) in cut.intensity.iter_mut().zip(whole.intensity.iter().skip(first)) {
                 *intensity = *shifted;
             }
         }
-        Scene::of(self.settings.clone(), observations)
+        let of_set = |s: usize| Observations { profiles: observations.profiles[self.imager.profiles_of(s)].to_vec() };
+        let parts: Vec<Observations> = (0..self.settings.sets.len()).map(of_set).collect();
+        let errors = vec![None; parts.len()];
+        Scene::with_noise(self.settings.clone(), parts, errors)
+    }
+
+    /// Whole profiles of all data sets in units of their continua.
+    fn over_continua(&self, whole: Observations) -> Observations {
+        let of_set = |(s, set): (usize, &DataSetSettings)| {
+            let part = Observations { profiles: whole.profiles[self.imager.profiles_of(s)].to_vec() };
+            part.over_continuum(set.continuum_level()).profiles
+        };
+        Observations { profiles: self.settings.sets.iter().enumerate().flat_map(of_set).collect() }
     }
 
     /// The space of the parameters in `free`, starting at the config's values, all others fixed there.
@@ -345,15 +375,8 @@ impl Scene {
         })
     }
 
-    fn continuum_level(&self) -> f64 {
-        match self.settings.source {
-            ObservationSource::Files { continuum_level, .. } => continuum_level,
-            ObservationSource::Simulate(_) => 1.0,
-        }
-    }
-
     fn simulation(&self) -> Option<&Simulation> {
-        match &self.settings.source {
+        match &self.settings.sets[0].source {
             ObservationSource::Simulate(simulation) => Some(simulation),
             ObservationSource::Files { .. } => None,
         }
@@ -376,10 +399,11 @@ impl Scene {
         Truth {
             parameters: simulation.truth,
             spots: simulation.spots.iter().map(Spot::written).collect(),
-            faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
+            faculae: self.settings.faculae_as_written(),
             contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
             continuum: simulation.nuisances(),
             zero_points_kms: simulation.zero_points_kms(),
+            zero_point_kms: Some(simulation.zero_point_kms).filter(|kms| *kms != 0.0),
             correlated_bins: Some(simulation.correlated_bins).filter(|bins| *bins != 1.0),
             spottedness,
             coverage,
@@ -422,20 +446,6 @@ impl Scene {
     }
 }
 
-/// What `observations` are imaged with.
-///
-/// # Errors
-/// Settings that make no sense with these observations.
-pub fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
-    settings.check_velocity_grid(&settings.values, observations.step_kms)?;
-    let star = settings.star_for(observations)?;
-    let imager = Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy());
-    Ok(match settings.imaging.nuisances {
-        Some(priors) => imager.with_nuisances(priors, observations),
-        None => imager,
-    })
-}
-
 /// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
 /// target chi2 is per datum, independent or not.
 fn zero_points(
@@ -462,20 +472,21 @@ fn zero_points(
 /// part.
 const SETTLED: (usize, f64) = (3, 0.03);
 
-/// The errors that the observations, `cut` as they are used, and the `whole` profiles ask for.
+/// The errors that the observations of a `set`, `cut` as they are used, and the `whole` profiles ask for.
 fn measured_errors(
     settings: &Settings,
+    set: &DataSetSettings,
     wanted: ErrorSettings,
     whole: &Observations,
     cut: &Observations,
 ) -> Result<MeasuredErrors, ConfigError> {
-    let fault = |e: NoiseError| settings.fault(e.key(), &e.to_string());
+    let fault = |e: NoiseError| settings.fault(&e.key().replacen("observations", &set.key, 1), &e.to_string());
     let scaled = |measured: &MeasuredErrors| {
         let mut observations = cut.clone();
         measured.apply(&mut observations);
         observations
     };
-    let continuum = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
+    let continuum = noise::by_continuum(whole, &set.star, &settings.values, wanted).map_err(fault)?;
     // what a map leaves over is no noise where stars may change
     if !wanted.measured || settings.imaging.objective == ObjectiveKind::MarginalLikelihood {
         return Ok(continuum);
@@ -485,11 +496,11 @@ fn measured_errors(
     let mut measured = continuum.clone();
     for _ in 0..SETTLED.0 {
         // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
-        let (zero_points, _) = zero_points(settings, &imager(settings, &scaled(&measured))?, chi2_target)?;
+        let (zero_points, _) = zero_points(settings, &imager(settings, &[scaled(&measured)])?, chi2_target)?;
         let with_factor = |factor: f64| {
             let mut observations = before.clone();
             observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
-            let imager = imager(settings, &observations)?;
+            let imager = imager(settings, &[observations])?;
             Ok(zero_points.iter().fold(imager, |imager, zero_points| zero_points.counted_in(imager)))
         };
         let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);
@@ -509,17 +520,17 @@ fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> Parame
         .of_star(star.epoch_d, settings.mass_msun)
 }
 
-/// SHA-256 (hex) of the numbers of `observations`, little-endian: the step, then for each profile time, number of bins,
+/// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of bins,
 /// and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
-    let step = observations.step_kms;
+    let step = observations.step_kms();
     let mut hash = Sha256::new();
     hash.update(step.to_le_bytes());
     for profile in &observations.profiles {
         hash.update(profile.time_d.to_le_bytes());
         hash.update((profile.intensity.len() as u64).to_le_bytes());
         for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
-            for number in [profile.velocity_kms(j, step), *intensity, *sigma] {
+            for number in [profile.velocity_kms(j), *intensity, *sigma] {
                 hash.update(number.to_le_bytes());
             }
         }

@@ -10,22 +10,24 @@ mod remarks;
 mod robustness;
 
 pub use remarks::Evidence;
-pub use robustness::{AtTarget, Robustness, WithoutNight, robustness};
+pub use robustness::{AtTarget, Robustness, WithoutNight, nights, robustness};
 
 use crate::field::{FieldError, Lifetime};
 use crate::maxent::Termination;
 use crate::planets::periodogram::eccentric::keplerian;
 use crate::planets::periodogram::offset::{Offset, offset};
+use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::peaks::refined;
 use crate::planets::periodogram::two_planets::{both, without};
 use crate::planets::periodogram::{
-    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
+    CircularOrbit, Frequencies, Jitters, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
+    co_rotation_penalty,
 };
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::posterior::expansion::{Expansion, Nuisance, STELLAR};
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::{Basis, Change, Fitted, Known, fit};
+use crate::posterior::marginal::{Basis, Change, Fitted, Known, NoFit, fit};
 use crate::posterior::objective::{Parameter, ParameterValues, Reference, ReferenceError};
 use crate::star::Orbit;
 use nalgebra::DVector;
@@ -74,24 +76,41 @@ impl Spots {
     }
 }
 
-/// A star's image and the quadratic in its profiles' velocities around it.
+/// The spots of a star as the profiles show them.
+#[derive(Clone, Debug)]
+pub enum Seen {
+    /// The map of maximum entropy.
+    OneMap(Box<Image>),
+    /// The field that was integrated over.
+    Integrated(Box<Fitted>),
+}
+
+/// A map of maximum entropy.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// The map.
+    pub reference: Reference,
+    /// How many times larger than the entropy expects the unresolved spots are, in variance.
+    pub unresolved_spots: f64,
+    /// Whether it reaches the target chi2.
+    pub on_target: bool,
+}
+
+/// A star with its spots, and the quadratic in its profiles' velocities around it.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// The image.
-    pub reference: Reference,
+    /// The spots.
+    pub seen: Seen,
     /// ln L around it.
     pub expansion: Expansion,
     /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over
     /// count as noise.
     pub quadratic: VelocityQuadratic,
+    /// The same with those zero points of data sets held that are otherwise integrated out, for tables of velocities;
+    /// `None` where there are none.
+    pub zero_points_held: Option<VelocityQuadratic>,
     /// The same with spots as the entropy sees them: the regularised likelihood itself.
     pub regularised: VelocityQuadratic,
-    /// How many times larger than the entropy expects the unresolved spots are, in variance.
-    pub unresolved_spots: f64,
-    /// Whether the image reaches the target chi2.
-    pub on_target: bool,
-    /// The field that was integrated over; `None` where the image alone counts.
-    pub field: Option<Box<Fitted>>,
 }
 
 /// The second planet.
@@ -109,7 +128,7 @@ pub struct Detection {
     /// The trial periods.
     pub frequencies: Frequencies,
     /// Whether the star changes, where that was looked into: of spots that are taken for unchanging.
-    pub change: Option<Result<Change, FieldError>>,
+    pub change: Option<Result<Change, NoFit>>,
     /// Without a planet; its quadratic is the one that `search` is of.
     pub planet_free: View,
     /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots,
@@ -144,7 +163,13 @@ pub enum DetectionError {
     Unbounded(#[from] Unbounded),
     /// No field.
     #[error(transparent)]
-    Field(#[from] FieldError),
+    Field(#[from] NoFit),
+}
+
+impl From<FieldError> for DetectionError {
+    fn from(error: FieldError) -> Self {
+        DetectionError::Field(error.into())
+    }
 }
 
 /// What is under way.
@@ -180,7 +205,7 @@ impl DetectionSettings {
 impl View {
     /// The star imaged at `values`. Where the target chi2 takes more than three times the entropy's weight over the
     /// number of data, the image stops short of it: beyond, noise is turned into spots. Where maps are integrated over
-    /// the field is fitted from that of a view `near` by, if there is one, and the image is but a picture.
+    /// there is no image, and the field is fitted from that of a view `near` by, if there is one.
     ///
     /// # Errors
     /// [`DetectionError`].
@@ -190,25 +215,67 @@ impl View {
         settings: &DetectionSettings,
         near: Option<&View>,
     ) -> Result<Self, DetectionError> {
-        let reference = Reference::provisional(imager, values, settings.chi2_target)?;
-        let on_target = reference.solution.termination == Termination::Converged;
         let nuisances = &settings.nuisances;
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
         if let Spots::Integrated(known) = settings.spots {
             let basis = Basis::new(&imager.grid);
-            let near = near.and_then(|view| view.field.as_ref()).map(|field| &field.marginal);
+            let near = near.and_then(View::field).map(|field| &field.marginal);
             let fitted = fit(imager, &basis, values, known, near)?;
             let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
             let quadratic = expansion.velocities(nuisances);
-            let (regularised, field) = (quadratic.clone(), Some(Box::new(fitted)));
-            return Ok(View { reference, expansion, quadratic, regularised, unresolved_spots: 1.0, on_target, field });
+            let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
+            let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
+            let zero_points_held = held.map(|held| held.velocities(nuisances));
+            let (regularised, seen) = (quadratic.clone(), Seen::Integrated(Box::new(fitted)));
+            return Ok(View { seen, expansion, quadratic, zero_points_held, regularised });
         }
+        let reference = Reference::provisional(imager, values, settings.chi2_target)?;
+        let on_target = reference.solution.termination == Termination::Converged;
         let expansion = Expansion::of(imager, &reference, &stellar);
         let regularised = expansion.velocities(nuisances);
         let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
         let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
-        Ok(View { reference, expansion, quadratic, regularised, unresolved_spots, on_target, field: None })
+        let seen = Seen::OneMap(Box::new(Image { reference, unresolved_spots, on_target }));
+        Ok(View { seen, expansion, quadratic, zero_points_held: None, regularised })
     }
+
+    /// The likelihood of the velocities beside jitters of several sizes, where the profiles say how large it is.
+    fn jitters(&self, imager: &Imager, settings: &DetectionSettings) -> Result<Jitters, DetectionError> {
+        match (&self.seen, settings.spots) {
+            (Seen::Integrated(fitted), Spots::Integrated(Known { jitter_kms: None, .. }))
+                if fitted.marginal.assumed.jitter_kms > 0.0 =>
+            {
+                let basis = Basis::new(&imager.grid);
+                let expansion = fitted.marginal.without_jitter(imager, &basis)?;
+                let expansion = expansion.expansion(imager, &basis, &self.expansion.stellar)?;
+                let without = expansion.velocities(&settings.nuisances);
+                Ok(Jitters::new(&without, fitted.marginal.assumed.jitter_kms))
+            }
+            _ => Ok(Jitters::none(&self.quadratic)),
+        }
+    }
+
+    /// The map of maximum entropy, where there is one.
+    pub fn image(&self) -> Option<&Image> {
+        match &self.seen {
+            Seen::OneMap(image) => Some(image),
+            Seen::Integrated(_) => None,
+        }
+    }
+
+    /// The field that was integrated over.
+    pub fn field(&self) -> Option<&Fitted> {
+        match &self.seen {
+            Seen::OneMap(_) => None,
+            Seen::Integrated(fitted) => Some(fitted),
+        }
+    }
+}
+
+/// Delta ln L of the best orbit at the trial periods.
+fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
+    let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+    trials.iter().filter_map(|trial| Some(trial.orbit?.delta_ln_l)).fold(0.0, f64::max)
 }
 
 impl Detection {
@@ -228,8 +295,16 @@ impl Detection {
         alone[Parameter::K] = 0.0;
         let planet_free = View::new(imager, alone, settings, None)?;
         report(Stage::Search);
-        let blind = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
-        let best = blind.best().orbit.delta_ln_l;
+        let jitters = planet_free.jitters(imager, settings)?;
+        let blind = Search::with_jitter(&jitters, &frequencies, settings.search)?;
+        let blind = match settings.spots {
+            Spots::OneMap(_) => blind,
+            Spots::Integrated(_) => blind.without_multiples(),
+        };
+        let best = match jitters.is_none() {
+            true => blind.best().orbit.delta_ln_l,
+            false => highest(&planet_free.quadratic, &frequencies),
+        };
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
         let change =
@@ -249,8 +324,7 @@ impl Detection {
             co_rotation_penalty: None,
         };
         found.close(imager, values, settings, report)?;
-        found.co_rotation_penalty =
-            co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies, &found.blind.rows);
+        found.co_rotation_penalty = co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies);
         if settings.eccentric {
             found.keplerian = found.eccentric();
         }
@@ -309,7 +383,7 @@ impl Detection {
             values[Parameter::PorbOverProt] = self.best.porb_over_prot;
             values[Parameter::Phi] = self.best.orbit.phi;
             let mut view = View::new(imager, values, &settings, Some(self.last()))?;
-            if let (Some(field), Some(before)) = (&mut view.field, at_bounds.take()) {
+            if let (Seen::Integrated(field), Some(before)) = (&mut view.seen, at_bounds.take()) {
                 field.at_bounds = before;
             }
             let mut next = refined(&view.quadratic, &self.frequencies, &self.best);
@@ -318,7 +392,7 @@ impl Detection {
             self.closed = moved < STAYS * next.orbit.sigma_k_kms;
             self.best = next;
             // the field with a planet in the model is another one; what moves after that is too little to matter
-            if let Some(field) = &view.field {
+            if let Some(field) = view.field() {
                 settings.spots = Spots::Integrated(Known::of(&field.marginal));
                 at_bounds = Some(field.at_bounds.clone());
             }

@@ -45,6 +45,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "origin",
             "blind_search",
             "limits",
+            "plan",
             "pool",
             "manifest",
             "grid_scan",

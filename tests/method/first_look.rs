@@ -65,6 +65,7 @@ fn with_line(
         pixels: 3000,
         continuum: Default::default(),
         velocity_jitter_kms: 0.0,
+        zero_point_kms: 0.0,
         correlated_bins: 1.0,
     };
     simulation.observe(&star)
@@ -184,10 +185,11 @@ fn made(depth: impl Fn(f64) -> f64) -> Observations {
     let profile = Profile {
         time_d: 0.0,
         first_velocity_kms: -50.0,
+        step_kms: 1.0,
         intensity: velocities.map(|v| 1.0 - depth(v)).collect(),
         sigma: vec![1e-3; 101],
     };
-    Observations { step_kms: 1.0, profiles: vec![profile.clone(), profile] }
+    Observations { profiles: vec![profile.clone(), profile] }
 }
 
 #[test]

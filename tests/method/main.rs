@@ -1,6 +1,7 @@
 //! The method against independent numbers, limit cases and itself: the library alone.
 
 mod common;
+mod data_sets;
 mod marginal;
 
 mod chain;
@@ -19,6 +20,7 @@ mod objective;
 mod oracle;
 mod paraboloid;
 mod pixels;
+mod plan;
 mod posterior;
 mod response;
 mod simulate;

@@ -3,8 +3,8 @@
 //! expansion becomes the next place to expand it around, as long as ln Z rises and until that place stays.
 
 use super::{
-    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, ROUNDS, SearchError, SearchSettings, Stage,
-    shift, within,
+    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, SearchError, SearchSettings, Stage, shift,
+    within,
 };
 use crate::field::FieldError;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
@@ -15,7 +15,7 @@ use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::{Basis, Fitted, Forecast, MarginalPosterior, fit};
 use crate::posterior::objective::{Elements, Parameter, ParameterSpace, ParameterValues, for_blind_search};
 use crate::posterior::surrogate::Surrogate;
-use crate::sampling::log_density::LogDensity as _;
+use crate::sampling::log_density::{Evaluation, LogDensity as _};
 use crate::sampling::optimise::climb;
 use crate::star::Shape;
 
@@ -24,6 +24,12 @@ const SMALLEST_E: f64 = 0.01;
 
 /// Share of the largest eccentricity that a climb begins within.
 const SMALL_PART: f64 = 0.8;
+
+/// Places that ln Z is expanded around at most: from an inclination that is far off it takes some.
+const MOST_ROUNDS: usize = 12;
+
+/// Parts of the way to the top of an expansion that are tried.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 
 /// A round that is lower than the one before by this much in log-probability is not followed.
 const DOWN: f64 = 0.1;
@@ -36,12 +42,16 @@ pub(super) fn find(
 ) -> Result<Found, SearchError> {
     let at = |stage| report(Progress { stage, evaluations: 0 });
     at(Stage::FirstImage);
-    let (mut theta, field, jitter_kms) = match blind(imager, space, settings) {
+    let (detection, start) = match blind(imager, space, settings) {
+        Some((detection, start)) => (Some(Box::new(detection)), start),
+        None => (None, None),
+    };
+    let (mut theta, field, jitter_kms) = match start {
         Some(start) => start,
         None => without_search(imager, space, settings)?,
     };
     let mut highest: Option<Found> = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         at(Stage::Reference);
         let values = space.clone().with_field_of(&field).values_at(&theta);
         let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, jitter_kms) else { break };
@@ -54,31 +64,47 @@ pub(super) fn find(
         let Ok(mut next) = forecast(&posterior).and_then(|forecast| Ok(climb(&forecast, &theta, &|| ())?)) else {
             break;
         };
+        let left_over = shift(space, &theta, &next);
+        (next.theta, next.evaluation) = uphill(&posterior, (&theta, here), &next.theta);
         let moved = shift(space, &theta, &next);
-        let next_theta = next.theta.clone();
-        next.evaluation = posterior.evaluate(&next.theta);
-        if next.evaluation.log_prob < here.log_prob || !next.evaluation.log_prob.is_finite() {
-            (next.theta, next.evaluation) = (theta, here);
-        }
-        theta = next_theta;
+        next.converged &= left_over < REFERENCE_SHIFT || moved > 0.0;
+        theta.clone_from(&next.theta);
         let posterior = Density::Integrated(Box::new(posterior));
-        highest = Some(Found { posterior, optimum: next, attempts: Vec::new() });
+        highest = Some(Found { posterior, optimum: next, attempts: Vec::new(), detection: None });
         if moved < REFERENCE_SHIFT {
             break;
         }
     }
-    let mut found = highest.ok_or(SearchError::Field(FieldError::NotPositive))?;
+    let mut found = highest.ok_or(FieldError::NotPositive)?;
+    found.detection = detection;
     if let Density::Integrated(posterior) = &found.posterior {
         found.attempts = attempts(posterior, &found.optimum.theta)?;
     }
     Ok(found)
 }
 
+/// The first of ever shorter parts of the way from a point to the top of the expansion around it that leads up; the
+/// point itself, where none does. Far from the best star the expansion promises too much.
+fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64]) -> (Vec<f64>, Evaluation) {
+    let space = posterior.space();
+    let (theta, here) = from;
+    let (a, b) = (space.to_sampling(theta), space.to_sampling(to));
+    let at = |share: f64| -> Vec<f64> { a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect() };
+    let tried = SHARES.iter().map(|share| {
+        let there = space.to_physical(&at(*share));
+        let evaluation = posterior.evaluate(&there);
+        (there, evaluation)
+    });
+    let mut higher = tried.filter(|(_, e)| e.log_prob.is_finite() && e.log_prob >= here.log_prob);
+    let found = higher.next();
+    found.unwrap_or_else(|| (theta.to_vec(), here))
+}
+
 /// Where to begin: vector, field and jitter.
 type Start = (Vec<f64>, ParameterValues, f64);
 
-/// The orbit that a blind search finds, where an orbit is looked for and the priors allow it.
-fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Option<Start> {
+/// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
+fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Option<(Detection, Option<Start>)> {
     let is_free = |p: Parameter| space.free().iter().any(|f| f.parameter == p);
     let sought = |of: &&Elements| is_free(of.k) && is_free(of.phi) && space.period_prior(of).is_some();
     let sought: Vec<&Elements> = Elements::PLANETS.iter().filter(sought).collect();
@@ -99,7 +125,7 @@ fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> O
     let config = space.values_at(&space.start());
     let values = for_blind_search(config, space.free());
     let found = Detection::find(imager, values, frequencies, &wanted, &|_| ()).ok()?;
-    let marginal = &found.last().field.as_ref()?.marginal;
+    let marginal = &found.last().field()?.marginal;
     let mut values = marginal.values;
     first.all().into_iter().chain(second.all()).for_each(|p| values[p] = config[p]);
     let both = found.second.as_ref().and_then(|second| second.both).map(|both| both.orbits.to_vec());
@@ -126,7 +152,8 @@ fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> O
     let mut theta = with_field(space, space.theta_of(&values), &values);
     // phi as its prior has it
     theta = space.to_physical(&space.to_sampling(&theta));
-    space.log_prior(&theta).is_finite().then_some((theta, values, marginal.assumed.jitter_kms))
+    let start = space.log_prior(&theta).is_finite().then_some((theta, values, marginal.assumed.jitter_kms));
+    Some((found, start))
 }
 
 /// The highest of the maxima that the expansion around the star without a planet has, the field fitted anew there.

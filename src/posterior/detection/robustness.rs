@@ -68,7 +68,7 @@ pub fn robustness(
     found: &Detection,
 ) -> Robustness {
     let peak = &found.best;
-    let field = found.last().field.as_ref();
+    let field = found.last().field();
     let spots = field.map_or(settings.spots, |field| Spots::Integrated(Known::of(&field.marginal)));
     let settings = &DetectionSettings { spots, ..settings.clone() };
     values[Parameter::K] = peak.orbit.k_kms;
@@ -80,12 +80,13 @@ pub fn robustness(
         let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
         AtTarget {
             chi2_target,
-            on_target: view.as_ref().is_ok_and(|view| view.on_target),
+            on_target: view.as_ref().is_ok_and(|view| view.image().is_none_or(|image| image.on_target)),
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };
+    let times_d = imager.times_d();
     let without = |night: &Vec<usize>| {
-        let times = || night.iter().map(|&k| imager.sampling.profiles[k].0);
+        let times = || night.iter().map(|&k| times_d[k]);
         let view: Result<View, DetectionError> = View::new(&imager.without(night), values, settings, None);
         WithoutNight {
             span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
@@ -93,9 +94,8 @@ pub fn robustness(
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };
-    let times: Vec<f64> = imager.sampling.profiles.iter().map(|profile| profile.0).collect();
-    let mut nights = nights(&times);
-    nights.retain(|night| times.len() - night.len() >= FEWEST);
+    let mut nights = nights(&times_d, NIGHT_GAP_D);
+    nights.retain(|night| times_d.len() - night.len() >= FEWEST);
     if nights.len() < 2 {
         nights.clear();
     }
@@ -107,11 +107,11 @@ pub fn robustness(
     Robustness { all, targets, nights: nights.par_iter().map(without).collect() }
 }
 
-/// Profiles night by night, in order of time.
-fn nights(times_d: &[f64]) -> Vec<Vec<usize>> {
+/// Profiles night by night, in order of time; nights are more than `gap_d` apart.
+pub fn nights(times_d: &[f64], gap_d: f64) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..times_d.len()).collect();
     order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
-    order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= NIGHT_GAP_D).map(<[usize]>::to_vec).collect()
+    order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= gap_d).map(<[usize]>::to_vec).collect()
 }
 
 impl Robustness {
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn nights_end_with_gaps() {
-        let found = nights(&[5.01, 3.2, 3.0, 5.2, 3.45, 9.0]);
+        let found = nights(&[5.01, 3.2, 3.0, 5.2, 3.45, 9.0], NIGHT_GAP_D);
         assert_eq!(found, vec![vec![2, 1, 4], vec![0, 3], vec![5]]);
     }
 

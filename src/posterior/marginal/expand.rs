@@ -1,16 +1,16 @@
 //! ln Z to second order in the velocities of the profiles and in the star's own parameters.
 
-use super::{Basis, Marginal};
+use super::{Basis, Design, Marginal, zero_points};
 use crate::field::{FieldError, Quadratic};
 use crate::posterior::expansion::{Expansion, VELOCITY_STEP_KMS, coordinates, stellar_step};
-use crate::posterior::imaging::Imager;
+use crate::posterior::imaging::{Imager, ZeroPointPrior};
 use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::star::Response;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 impl Marginal {
-    /// ln Z, the jitter counted.
+    /// ln Z, the jitter counted, those zero points held that are otherwise integrated out.
     pub fn ln_evidence(&self) -> f64 {
         self.settled.evidence.ln_evidence()
     }
@@ -21,9 +21,47 @@ impl Marginal {
     /// # Errors
     /// [`FieldError`].
     pub fn expansion(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
-        let Quadratic { ln_evidence, gradient, information } = self.quadratic(imager, basis, stellar)?;
+        let quadratic = self.quadratic(imager, basis, stellar)?;
+        if imager.zero_points.is_empty() {
+            return Ok(self.expanded(imager, stellar, quadratic));
+        }
+        let of_each = |number: &dyn Fn(&ZeroPointPrior) -> f64| {
+            DVector::from_iterator(imager.zero_points.len(), imager.zero_points.iter().map(number))
+        };
+        let (mean, sd) = (of_each(&|prior| prior.mean_kms), of_each(&|prior| prior.sd_kms));
+        let columns = zero_points::columns(imager, quadratic.gradient.len());
+        let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
+        Ok(self.expanded(imager, stellar, quadratic))
+    }
+
+    /// The same, those zero points of data sets held that are otherwise integrated out.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn known_zero_points(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> Result<Expansion, FieldError> {
+        Ok(self.expanded(imager, stellar, self.quadratic(imager, basis, stellar)?))
+    }
+
+    /// ln Z, the jitter counted and zero points of data sets integrated out.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn ln_evidence_of_sets(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
+        match imager.zero_points.is_empty() {
+            true => Ok(self.ln_evidence()),
+            false => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
+        }
+    }
+
+    fn expanded(&self, imager: &Imager, stellar: &[Parameter], quadratic: Quadratic) -> Expansion {
+        let Quadratic { ln_evidence, gradient, information } = quadratic;
         let cycles = imager.cycles();
-        Ok(Expansion {
+        Expansion {
             values: self.values,
             centre: coordinates(&self.values, &cycles, stellar),
             cycles,
@@ -32,7 +70,7 @@ impl Marginal {
             gradient,
             noise: information.clone(),
             information,
-        })
+        }
     }
 
     fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
@@ -51,21 +89,34 @@ impl Marginal {
         basis: &Basis,
         stellar: &[Parameter],
     ) -> Vec<DMatrix<f64>> {
-        let brightness = self.brightness(basis);
+        self.design.slopes(imager, &self.values, &self.brightness(basis), stellar)
+    }
+}
+
+impl Design {
+    /// How the depths of each profile change with its velocity and with the star's parameters (bins, 1 + parameters)
+    /// at `values`, for maps of this `brightness` (pixels, profiles).
+    pub(super) fn slopes(
+        &self,
+        imager: &Imager,
+        values: &ParameterValues,
+        brightness: &DMatrix<f64>,
+        stellar: &[Parameter],
+    ) -> Vec<DMatrix<f64>> {
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
         let derivative = |parameter: Option<Parameter>| {
-            let h = parameter.map_or(VELOCITY_STEP_KMS, |p| stellar_step(p, &self.values, time_base_d));
+            let h = parameter.map_or(VELOCITY_STEP_KMS, |p| stellar_step(p, values, time_base_d));
             let at = |h: f64| {
-                let mut values = self.values;
+                let mut values = *values;
                 values[parameter.unwrap_or(Parameter::Vsys)] += h;
-                self.response(imager, parameter, &values).depths_of_each(&brightness)
+                self.displaced(imager, parameter, &values).depths_of_each(brightness)
             };
             let (above, below) = (at(h), at(-h));
             above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * h)).collect::<Vec<f64>>()
         };
         let all: Vec<Option<Parameter>> = std::iter::once(None).chain(stellar.iter().map(|p| Some(*p))).collect();
         let columns: Vec<Vec<f64>> = all.into_par_iter().map(derivative).collect();
-        let response = self.design.response();
+        let response = self.response();
         let of_profile = |k: usize| {
             let bins = response.bins(k);
             DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][bins.start + j])
@@ -73,9 +124,9 @@ impl Marginal {
         (0..response.profiles()).map(of_profile).collect()
     }
 
-    fn response(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
+    fn displaced(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
         match moved {
-            None => self.design.response().with_velocities(&imager.star, &values.state(), &imager.sampling),
+            None => imager.with_velocities(self.response(), &values.state()),
             Some(_) => imager.response(&values.state()),
         }
     }
@@ -83,7 +134,7 @@ impl Marginal {
 
 /// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of all epochs and the
 /// parameters, which are those of all epochs.
-fn summed(of_all: &Quadratic, epochs: usize, stellar: usize) -> Quadratic {
+pub(super) fn summed(of_all: &Quadratic, epochs: usize, stellar: usize) -> Quadratic {
     let mut sums = DMatrix::zeros(epochs * (1 + stellar), epochs + stellar);
     for k in 0..epochs {
         sums[(k * (1 + stellar), k)] = 1.0;

@@ -9,6 +9,7 @@ fn profile(first_velocity_kms: f64, phase: f64) -> Profile {
     Profile {
         time_d: phase,
         first_velocity_kms,
+        step_kms: 2.0,
         intensity: (0..20).map(|j| 1.0 - depth(j) + 0.01 * (phase + j as f64).sin()).collect(),
         sigma: (0..20).map(|j| 1e-3 * (1.5 + (0.7 * j as f64 + phase).cos())).collect(),
     }
@@ -16,7 +17,7 @@ fn profile(first_velocity_kms: f64, phase: f64) -> Profile {
 
 /// Two profiles whose bins stand between each other's.
 fn observations() -> Observations {
-    Observations { step_kms: 2.0, profiles: vec![profile(-20.0, 0.0), profile(-17.3, 1.0)] }
+    Observations { profiles: vec![profile(-20.0, 0.0), profile(-17.3, 1.0)] }
 }
 
 /// Dense weights of profile `k`: what they make of every unit vector.
@@ -81,7 +82,7 @@ fn the_line_is_the_mean_of_all_profiles_where_they_are() {
     let observations = observations();
     let rows = templates_of(&observations.profiles[1], &observations);
     let [first, second] = [0, 1].map(|k| &observations.profiles[k]);
-    let both = 1.0 - 0.5 * (second.intensity[3] + first.intensity_at(-11.3, 2.0));
+    let both = 1.0 - 0.5 * (second.intensity[3] + first.intensity_at(-11.3));
     assert!((rows[3][2] - both).abs() < 1e-12);
     // beyond the end of the first
     assert!((rows[19][2] - (1.0 - second.intensity[19])).abs() < 1e-12);

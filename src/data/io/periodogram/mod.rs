@@ -19,7 +19,7 @@ use crate::planets::periodogram::Search;
 use crate::planets::periodogram::orbits::scan;
 use crate::planets::verdict::{Remark, Verdict};
 use crate::posterior::detection::{Detection, DetectionSettings, Robustness};
-use crate::posterior::fit::Fit;
+use crate::posterior::fit::Explained;
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::ParameterValues;
 use nalgebra::{DMatrix, DVector};
@@ -42,8 +42,10 @@ pub struct PeriodogramResult<'a> {
     pub robustness: &'a Robustness,
     /// How it was asked for.
     pub settings: &'a DetectionSettings,
-    /// The planet-free image held against the data.
-    pub fit: &'a Fit,
+    /// The profiles as the spots of a star without a planet explain them.
+    pub planet_free: &'a Explained,
+    /// The same beside the best orbit.
+    pub at_best: &'a Explained,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
@@ -67,6 +69,9 @@ const COLUMNS: [&str; 12] = [
     "k_limit_kms",
     "k_limit95_kms",
 ];
+
+/// Column of the number of each profile's data set, from 1, where there are several.
+pub const DATA_SET: &str = "data_set";
 
 /// Name of what was found.
 pub const FILE: &str = "periodogram.json";
@@ -98,7 +103,8 @@ impl PeriodogramResult<'_> {
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
     fn velocities(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let quadratic = &self.detection.last().quadratic;
+        let last = self.detection.last();
+        let quadratic = last.zero_points_held.as_ref().unwrap_or(&last.quadratic);
         let n = quadratic.len();
         let missing = |_| (DVector::from_element(n, f64::NAN), DMatrix::from_element(n, n, f64::NAN));
         quadratic.radial_velocities().unwrap_or_else(missing)
@@ -106,11 +112,15 @@ impl PeriodogramResult<'_> {
 
     fn rv(&self, velocities: &DVector<f64>, covariance: &DMatrix<f64>) -> Table {
         let moments = ["first_moment_kms", "first_moment_sigma_kms", "filtered_kms"];
-        let mut table = Table::new(&[&["time_d", "cycle", "rv_kms", "rv_sigma_kms"][..], &moments].concat());
-        for (k, v) in self.fit.velocities.iter().enumerate() {
+        let set_of = self.imager.set_of_each();
+        let sets: &[&str] = if set_of.is_empty() { &[] } else { &[DATA_SET] };
+        let mut table = Table::new(&[&["time_d", "cycle", "rv_kms", "rv_sigma_kms"][..], &moments, sets].concat());
+        for (k, v) in self.planet_free.velocities.iter().enumerate() {
             let (rv, sigma) = (velocities[k], covariance[(k, k)].sqrt());
             let moment = v.observed;
-            table.row(&[v.time_d, v.cycle, rv, sigma, moment.value_kms, moment.sigma_kms, v.filtered_kms()]);
+            let mut row = vec![v.time_d, v.cycle, rv, sigma, moment.value_kms, moment.sigma_kms, v.filtered_kms()];
+            row.extend(set_of.get(k).map(|s| *s as f64));
+            table.row(&row);
         }
         table
     }

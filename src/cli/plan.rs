@@ -1,0 +1,123 @@
+//! `dimcmc plan`: which planets profiles would show that are not yet taken.
+
+use super::output::Output;
+use super::{Failure, Global, console, progress};
+use crate::data::config::Config;
+use crate::data::scene::SceneError;
+use crate::numerics::text::shown;
+use crate::planets::periodogram::{FrequencyError, FrequencySettings};
+use crate::runs::plan::{
+    CSV, Campaign, CampaignError, JSON, Outlook, PlanError, PlanFile, PlanSettings, compared_d, outlook, range_d,
+};
+use std::path::PathBuf;
+
+/// Forecast which planets a schedule would show, before any profile is taken
+///
+/// Of a star that is not yet observed the config says when and how well it will be: `observations.simulate` with its
+/// schedule (or cycles), velocity bins and S/N, and what its spots are like (`imaging.spot_amplitude`, `spot_slope`,
+/// `spot_lifetime_d`; usual ones where they are not given). Of an observed star the section `plan` says which nights
+/// come next. The spots are integrated out as with objective "marginal-likelihood", in closed form: nothing is
+/// simulated. Several schedules are compared: several configs, or several numbers of nights. Writes plan.json and
+/// plan.csv (period, error of K, K detected with a probability of 50 and 95 %); `plot` draws them.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  dimcmc plan configs/demo.json --out runs/demo_plan\n  \
+                        dimcmc plan configs/plan.json --nights 8,12,16 --out runs/plan")]
+pub struct Args {
+    /// Config files (JSON), one a schedule
+    #[arg(required = true)]
+    configs: Vec<PathBuf>,
+    #[command(flatten)]
+    output: Output,
+    /// Numbers of nights (of a season), each a schedule; of cycles that are listed, the first nights
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = nights)]
+    nights: Vec<usize>,
+    /// Shortest period searched (d); by default as `periodogram` would choose it
+    #[arg(long, value_name = "DAYS")]
+    min_period_d: Option<f64>,
+    /// Longest period searched (d); by default twice the time base
+    #[arg(long, value_name = "DAYS")]
+    max_period_d: Option<f64>,
+    /// Hold the systemic velocity and stellar parameters that are free in the config at its values; otherwise they are
+    /// integrated out within their priors
+    #[arg(long)]
+    fixed: bool,
+    /// Spot maps drawn, of which medians are taken; 0 for lines of a star without spots
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(0..=1000))]
+    maps: u16,
+    /// Number of stars without a planet that false alarms are taken from
+    #[arg(long, value_name = "N", default_value_t = 4_000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
+    draws: u32,
+    /// Seed of both
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+fn nights(text: &str) -> Result<usize, String> {
+    let number = text.trim().parse::<usize>().ok().filter(|n| (1..=1000).contains(n));
+    number.ok_or_else(|| "a whole number from 1 to 1000".into())
+}
+
+/// Runs the command.
+pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
+    args.output.check()?;
+    args.output.spare(&args.configs, |name| [CSV, JSON].contains(&name))?;
+    let spinner = progress::bar(global, None, "reading");
+    let found = forecast(args, &|message| spinner.set_message(message));
+    spinner.finish_and_clear();
+    let (campaigns, outlooks, range) = found?;
+    let looked: Vec<(&Campaign, &[Outlook])> =
+        campaigns.iter().zip(&outlooks).map(|(campaign, outlooks)| (campaign, outlooks.as_slice())).collect();
+    let file = PlanFile::new(&looked, range, &compared_d(&campaigns, range), &settings(args));
+    let folder = args.output.create()?;
+    file.write(&looked, folder)?;
+    console::line(format_args!("{}\nwritten: {}: {CSV}, {JSON}", file.table(), shown(folder)));
+    Ok(())
+}
+
+fn settings(args: &Args) -> PlanSettings {
+    let Args { maps, draws, seed, fixed, .. } = *args;
+    PlanSettings { maps: usize::from(maps), draws: draws as usize, seed, fixed }
+}
+
+type Forecast = (Vec<Campaign>, Vec<Vec<Outlook>>, [f64; 2]);
+
+fn forecast(args: &Args, report: &dyn Fn(String)) -> Result<Forecast, Failure> {
+    let mut campaigns = Vec::new();
+    for path in &args.configs {
+        report(format!("reading {}", shown(path)));
+        let config = Config::load(path).map_err(Failure::of)?;
+        campaigns.extend(Campaign::of(&config, &args.nights).map_err(not_begun)?);
+    }
+    let wanted =
+        FrequencySettings { min_period_d: args.min_period_d, max_period_d: args.max_period_d, oversampling: None };
+    let range = range_d(&campaigns, wanted).map_err(|error| periods(args, error))?;
+    let one = |campaign: &Campaign| {
+        report(campaign.name.clone());
+        outlook(campaign, range, &settings(args)).map_err(|error| match error {
+            PlanError::Frequencies(error) => periods(args, error),
+            error => Failure::failed(error),
+        })
+    };
+    let outlooks = campaigns.iter().map(one).collect::<Result<_, _>>()?;
+    Ok((campaigns, outlooks, range))
+}
+
+fn not_begun(error: CampaignError) -> Failure {
+    match error {
+        CampaignError::Scene(SceneError::Config(error)) => Failure::of(error),
+        CampaignError::Scene(SceneError::Observations(error)) => Failure::of(error),
+        CampaignError::Field { .. } => Failure::failed(error),
+        CampaignError::Nights { .. } => Failure::input(error.to_string()),
+    }
+}
+
+fn periods(args: &Args, error: FrequencyError) -> Failure {
+    match error {
+        FrequencyError::TooFewTimes(_) => {
+            let names: Vec<String> = args.configs.iter().map(|path| shown(path)).collect();
+            Failure::input(format!("{}: {error}", names.join(", ")))
+        }
+        error => Failure::of(error),
+    }
+}
