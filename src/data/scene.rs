@@ -5,7 +5,7 @@ use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Set
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::io::truth::Truth;
-use crate::data::search::{self, Found, SearchError, SearchSettings};
+use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
 use crate::posterior::imaging::Imager;
@@ -249,7 +249,15 @@ impl Scene {
     /// # Errors
     /// No map, or no start that leads anywhere.
     pub fn optimise(&self) -> Result<Found, SearchError> {
-        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), &|_| ())
+        self.optimise_with(&|_| ())
+    }
+
+    /// The same; `report` is told at every evaluation how far the search has come, from any thread.
+    ///
+    /// # Errors
+    /// As [`Scene::optimise`].
+    pub fn optimise_with(&self, report: &(dyn Fn(Progress) + Sync)) -> Result<Found, SearchError> {
+        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), report)
     }
 
     /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected

@@ -9,6 +9,7 @@ pub mod parameters;
 pub mod posterior;
 mod prediction;
 pub mod prior;
+mod quantile;
 pub mod reference;
 pub mod target;
 pub mod tradeoff;

@@ -1,11 +1,15 @@
 //! A sampling run: search, start, chain, in memory or on disk; begun afresh or resumed to the same bytes.
 //!
-//! `start` is where the walkers begin.
+//! `start` is where the walkers begin, `pace` how far they have come, `conclusion` what is said in the end.
 
+mod conclusion;
 mod error;
+mod pace;
 mod start;
 
+pub use conclusion::Conclusion;
 pub use error::RunError;
+pub use pace::{Meter, Pace};
 
 use crate::data::config::Settings;
 use crate::data::io::journal::{self, Journal, JournalError};
