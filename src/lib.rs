@@ -148,6 +148,7 @@ pub mod internals {
 
 pub use cli::{Failure, main as command_line};
 pub use data::config::{Config, ConfigError};
+pub use data::io::lsd::{LsdError, write_numbers as write_observations};
 pub use data::scene::{Scene, SceneError};
 pub use data::search::{Found, Progress};
 pub use figures::drawing::Figure;
@@ -156,7 +157,7 @@ pub use planets::verdict::{Finding, Remark, Signal, Verdict};
 pub use posterior::fit::{ChangingFit, ChangingSummary, Fit, FitSummary, MapAt, NoField, VelocityWithoutSpots};
 pub use posterior::objective::{Parameter, Posterior, Prior};
 pub use runs::blind_search::BlindSearch;
-pub use runs::export::{ExportError, Format};
+pub use runs::export::{ExportError, Format, export};
 pub use runs::log_posterior::LogPosterior;
 pub use runs::maps::{MapError, Maps};
 pub use runs::optimum::OptimumFile;

@@ -5,7 +5,7 @@ use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
 use crate::data::config::Config;
-use crate::data::io::effort::{EFFORT, Effort};
+use crate::data::io::effort::EFFORT;
 use crate::data::scene::Scene;
 use crate::runs::manifest;
 use crate::runs::run::{CHAIN, Meter, Pace, Run, RunError, SUMMARY, StartFrom};
@@ -100,7 +100,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let mut meter = Meter::new(&run);
     let reason = run.go(&pool, |records, convergence| show(&bar, &meter.step(records, convergence)));
     bar.finish_and_clear();
-    let noted = Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size());
+    let noted = Run::note_effort(folder, !resume, began.elapsed().as_secs_f64(), pool.size());
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);
@@ -111,7 +111,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             )))
         }
         StopReason::Converged | StopReason::StepLimit => {
-            noted?;
+            noted.map_err(failed)?;
             analyse::report(folder, &run.manifest, &run.chain)
         }
     }

@@ -201,6 +201,19 @@ impl Scene {
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
     }
 
+    /// The config file, or what stands for it: what errors name.
+    pub fn path(&self) -> &Path {
+        &self.settings.path
+    }
+
+    /// That the config leaves a parameter free, as searches and chains need.
+    ///
+    /// # Errors
+    /// A config that does not.
+    pub fn require_free(&self) -> Result<(), ConfigError> {
+        self.settings.require_free().map(drop)
+    }
+
     /// What becomes of the spots in a blind search.
     #[doc(hidden)]
     pub fn spots(&self) -> Spots {
