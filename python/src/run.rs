@@ -84,12 +84,17 @@ pub fn is_false_start(folder: PathBuf) -> bool {
     Run::is_false_start(&folder)
 }
 
-/// Reads a run: names, text and summary; positions `[step, ensemble, walker, parameter]`, log-probabilities and
+/// Reads a run: names, text and summary; draws by name; positions `[step, ensemble, walker, parameter]`, log-probabilities and
 /// numbers beside them `[step, ensemble, walker]`, all flat.
 #[pyfunction]
 pub fn read_run(py: Python, folder: PathBuf) -> PyResult<Bound<PyDict>> {
     let (conclusion, chain) = py.detach(|| read(&folder))?;
     let content = PyDict::new(py);
+    let draws = PyDict::new(py);
+    for (name, values) in conclusion.draws(&chain) {
+        draws.set_item(name, PyArray1::from_vec(py, values))?;
+    }
+    content.set_item("draws", draws)?;
     let shape = chain.shape();
     content.set_item("names", chain.names())?;
     content.set_item("shape", (chain.steps(), shape.ensembles, shape.walkers))?;

@@ -3,8 +3,9 @@
 use super::{CHAIN, RunError, SUMMARY};
 use crate::data::io::atomic::write_json;
 use crate::data::io::journal;
-use crate::runs::manifest::Manifest;
-use crate::sampling::chain::{Chain, Summary, table};
+use crate::runs::manifest::{Manifest, kinds_and_goals};
+use crate::sampling::chain::statistics::unwrap_around;
+use crate::sampling::chain::{Chain, ParameterKind, Settled, Summary, table};
 use std::path::Path;
 
 /// Summary and text.
@@ -14,6 +15,8 @@ pub struct Conclusion {
     pub summary: Summary,
     /// The verdict, the table of the parameters, and notes: what `dimcmc analyse` prints.
     pub text: String,
+    kinds: Vec<ParameterKind>,
+    settled: Vec<Settled>,
 }
 
 impl Conclusion {
@@ -34,13 +37,31 @@ impl Conclusion {
     #[doc(hidden)]
     pub fn of(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<Self, RunError> {
         let settings = manifest.settings(folder)?;
-        let (summary, _) = manifest
+        let (kinds, _) = kinds_and_goals(&settings);
+        let (summary, settled) = manifest
             .summarise(&settings, chain)
             .map_err(|source| RunError::Analysis { path: folder.join(CHAIN), source })?;
         let mut text = table(&summary, manifest.truth(&settings, &summary).as_ref()).trim_end().to_owned();
         let notes = summary.remarks.iter().cloned().chain(manifest.warnings()).chain(manifest.co_rotation(&summary));
         notes.for_each(|note| text += &format!("\nnote: {note}"));
-        Ok(Conclusion { summary, text })
+        Ok(Conclusion { summary, text, kinds, settled })
+    }
+
+    /// The draws of every parameter and of every quantity that follows from them, by name: those of `chain`, whose
+    /// conclusion this is, in its order and without the steps left out. Phases are unwrapped around their mode.
+    pub fn draws(&self, chain: &Chain) -> Vec<(String, Vec<f64>)> {
+        let kept = || chain.records().iter().skip(self.summary.discarded_steps * chain.shape().size());
+        let parameter = |(k, name): (usize, &String)| {
+            let mut values: Vec<f64> = kept().map(|record| record.theta[k]).collect();
+            if self.kinds[k] == ParameterKind::Periodic {
+                unwrap_around(&mut values, self.summary.parameters[name].mode);
+            }
+            (name.clone(), values)
+        };
+        let derived = |settled: &Settled| {
+            (settled.quantity.name.clone(), kept().map(|record| settled.value(&record.theta)).collect())
+        };
+        chain.names().iter().enumerate().map(parameter).chain(self.settled.iter().map(derived)).collect()
     }
 
     /// Writes `summary.json` into `folder`.

@@ -1,0 +1,67 @@
+"""The notebook, cell by cell, and that types are right where users write them."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import ROOT
+from notebook import EXAMPLES, cells, notebook
+
+SCRIPT = (EXAMPLES / "first_star.py").read_text()
+
+
+def test_notebook_and_script_are_the_same() -> None:
+    message = "python python/tests/notebook.py writes it anew"
+    assert (EXAMPLES / "first_star.ipynb").read_text() == notebook(SCRIPT), message
+
+
+def test_the_notebook_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    """As a notebook does: what a cell ends with is shown."""
+    sources = ["".join(cell["source"]) for cell in json.loads(notebook(SCRIPT))["cells"] if cell["cell_type"] == "code"]
+    assert sources == [text for kind, text in cells(SCRIPT) if kind == "code"]
+    names: dict[str, Any] = {}
+    for source in sources:
+        tree = ast.parse(source)
+        last = tree.body[-1] if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+        if last is not None:
+            tree.body.pop()
+        exec(compile(tree, "first_star.ipynb", "exec"), names)
+        if last is not None:
+            shown = eval(compile(ast.Expression(last.value), "first_star.ipynb", "eval"), names)
+            for how in ("_repr_html_", "_repr_png_"):
+                assert not hasattr(shown, how) or getattr(shown, how)()
+    printed = capsys.readouterr().out
+    assert "Detection" in printed and "the chain has converged" in printed and "phi') True" in printed
+
+
+def test_types_hold_on_the_examples() -> None:
+    pytest.importorskip("mypy")
+    checked = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--ignore-missing-imports", EXAMPLES / "first_star.py"],
+        capture_output=True, text=True, check=False, cwd=ROOT / "python/tests",
+        env={**os.environ, "MYPY_CACHE_DIR": os.devnull},
+    )  # fmt: skip
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_every_public_name_is_documented() -> None:
+    import dimcmc
+
+    page = (Path(ROOT) / "docs/guide/python.md").read_text()
+    for name in dimcmc.__all__:
+        thing = getattr(dimcmc, name)
+        if name.startswith("__"):
+            continue
+        assert thing.__doc__, name
+        assert f"`{name}" in page or f".{name}" in page, f"{name} is not in docs/guide/python.md"
+        for method, what in vars(thing).items() if isinstance(thing, type) else []:
+            if not method.startswith("_") and (callable(what) or isinstance(what, property)):
+                documented = getattr(thing, method).__doc__ if callable(what) else what.__doc__
+                assert documented, f"{name}.{method} has no docstring"
