@@ -12,7 +12,7 @@ use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Se
 use dimcmc::internals::posterior::detection::{
     Detection, DetectionSettings, Evidence, Robustness, Spots, View, robustness,
 };
-use dimcmc::internals::posterior::fit::Fit;
+use dimcmc::internals::posterior::fit::Explained;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -41,10 +41,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Spots::Integrated(_) if detection.is_candidate() => robustness(imager, values, &settings, &detection),
         _ => Robustness { all: None, targets: Vec::new(), nights: Vec::new() },
     };
-    let fit = |view: &View| Fit::new(imager, &scene.observations, &view.reference);
-    let misfit = fit(detection.last()).checks.warnings;
-    let remarks =
-        detection.remarks(&Evidence { imager, settings: &settings, robustness: Some(&choices), misfit: &misfit });
+    let explained = |view: &View| Explained::new(imager, &scene.observations, view);
+    let at_best = explained(detection.last());
+    let misfit = &at_best.misfit;
+    let remarks = detection.remarks(&Evidence { imager, settings: &settings, robustness: Some(&choices), misfit });
     std::fs::create_dir_all(folder)?;
     PeriodogramResult {
         imager,
@@ -53,7 +53,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         remarks: &remarks,
         robustness: &choices,
         settings: &settings,
-        fit: &fit(&detection.planet_free),
+        planet_free: &explained(&detection.planet_free),
+        at_best: &at_best,
         truth: scene.truth,
         mass_msun: scene.settings.mass_msun,
         provenance: &scene.provenance(),

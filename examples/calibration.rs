@@ -109,12 +109,13 @@ fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Fa
     let frequencies = frequencies(&imager)?;
     let found = detect(scene, &imager, 10_000)?;
     let view = &found.planet_free;
+    let image = view.image().expect("one map");
     let trusting = Search::new(&view.regularised, &frequencies, SearchSettings { draws: 10_000, seed: 1 })?;
     let both = [&trusting, &found.blind];
     let height = |search: &Search| search.best().orbit.delta_ln_l;
     Ok(NullStar {
-        chi2_per_datum: view.reference.solution.chi2 / imager.data.depth.len() as f64,
-        unresolved_spots: view.unresolved_spots,
+        chi2_per_datum: image.reference.solution.chi2 / imager.data.depth.len() as f64,
+        unresolved_spots: image.unresolved_spots,
         delta_ln_l: both.map(height),
         porb_over_prot: both.map(|search| search.best().porb_over_prot),
         false_alarm: both.map(|search| search.false_alarm.probability(height(search)).value()),
@@ -173,7 +174,7 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
         (Parameter::Phi, Prior::Periodic),
     ];
     let free = free.into_iter().map(|(parameter, prior)| FreeParameter { parameter, prior }).collect();
-    let reference = &found.last().reference;
+    let reference = &found.last().image().expect("one map").reference;
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
     let space = ParameterSpace::new(free, reference.values, mid, base, imager.star.rotation_period_d);
     let expansion = Expansion::of(&imager, reference, &[]);

@@ -9,8 +9,9 @@
 use crate::data::config::{ImagingSettings, Settings};
 use crate::field::FieldError;
 use crate::posterior::density::Density;
+use crate::posterior::detection::Detection;
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::Known;
+use crate::posterior::marginal::{Known, NoFit};
 use crate::posterior::objective::{
     FreeParameter, ObjectiveKind, ParameterSpace, Posterior, Prior, Reference, ReferenceError,
 };
@@ -80,6 +81,9 @@ pub struct Found {
     /// All starts, by regularised likelihood at the first reference's lambda.
     #[doc(hidden)]
     pub attempts: Vec<Attempt>,
+    /// The blind search that it began with, where all maps are integrated over.
+    #[doc(hidden)]
+    pub detection: Option<Box<Detection>>,
 }
 
 /// Why a search failed.
@@ -90,10 +94,16 @@ pub enum SearchError {
     Reference(#[from] ReferenceError),
     /// No field, where maps are integrated over.
     #[error("{0}")]
-    Field(#[from] FieldError),
+    Field(#[from] NoFit),
     /// No start led anywhere.
     #[error("{0}")]
     Optimise(#[from] OptimiseError),
+}
+
+impl From<FieldError> for SearchError {
+    fn from(error: FieldError) -> Self {
+        SearchError::Field(error.into())
+    }
 }
 
 /// How far a search has come.
@@ -197,7 +207,8 @@ pub fn find(
         let moved = shift(space, &optimum.theta, &next);
         optimum = next;
         if moved < REFERENCE_SHIFT || round + 1 == ROUNDS {
-            return Ok(Found { posterior: Density::Mapped(Box::new(posterior)), optimum, attempts });
+            let posterior = Density::Mapped(Box::new(posterior));
+            return Ok(Found { posterior, optimum, attempts, detection: None });
         }
     }
     unreachable!("the loop returns")

@@ -25,7 +25,7 @@ use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::posterior::expansion::{Expansion, Nuisance, STELLAR};
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::{Basis, Change, Fitted, Known, fit};
+use crate::posterior::marginal::{Basis, Change, Fitted, Known, NoFit, fit};
 use crate::posterior::objective::{Parameter, ParameterValues, Reference, ReferenceError};
 use crate::star::Orbit;
 use nalgebra::DVector;
@@ -74,11 +74,31 @@ impl Spots {
     }
 }
 
-/// A star's image and the quadratic in its profiles' velocities around it.
+/// The spots of a star as the profiles show them.
+#[derive(Clone, Debug)]
+pub enum Seen {
+    /// The map of maximum entropy.
+    OneMap(Box<Image>),
+    /// The field that was integrated over.
+    Integrated(Box<Fitted>),
+}
+
+/// A map of maximum entropy.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// The map.
+    pub reference: Reference,
+    /// How many times larger than the entropy expects the unresolved spots are, in variance.
+    pub unresolved_spots: f64,
+    /// Whether it reaches the target chi2.
+    pub on_target: bool,
+}
+
+/// A star with its spots, and the quadratic in its profiles' velocities around it.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// The image.
-    pub reference: Reference,
+    /// The spots.
+    pub seen: Seen,
     /// ln L around it.
     pub expansion: Expansion,
     /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over
@@ -86,12 +106,6 @@ pub struct View {
     pub quadratic: VelocityQuadratic,
     /// The same with spots as the entropy sees them: the regularised likelihood itself.
     pub regularised: VelocityQuadratic,
-    /// How many times larger than the entropy expects the unresolved spots are, in variance.
-    pub unresolved_spots: f64,
-    /// Whether the image reaches the target chi2.
-    pub on_target: bool,
-    /// The field that was integrated over; `None` where the image alone counts.
-    pub field: Option<Box<Fitted>>,
 }
 
 /// The second planet.
@@ -109,7 +123,7 @@ pub struct Detection {
     /// The trial periods.
     pub frequencies: Frequencies,
     /// Whether the star changes, where that was looked into: of spots that are taken for unchanging.
-    pub change: Option<Result<Change, FieldError>>,
+    pub change: Option<Result<Change, NoFit>>,
     /// Without a planet; its quadratic is the one that `search` is of.
     pub planet_free: View,
     /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots,
@@ -144,7 +158,13 @@ pub enum DetectionError {
     Unbounded(#[from] Unbounded),
     /// No field.
     #[error(transparent)]
-    Field(#[from] FieldError),
+    Field(#[from] NoFit),
+}
+
+impl From<FieldError> for DetectionError {
+    fn from(error: FieldError) -> Self {
+        DetectionError::Field(error.into())
+    }
 }
 
 /// What is under way.
@@ -180,7 +200,7 @@ impl DetectionSettings {
 impl View {
     /// The star imaged at `values`. Where the target chi2 takes more than three times the entropy's weight over the
     /// number of data, the image stops short of it: beyond, noise is turned into spots. Where maps are integrated over
-    /// the field is fitted from that of a view `near` by, if there is one, and the image is but a picture.
+    /// there is no image, and the field is fitted from that of a view `near` by, if there is one.
     ///
     /// # Errors
     /// [`DetectionError`].
@@ -190,24 +210,41 @@ impl View {
         settings: &DetectionSettings,
         near: Option<&View>,
     ) -> Result<Self, DetectionError> {
-        let reference = Reference::provisional(imager, values, settings.chi2_target)?;
-        let on_target = reference.solution.termination == Termination::Converged;
         let nuisances = &settings.nuisances;
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
         if let Spots::Integrated(known) = settings.spots {
             let basis = Basis::new(&imager.grid);
-            let near = near.and_then(|view| view.field.as_ref()).map(|field| &field.marginal);
+            let near = near.and_then(View::field).map(|field| &field.marginal);
             let fitted = fit(imager, &basis, values, known, near)?;
             let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
             let quadratic = expansion.velocities(nuisances);
-            let (regularised, field) = (quadratic.clone(), Some(Box::new(fitted)));
-            return Ok(View { reference, expansion, quadratic, regularised, unresolved_spots: 1.0, on_target, field });
+            let (regularised, seen) = (quadratic.clone(), Seen::Integrated(Box::new(fitted)));
+            return Ok(View { seen, expansion, quadratic, regularised });
         }
+        let reference = Reference::provisional(imager, values, settings.chi2_target)?;
+        let on_target = reference.solution.termination == Termination::Converged;
         let expansion = Expansion::of(imager, &reference, &stellar);
         let regularised = expansion.velocities(nuisances);
         let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
         let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
-        Ok(View { reference, expansion, quadratic, regularised, unresolved_spots, on_target, field: None })
+        let seen = Seen::OneMap(Box::new(Image { reference, unresolved_spots, on_target }));
+        Ok(View { seen, expansion, quadratic, regularised })
+    }
+
+    /// The map of maximum entropy, where there is one.
+    pub fn image(&self) -> Option<&Image> {
+        match &self.seen {
+            Seen::OneMap(image) => Some(image),
+            Seen::Integrated(_) => None,
+        }
+    }
+
+    /// The field that was integrated over.
+    pub fn field(&self) -> Option<&Fitted> {
+        match &self.seen {
+            Seen::OneMap(_) => None,
+            Seen::Integrated(fitted) => Some(fitted),
+        }
     }
 }
 
@@ -229,6 +266,10 @@ impl Detection {
         let planet_free = View::new(imager, alone, settings, None)?;
         report(Stage::Search);
         let blind = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
+        let blind = match settings.spots {
+            Spots::OneMap(_) => blind,
+            Spots::Integrated(_) => blind.without_multiples(),
+        };
         let best = blind.best().orbit.delta_ln_l;
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
@@ -309,7 +350,7 @@ impl Detection {
             values[Parameter::PorbOverProt] = self.best.porb_over_prot;
             values[Parameter::Phi] = self.best.orbit.phi;
             let mut view = View::new(imager, values, &settings, Some(self.last()))?;
-            if let (Some(field), Some(before)) = (&mut view.field, at_bounds.take()) {
+            if let (Seen::Integrated(field), Some(before)) = (&mut view.seen, at_bounds.take()) {
                 field.at_bounds = before;
             }
             let mut next = refined(&view.quadratic, &self.frequencies, &self.best);
@@ -318,7 +359,7 @@ impl Detection {
             self.closed = moved < STAYS * next.orbit.sigma_k_kms;
             self.best = next;
             // the field with a planet in the model is another one; what moves after that is too little to matter
-            if let Some(field) = &view.field {
+            if let Some(field) = view.field() {
                 settings.spots = Spots::Integrated(Known::of(&field.marginal));
                 at_bounds = Some(field.at_bounds.clone());
             }

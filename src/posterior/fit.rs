@@ -11,6 +11,7 @@ pub use checks::{Checks, ProfileCheck};
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Problem, Termination, parallelism};
 use crate::numerics::json::number_or_null;
+use crate::posterior::detection::{Seen, View};
 use crate::posterior::imaging::Imager;
 use crate::posterior::nuisances::{Estimate, LineAndContinuum};
 use crate::posterior::objective::tradeoff::Node;
@@ -186,6 +187,30 @@ impl Fit {
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
         let tradeoff = reference.tradeoff.nodes().to_vec();
         Fit { map, model, nuisances, zero_points_kms, velocities, tradeoff, summary, checks }
+    }
+}
+
+/// The profiles as the spots of a [`View`] explain them.
+#[derive(Clone, Debug)]
+pub struct Explained {
+    /// Radial velocities, one a profile.
+    pub velocities: Vec<FilteredVelocity>,
+    /// chi2 over the number of data.
+    pub chi2_per_datum: f64,
+    /// What is not like noise in what is left over.
+    pub misfit: Vec<String>,
+}
+
+impl Explained {
+    /// By the spots in `view`, of the `observations` that `imager` was made for.
+    pub fn new(imager: &Imager, observations: &Observations, view: &View) -> Self {
+        match &view.seen {
+            Seen::OneMap(image) => {
+                let Fit { velocities, summary, checks, .. } = Fit::new(imager, observations, &image.reference);
+                Explained { velocities, chi2_per_datum: summary.chi2_per_datum, misfit: checks.warnings }
+            }
+            Seen::Integrated(fitted) => changing::explained(imager, observations, fitted),
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::planets::periodogram::{
 use crate::planets::verdict::{Finding, Remark, Signal, Verdict};
 use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, robustness};
 use crate::posterior::expansion::nuisances;
-use crate::posterior::fit::Fit;
+use crate::posterior::fit::Explained;
 use crate::posterior::objective::{Parameter, ParameterValues, Prior};
 use serde::{Deserialize, Serialize};
 
@@ -39,31 +39,38 @@ enum SearchError {
 }
 
 impl BlindSearch {
-    /// Searches the star of `scene`, what its config leaves free integrated out. `None` where no orbit is asked for, K
-    /// being fixed. Where the search fails the verdict says why.
-    pub fn of(scene: &Scene) -> Option<Self> {
+    /// Searches the star of `scene`, what its config leaves free integrated out; the search `before` is taken where
+    /// there is one. `None` where no orbit is asked for, K being fixed. Where the search fails the verdict says why.
+    pub fn of(scene: &Scene, before: Option<&Detection>) -> Option<Self> {
         let asked = scene.settings.free.iter().any(|f| f.parameter == Parameter::K);
-        asked.then(|| BlindSearch::tried(scene).unwrap_or_else(|error| BlindSearch::failed(&error)))
+        asked.then(|| BlindSearch::tried(scene, before).unwrap_or_else(|error| BlindSearch::failed(&error)))
     }
 
-    fn tried(scene: &Scene) -> Result<Self, SearchError> {
+    fn tried(scene: &Scene, before: Option<&Detection>) -> Result<Self, SearchError> {
         let rotation_period_d = scene.imager.star.rotation_period_d;
         let frequencies = Frequencies::new(&scene.imager.cycles(), rotation_period_d, FrequencySettings::default())?;
         let settings = DetectionSettings {
             spots: scene.spots(),
             ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), nuisances(&scene.settings.free))
         };
-        let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ())?;
-        let fit = Fit::new(&scene.imager, &scene.observations, &found.last().reference);
-        let misfit: Vec<String> = fit.checks.warnings.iter().cloned().chain(scene.measured.misfit_text()).collect();
+        let anew;
+        let found = match before {
+            Some(found) => found,
+            None => {
+                anew = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ())?;
+                &anew
+            }
+        };
+        let explained = Explained::new(&scene.imager, &scene.observations, found.last());
+        let misfit: Vec<String> = explained.misfit.into_iter().chain(scene.measured.misfit_text()).collect();
         // of what is no candidate it would say nothing
-        let choices = found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, &found));
+        let choices = found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, found));
         let evidence =
             Evidence { imager: &scene.imager, settings: &settings, robustness: choices.as_ref(), misfit: &misfit };
         let mut remarks = found.remarks(&evidence);
         let mut verdict = found.verdict(&remarks);
         let prior = |p: Parameter| scene.settings.free.iter().find(|f| f.parameter == p).map(|f| f.prior);
-        let periods = Periods::of(prior(Parameter::PorbOverProt), &scene.settings.values, &found);
+        let periods = Periods::of(prior(Parameter::PorbOverProt), &scene.settings.values, found);
         if !periods.contain(found.best.porb_over_prot) {
             remarks.retain(|remark| !found.of_the_period().contains(remark));
             remarks.push(Remark::against(
@@ -76,7 +83,7 @@ impl BlindSearch {
                 ),
             ));
             if verdict.finding != Finding::NotJudged {
-                verdict = within(&periods, &found, &remarks);
+                verdict = within(&periods, found, &remarks);
             }
         }
         let k_kms = verdict.signal.map(|signal| signal.k_kms);

@@ -100,7 +100,8 @@ impl OptimumFile {
             converged: optimum.converged,
             covariance: rows(&optimum.written_covariance),
             internal_curvature: rows(&optimum.curvature),
-            blind_search: BlindSearch::of(scene).map(|search| search.beside(porb_over_prot, prot)),
+            blind_search: BlindSearch::of(scene, found.detection.as_deref())
+                .map(|search| search.beside(porb_over_prot, prot)),
             derived,
             truth: scene.truth.map(|values| by_name(&values)),
             derived_truth,

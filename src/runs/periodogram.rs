@@ -10,7 +10,7 @@ use crate::posterior::detection::{
     Detection, DetectionError, DetectionSettings, Evidence, Robustness, Stage, View, robustness,
 };
 use crate::posterior::expansion::nuisances;
-use crate::posterior::fit::Fit;
+use crate::posterior::fit::Explained;
 use std::path::{Path, PathBuf};
 
 /// What to search for, and how.
@@ -74,7 +74,8 @@ pub struct Periodogram<'a> {
     settings: DetectionSettings,
     detection: Detection,
     choices: Robustness,
-    planet_free: Fit,
+    planet_free: Explained,
+    at_best: Explained,
     remarks: Vec<Remark>,
     provenance: Provenance,
     /// What is said of the best orbit.
@@ -120,14 +121,13 @@ impl<'a> Periodogram<'a> {
         let detection = Detection::find(imager, values, frequencies, &settings, &at).map_err(failed)?;
         report("other targets, without each night");
         let choices = robustness(imager, values, &settings, &detection);
-        let fit = |view: &View| Fit::new(imager, &scene.observations, &view.reference);
-        let mut misfit = fit(detection.last()).checks.warnings;
-        misfit.extend(scene.measured.misfit_text());
+        let explained = |view: &View| Explained::new(imager, &scene.observations, view);
+        let (planet_free, at_best) = (explained(&detection.planet_free), explained(detection.last()));
+        let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
         let evidence = Evidence { imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
         let remarks = detection.remarks(&evidence);
-        let (verdict, planet_free) = (detection.verdict(&remarks), fit(&detection.planet_free));
-        let provenance = scene.provenance();
-        Ok(Periodogram { scene, settings, detection, choices, planet_free, remarks, provenance, verdict })
+        let (verdict, provenance) = (detection.verdict(&remarks), scene.provenance());
+        Ok(Periodogram { scene, settings, detection, choices, planet_free, at_best, remarks, provenance, verdict })
     }
 
     fn result(&self) -> PeriodogramResult<'_> {
@@ -138,7 +138,8 @@ impl<'a> Periodogram<'a> {
             remarks: &self.remarks,
             robustness: &self.choices,
             settings: &self.settings,
-            fit: &self.planet_free,
+            planet_free: &self.planet_free,
+            at_best: &self.at_best,
             truth: self.scene.truth,
             mass_msun: self.scene.settings.mass_msun,
             provenance: &self.provenance,

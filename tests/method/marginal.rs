@@ -1,10 +1,12 @@
 //! The marginal likelihood of stars that change, against an independent implementation (`tests/data/evolving`).
 
-use dimcmc::Scene;
 use dimcmc::internals::field::Lifetime;
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings, orbits};
+use dimcmc::internals::posterior::detection::{Detection, DetectionSettings, Evidence};
 use dimcmc::internals::posterior::marginal::{Basis, Change, Known, MarginalPosterior, fit};
 use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use dimcmc::{Config, Scene};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 fn folder(star: &str) -> PathBuf {
@@ -33,6 +35,7 @@ fn the_highest_peak_is_that_of_another_implementation() {
             slope: Some(number("hyper", "slope")),
             lifetime: Some(Lifetime::Days(number("hyper", "lifetime_d"))),
             jitter_kms: Some(0.0),
+            ..Known::default()
         };
         let basis = Basis::new(&scene.imager.grid);
         let fitted = fit(&scene.imager, &basis, values, known, None).unwrap();
@@ -62,6 +65,57 @@ fn a_star_that_changes_is_told_from_one_that_does_not() {
         let change = Change::of(&scene.imager, values, &frequencies, &[], known).unwrap();
         assert_eq!(change.is_changing(), changes, "{name}: {change:?}");
     }
+}
+
+/// Maximum entropy has no part in it: no map without spots is refused, whatever the target chi2.
+#[test]
+fn a_planet_of_a_star_without_spots_is_found() {
+    let cycles: Vec<f64> = (0..18).map(|k| 0.37 * f64::from(k) + 0.05 * f64::from(k % 3)).collect();
+    let config = Config::default()
+        .with("star", json!({ "rotation_period_d": 2.0, "inclination_deg": 50.0, "vsini_kms": 25.0, "contrast": 0.1 }))
+        .with("star.line", json!({ "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }))
+        .with("planet", json!({ "k_kms": 0.4, "porb_over_prot": 1.7, "phi": 0.2 }))
+        .with("observations.simulate.spots", json!([]))
+        .with("observations.simulate.cycles", cycles)
+        .with("observations.simulate.velocity_kms", json!({ "min": -33.0, "max": 33.0, "step": 3.0 }))
+        .with("observations.simulate.snr", 500.0)
+        .with("observations.simulate.pixels", 2000)
+        .with("imaging", json!({ "pixels": 300, "chi2_target": 0.5, "objective": "marginal-likelihood" }));
+    let scene = Scene::new(&config).unwrap();
+    let usual = FrequencySettings::default();
+    let frequencies = Frequencies::new(&scene.imager.cycles(), scene.imager.star.rotation_period_d, usual).unwrap();
+    let settings = DetectionSettings { spots: scene.spots(), ..DetectionSettings::of(0.5, Vec::new()) };
+    let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ()).unwrap();
+    assert!(found.last().image().is_none());
+    let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: None, misfit: &[] };
+    let remarks = found.remarks(&evidence);
+    let verdict = found.verdict(&remarks);
+    let signal = verdict.signal.unwrap();
+    assert!((signal.k_kms - 0.4).abs() < 3.0 * signal.sigma_k_kms, "{}", verdict.sentence);
+    assert!((signal.period_d - 3.4).abs() < 0.1, "{}", verdict.sentence);
+    assert!(verdict.false_alarm_probability.unwrap() < 1e-4, "{}", verdict.sentence);
+    assert!(remarks.iter().any(|r| r.text.contains("the profiles show no spots")), "{remarks:?}");
+    assert!(remarks.iter().all(|r| !r.text.contains("chi2")), "{remarks:?}");
+}
+
+/// What is known of the field beforehand counts where it is fitted, too.
+#[test]
+fn a_prior_of_the_field_counts_in_its_fit() {
+    let (scene, values, _) = star("slow-planet");
+    let basis = Basis::new(&scene.imager.grid);
+    let even = Known { jitter_kms: Some(0.0), slope: Some(0.5), amplitude: Some(0.24), ..Known::default() };
+    let fitted = |prior: Option<Prior>| {
+        let known = Known { priors: [None, None, prior], ..even };
+        let fitted = fit(&scene.imager, &basis, values, known, None).unwrap();
+        (fitted.marginal.assumed.field.kernel.lifetime.days().unwrap(), fitted)
+    };
+    let (free_d, free) = fitted(None);
+    let (held_d, held) = fitted(Some(Prior::Normal { mean: 2.0 * free_d, sd: 3.0, min: 0.3, max: 3000.0 }));
+    assert!((held_d - 2.0 * free_d).abs() < 9.0, "{held_d} {free_d}");
+    assert!(held.ln_evidence < free.ln_evidence);
+    let (below_d, below) = fitted(Some(Prior::LogUniform { min: 1.0, max: 0.5 * free_d }));
+    assert!((below_d / (0.5 * free_d) - 1.0).abs() < 1e-6, "{below_d} {free_d}");
+    assert_eq!(below.at_bounds, ["spot_lifetime_d"]);
 }
 
 /// The posterior of slow-planet with these parameters free, around its planet and the field of the reference.

@@ -266,13 +266,17 @@ impl Settings {
     /// What is known of the field of spots before the profiles, where maps are integrated over.
     pub fn known_field(&self) -> Known {
         let ImagingSettings { spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.imaging;
+        let priors = Parameter::FIELD.map(|p| self.free.iter().find(|f| f.parameter == p).map(|f| f.prior));
+        // a number beside a prior is where a chain starts
+        let number = |i: usize, given: Hyperparameter| given.known().filter(|_| priors[i].is_none());
         Known {
-            amplitude: spot_amplitude.known(),
-            slope: spot_slope.known(),
+            amplitude: number(0, spot_amplitude),
+            slope: number(1, spot_slope),
             lifetime: match spot_lifetime_d {
                 Hyperparameter::Static => Some(Lifetime::Static),
-                days => days.known().map(Lifetime::Days),
+                days => number(2, days).map(Lifetime::Days),
             },
+            priors,
             jitter_kms: match self.velocity_jitter {
                 VelocityJitter::Known(kms) => Some(kms),
                 VelocityJitter::Fitted => None,

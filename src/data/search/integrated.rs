@@ -29,7 +29,11 @@ pub(super) fn find(
 ) -> Result<Found, SearchError> {
     let at = |stage| report(Progress { stage, evaluations: 0 });
     at(Stage::FirstImage);
-    let (mut theta, field, jitter_kms) = match blind(imager, space, settings) {
+    let (detection, start) = match blind(imager, space, settings) {
+        Some((detection, start)) => (Some(Box::new(detection)), start),
+        None => (None, None),
+    };
+    let (mut theta, field, jitter_kms) = match start {
         Some(start) => start,
         None => without_search(imager, space, settings)?,
     };
@@ -55,12 +59,13 @@ pub(super) fn find(
         }
         theta = next_theta;
         let posterior = Density::Integrated(Box::new(posterior));
-        highest = Some(Found { posterior, optimum: next, attempts: Vec::new() });
+        highest = Some(Found { posterior, optimum: next, attempts: Vec::new(), detection: None });
         if moved < REFERENCE_SHIFT {
             break;
         }
     }
-    let mut found = highest.ok_or(SearchError::Field(FieldError::NotPositive))?;
+    let mut found = highest.ok_or(FieldError::NotPositive)?;
+    found.detection = detection;
     if let Density::Integrated(posterior) = &found.posterior {
         found.attempts = attempts(posterior, &found.optimum.theta)?;
     }
@@ -70,8 +75,8 @@ pub(super) fn find(
 /// Where to begin: vector, field and jitter.
 type Start = (Vec<f64>, ParameterValues, f64);
 
-/// The orbit that a blind search finds, where an orbit is looked for and the priors allow it.
-fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Option<Start> {
+/// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
+fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Option<(Detection, Option<Start>)> {
     let orbit = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
     orbit.iter().all(|p| space.free().iter().any(|f| f.parameter == *p)).then_some(())?;
     let usual = FrequencySettings::default();
@@ -82,7 +87,7 @@ fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> O
     };
     let values = space.values_at(&space.start());
     let found = Detection::find(imager, values, frequencies, &wanted, &|_| ()).ok()?;
-    let marginal = &found.last().field.as_ref()?.marginal;
+    let marginal = &found.last().field()?.marginal;
     let mut values = marginal.values;
     values[Parameter::K] = found.best.orbit.k_kms;
     values[Parameter::PorbOverProt] = found.best.porb_over_prot;
@@ -90,7 +95,8 @@ fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> O
     let mut theta = with_field(space, space.theta_of(&values), &values);
     // phi as its prior has it
     theta = space.to_physical(&space.to_sampling(&theta));
-    space.log_prior(&theta).is_finite().then_some((theta, values, marginal.assumed.jitter_kms))
+    let start = space.log_prior(&theta).is_finite().then_some((theta, values, marginal.assumed.jitter_kms));
+    Some((found, start))
 }
 
 /// The highest of the maxima that the expansion around the star without a planet has, the field fitted anew there.

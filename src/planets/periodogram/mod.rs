@@ -117,6 +117,16 @@ impl Search {
         Ok(Search { rows, peaks, rotation, false_alarm })
     }
 
+    /// The same where spots imitate no orbits of several rotations.
+    #[must_use]
+    pub fn without_multiples(mut self) -> Self {
+        self.rotation.multiples = 1;
+        for peak in &mut self.peaks {
+            peak.imitation = self.rotation.imitated(peak.porb_over_prot, peak.sigma_porb_over_prot);
+        }
+        self
+    }
+
     /// The highest peak.
     pub fn best(&self) -> &Peak {
         &self.peaks[0]

@@ -11,7 +11,10 @@ use serde::{Deserialize, Serialize};
 
 /// Fractions and multiples of the rotation period that are looked at.
 const FRACTIONS: u32 = 4;
-const MULTIPLES: u32 = 4;
+
+fn usual_multiples() -> u32 {
+    4
+}
 
 /// A period is told from another if its frequency differs by more than so many standard errors, but for the second
 /// number (in inverse time bases) within which it never is: spots that change or rotate differentially do not keep
@@ -67,6 +70,10 @@ pub struct RotationPeriods {
     pub window: Vec<WindowPeak>,
     /// Time base in rotation cycles.
     pub time_base_cycles: f64,
+    /// The largest multiple of the rotation period that is looked at. Where spots may change it is 1: the field knows
+    /// that they return with each rotation, and how long they live.
+    #[serde(default = "usual_multiples")]
+    pub multiples: u32,
 }
 
 impl RotationPeriods {
@@ -81,7 +88,7 @@ impl RotationPeriods {
                 all.push(WindowPeak { frequency, height });
             }
         }
-        RotationPeriods { window: all, time_base_cycles }
+        RotationPeriods { window: all, time_base_cycles, multiples: usual_multiples() }
     }
 
     /// The star's period that `porb_over_prot`, known to `sigma`, is not told from, if there is one: itself rather than
@@ -91,7 +98,7 @@ impl RotationPeriods {
         let sigma = sigma.filter(|s| s.is_finite()).unwrap_or(f64::INFINITY) * frequency * frequency;
         let wide = SAME / self.time_base_cycles;
         let tight = (TOLD_APART.0 * sigma).max(TOLD_APART.1 / self.time_base_cycles).min(wide);
-        let own = || (1..=FRACTIONS).map(|n| (1, n)).chain((2..=MULTIPLES).map(|n| (n, 1)));
+        let own = || (1..=FRACTIONS).map(|n| (1, n)).chain((2..=self.multiples).map(|n| (n, 1)));
         let of = |(n, d): (u32, u32)| f64::from(d) / f64::from(n);
         let direct = own().find(|&pair| {
             let within = if pair.0 == 1 { wide } else { tight };
@@ -127,6 +134,15 @@ mod tests {
         assert_eq!(words(0.7308 / rotation_period_d, 0.006).as_deref(), Some("an alias of Prot by 1.000/d"));
         assert_eq!(words(0.501, 0.0003).as_deref(), Some("close to Prot/2"));
         assert_eq!(words(1.45, 0.004), None);
+    }
+
+    #[test]
+    fn without_multiples_two_rotations_are_a_period_like_others() {
+        let cycles: Vec<f64> = (0..50).map(|k| 0.6 * f64::from(k)).collect();
+        let all = RotationPeriods::new(&cycles, 3.0, &[], 29.4);
+        let own = RotationPeriods { multiples: 1, ..all.clone() };
+        assert!(all.imitated(2.0, Some(0.01)).is_some() && own.imitated(2.0, Some(0.01)).is_none());
+        assert_eq!(all.imitated(1.0, Some(0.01)), own.imitated(1.0, Some(0.01)));
     }
 
     /// A period that is five of its errors from two rotations is another one, however few rotations were seen.

@@ -68,7 +68,7 @@ pub fn robustness(
     found: &Detection,
 ) -> Robustness {
     let peak = &found.best;
-    let field = found.last().field.as_ref();
+    let field = found.last().field();
     let spots = field.map_or(settings.spots, |field| Spots::Integrated(Known::of(&field.marginal)));
     let settings = &DetectionSettings { spots, ..settings.clone() };
     values[Parameter::K] = peak.orbit.k_kms;
@@ -80,7 +80,7 @@ pub fn robustness(
         let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
         AtTarget {
             chi2_target,
-            on_target: view.as_ref().is_ok_and(|view| view.on_target),
+            on_target: view.as_ref().is_ok_and(|view| view.image().is_none_or(|image| image.on_target)),
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };

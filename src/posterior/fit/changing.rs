@@ -2,12 +2,12 @@
 //! deviation at any time, model profiles, and radial velocities with all maps integrated out (`docs/method.md` section
 //! 9).
 
-use super::{Checks, Residual, residuals, rms, scatter};
+use super::{Checks, Explained, FilteredVelocity, Residual, residuals, rms, scatter};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::numerics::json::number_or_null;
 use crate::numerics::vector::{self, Instructions, Task};
 use crate::posterior::imaging::{Data, Imager};
-use crate::posterior::marginal::{Assumed, Basis, Fitted, Known, Maps, Marginal, fit};
+use crate::posterior::marginal::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
 use crate::posterior::nuisances::{Estimate, LineAndContinuum};
 use crate::posterior::objective::ParameterValues;
 use crate::sampling::log_density::Status;
@@ -129,9 +129,9 @@ pub struct ChangingSummary {
 /// Why there are no such maps.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoField {
-    /// The field cannot be integrated over.
+    /// There is no most probable field.
     #[error(transparent)]
-    Field(#[from] FieldError),
+    Fit(#[from] NoFit),
     /// No map can be asked for at these times.
     #[error("{0}")]
     Times(&'static str),
@@ -141,26 +141,14 @@ pub enum NoField {
         observations.sigma_scale may be too large"
     )]
     TooFaint(f64),
-    /// No spots are like that.
-    #[error(
-        "the amplitude of the spots grows to the upper bound of its search, {0:.2}: spots stand in for something else; \
-        star.vsini_kms, star.line or observations.sigma_scale may be wrong"
-    )]
-    TooLarge(f64),
-    /// The density of the data is no number.
-    #[error("the evidence of the most probable field is not finite; data or errors are beyond sense")]
-    NotFinite,
 }
 
 impl NoField {
     /// A name for it.
     pub fn status(&self) -> &'static str {
         match self {
-            NoField::Field(FieldError::NoSuchField { .. }) => "no-such-field",
-            NoField::Field(FieldError::NotFinite { .. }) | NoField::NotFinite => "non-finite",
-            NoField::Field(FieldError::NotPositive) => "not-positive",
-            NoField::Field(FieldError::NotSettled { .. }) => "not-settled",
-            NoField::TooFaint(_) | NoField::TooLarge(_) => "amplitude-at-bound",
+            NoField::Fit(error) => error.status(),
+            NoField::TooFaint(_) => "amplitude-at-bound",
             NoField::Times(_) => "no-such-times",
         }
     }
@@ -183,7 +171,9 @@ impl ChangingFit {
         let times_d = times_d.map(in_order).transpose()?;
         let basis = Basis::new(&imager.grid);
         let fitted = fit(imager, &basis, values, known, None)?;
-        check(&fitted)?;
+        if let Some(amplitude) = fitted.too_faint() {
+            return Err(NoField::TooFaint(amplitude));
+        }
         let marginal = &fitted.marginal;
         let settled = &marginal.settled;
         let modelled = Modelled::of(imager, &basis, marginal, &settled.coefficients);
@@ -202,7 +192,7 @@ impl ChangingFit {
         };
         let mut warnings = reached(&fitted);
         warnings.extend(far(&times_d, observations, &marginal.assumed.field.kernel));
-        let velocities = velocities(imager, &basis, observations, marginal, &modelled)?;
+        let velocities = velocities(imager, &basis, observations, marginal, &modelled).map_err(NoFit::from)?;
         let mut summary = summarise(imager, observations, &marginal.values, &residuals, &velocities);
         summary.chi2_per_datum_unchanging =
             unchanging.as_ref().map(|modelled| chi2(&super::residuals(observations, &modelled.depths())).0);
@@ -223,15 +213,26 @@ impl ChangingFit {
     }
 }
 
-/// That the field is one.
-fn check(fitted: &Fitted) -> Result<(), NoField> {
-    let amplitude = fitted.marginal.assumed.field.spectrum.amplitude;
-    match fitted.at_bounds.contains(&"spot_amplitude") {
-        // the bounds are far apart
-        true if amplitude < 0.5 => Err(NoField::TooFaint(amplitude)),
-        true => Err(NoField::TooLarge(amplitude)),
-        false if !fitted.ln_evidence.is_finite() => Err(NoField::NotFinite),
-        false => Ok(()),
+/// The profiles as the most probable maps of a field explain them.
+pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &Fitted) -> Explained {
+    let marginal = &fitted.marginal;
+    let modelled = Modelled::of(imager, &Basis::new(&imager.grid), marginal, &marginal.settled.coefficients);
+    let residuals = residuals(observations, &modelled.depths());
+    let state = marginal.values.state();
+    let velocity = |(profile, depth): (&Profile, &[f64])| {
+        let cycle = imager.star.cycle(profile.time_d);
+        FilteredVelocity {
+            time_d: profile.time_d,
+            cycle,
+            observed: profile.first_moment(observations.step_kms),
+            modelled_kms: profile.first_moment_of(depth, observations.step_kms),
+            orbit_kms: state.vsys_kms + state.orbit.velocity_kms(cycle),
+        }
+    };
+    Explained {
+        velocities: observations.profiles.iter().zip(modelled.depths()).map(velocity).collect(),
+        chi2_per_datum: chi2(&residuals).0,
+        misfit: Checks::of_flexible(&residuals, imager.data.correlated_bins).warnings,
     }
 }
 

@@ -7,7 +7,7 @@
 //! kept: where that gains enough the star changes, and where it gains nothing it does not. In between, the changing
 //! field is fitted as well, with an orbit of its own.
 
-use super::fit::{Fitted, Known, fit, usual};
+use super::fit::{Fitted, Known, NoFit, fit, usual};
 use super::{Assumed, Basis, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::planets::periodogram::Frequencies;
@@ -43,14 +43,14 @@ impl Change {
     /// Compares both for the profiles of `imager`, all but the orbit as in `values`, the `nuisances` integrated out.
     ///
     /// # Errors
-    /// [`FieldError`] where the field that does not change cannot be fitted.
+    /// [`NoFit`] where the field that does not change cannot be fitted.
     pub fn of(
         imager: &Imager,
         values: ParameterValues,
         frequencies: &Frequencies,
         nuisances: &[Nuisance],
         known: Known,
-    ) -> Result<Self, FieldError> {
+    ) -> Result<Self, NoFit> {
         let basis = Basis::rough(&imager.grid);
         let with_best_orbit = |near: &Marginal| with_best_orbit(near, imager, &basis, values, frequencies, nuisances);
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;

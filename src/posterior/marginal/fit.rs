@@ -4,7 +4,7 @@
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
 use crate::posterior::imaging::Imager;
-use crate::posterior::objective::{Parameter, ParameterValues};
+use crate::posterior::objective::{Parameter, ParameterValues, Prior};
 use nalgebra::{Matrix4, Vector4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -60,6 +60,9 @@ pub struct Known {
     pub lifetime: Option<Lifetime>,
     /// Velocity jitter (km/s).
     pub jitter_kms: Option<f64>,
+    /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are even between the bounds
+    /// in ln amplitude, slope and ln lifetime.
+    pub priors: [Option<Prior>; 3],
 }
 
 impl Known {
@@ -71,12 +74,42 @@ impl Known {
             slope: Some(field.spectrum.slope),
             lifetime: Some(field.kernel.lifetime),
             jitter_kms: Some(jitter_kms),
+            priors: [None; 3],
         }
     }
 
     /// The spectrum where a search starts.
     fn spectrum(&self) -> Spectrum {
-        Spectrum { amplitude: self.amplitude.unwrap_or(USUAL[0]), slope: self.slope.unwrap_or(USUAL[1]) }
+        let usual = |i: usize| self.within(i, USUAL[i]);
+        Spectrum { amplitude: self.amplitude.unwrap_or(usual(0)), slope: self.slope.unwrap_or(usual(1)) }
+    }
+
+    /// Bounds of amplitude, slope or lifetime: those of their prior, where there is one.
+    fn bounds(&self, i: usize) -> (f64, f64) {
+        let (low, high) = BOUNDS[i];
+        let (least, most) = self.priors[i].map_or(BOUNDS[i], |prior| prior.bounds());
+        (low.max(least), high.min(most))
+    }
+
+    fn within(&self, i: usize, x: f64) -> f64 {
+        let (low, high) = self.bounds(i);
+        x.clamp(low, high)
+    }
+
+    /// ln of the prior density in the coordinates of [`place`].
+    fn log_prior(&self, assumed: &Assumed) -> f64 {
+        let Field { spectrum, kernel } = assumed.field;
+        let numbers = [Some(spectrum.amplitude), Some(spectrum.slope), kernel.lifetime.days()];
+        let of = |i: usize| {
+            let (prior, x) = (self.priors[i]?, numbers[i]?);
+            free(assumed, self)[i].then(|| prior.log_density(x) + Parameter::FIELD[i].log_jacobian(x))
+        };
+        (0..3).filter_map(of).sum()
+    }
+
+    /// What is maximised: ln Z, and what is known of the field beforehand.
+    fn height(&self, of: &Marginal) -> f64 {
+        of.ln_evidence() + self.log_prior(&of.assumed)
     }
 
     /// The same of a star that does not change.
@@ -94,6 +127,54 @@ pub struct Fitted {
     pub ln_evidence: f64,
     /// Bounds of the search that were reached.
     pub at_bounds: Vec<&'static str>,
+}
+
+/// Why there is no most probable field.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoFit {
+    /// The field cannot be integrated over.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// No spots are like that.
+    #[error(
+        "the amplitude of the spots grows to the upper bound of its search, {0:.2}: spots stand in for something else; \
+        star.vsini_kms, star.line, star.vsys_kms or observations.sigma_scale may be wrong"
+    )]
+    TooLarge(f64),
+    /// The density of the data is no number.
+    #[error("the evidence of the most probable field is not finite; data or errors are beyond sense")]
+    NotFinite,
+}
+
+impl NoFit {
+    /// A name for it.
+    pub fn status(&self) -> &'static str {
+        match self {
+            NoFit::Field(FieldError::NoSuchField { .. }) => "no-such-field",
+            NoFit::Field(FieldError::NotFinite { .. }) | NoFit::NotFinite => "non-finite",
+            NoFit::Field(FieldError::NotPositive) => "not-positive",
+            NoFit::Field(FieldError::NotSettled { .. }) => "not-settled",
+            NoFit::TooLarge(_) => "amplitude-at-bound",
+        }
+    }
+}
+
+impl Fitted {
+    /// The amplitude, where it lies on the lower bound: the profiles show no spots.
+    pub fn too_faint(&self) -> Option<f64> {
+        let amplitude = self.marginal.assumed.field.spectrum.amplitude;
+        (self.at_bounds.contains(&Parameter::SpotAmplitude.name()) && amplitude < USUAL[0]).then_some(amplitude)
+    }
+
+    /// That spots are like that.
+    fn checked(self) -> Result<Self, NoFit> {
+        let amplitude = self.marginal.assumed.field.spectrum.amplitude;
+        match self.at_bounds.contains(&Parameter::SpotAmplitude.name()) {
+            true if amplitude > BOUNDS[0].1 - 1e-9 => Err(NoFit::TooLarge(amplitude)),
+            _ if !self.ln_evidence.is_finite() => Err(NoFit::NotFinite),
+            _ => Ok(self),
+        }
+    }
 }
 
 /// The profiles with a usual field, but for what is known: one that does not change, if the lifetime is not. Maps are
@@ -117,14 +198,14 @@ pub(super) fn usual(
 /// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from several lifetimes.
 ///
 /// # Errors
-/// [`FieldError`] of the last attempt, where none succeeds.
+/// [`NoFit`]: of the last attempt, where none succeeds.
 pub fn fit(
     imager: &Imager,
     basis: &Basis,
     values: ParameterValues,
     known: Known,
     near: Option<&Marginal>,
-) -> Result<Fitted, FieldError> {
+) -> Result<Fitted, NoFit> {
     let design = Arc::new(Design::new(imager, basis, &values.state()));
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
@@ -137,7 +218,7 @@ pub fn fit(
         None => {
             let rough = basis.roughly();
             let start = |assumed: &Assumed| Marginal::new(imager, &rough, Arc::clone(&design), values, *assumed, None);
-            let best = highest(starts(&known).par_iter().with_max_len(1).map(start).collect())?;
+            let best = highest(starts(&known).par_iter().with_max_len(1).map(start).collect(), &known)?;
             at(best.assumed, Some(&best))?
         }
     };
@@ -147,14 +228,18 @@ pub fn fit(
     }
     let ln_evidence = marginal.ln_evidence();
     let at_bounds = reached(&marginal.assumed, &known);
-    Ok(Fitted { marginal, ln_evidence, at_bounds })
+    Fitted { marginal, ln_evidence, at_bounds }.checked()
 }
 
 /// Where a fit may start: several lifetimes, with and without a jitter, as far as they are not known.
 fn starts(known: &Known) -> Vec<Assumed> {
     let lifetimes: Vec<Lifetime> = match known.lifetime {
         Some(lifetime) => vec![lifetime],
-        None => LIFETIMES_D.map(Lifetime::Days).to_vec(),
+        None => {
+            let mut all = LIFETIMES_D.map(|days| known.within(2, days)).to_vec();
+            all.dedup();
+            all.into_iter().map(Lifetime::Days).collect()
+        }
     };
     let jitters = known.jitter_kms.map_or(vec![0.0, USUAL_JITTER_KMS], |kms| vec![kms]);
     let spectrum = known.spectrum();
@@ -167,11 +252,11 @@ fn starts(known: &Known) -> Vec<Assumed> {
 }
 
 /// The one with the highest ln Z, or the last error.
-fn highest(tried: Vec<Result<Marginal, FieldError>>) -> Result<Marginal, FieldError> {
+fn highest(tried: Vec<Result<Marginal, FieldError>>, known: &Known) -> Result<Marginal, FieldError> {
     let mut best: Option<Result<Marginal, FieldError>> = None;
     for next in tried {
         let is_better = match (&next, &best) {
-            (Ok(next), Some(Ok(best))) => next.ln_evidence() > best.ln_evidence(),
+            (Ok(next), Some(Ok(best))) => known.height(next) > known.height(best),
             (Err(_), Some(Ok(_))) => false,
             _ => true,
         };
@@ -220,9 +305,9 @@ fn assumed_at(place: Vector4<f64>, like: &Assumed) -> Assumed {
 }
 
 /// Bounds in the coordinates of [`place`].
-fn limits() -> [(f64, f64); 4] {
-    let [amplitude, slope, lifetime] = Parameter::FIELD.map(|p| {
-        let (low, high) = bounds(p);
+fn limits(known: &Known) -> [(f64, f64); 4] {
+    let [amplitude, slope, lifetime] = [0, 1, 2].map(|i| {
+        let ((low, high), p) = (known.bounds(i), Parameter::FIELD[i]);
         (p.to_sampling(low), p.to_sampling(high))
     });
     [amplitude, slope, lifetime, (JITTER_KMS.0.ln(), JITTER_KMS.1.ln())]
@@ -230,8 +315,8 @@ fn limits() -> [(f64, f64); 4] {
 
 /// Which of the fitted numbers lie on a bound.
 fn reached(assumed: &Assumed, known: &Known) -> Vec<&'static str> {
-    let (place, free) = (place(assumed), free(assumed, known));
-    let on = |i: &usize| free[*i] && (place[*i] <= limits()[*i].0 + 1e-9 || place[*i] >= limits()[*i].1 - 1e-9);
+    let (place, free, limits) = (place(assumed), free(assumed, known), limits(known));
+    let on = |i: &usize| free[*i] && (place[*i] <= limits[*i].0 + 1e-9 || place[*i] >= limits[*i].1 - 1e-9);
     (0..3).filter(on).map(|i| Parameter::FIELD[i].name()).collect()
 }
 
@@ -247,8 +332,8 @@ fn climb(
     known: &Known,
     at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
 ) -> Result<Marginal, FieldError> {
-    let free = free(&first.assumed, known);
-    let height = Marginal::ln_evidence;
+    let (free, limits) = (free(&first.assumed, known), limits(known));
+    let height = |of: &Marginal| known.height(of);
     // gradient, and second derivatives along each number. Derivatives at fixed maps are not enough: the determinant
     // changes with the maps, and outweighs the rest
     let slope = |of: &Marginal| {
@@ -256,7 +341,10 @@ fn climb(
         let beside = |i: usize, h: f64| {
             let mut to = from;
             to[i] += h;
-            at(assumed_at(to, &of.assumed), Some(of)).map(|there| height(&there)).ok()
+            at(assumed_at(to, &of.assumed), Some(of))
+                .map(|there| height(&there))
+                .ok()
+                .filter(|height| height.is_finite())
         };
         let along = |i: usize| {
             if !free[i] {
@@ -283,7 +371,7 @@ fn climb(
         let from = place(&here.assumed);
         // what pushes against a bound stays there
         let pushes = |i: usize| {
-            let (low, high) = limits()[i];
+            let (low, high) = limits[i];
             (from[i] <= low + 1e-9 && gradient[i] < 0.0) || (from[i] >= high - 1e-9 && gradient[i] > 0.0)
         };
         let inside = Vector4::from_fn(|i, _| if pushes(i) { 0.0 } else { gradient[i] });
@@ -293,7 +381,9 @@ fn climb(
             break;
         }
         step *= (LONGEST / step.amax()).min(1.0);
-        let Some((next, slope_there)) = shortened(&here, step, &gradient, &height, &slope, at) else { break };
+        let Some((next, slope_there)) = shortened(&here, step, &gradient, (&limits, &height), &slope, at) else {
+            break;
+        };
         let moved = Vector4::from_fn(|i, _| if free[i] { place(&next.assumed)[i] - from[i] } else { 0.0 });
         let bent = gradient - slope_there;
         let gained = height(&next) - height(&here);
@@ -316,14 +406,14 @@ fn shortened(
     here: &Marginal,
     mut step: Vector4<f64>,
     gradient: &Vector4<f64>,
-    height: &impl Fn(&Marginal) -> f64,
+    (limits, height): (&[(f64, f64); 4], &impl Fn(&Marginal) -> f64),
     slope: &impl Fn(&Marginal) -> (Vector4<f64>, Vector4<f64>),
     at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
 ) -> Option<(Marginal, Vector4<f64>)> {
     const TRIES: usize = 6;
     let from = place(&here.assumed);
     for _ in 0..TRIES {
-        let to = Vector4::from_fn(|i, _| (from[i] + step[i]).clamp(limits()[i].0, limits()[i].1.max(from[i])));
+        let to = Vector4::from_fn(|i, _| (from[i] + step[i]).clamp(limits[i].0, limits[i].1.max(from[i])));
         let to = Vector4::from_fn(|i, _| if step[i] == 0.0 { from[i] } else { to[i] });
         let next = at(assumed_at(to, &here.assumed), Some(here));
         if let Some(next) = next.ok().filter(|next| height(next) > height(here) + 1e-4 * gradient.dot(&step)) {

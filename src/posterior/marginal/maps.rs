@@ -5,6 +5,9 @@ use crate::field::{Epoch, FieldError, Settled, Sought, settle};
 use crate::posterior::imaging::Imager;
 use nalgebra::DMatrix;
 
+/// Times that maps are found with a jitter along the slopes of those before.
+const JITTERED: usize = 2;
+
 /// Maps at some times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maps {
@@ -24,21 +27,24 @@ impl Maps {
 }
 
 impl Marginal {
-    /// The same where the jitter is noise of the profiles, along their slopes at the most probable maps so far. Maps
-    /// that know nothing of it explain zero points by spots that change.
+    /// The same where the jitter is noise of the profiles, along their slopes at the most probable maps. Maps that know
+    /// nothing of it explain zero points by spots, so slopes and maps are found [`JITTERED`] times in turn: slopes of
+    /// other maps than these would seem to tell the velocities of the profiles from their zero points.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub(super) fn with_jitter(self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
-        let slopes = self.design.condensed(&self.slopes(imager, basis, &[]));
-        let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
-            Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
-        };
-        let linearise =
-            |maps: &DMatrix<f64>| self.design.epochs(imager, maps).into_iter().zip(&slopes).map(jittered).collect();
+    pub(super) fn with_jitter(mut self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
         let sought = Sought { field: self.assumed.field, degrees: &basis.degrees, watched: &basis.watched };
-        let start = self.settled.coefficients.clone();
-        let settled = settle(linearise, sought, start, Some(&self.settled.evidence), &basis.settling)?;
-        Ok(Marginal { settled, ..self })
+        for _ in 0..JITTERED {
+            let slopes = self.design.condensed(&self.slopes(imager, basis, &[]));
+            let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
+                Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
+            };
+            let linearise =
+                |maps: &DMatrix<f64>| self.design.epochs(imager, maps).into_iter().zip(&slopes).map(jittered).collect();
+            let start = self.settled.coefficients.clone();
+            self.settled = settle(linearise, sought, start, Some(&self.settled.evidence), &basis.settling)?;
+        }
+        Ok(self)
     }
 }

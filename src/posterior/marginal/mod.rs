@@ -23,7 +23,7 @@ mod posterior;
 
 pub use change::Change;
 pub use design::{Basis, Design};
-pub use fit::{Fitted, Known, bounds, fit, usual_value};
+pub use fit::{Fitted, Known, NoFit, bounds, fit, usual_value};
 pub use forecast::Forecast;
 pub use maps::Maps;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};

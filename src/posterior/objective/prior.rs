@@ -3,10 +3,10 @@
 //! Every density is normalised over its own bounds.
 
 use rand::Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The prior of one free parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "prior", rename_all = "kebab-case")]
 pub enum Prior {
     /// Constant density.

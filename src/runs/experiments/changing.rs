@@ -158,7 +158,7 @@ impl Star {
         let near = |frequency: f64| (1.0 / frequency - 1.0).abs() < NEAR;
         let trials = found.blind.rows.iter().map(|row| row.trial).filter(|trial| !near(trial.frequency));
         let away = trials.filter_map(|trial| Some(trial.orbit?.sigma_k_kms));
-        let field = found.last().field.as_ref();
+        let field = found.last().field();
         Ok(Searched {
             verdict: found.verdict(&remarks),
             porb_over_prot: found.best.porb_over_prot,

@@ -1,6 +1,5 @@
 //! The blind search after an orbit has been put in, to second order around the image without a planet.
 
-use crate::field::FieldError;
 use crate::planets::periodogram::orbits::scan;
 use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
@@ -8,7 +7,7 @@ use crate::planets::verdict::CANDIDATE_FAP;
 use crate::posterior::detection::{DetectionError, DetectionSettings, Spots, View};
 use crate::posterior::expansion::Expansion;
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::Change;
+use crate::posterior::marginal::{Change, NoFit};
 use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::runs::limits::LimitSettings;
 use crate::star::Orbit;
@@ -48,7 +47,7 @@ pub struct Shortcut<'a> {
     /// Image and expansion.
     pub view: View,
     /// Whether the star changes, where spots are taken for unchanging.
-    pub change: Option<Result<Change, FieldError>>,
+    pub change: Option<Result<Change, NoFit>>,
     /// What was taken out of the profiles: the orbit found, with the opposite sign.
     pub removed: Option<Orbit>,
     /// The search before anything is put in.

@@ -155,7 +155,7 @@ impl Run {
         let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
         // what was not evaluated looks like a start that is none
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
-        let manifest = new_manifest(scene, origin, &target, BlindSearch::of(scene), start);
+        let manifest = new_manifest(scene, origin, &target, BlindSearch::of(scene, found.detection.as_deref()), start);
         let mut chain = Chain::new(manifest.shape());
         chain.push_step(&first)?;
         let run = Run::of(scene, manifest, (target, task), surrogate, (None, chain));

@@ -18,7 +18,7 @@ use crate::planets::periodogram::Search;
 use crate::planets::periodogram::orbits::scan;
 use crate::planets::verdict::{Remark, Verdict};
 use crate::posterior::detection::{Detection, DetectionSettings, Robustness};
-use crate::posterior::fit::Fit;
+use crate::posterior::fit::Explained;
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::ParameterValues;
 use nalgebra::{DMatrix, DVector};
@@ -39,8 +39,10 @@ pub struct PeriodogramResult<'a> {
     pub robustness: &'a Robustness,
     /// How it was asked for.
     pub settings: &'a DetectionSettings,
-    /// The planet-free image held against the data.
-    pub fit: &'a Fit,
+    /// The profiles as the spots of a star without a planet explain them.
+    pub planet_free: &'a Explained,
+    /// The same beside the best orbit.
+    pub at_best: &'a Explained,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
@@ -104,7 +106,7 @@ impl PeriodogramResult<'_> {
     fn rv(&self, velocities: &DVector<f64>, covariance: &DMatrix<f64>) -> Table {
         let moments = ["first_moment_kms", "first_moment_sigma_kms", "filtered_kms"];
         let mut table = Table::new(&[&["time_d", "cycle", "rv_kms", "rv_sigma_kms"][..], &moments].concat());
-        for (k, v) in self.fit.velocities.iter().enumerate() {
+        for (k, v) in self.planet_free.velocities.iter().enumerate() {
             let (rv, sigma) = (velocities[k], covariance[(k, k)].sqrt());
             let moment = v.observed;
             table.row(&[v.time_d, v.cycle, rv, sigma, moment.value_kms, moment.sigma_kms, v.filtered_kms()]);

@@ -61,7 +61,7 @@ impl QuantitiesRecord {
 
 impl PeriodogramResult<'_> {
     pub(super) fn orbit_quantities(&self) -> OrbitQuantities {
-        let times = || self.fit.velocities.iter().map(|velocity| velocity.time_d);
+        let times = || self.planet_free.velocities.iter().map(|velocity| velocity.time_d);
         let span = times().reduce(f64::min).zip(times().reduce(f64::max)).map(|(first, last)| [first, last]);
         OrbitQuantities::new(&self.imager.star, self.mass_msun, span)
     }

@@ -10,7 +10,6 @@ use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::posterior::detection::View;
 use crate::posterior::marginal::{Change, Fitted, Known};
 use crate::posterior::objective::ParameterValues;
 use serde::{Deserialize, Serialize};
@@ -79,7 +78,7 @@ pub struct FieldRecord {
 impl FieldRecord {
     /// Of a fit.
     pub fn of(fitted: &Fitted) -> Self {
-        let Known { amplitude, slope, lifetime, jitter_kms } = Known::of(&fitted.marginal);
+        let Known { amplitude, slope, lifetime, jitter_kms, .. } = Known::of(&fitted.marginal);
         FieldRecord {
             spot_amplitude: amplitude.unwrap_or(f64::NAN),
             spot_slope: slope.unwrap_or(f64::NAN),
@@ -276,18 +275,19 @@ impl PeriodogramResult<'_> {
                 time_base_d: found.frequencies.time_base_cycles * prot,
                 seed: self.settings.search.seed,
             },
-            field: found.last().field.as_ref().map(|field| FieldRecord::of(field)),
+            field: found.last().field().map(FieldRecord::of),
             change: found.change.and_then(Result::ok),
             expansion: ExpansionRecord {
                 marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name().to_owned()).collect(),
-                unresolved_spots: [found.planet_free.unresolved_spots, found.last().unresolved_spots],
+                unresolved_spots: [&found.planet_free, found.last()]
+                    .map(|view| view.image().map_or(1.0, |image| image.unresolved_spots)),
                 regularised_delta_ln_l: found.regularised_delta_ln_l(),
                 rounds: found.rounds,
                 closed: found.closed,
                 data: self.imager.data.depth.len(),
                 chi2_target: self.settings.chi2_target,
-                chi2_per_datum_planet_free: self.per_datum(&found.planet_free),
-                chi2_per_datum: self.per_datum(found.last()),
+                chi2_per_datum_planet_free: self.planet_free.chi2_per_datum,
+                chi2_per_datum: self.at_best.chi2_per_datum,
             },
             offset: found.offset,
             co_rotation: CoRotationRecord {
@@ -298,10 +298,6 @@ impl PeriodogramResult<'_> {
             warnings: self.remarks.iter().map(|remark| remark.text.clone()).collect(),
             provenance: self.provenance.clone(),
         }
-    }
-
-    pub(super) fn per_datum(&self, view: &View) -> f64 {
-        view.reference.solution.chi2 / self.imager.data.depth.len() as f64
     }
 
     pub(super) fn orbit(&self, peak: &Peak) -> OrbitRecord {

@@ -18,7 +18,7 @@ impl PeriodogramResult<'_> {
         let best = self.orbit(&found.best);
         let meanings = self.meanings(&best.quantities);
         let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(&[best]) + &meanings;
-        if let Some(field) = &found.last().field {
+        if let Some(field) = found.last().field() {
             text += &FieldRecord::of(field).line();
         }
         text += &format!("{}\n", chance(&false_alarm(&found.blind)));
