@@ -88,7 +88,8 @@ class Config:
     ----------
     source : dict, str, path or Config
         Keys and values; the same as JSON text, which begins with a brace; or the path of a JSON file. Paths in the
-        config start from the folder of that file, or else from the working directory.
+        config start from the folder of that file, or else from the working directory. Where profiles are at hand as
+        `Observations`, nothing need be said of them.
 
     Raises
     ------
@@ -202,9 +203,13 @@ class Config:
         with open(path, "w", encoding="utf-8") as file:
             file.write(self.to_json() + "\n")
 
-    def _as_text(self) -> tuple[str, str | None]:
-        """What the engine takes."""
-        return json.dumps(self._json), self._path
+    def _as_text(self, observed: bool = False) -> tuple[str, str | None]:
+        """What the engine takes; where profiles are `observed` as arrays, none are simulated."""
+        value = self._json
+        if observed and isinstance(value.get("observations"), dict):
+            section = {key: one for key, one in value["observations"].items() if key != "simulate"}
+            value = {**value, "observations": section}
+        return json.dumps(_with_profiles(value) if observed else value), self._path
 
     def _root(self) -> Section:
         return Section(self, ())
@@ -246,6 +251,9 @@ class Config:
 
 _ABSENT = object()
 
+# stands for the list of profiles that are arrays
+_IN_MEMORY = "profiles in memory"
+
 
 def _restore(value: dict[str, Any], path: str | None) -> Config:
     config = Config.__new__(Config)
@@ -285,7 +293,15 @@ def _plain(value: Any, path: tuple[str, ...]) -> Any:
 def _checked(value: Mapping[str, Any], path: str | None) -> tuple[dict[str, Any], dict[str, Any]]:
     """As JSON has it, and with all defaults."""
     plain = _plain(value, ())
-    return plain, json.loads(_core.check_config((json.dumps(plain), path)))
+    return plain, json.loads(_core.check_config((json.dumps(_with_profiles(plain)), path)))
+
+
+def _with_profiles(value: dict[str, Any]) -> dict[str, Any]:
+    """The same where nothing is said of profiles, which are arrays then."""
+    section = value.get("observations", {})
+    if not isinstance(section, dict) or section.get("path") is not None or section.get("simulate") is not None:
+        return value
+    return {**value, "observations": {**section, "path": _IN_MEMORY}}
 
 
 def _merge(values: dict[str, Any], changes: Mapping[str, Any]) -> None:

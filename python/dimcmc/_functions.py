@@ -107,7 +107,7 @@ def map(
     >>> star.summary.chi2_per_datum                                              # doctest: +SKIP
     0.97
     """
-    text, times = Config(config)._as_text(), None if times_d is None else [float(time) for time in times_d]
+    text, times = Config(config)._as_text(observations is not None), None if times_d is None else [float(time) for time in times_d]
     with _folder(out, force) as (folder, scratch), shown("map", progress) as show:
         manner = (_threads(threads), show)
         said = _core.map(text, _arrays(observations), times, os.fspath(folder), manner)
@@ -176,7 +176,7 @@ def periodogram(
     if not 1000 <= draws <= 10_000_000:
         raise ValueError(f"draws: must be from 1000 to 10000000, not {draws}")
     options = (min_period_d, max_period_d, oversampling, eccentric, planets == 2, fixed, draws, seed)
-    text = Config(config)._as_text()
+    text = Config(config)._as_text(observations is not None)
     with _folder(out, force) as (folder, scratch), shown("periodogram", progress) as show:
         manner = (_threads(threads), show)
         said = _core.periodogram(text, _arrays(observations), options, os.fspath(folder), manner)
@@ -219,7 +219,7 @@ def optimise(
     >>> best.parameters["k_kms"], best.sd["k_kms"]                               # doctest: +SKIP
     (0.103, 0.011)
     """
-    text = Config(config)._as_text()
+    text = Config(config)._as_text(observations is not None)
     with _folder(out, force) as (folder, scratch), shown("optimise", progress) as show:
         said = _core.optimise(text, _arrays(observations), os.fspath(folder), (_threads(threads), show))
     return Optimum(folder, said, scratch)
@@ -283,7 +283,7 @@ def sample(
         raise ValueError("out: say which run to go on with")
     if resume and extend is not None:
         raise ValueError("extend: goes on by itself, leave out resume")
-    text = Config(config)._as_text()
+    text = Config(config)._as_text(observations is not None)
     goes_on = extend is not None or (resume and (Path(os.fspath(out or "")) / "manifest.json").is_file())
     with _folder(out, force or goes_on, of_run=True) as (folder, scratch), shown("sample", progress) as show:
         false_start = _core.is_false_start(os.fspath(folder))

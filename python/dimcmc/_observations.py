@@ -19,8 +19,8 @@ _EVEN = 1e-3
 class Observations:
     """Line profiles (LSD, Stokes I) at hand as arrays, in place of files.
 
-    Everywhere a config is taken, ``observations=`` may be given beside it; `observations.path` of the config is not
-    needed then. They are cut, scaled and judged as profiles from files would be.
+    Everywhere a config is taken, ``observations=`` may be given beside it, in place of ``observations.path`` or
+    ``observations.simulate`` of the config. They are cut, scaled and judged as profiles from files would be.
 
     Parameters
     ----------

@@ -81,8 +81,9 @@ class LogPosterior:
         progress: bool | None,
     ) -> None:
         self._config, self._observations, self._threads = config.copy(), observations, threads
+        text = config._as_text(observations is not None)
         with shown("LogPosterior", progress) as show:
-            self._core = _core.LogPosterior(config._as_text(), _arrays(observations), origin, (threads, show))
+            self._core = _core.LogPosterior(text, _arrays(observations), origin, (threads, show))
         self.names = tuple(self._core.names)
         self.ndim = len(self.names)
         self.optimum, self.sd = self._core.optimum()
