@@ -107,7 +107,8 @@ def map(
     >>> star.summary.chi2_per_datum                                              # doctest: +SKIP
     0.97
     """
-    text, times = Config(config)._as_text(observations is not None), None if times_d is None else [float(time) for time in times_d]
+    text = Config(config)._as_text(observations is not None)
+    times = None if times_d is None else [float(time) for time in times_d]
     with _folder(out, force) as (folder, scratch), shown("map", progress) as show:
         manner = (_threads(threads), show)
         said = _core.map(text, _arrays(observations), times, os.fspath(folder), manner)

@@ -85,16 +85,8 @@ pub fn periodogram(
     manner: Manner,
 ) -> PyResult<String> {
     let (min_period_d, max_period_d, oversampling, eccentric, second_planet, fixed, draws, seed) = options;
-    let options = PeriodogramOptions {
-        min_period_d,
-        max_period_d,
-        oversampling,
-        eccentric,
-        second_planet,
-        fixed,
-        draws,
-        seed,
-    };
+    let options =
+        PeriodogramOptions { min_period_d, max_period_d, oversampling, eccentric, second_planet, fixed, draws, seed };
     with_scene(py, Source::new(config, observations)?, out, manner, move |job, scene, out| {
         let found = Periodogram::of(scene, &options, &|what| job.say(what)).map_err(Failure::periodogram)?;
         create(job, out)?;

@@ -63,7 +63,12 @@ impl LogPosterior {
     }
 
     /// Log-probability of a vector, or of each row.
-    fn log_prob<'py>(&self, py: Python<'py>, theta: Vectors<'py>, threads: Option<usize>) -> PyResult<Bound<'py, PyAny>> {
+    fn log_prob<'py>(
+        &self,
+        py: Python<'py>,
+        theta: Vectors<'py>,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         if self.is_one(&theta)? {
             let theta = contiguous(&theta);
             return Ok(py.detach(|| self.0.evaluate(&theta).log_prob).into_pyobject(py)?.into_any());
@@ -119,8 +124,10 @@ impl LogPosterior {
 
 /// The numbers row by row, copied only where they do not lie so.
 fn contiguous<'a>(vectors: &'a Vectors) -> Cow<'a, [f64]> {
-    match vectors.as_slice() {
-        Ok(slice) => Cow::Borrowed(slice),
-        Err(_) => Cow::Owned(vectors.as_array().iter().copied().collect()),
+    let view = vectors.as_array();
+    // `as_slice` of the array itself would take columns for rows where they are what lies together
+    match view.to_slice() {
+        Some(slice) => Cow::Borrowed(slice),
+        None => Cow::Owned(view.iter().copied().collect()),
     }
 }

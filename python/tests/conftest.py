@@ -29,12 +29,12 @@ SMALL: dict[str, Any] = {
             "snr": 1000.0,
         }
     },
-    "imaging": {"pixels": 400},
+    "imaging": {"pixels": 300},
     "parameters": {
         "k_kms": {"prior": "uniform", "min": 0.0, "max": 1.0},
         "phi": {"prior": "periodic"},
     },
-    "sampler": {"ensembles": 2, "walkers": 8, "steps": 60, "ess": 100.0, "rhat": 1.1},
+    "sampler": {"ensembles": 2, "walkers": 8, "steps": 30, "ess": 100.0, "rhat": 1.1},
 }
 
 

@@ -35,7 +35,7 @@ def test_attributes_give_what_is_written_or_the_default(config: dimcmc.Config) -
 def test_changes_are_checked_and_reach_the_engine(config: dimcmc.Config) -> None:
     config.star.vsini_kms = np.float64(30.0)
     config.sampler["steps"] = 7
-    config.grid = {"axes": {"k_kms": [0.0, 0.5, 3], "phi": np.array([0.0, 0.9, 4])}}
+    config.grid = {"axes": {"k_kms": [0.0, 0.5, 3], "phi": [np.float64(0.0), 0.9, np.int64(4)]}}
     assert config.resolved()["star"]["vsini_kms"] == 30.0 and config.resolved()["sampler"]["steps"] == 7
     del config.grid
     del config.sampler.steps

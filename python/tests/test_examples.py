@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
 import json
 import os
 import subprocess
@@ -39,6 +40,40 @@ def test_the_notebook_runs(capsys: pytest.CaptureFixture[str]) -> None:
                 assert not hasattr(shown, how) or getattr(shown, how)()
     printed = capsys.readouterr().out
     assert "Detection" in printed and "the chain has converged" in printed and "phi') True" in printed
+
+
+def blocks(page: str) -> list[str]:
+    return [block.split("\n```")[0] for block in page.split("```python\n")[1:]]
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a demo of few profiles, pixels and steps."""
+    demo = json.loads((ROOT / "configs/demo.json").read_text())
+    simulate = demo["observations"]["simulate"]
+    simulate |= {"cycles": simulate["cycles"][::3], "pixels": 2000, "snr": 300}
+    demo["imaging"] |= {"pixels": 500, "chi2_target": 1.0}
+    demo["sampler"] = {"ensembles": 2, "walkers": 8, "steps": 10}
+    (tmp_path / "configs").mkdir()
+    (tmp_path / "configs/demo.json").write_text(json.dumps(demo))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_readme_runs(desk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (block,) = blocks((ROOT / "README.md").read_text())
+    assert len(block.splitlines()) <= 10
+    exec(block, {})
+    assert "k_kms" in capsys.readouterr().out and (desk / "corner.png").is_file()
+
+
+def test_the_guide_runs(desk: Path) -> None:
+    """Up to the exports, which tests/export.py holds to other programs."""
+    names: dict[str, Any] = {}
+    for block in blocks((ROOT / "docs/guide/python.md").read_text().split("## Exports")[0]):
+        if "emcee" not in block or importlib.util.find_spec("emcee"):
+            exec(block, names)
+    assert names["run"].summary.steps > 10
 
 
 def test_types_hold_on_the_examples() -> None:

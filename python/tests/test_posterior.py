@@ -50,7 +50,7 @@ def test_outside_and_not_a_number(log_posterior: dimcmc.LogPosterior) -> None:
 
 def test_priors(log_posterior: dimcmc.LogPosterior) -> None:
     assert np.allclose(log_posterior.prior_transform([0.25, 0.75]), [0.25, 0.75])
-    unit = np.random.default_rng(1).random((50, 2))
+    unit = np.random.default_rng(1).random((12, 2))
     theta = log_posterior.prior_transform(unit)
     assert theta.shape == (50, 2) and np.all(np.isfinite(log_posterior.log_prior(theta)))
     # the prior of k_kms is uniform from 0 to 1, that of phi periodic: their density is 1
@@ -61,7 +61,7 @@ def test_priors(log_posterior: dimcmc.LogPosterior) -> None:
 
 
 def test_threads(log_posterior: dimcmc.LogPosterior) -> None:
-    theta = log_posterior.prior_transform(np.random.default_rng(2).random((40, 2)))
+    theta = log_posterior.prior_transform(np.random.default_rng(2).random((10, 2)))
     alone = dimcmc.LogPosterior(SMALL, threads=1)
     assert np.array_equal(alone(theta), log_posterior(theta))
     with ThreadPoolExecutor(4) as pool:
@@ -72,7 +72,7 @@ def test_threads(log_posterior: dimcmc.LogPosterior) -> None:
 
 def test_the_interpreter_goes_on_meanwhile(log_posterior: dimcmc.LogPosterior) -> None:
     """Were its lock held, the counter would stand still during the call."""
-    theta = log_posterior.prior_transform(np.random.default_rng(3).random((2000, 2)))
+    theta = log_posterior.prior_transform(np.random.default_rng(3).random((200, 2)))
     with ThreadPoolExecutor(1) as pool:
         computing = pool.submit(log_posterior, theta)
         began, counted = time.perf_counter(), 0

@@ -78,20 +78,20 @@ def test_a_run_in_numbers(run: dimcmc.Run) -> None:
 
 
 def test_runs_go_on_and_begin_again(config: dimcmc.Config, run: dimcmc.Run, tmp_path: Path) -> None:
-    config.sampler.steps = 20
+    config.sampler.steps = 10
     config.sampler.ess = 1e5
     folder = tmp_path / "run"
     first = dimcmc.sample(config, out=folder, resume=True)
-    assert first.summary.steps == 20
+    assert first.summary.steps == 10
     with pytest.raises(FileExistsError, match="resume=True"):
         dimcmc.sample(config, out=folder)
-    assert dimcmc.sample(config, out=folder, extend=5).summary.steps == 25
-    config.sampler.steps = 40
+    assert dimcmc.sample(config, out=folder, extend=5).summary.steps == 15
+    config.sampler.steps = 20
     config.sampler.ess = 100.0
     gone_on = dimcmc.sample(config, out=folder, resume=True)
-    assert np.array_equal(gone_on.chain[:21], first.chain)
+    assert np.array_equal(gone_on.chain[:11], first.chain)
     config.star.vsini_kms = 26.0
-    with pytest.raises(ValueError, match="star.vsini_kms of the config changed"):
+    with pytest.raises(ValueError, match="star.vsini_kms .*of the config changed"):
         dimcmc.sample(config, out=folder, resume=True)
     again = dimcmc.sample(config, out=folder, force=True, seed=2, start="prior")
     assert not np.array_equal(again.chain[0], first.chain[0])
@@ -107,7 +107,7 @@ def test_a_map_and_a_search_in_numbers(simulation: dimcmc.Simulation) -> None:
     observations = simulation.observations
     star = dimcmc.map(SMALL, observations=observations)
     assert star.summary.chi2_per_datum == pytest.approx(1.0, abs=0.2)
-    assert len(star.map.spot_filling) == star.map.pixels == 400
+    assert len(star.map.spot_filling) == star.map.pixels
     assert np.array_equal(star.profiles["observed"], observations.intensity.ravel())
     assert len(star.velocities["time_d"]) == len(observations)
     search = dimcmc.periodogram(SMALL, observations=observations, draws=1000, min_period_d=2.0, planets=2)
@@ -123,7 +123,7 @@ def test_a_map_and_a_search_in_numbers(simulation: dimcmc.Simulation) -> None:
 
 
 def test_maps_of_a_star_that_changes(config: dimcmc.Config) -> None:
-    config.imaging.objective = "marginal-likelihood"
+    config.update({"imaging": {"objective": "marginal-likelihood"}, "sampler": {"walkers": 14}})
     star = dimcmc.map(config, times_d=np.array([0.5, 2.0]))  # type: ignore[arg-type]
     assert [one.time_d for one in star.map.maps] == [0.5, 2.0] and star.figures[0].startswith("map")
 
