@@ -84,8 +84,8 @@ pub fn is_false_start(folder: PathBuf) -> bool {
     Run::is_false_start(&folder)
 }
 
-/// Reads a run: names, text and summary; draws by name; positions `[step, ensemble, walker, parameter]`, log-probabilities and
-/// numbers beside them `[step, ensemble, walker]`, all flat.
+/// Reads a run: names, text and summary; draws by name; positions `[step, ensemble, walker, parameter]`,
+/// log-probabilities and numbers beside them `[step, ensemble, walker]`, all flat.
 #[pyfunction]
 pub fn read_run(py: Python, folder: PathBuf) -> PyResult<Bound<PyDict>> {
     let (conclusion, chain) = py.detach(|| read(&folder))?;
