@@ -76,7 +76,7 @@ impl Task for Read<'_> {
 fn passes(scene: &Scene, pixels: usize, table: &mut Table) {
     let imager = &scene.imager;
     let response = imager.response(&truth(scene));
-    let plain = PlainLoop::<WINDOW>::new(&imager.grid, &imager.star, &truth(scene), &imager.sampling);
+    let plain = PlainLoop::<WINDOW>::new(&imager.grid, &imager.star, &truth(scene), &imager.sets[0].sampling);
     let stored = vec![1_u64; response.bytes() / size_of::<u64>()];
     let plain_read = || black_box(&stored).iter().fold(0_u64, |sum, x| sum.wrapping_add(*x));
     let read = || vector::run(Read(black_box(&stored)));
@@ -120,7 +120,7 @@ fn others(scene: &Scene, pixels: usize, table: &mut Table) {
     let (imager, state) = (&scene.imager, truth(scene));
     let response = imager.response(&state);
     let build = || imager.response(black_box(&state));
-    let shift = || response.with_velocities(&imager.star, black_box(&state), &imager.sampling);
+    let shift = || imager.with_velocities(response, black_box(&state));
     let mut only_passes = Passes::new(&response);
     let single = || only_passes.run_single(&response, 2);
     let mut candidates = [

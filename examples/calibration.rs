@@ -38,7 +38,7 @@ fn main() -> Result<(), Failure> {
     let folder = args.next().unwrap_or_else(|| "results/calibration".into());
     std::fs::create_dir_all(&folder)?;
     let scene = Scene::load("configs/demo.json".as_ref())?;
-    let config::ObservationSource::Simulate(simulation) = &scene.settings.source else {
+    let config::ObservationSource::Simulate(simulation) = &scene.settings.sets[0].source else {
         return Err("configs/demo.json does not simulate".into());
     };
     let null: Vec<NullStar> = in_parallel(stars, |seed| null_star(&scene, simulation, seed))?;

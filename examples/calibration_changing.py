@@ -130,6 +130,7 @@ def search(program, config, objective, folder):
     """periodogram.json of a blind search with that objective, and its seconds."""
     changed = json.loads(config.read_text())
     changed["imaging"] = changed.get("imaging", {}) | {"objective": objective}
+    changed["observations"]["velocity_jitter_kms"] = 0.0
     path = config.with_name(f"{objective}.json")
     path.write_text(json.dumps(changed))
     began = time.monotonic()
@@ -181,8 +182,8 @@ def by_period(folder, row):
     return {"chi2_rv": left @ weight @ left / len(left)} | means
 
 
-def searched(row, folder, args):
-    """The line of a simulated star."""
+def searched(row, folder, args, static):
+    """The line of a simulated star, taken for one that does not change as well if `static`."""
     config = folder / "config.json"
     found, row["seconds"] = search(args.search, config, "marginal-likelihood", folder / "changing")
     best, field = found["best"], found["field"]
@@ -201,6 +202,8 @@ def searched(row, folder, args):
     off = np.array([there["along_kms"] - row["true_k_kms"], there["across_kms"]])
     row |= there | {"chi2_orbit": off @ np.linalg.solve(errors, off)}
     row |= by_period(folder / "changing", row)
+    if not static:
+        return row
     found, row["static_seconds"] = search(args.search, config, "spottedness", folder / "static")
     row["static_false_alarm"] = found["false_alarm"]["probability"]
     row["static_finding"] = found["verdict"]["finding"]
@@ -216,7 +219,7 @@ def one(kind, number, planet, simulator, args):
     try:
         if not (folder / "config.json").exists():
             simulate(simulator, options, folder)
-        return searched(row, folder, args)
+        return searched(row, folder, args, number < args.static)
     except subprocess.CalledProcessError as failure:
         return row | {"error": failure.stderr.strip().splitlines()[-1]}
 
@@ -242,6 +245,7 @@ if __name__ == "__main__":
     parser.add_argument("--simulator", action="append", help=SIMULATOR)
     parser.add_argument("--search", help="dimcmc, or the example blind_search")
     parser.add_argument("--stars", type=int, default=25, help="of each kind, without and with a planet each")
+    parser.add_argument("--static", type=int, default=6, help="how many of these are searched by spottedness as well")
     parser.add_argument("--work", type=Path, default=Path("target/calibration-changing"), help="folder of the stars")
     parser.add_argument("--csv", type=Path, default=Path("results/calibration/changing.csv"))
     parser.add_argument("--moments", type=Path, default=Path("results/calibration/changing-moments.csv"))

@@ -67,7 +67,7 @@ pub fn scene(free: Free, size: Size) -> Scene {
     let spacing = 3.0 / size.profiles as f64;
     simulate["cycles"] = (0..size.profiles).map(|k| json!(k as f64 * spacing)).collect();
     let mut settings = config::from_json(config.to_string().as_bytes(), &path).unwrap();
-    let ObservationSource::Simulate(simulation) = settings.source.clone() else { panic!("{}", path.display()) };
+    let ObservationSource::Simulate(simulation) = settings.sets[0].source.clone() else { panic!("{}", path.display()) };
     settings.values = simulation.truth;
     let observations = simulation.observe(&settings.star);
     Scene::of(settings, observations).unwrap()

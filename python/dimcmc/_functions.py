@@ -56,9 +56,9 @@ def simulate(
     """
     text = Config(config)._as_text()
     with _folder(out, force) as (folder, scratch), shown("simulate", progress) as show:
-        said, arrays = _core.simulate(text, os.fspath(folder), (_threads(threads), show))
+        said, sets = _core.simulate(text, os.fspath(folder), (_threads(threads), show))
     simulation = Simulation(folder, said, scratch)
-    simulation._observations = Observations._of(arrays)
+    simulation._sets = [Observations._of(arrays) for arrays in sets]
     return simulation
 
 

@@ -193,26 +193,33 @@ def _restored(kind: type[_R], files: Mapping[str, bytes], text: str) -> _R:
 
 
 class Simulation(Result):
-    """Profiles of a spotted star with a planet, from `simulate`."""
+    """Profiles of a spotted star with a planet, from `simulate`; of several data sets each in a folder of its name."""
 
     @property
     def observations(self) -> Observations:
-        """The profiles, for ``observations=`` of other calls."""
-        return self._observations
+        """The profiles, for ``observations=`` of other calls; there is one data set."""
+        if len(self._sets) > 1:
+            raise ValueError(f"{len(self._sets)} data sets: see `sets`, or the folders in {self.folder}")
+        return self._sets[0]
+
+    @property
+    def sets(self) -> list[Observations]:
+        """The profiles of each data set."""
+        return list(self._sets)
 
     @property
     def truth(self) -> Record:
-        """What they were made with: parameters, spots, noise (`truth.json`)."""
+        """What they were made with: parameters, spots, noise (`truth.json`); there is one data set."""
         return self._json("truth.json")
 
-    _observations: Observations
+    _sets: list[Observations]
 
     def __reduce__(self) -> tuple[Any, ...]:
         make, arguments = super().__reduce__()
-        return make, arguments, {"_observations": self._observations}
+        return make, arguments, {"_sets": self._sets}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self._observations = state["_observations"]
+        self._sets = state["_sets"]
 
 
 class Maps(Result):

@@ -40,9 +40,9 @@ fn text(lines: &[(&str, String)]) -> String {
     lines.join("\n")
 }
 
-/// `dimcmc simulate`.
+/// `dimcmc simulate`: the text, and the profiles of each data set.
 #[pyfunction]
-pub fn simulate(py: Python, config: ConfigText, out: PathBuf, manner: Manner) -> PyResult<(String, NewArrays)> {
+pub fn simulate(py: Python, config: ConfigText, out: PathBuf, manner: Manner) -> PyResult<(String, Vec<NewArrays>)> {
     let simulated = attend(py, manner.0, manner.1, move |job| {
         job.say("simulating");
         let simulated = Simulated::of(&config.config()?)?;
@@ -50,7 +50,8 @@ pub fn simulate(py: Python, config: ConfigText, out: PathBuf, manner: Manner) ->
         simulated.write(&out)?;
         Ok(simulated)
     })?;
-    Ok((text(&simulated.lines()), arrays(py, simulated.observations())?))
+    let sets = simulated.sets().iter().map(|set| arrays(py, &set.observations));
+    Ok((text(&simulated.lines()), sets.collect::<PyResult<_>>()?))
 }
 
 /// `dimcmc map`.

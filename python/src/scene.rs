@@ -47,10 +47,11 @@ impl Arrays<'_> {
         let profile = |k: usize| Profile {
             time_d: times[k],
             first_velocity_kms: first[k],
+            step_kms: *step_kms,
             intensity: intensity.row(k).to_vec(),
             sigma: sigma.row(k).to_vec(),
         };
-        Ok(Observations { step_kms: *step_kms, profiles: (0..times.len()).map(profile).collect() })
+        Ok(Observations { profiles: (0..times.len()).map(profile).collect() })
     }
 }
 
@@ -63,7 +64,7 @@ pub fn arrays<'py>(py: Python<'py>, observations: &Observations) -> PyResult<New
             .map_err(|e| PyValueError::new_err(format!("observations: {e}")))
     };
     let (times, first) = (of(|p| p.time_d), of(|p| p.first_velocity_kms));
-    Ok((times, first, observations.step_kms, rows(|p| &p.intensity)?, rows(|p| &p.sigma)?))
+    Ok((times, first, observations.step_kms(), rows(|p| &p.intensity)?, rows(|p| &p.sigma)?))
 }
 
 /// What a scene is made of, owned.

@@ -191,7 +191,9 @@ impl From<SimulateError> for Failure {
     fn from(error: SimulateError) -> Self {
         match error {
             SimulateError::Scene(error) => error.into(),
-            error @ SimulateError::Nothing(_) => Failure::input(error.to_string()),
+            error @ SimulateError::Nothing { .. } => Failure::input(error.to_string()),
+            error @ SimulateError::Folder { .. } => Failure::failed(error),
+            SimulateError::Write(error) => error.into(),
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::data::scene::Scene;
 use crate::posterior::objective::Parameter;
 use crate::star::Orbit;
 use crate::star::injection::inject;
-use crate::star::observation::Observations;
+use crate::star::observation::{Observations, Profile};
 use std::path::PathBuf;
 
 /// Name of the config that is written beside the profiles.
@@ -50,6 +50,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| name == CONFIG || lsd::is_written(name) || name == truth::FILE)?;
+    if scene.settings.sets.len() > 1 {
+        let problem = "several data sets: put the orbit into each of them, by a config with that one alone";
+        return Err(Failure::input(format!("{}: observations: {problem}", args.config.display())));
+    }
     let (whole, labels) = scene.whole()?;
     let orbit = orbit(args, &whole)?;
     let star = &scene.imager.star;
@@ -82,8 +86,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// The orbit asked for, which leaves the line in the data.
 fn orbit(args: &Args, whole: &Observations) -> Result<Orbit, Failure> {
     let Args { k_kms, porb_over_prot, phi, .. } = *args;
-    let bins = whole.profiles.iter().map(|p| p.intensity.len()).min().unwrap_or(0);
-    let most = 0.25 * bins as f64 * whole.step_kms;
+    let width_kms = |p: &Profile| p.intensity.len() as f64 * p.step_kms;
+    let most = 0.25 * whole.profiles.iter().map(width_kms).fold(f64::INFINITY, f64::min);
     let wrong = |option: &str, value: f64, must: String| {
         Err(Failure::input(format!("--{option}: must be {must}, not {value}")))
     };

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 /// Simulate observations of a spotted star with a planet
 ///
 /// Reads `observations.simulate` of the config. Writes observations.txt and the profiles it lists, which other commands
-/// read by `observations.path`, and truth.json: what they were made with.
+/// read by `observations.path`, and truth.json: what they were made with. Of several data sets each has these in a
+/// folder of its name.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc simulate configs/demo.json --out demo_data")]
 pub struct Args {
@@ -30,6 +31,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     simulated.write(folder)?;
     let lines = simulated.lines().into_iter();
     let report = lines.fold(Report::default(), |report, (label, text)| report.line(label, text));
-    report.written(folder, "observations.txt, p000.prof ..., truth.json").print();
+    let files = "observations.txt, p000.prof ..., truth.json";
+    let files = match simulated.sets().len() {
+        1 => files.to_owned(),
+        _ => format!("of each data set, in a folder of its name: {files}"),
+    };
+    report.written(folder, files).print();
     Ok(())
 }

@@ -77,8 +77,12 @@ pub struct Tried {
 
 impl Diagnosis {
     /// Of a scene that no map fits as well as its errors promise, by trying; `whole` are its profiles in their whole
-    /// width, in units of their continuum, if they are at hand. `None` where there is no map at all.
+    /// width, in units of their continuum, if they are at hand. `None` where there is no map at all, and of several
+    /// data sets.
     pub fn of(scene: &Scene, whole: Option<&Observations>) -> Option<Self> {
+        if scene.settings.sets.len() > 1 {
+            return None;
+        }
         let patient = patient(scene, whole);
         let unchanged = factor(&patient, 1.0)?;
         let relative = |changes: &[Change]| -> Vec<Option<f64>> {
@@ -154,7 +158,7 @@ fn factor(patient: &Patient, start: f64) -> Option<f64> {
     let imager = |factor: f64| {
         let mut observations = patient.observations.clone();
         scale_errors(&mut observations, start * factor);
-        scene::imager(&patient.settings, &observations)
+        scene::imager(&patient.settings, &[observations])
     };
     factor_to_fit(patient.settings.values, patient.correlated_bins, imager).ok()?.ok().map(|found| start * found)
 }
@@ -169,7 +173,7 @@ fn helps(unchanged: f64, changed: f64) -> bool {
 fn relative_chi2(patient: &Patient, change: &Change, unchanged: f64) -> Option<f64> {
     let mut changed = change.applied(patient)?;
     scale_errors(&mut changed.observations, unchanged);
-    let imager = scene::imager(&changed.settings, &changed.observations).ok()?;
+    let imager = scene::imager(&changed.settings, &[changed.observations]).ok()?;
     chi2_at(&imager, changed.settings.values, changed.correlated_bins).ok().map(|chi2| chi2 / FITTED)
 }
 

@@ -1,15 +1,20 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
-use crate::data::config::{Automatic, Config, ConfigError, ObservationSource, Settings, VelocityJitter};
-use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
-use crate::data::io::provenance::{Measured, Provenance};
+mod reading;
+
+use crate::data::config::{
+    Automatic, Config, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter, ZeroPoint,
+};
+use crate::data::io::lsd::{self, Label, LsdError};
+use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
+use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
-use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::Known;
+use crate::posterior::imaging::{Imager, ZeroPointPrior};
+use crate::posterior::marginal::{Known, zero_points as set_zero_points};
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::posterior::objective::{
     FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
@@ -18,7 +23,8 @@ use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
-use crate::star::{BrightnessModel, Orbit, Quadrature, Spot, SurfaceGrid};
+use crate::star::{BrightnessModel, Orbit, Quadrature, Sampling, Seen, Spot, StarSettings, SurfaceGrid};
+use reading::Part;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -31,7 +37,7 @@ pub struct Scene {
     /// The config, resolved.
     #[doc(hidden)]
     pub settings: Settings,
-    /// The line profiles, read or simulated.
+    /// The line profiles, read or simulated; of several data sets one after the other.
     pub observations: Observations,
     /// SHA-256 (hex) of the observations: of the bytes of their files, or of the numbers simulated.
     #[doc(hidden)]
@@ -92,7 +98,10 @@ impl Scene {
         let settings = config.settings()?;
         let fault = |problem: String| settings.fault("observations", &problem);
         profiles.check().map_err(fault)?;
-        let ObservationSource::Files { options, continuum_level, .. } = &settings.source else {
+        let [set] = &settings.sets[..] else {
+            return Err(fault("profiles at hand are one data set: give one".into()).into());
+        };
+        let ObservationSource::Files { options, continuum_level, .. } = &set.source else {
             return Err(fault("profiles are given and simulated: leave out `simulate`".into()).into());
         };
         let whole = profiles.over_continuum(*continuum_level);
@@ -107,47 +116,38 @@ impl Scene {
 
     /// Reads or simulates the observations of `settings`.
     fn read(settings: Settings) -> Result<Self, SceneError> {
-        let (mut errors, mut remarks) = (None, Vec::new());
-        let (observations, data_sha256, truth) = match &settings.source {
-            ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
-                let mut data = lsd::read(path, options)?;
-                remarks = std::mem::take(&mut data.remarks);
-                let as_quoted = *wanted == ErrorSettings::default();
-                if as_quoted && *continuum_level == 1.0 {
-                    (data.observations, data.sha256, None)
-                } else {
-                    let mut observations = data.observations.over_continuum(*continuum_level);
-                    if !as_quoted {
-                        let whole = lsd::read(path, &ReadOptions::default())?.observations;
-                        let whole = whole.over_continuum(*continuum_level);
-                        let measured = measured_errors(&settings, *wanted, &whole, &observations)?;
-                        measured.apply(&mut observations);
-                        errors = Some(measured);
-                    }
-                    let sha256 = fingerprint(&observations);
-                    (observations, sha256, None)
-                }
-            }
-            ObservationSource::Simulate(simulation) => {
-                settings.check_velocity_grid(&simulation.truth, simulation.step_kms)?;
-                let observations = simulation.observe(&settings.star);
-                let sha256 = fingerprint(&observations);
-                (observations, sha256, Some(simulation.truth))
+        let parts = settings.sets.iter().map(|set| Part::read(&settings, set)).collect::<Result<Vec<_>, _>>()?;
+        let several = parts.len() > 1;
+        let mut remarks = Vec::new();
+        for (set, part) in settings.sets.iter().zip(&parts) {
+            let of = |remark: &String| if several { format!("{}: {remark}", set.name) } else { remark.clone() };
+            remarks.extend(part.remarks.iter().map(of));
+        }
+        let truth = settings.sets.iter().find_map(|set| match &set.source {
+            ObservationSource::Simulate(simulation) => Some(simulation.truth),
+            ObservationSource::Files { .. } => None,
+        });
+        let data_sha256 = match &parts[..] {
+            [one] => one.sha256.clone(),
+            several => {
+                let all: String = several.iter().map(|part| part.sha256.as_str()).collect();
+                format!("{:x}", Sha256::digest(all))
             }
         };
+        let (observations, errors) = parts.into_iter().map(|part| (part.observations, part.errors)).unzip();
         let mut scene = Scene::with_noise(settings, observations, errors)?;
         scene.measured.profiles = remarks;
         Ok(Scene { data_sha256, truth, ..scene })
     }
 
-    /// The scene of observations at hand, whatever `settings` say of where they come from. A target chi2 that is left
-    /// to them is chosen.
+    /// The scene of observations at hand, of one data set, whatever `settings` say of where they come from. A target
+    /// chi2 that is left to them is chosen.
     ///
     /// # Errors
     /// Settings that make no sense with these observations.
     #[doc(hidden)]
     pub fn of(settings: Settings, observations: Observations) -> Result<Self, ConfigError> {
-        Scene::with_noise(settings, observations, None)
+        Scene::with_noise(settings, vec![observations], vec![None])
     }
 
     /// The same of profiles in their `whole` width and `cut` to the config's velocity range, both in units of their
@@ -157,7 +157,7 @@ impl Scene {
     /// Settings that make no sense with these observations, and errors that cannot be measured.
     #[doc(hidden)]
     pub fn of_whole(settings: Settings, whole: &Observations, cut: &Observations) -> Result<Self, ConfigError> {
-        let ObservationSource::Files { options, errors: wanted, .. } = &settings.source else {
+        let ObservationSource::Files { options, errors: wanted, .. } = &settings.sets[0].source else {
             return Scene::of(settings, cut.clone());
         };
         let (scale, wanted) = (options.sigma_scale, *wanted);
@@ -166,21 +166,22 @@ impl Scene {
         if wanted == ErrorSettings::default() {
             return Scene::of(settings, observations);
         }
-        let measured = measured_errors(&settings, wanted, whole, &observations)?;
+        let measured = measured_errors(&settings, &settings.sets[0], wanted, whole, &observations)?;
         measured.apply(&mut observations);
-        Scene::with_noise(settings, observations, Some(measured))
+        Scene::with_noise(settings, vec![observations], vec![Some(measured)])
     }
 
-    /// The same where the errors were measured: a target chi2 is then that of independent data.
+    /// The same of the data sets of `parts` where their errors were measured: a target chi2 is then that of independent
+    /// data.
     fn with_noise(
         mut settings: Settings,
-        observations: Observations,
-        errors: Option<MeasuredErrors>,
+        parts: Vec<Observations>,
+        errors: Vec<Option<MeasuredErrors>>,
     ) -> Result<Self, ConfigError> {
-        let mut imager = imager(&settings, &observations)?;
-        let correlated_bins = errors.as_ref().map_or(1.0, |errors| errors.correlated_bins);
+        let mut imager = imager(&settings, &parts)?;
+        let correlated_bins = errors.iter().flatten().map(|errors| errors.correlated_bins).fold(1.0, f64::max);
         imager.data.correlated_bins = correlated_bins;
-        let mut measured = Measured { errors, ..Measured::default() };
+        let mut measured = Measured::default();
         settings.imaging.chi2_target = match settings.imaging.chi2_target {
             Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
             Automatic::Auto => {
@@ -196,6 +197,20 @@ impl Scene {
             imager = zero_points.counted_in(imager);
         }
         measured.velocity_jitter = jitter;
+        hold_zero_points(&mut settings, &mut imager)?;
+        match settings.sets.len() {
+            1 => measured.errors = errors.into_iter().next().flatten(),
+            _ => {
+                let of_set = |((set, part), errors): ((&DataSetSettings, &Observations), _)| MeasuredSet {
+                    name: set.name.clone(),
+                    profiles: part.profiles.len(),
+                    errors,
+                    zero_point: set.held,
+                };
+                measured.sets = settings.sets.iter().zip(&parts).zip(errors).map(of_set).collect();
+            }
+        }
+        let observations = Observations { profiles: parts.into_iter().flat_map(|part| part.profiles).collect() };
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = fingerprint(&observations);
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
@@ -280,24 +295,23 @@ impl Scene {
     /// Files that are no longer what they were.
     #[doc(hidden)]
     pub fn whole(&self) -> Result<(Observations, Vec<Label>), LsdError> {
-        match &self.settings.source {
-            ObservationSource::Files { path, .. } => {
-                Ok((lsd::read(path, &ReadOptions::default())?.observations, lsd::labels(path)?))
-            }
-            ObservationSource::Simulate(_) => {
-                let name = |k: usize| Label { file: format!("simulated profile {k}"), vrad_kms: 0.0 };
-                let profiles = self.observations.profiles.len();
-                Ok((self.observations.clone(), (0..profiles).map(name).collect()))
-            }
+        let mut all = (Observations { profiles: Vec::new() }, Vec::new());
+        for set in &self.settings.sets {
+            let (whole, labels) = reading::whole(&self.settings, set)?;
+            all.0.profiles.extend(whole.profiles);
+            all.1.extend(labels);
         }
+        Ok(all)
     }
 
     /// The files that it was read from: config, list, profiles.
     #[doc(hidden)]
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = vec![self.settings.path.clone()];
-        if let ObservationSource::Files { path, .. } = &self.settings.source {
-            files.extend(lsd::files(path));
+        for set in &self.settings.sets {
+            if let ObservationSource::Files { path, .. } = &set.source {
+                files.extend(lsd::files(path));
+            }
         }
         files
     }
@@ -306,7 +320,7 @@ impl Scene {
     /// longer there.
     #[doc(hidden)]
     pub fn whole_over_continuum(&self) -> Option<Observations> {
-        self.whole().ok().map(|(whole, _)| whole.over_continuum(self.continuum_level()))
+        self.whole().ok().map(|(whole, _)| self.over_continua(whole))
     }
 
     /// The same star with `orbits` put into its profiles: those of its `whole` ones, resampled and cut again. Errors
@@ -317,14 +331,26 @@ impl Scene {
     #[doc(hidden)]
     pub fn injected(&self, whole: &Observations, orbits: &[Orbit]) -> Result<Self, ConfigError> {
         let mut observations = self.observations.clone();
-        let injected = inject(whole, &self.imager.star, orbits).over_continuum(self.continuum_level());
+        let injected = self.over_continua(inject(whole, &self.imager.star, orbits));
         for (cut, whole) in observations.profiles.iter_mut().zip(&injected.profiles) {
-            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / injected.step_kms).round() as usize;
+            let first = ((cut.first_velocity_kms - whole.first_velocity_kms) / cut.step_kms).round() as usize;
             for (intensity, shifted) in cut.intensity.iter_mut().zip(whole.intensity.iter().skip(first)) {
                 *intensity = *shifted;
             }
         }
-        Scene::of(self.settings.clone(), observations)
+        let of_set = |s: usize| Observations { profiles: observations.profiles[self.imager.profiles_of(s)].to_vec() };
+        let parts: Vec<Observations> = (0..self.settings.sets.len()).map(of_set).collect();
+        let errors = vec![None; parts.len()];
+        Scene::with_noise(self.settings.clone(), parts, errors)
+    }
+
+    /// Whole profiles of all data sets in units of their continua.
+    fn over_continua(&self, whole: Observations) -> Observations {
+        let of_set = |(s, set): (usize, &DataSetSettings)| {
+            let part = Observations { profiles: whole.profiles[self.imager.profiles_of(s)].to_vec() };
+            part.over_continuum(set.continuum_level()).profiles
+        };
+        Observations { profiles: self.settings.sets.iter().enumerate().flat_map(of_set).collect() }
     }
 
     /// The space of the parameters in `free`, starting at the config's values, all others fixed there.
@@ -359,15 +385,8 @@ impl Scene {
         })
     }
 
-    fn continuum_level(&self) -> f64 {
-        match self.settings.source {
-            ObservationSource::Files { continuum_level, .. } => continuum_level,
-            ObservationSource::Simulate(_) => 1.0,
-        }
-    }
-
     fn simulation(&self) -> Option<&Simulation> {
-        match &self.settings.source {
+        match &self.settings.sets[0].source {
             ObservationSource::Simulate(simulation) => Some(simulation),
             ObservationSource::Files { .. } => None,
         }
@@ -390,10 +409,11 @@ impl Scene {
         Truth {
             parameters: simulation.truth,
             spots: simulation.spots.iter().map(Spot::written).collect(),
-            faculae: self.settings.resolved["observations"]["simulate"].get("faculae").cloned(),
+            faculae: self.settings.faculae_as_written(),
             contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
             continuum: simulation.nuisances(),
             zero_points_kms: simulation.zero_points_kms(),
+            zero_point_kms: Some(simulation.zero_point_kms).filter(|kms| *kms != 0.0),
             correlated_bins: Some(simulation.correlated_bins).filter(|bins| *bins != 1.0),
             spottedness,
             coverage,
@@ -420,18 +440,59 @@ impl Scene {
     }
 }
 
-/// What `observations` are imaged with.
+/// What the observations of all data sets are imaged with.
 ///
 /// # Errors
 /// Settings that make no sense with these observations.
-pub fn imager(settings: &Settings, observations: &Observations) -> Result<Imager, ConfigError> {
-    settings.check_velocity_grid(&settings.values, observations.step_kms)?;
-    let star = settings.star_for(observations)?;
-    let imager = Imager::new(star, observations, settings.imaging.pixels, settings.imaging.entropy());
-    Ok(match settings.imaging.nuisances {
-        Some(priors) => imager.with_nuisances(priors, observations),
-        None => imager,
-    })
+pub fn imager(settings: &Settings, parts: &[Observations]) -> Result<Imager, ConfigError> {
+    let mut stars = Vec::new();
+    for (set, part) in settings.sets.iter().zip(parts) {
+        settings.check_velocity_grid(&set.star, &settings.values, part.step_kms())?;
+        stars.push(settings.star_for(set, part)?);
+    }
+    let star = stars[0].clone();
+    let seen = |(own, part): (&StarSettings, &Observations)| Seen {
+        line: Some(own.line).filter(|line| *line != star.line),
+        contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast),
+        sampling: Sampling::of(part),
+    };
+    let sets: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
+    let all = Observations { profiles: parts.iter().flat_map(|part| part.profiles.iter().cloned()).collect() };
+    let mut imager = Imager::of_sets(star, sets, &all, settings.imaging.pixels, settings.imaging.entropy());
+    if settings.sets.iter().any(|set| set.nuisances.is_some()) {
+        let priors = settings.sets.iter().map(|set| set.nuisances.unwrap_or_default());
+        imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
+    }
+    for (s, set) in settings.sets.iter().enumerate() {
+        match set.zero_point {
+            ZeroPoint::Known(0.0) => {}
+            ZeroPoint::Known(kms) => imager.move_set(s, kms),
+            ZeroPoint::Fitted => {
+                let held = set.held.map_or(0.0, |held| held.value_kms);
+                let prior = ZeroPointPrior { set: s, mean_kms: 0.0, sd_kms: set_zero_points::PRIOR_KMS };
+                imager.zero_points.push(prior);
+                imager.move_zero_point(imager.zero_points.len() - 1, held);
+            }
+        }
+    }
+    Ok(imager)
+}
+
+/// Finds the zero points of data sets that are fitted, if they are not known yet, and holds them in `imager`.
+fn hold_zero_points(settings: &mut Settings, imager: &mut Imager) -> Result<(), ConfigError> {
+    let unknown = |set: &&mut DataSetSettings| set.zero_point == ZeroPoint::Fitted;
+    if imager.zero_points.is_empty() || settings.sets.iter().any(|set| set.held.is_some()) {
+        return Ok(());
+    }
+    let usual = FrequencySettings::default();
+    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok();
+    let first = imager.zero_points[0].set;
+    let held = set_zero_points::hold(imager, settings.values, settings.known_field(), frequencies.as_ref())
+        .map_err(|e| settings.fault(&format!("{}.zero_point_kms", settings.sets[first].key), &e.to_string()))?;
+    for (set, held) in settings.sets.iter_mut().filter(unknown).zip(held) {
+        set.held = Some(held);
+    }
+    Ok(())
 }
 
 /// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
@@ -460,20 +521,21 @@ fn zero_points(
 /// part.
 const SETTLED: (usize, f64) = (3, 0.03);
 
-/// The errors that the observations, `cut` as they are used, and the `whole` profiles ask for.
+/// The errors that the observations of a `set`, `cut` as they are used, and the `whole` profiles ask for.
 fn measured_errors(
     settings: &Settings,
+    set: &DataSetSettings,
     wanted: ErrorSettings,
     whole: &Observations,
     cut: &Observations,
 ) -> Result<MeasuredErrors, ConfigError> {
-    let fault = |e: NoiseError| settings.fault(e.key(), &e.to_string());
+    let fault = |e: NoiseError| settings.fault(&e.key().replacen("observations", &set.key, 1), &e.to_string());
     let scaled = |measured: &MeasuredErrors| {
         let mut observations = cut.clone();
         measured.apply(&mut observations);
         observations
     };
-    let continuum = noise::by_continuum(whole, &settings.star, &settings.values, wanted).map_err(fault)?;
+    let continuum = noise::by_continuum(whole, &set.star, &settings.values, wanted).map_err(fault)?;
     // what a map leaves over is no noise where stars may change
     if !wanted.measured || settings.imaging.objective == ObjectiveKind::MarginalLikelihood {
         return Ok(continuum);
@@ -483,11 +545,11 @@ fn measured_errors(
     let mut measured = continuum.clone();
     for _ in 0..SETTLED.0 {
         // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
-        let (zero_points, _) = zero_points(settings, &imager(settings, &scaled(&measured))?, chi2_target)?;
+        let (zero_points, _) = zero_points(settings, &imager(settings, &[scaled(&measured)])?, chi2_target)?;
         let with_factor = |factor: f64| {
             let mut observations = before.clone();
             observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
-            let imager = imager(settings, &observations)?;
+            let imager = imager(settings, &[observations])?;
             Ok(zero_points.iter().fold(imager, |imager, zero_points| zero_points.counted_in(imager)))
         };
         let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);
@@ -505,17 +567,17 @@ fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> Parame
     ParameterSpace::new(free.to_vec(), settings.values, mid, base, imager.star.rotation_period_d)
 }
 
-/// SHA-256 (hex) of the numbers of `observations`, little-endian: the step, then for each profile time, number of bins,
+/// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of bins,
 /// and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
-    let step = observations.step_kms;
+    let step = observations.step_kms();
     let mut hash = Sha256::new();
     hash.update(step.to_le_bytes());
     for profile in &observations.profiles {
         hash.update(profile.time_d.to_le_bytes());
         hash.update((profile.intensity.len() as u64).to_le_bytes());
         for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
-            for number in [profile.velocity_kms(j, step), *intensity, *sigma] {
+            for number in [profile.velocity_kms(j), *intensity, *sigma] {
                 hash.update(number.to_le_bytes());
             }
         }

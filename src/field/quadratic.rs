@@ -20,6 +20,28 @@ impl Quadratic {
         self.ln_evidence + self.gradient.dot(v) - 0.5 * (&self.information * v).dot(v)
     }
 
+    /// The same where numbers x of a Gaussian of this `mean` and standard deviations `sd` are added, `v + columns x`, and
+    /// integrated out. `None` where the information is not finite.
+    pub fn integrated(&self, columns: &DMatrix<f64>, mean: &DVector<f64>, sd: &DVector<f64>) -> Option<Self> {
+        let shift = columns * mean;
+        let pulled_by = &self.information * &shift;
+        let ln_evidence = self.ln_evidence + self.gradient.dot(&shift) - 0.5 * shift.dot(&pulled_by);
+        let gradient = &self.gradient - pulled_by;
+        // as for a jitter, its columns in the place of the diagonal matrix s
+        let mut scaled = columns.clone();
+        scaled.column_iter_mut().zip(sd.iter()).for_each(|(mut column, sd)| column *= *sd);
+        let across = scaled.tr_mul(&self.information);
+        let a = &across * &scaled + DMatrix::identity(sd.len(), sd.len());
+        let factor = a.cholesky()?;
+        let pulled = scaled.tr_mul(&gradient);
+        let answer = factor.solve(&pulled);
+        Some(Quadratic {
+            ln_evidence: ln_evidence + 0.5 * pulled.dot(&answer) - 0.5 * factor.ln_determinant(),
+            gradient: gradient - across.tr_mul(&answer),
+            information: &self.information - across.tr_mul(&factor.solve(&across)),
+        })
+    }
+
     /// The same where each number has noise of its own beside what is asked of it, of standard deviation `sd`:
     /// integrated out, as if `D' sd` had been nuisances of the epochs. `None` where the information is not finite.
     pub fn jittered(&self, sd: &[f64]) -> Option<Self> {

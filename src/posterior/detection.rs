@@ -16,10 +16,12 @@ use crate::field::{FieldError, Lifetime};
 use crate::maxent::Termination;
 use crate::planets::periodogram::eccentric::keplerian;
 use crate::planets::periodogram::offset::{Offset, offset};
+use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::peaks::refined;
 use crate::planets::periodogram::two_planets::{both, without};
 use crate::planets::periodogram::{
-    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
+    CircularOrbit, Frequencies, Jitters, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
+    co_rotation_penalty,
 };
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
@@ -104,6 +106,9 @@ pub struct View {
     /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over
     /// count as noise.
     pub quadratic: VelocityQuadratic,
+    /// The same with those zero points of data sets held that are otherwise integrated out, for tables of velocities;
+    /// `None` where there are none.
+    pub zero_points_held: Option<VelocityQuadratic>,
     /// The same with spots as the entropy sees them: the regularised likelihood itself.
     pub regularised: VelocityQuadratic,
 }
@@ -218,8 +223,15 @@ impl View {
             let fitted = fit(imager, &basis, values, known, near)?;
             let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
             let quadratic = expansion.velocities(nuisances);
-            let (regularised, seen) = (quadratic.clone(), Seen::Integrated(Box::new(fitted)));
-            return Ok(View { seen, expansion, quadratic, regularised });
+            let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
+            let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
+            return Ok(View {
+                expansion,
+                regularised: quadratic.clone(),
+                quadratic,
+                zero_points_held: held.map(|held| held.velocities(nuisances)),
+                seen: Seen::Integrated(Box::new(fitted)),
+            });
         }
         let reference = Reference::provisional(imager, values, settings.chi2_target)?;
         let on_target = reference.solution.termination == Termination::Converged;
@@ -228,7 +240,23 @@ impl View {
         let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
         let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
         let seen = Seen::OneMap(Box::new(Image { reference, unresolved_spots, on_target }));
-        Ok(View { seen, expansion, quadratic, regularised })
+        Ok(View { seen, expansion, quadratic, zero_points_held: None, regularised })
+    }
+
+    /// The likelihood of the velocities beside jitters of several sizes, where the profiles say how large it is.
+    fn jitters(&self, imager: &Imager, settings: &DetectionSettings) -> Result<Jitters, DetectionError> {
+        match (&self.seen, settings.spots) {
+            (Seen::Integrated(fitted), Spots::Integrated(Known { jitter_kms: None, .. }))
+                if fitted.marginal.assumed.jitter_kms > 0.0 =>
+            {
+                let basis = Basis::new(&imager.grid);
+                let expansion = fitted.marginal.without_jitter(imager, &basis)?;
+                let expansion = expansion.expansion(imager, &basis, &self.expansion.stellar)?;
+                let without = expansion.velocities(&settings.nuisances);
+                Ok(Jitters::new(&without, fitted.marginal.assumed.jitter_kms))
+            }
+            _ => Ok(Jitters::none(&self.quadratic)),
+        }
     }
 
     /// The map of maximum entropy, where there is one.
@@ -248,6 +276,12 @@ impl View {
     }
 }
 
+/// Delta ln L of the best orbit at the trial periods.
+fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
+    let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+    trials.iter().filter_map(|trial| Some(trial.orbit?.delta_ln_l)).fold(0.0, f64::max)
+}
+
 impl Detection {
     /// Searches the star in `imager`, all but the orbit as in `values`, at the given periods.
     ///
@@ -265,12 +299,16 @@ impl Detection {
         alone[Parameter::K] = 0.0;
         let planet_free = View::new(imager, alone, settings, None)?;
         report(Stage::Search);
-        let blind = Search::new(&planet_free.quadratic, &frequencies, settings.search)?;
+        let jitters = planet_free.jitters(imager, settings)?;
+        let blind = Search::with_jitter(&jitters, &frequencies, settings.search)?;
         let blind = match settings.spots {
             Spots::OneMap(_) => blind,
             Spots::Integrated(_) => blind.without_multiples(),
         };
-        let best = blind.best().orbit.delta_ln_l;
+        let best = match jitters.is_none() {
+            true => blind.best().orbit.delta_ln_l,
+            false => highest(&planet_free.quadratic, &frequencies),
+        };
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
         let change =
@@ -290,8 +328,7 @@ impl Detection {
             co_rotation_penalty: None,
         };
         found.close(imager, values, settings, report)?;
-        found.co_rotation_penalty =
-            co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies, &found.blind.rows);
+        found.co_rotation_penalty = co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies);
         if settings.eccentric {
             found.keplerian = found.eccentric();
         }

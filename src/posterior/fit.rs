@@ -238,8 +238,8 @@ fn velocities(
         FilteredVelocity {
             time_d: profile.time_d,
             cycle,
-            observed: profile.first_moment(observations.step_kms),
-            modelled_kms: profile.first_moment_of(depth, observations.step_kms),
+            observed: profile.first_moment(),
+            modelled_kms: profile.first_moment_of(depth),
             orbit_kms: state.vsys_kms + state.orbit.velocity_kms(cycle),
         }
     };

@@ -13,10 +13,21 @@ use crate::numerics::vector::linear::combine;
 use crate::numerics::vector::{self, Number};
 use crate::posterior::nuisances::{LineAndContinuum, Nuisances};
 use crate::star::observation::Observations;
-use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, StarSettings, StarState, SurfaceGrid};
+use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid};
 use profile::{Bend, Misfit, Pull};
 
 pub use data::Data;
+
+/// What is assumed of the velocity zero point of a data set beyond where it is held: a Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZeroPointPrior {
+    /// The data set.
+    pub set: usize,
+    /// Mean (km/s).
+    pub mean_kms: f64,
+    /// Standard deviation (km/s).
+    pub sd_kms: f64,
+}
 
 /// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
 #[derive(Clone, Debug)]
@@ -25,12 +36,15 @@ pub struct Imager {
     pub grid: SurfaceGrid,
     /// The star, but for the parameters.
     pub star: StarSettings,
-    /// Times and velocity bins.
-    pub sampling: Sampling,
+    /// The data sets, whose profiles follow each other: times and velocity bins, and what of the star looks different
+    /// through each.
+    pub sets: Vec<Seen>,
     /// Observed depths and their weights.
     pub data: Data,
     /// Entropy of a map.
     pub entropy: Entropy,
+    /// The data sets whose velocity zero points are integrated out; mostly none.
+    pub zero_points: Vec<ZeroPointPrior>,
 }
 
 impl Imager {
@@ -39,10 +53,23 @@ impl Imager {
         Imager {
             grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
             star,
-            sampling: Sampling::of(observations),
+            sets: vec![Sampling::of(observations).into()],
             data: Data::of(observations),
             entropy,
+            zero_points: Vec::new(),
         }
+    }
+
+    /// The same for several data sets, whose profiles follow each other in `observations`; the first sees the `star` as
+    /// it is.
+    pub fn of_sets(
+        star: StarSettings,
+        sets: Vec<Seen>,
+        observations: &Observations,
+        pixels: usize,
+        entropy: Entropy,
+    ) -> Self {
+        Imager { sets, ..Imager::new(star, observations, pixels, entropy) }
     }
 
     /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard
@@ -50,6 +77,38 @@ impl Imager {
     pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
         self.data.nuisances = Nuisances::new(priors, observations);
         self
+    }
+
+    /// The same of several data sets, each with its own priors.
+    pub fn with_nuisances_of(mut self, sets: &[(LineAndContinuum, &Observations)]) -> Self {
+        self.data.nuisances = Nuisances::of_sets(sets);
+        self
+    }
+
+    /// Moves the velocities at which the profiles of a data set are expected, by `kms` to the red.
+    pub fn move_set(&mut self, set: usize, kms: f64) {
+        self.sets[set].sampling.profiles.iter_mut().for_each(|profile| profile.1 -= kms);
+    }
+
+    /// Holds a zero point that is integrated out farther to the red, by `kms`.
+    pub fn move_zero_point(&mut self, z: usize, kms: f64) {
+        self.move_set(self.zero_points[z].set, kms);
+        self.zero_points[z].mean_kms -= kms;
+    }
+
+    /// Number of each profile's data set, from 1; empty where there is only one.
+    pub fn set_of_each(&self) -> Vec<usize> {
+        let of_set = |(s, set): (usize, &Seen)| vec![s + 1; set.sampling.profiles.len()];
+        match self.sets.len() {
+            1 => Vec::new(),
+            _ => self.sets.iter().enumerate().flat_map(of_set).collect(),
+        }
+    }
+
+    /// The profiles of a data set.
+    pub fn profiles_of(&self, set: usize) -> std::ops::Range<usize> {
+        let count = |sets: &[Seen]| sets.iter().map(|set| set.sampling.profiles.len()).sum::<usize>();
+        count(&self.sets[..set])..count(&self.sets[..=set])
     }
 
     /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
@@ -63,54 +122,78 @@ impl Imager {
 
     /// The same without some of the profiles.
     pub fn without(&self, profiles: &[usize]) -> Self {
-        let (mut rest, mut kept) = (Vec::new(), Vec::new());
-        for (k, (profile, bins)) in self.sampling.profiles.iter().zip(self.bins()).enumerate() {
-            if !profiles.contains(&k) {
-                rest.push(*profile);
-                kept.push(bins);
-            }
+        let mut first = 0;
+        let mut sets = self.sets.clone();
+        for set in &mut sets {
+            let all = &mut set.sampling.profiles;
+            let before = first;
+            first += all.len();
+            let mut k = before..first;
+            all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
-        let sampling = Sampling { profiles: rest, ..self.sampling };
-        Imager { sampling, data: self.data.of_profiles(&kept), ..self.clone() }
+        // a data set of which nothing is left is none
+        let mut zero_points = self.zero_points.clone();
+        let is_left = |set: &Seen| !set.sampling.profiles.is_empty();
+        zero_points.retain(|prior| is_left(&sets[prior.set]));
+        zero_points.iter_mut().for_each(|prior| prior.set = sets[..prior.set].iter().filter(|s| is_left(s)).count());
+        sets.retain(is_left);
+        let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
+        Imager { sets, zero_points, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
+    }
+
+    /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
+    pub fn profiles(&self) -> impl Iterator<Item = (f64, f64, usize)> {
+        self.sets.iter().flat_map(|set| set.sampling.profiles.iter().copied())
+    }
+
+    /// Times of all profiles (d).
+    pub fn times_d(&self) -> Vec<f64> {
+        self.profiles().map(|profile| profile.0).collect()
     }
 
     /// Bins of every profile within the data.
     fn bins(&self) -> Vec<std::ops::Range<usize>> {
         let mut end = 0;
-        let next = |profile: &(f64, f64, usize)| {
+        let next = |profile: (f64, f64, usize)| {
             end += profile.2;
             end - profile.2..end
         };
-        self.sampling.profiles.iter().map(next).collect()
+        self.profiles().map(next).collect()
     }
 
     /// The response at one state of star and planet.
     pub fn response(&self, state: &StarState) -> Response {
-        Response::new(&self.grid, &self.star, state, &self.sampling)
+        Response::of_sets(&self.grid, &self.star, state, &self.sets)
     }
 
     /// What responses close to a state have in common.
     pub fn nearby(&self, state: &StarState) -> Nearby {
-        Nearby::new(&self.grid, &self.star, state, &self.sampling)
+        Nearby::new(&self.grid, &self.star, state, &self.sets)
     }
 
     /// The response at a state, in half the time if it is close to another.
     pub fn response_near(&self, nearby: &Nearby, state: &StarState) -> Response {
-        nearby.response(&self.grid, &self.star, state, &self.sampling).unwrap_or_else(|| self.response(state))
+        nearby.response(&self.grid, &self.star, state, &self.sets).unwrap_or_else(|| self.response(state))
+    }
+
+    /// That of `response` at a state that differs from its own by orbit and systemic velocity alone.
+    pub fn with_velocities(&self, response: &Response, state: &StarState) -> Response {
+        response.with_velocities(&self.star, state, &self.sets)
     }
 
     /// The misfit of maps seen through `response`.
     pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
-        let brightness = match self.entropy {
-            Entropy::Spots { .. } => Brightness::of_spots(response.contrast()),
+        let brightness = |k: usize| match self.entropy {
+            Entropy::Spots { .. } => Brightness::of_spots(response.contrast(k)),
             Entropy::BrightAndDark => Brightness::ITSELF,
         };
+        let brightness = (0..response.profiles()).map(brightness).collect();
         ImagingProblem::of_brightness(&self.grid.area, &self.data, response, brightness)
     }
 
     /// Rotation cycle of each profile.
     pub fn cycles(&self) -> Vec<f64> {
-        self.sampling.profiles.iter().map(|profile| self.star.cycle(profile.0)).collect()
+        self.profiles().map(|profile| self.star.cycle(profile.0)).collect()
     }
 
     /// Middle of the time base in rotation cycles.
@@ -136,7 +219,7 @@ pub struct ImagingProblem<'a> {
     area: &'a [f64],
     data: &'a Data,
     response: Response,
-    brightness_of: Brightness,
+    brightness_of: Vec<Brightness>,
     model_applications: u32,
     single_applications: u32,
     /// Model depth of every bin at the current map.
@@ -155,12 +238,13 @@ impl<'a> ImagingProblem<'a> {
     /// The problem of `data` seen through `response` on pixels of area fraction `area`, with spots of brightness
     /// `contrast`.
     pub fn new(area: &'a [f64], data: &'a Data, response: Response, contrast: f64) -> Self {
-        ImagingProblem::of_brightness(area, data, response, Brightness::of_spots(contrast))
+        let brightness = vec![Brightness::of_spots(contrast); response.profiles()];
+        ImagingProblem::of_brightness(area, data, response, brightness)
     }
 
     /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the
-    /// `brightness`.
-    fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Brightness) -> Self {
+    /// brightness as each profile sees it.
+    fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Vec<Brightness>) -> Self {
         let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
         ImagingProblem {
             area,
@@ -215,7 +299,7 @@ impl<'a> ImagingProblem<'a> {
 
     /// What profile `k` hands to the transpose for such a residual: its bins, and the constant that comes with them.
     fn pull(&self, k: usize, weighted_residual: &[f64], back: &mut [f64]) -> f64 {
-        let (bins, scale) = (self.response.bins(k), self.brightness_of.slope / self.continuum[k]);
+        let (bins, scale) = (self.response.bins(k), self.brightness_of[k].slope / self.continuum[k]);
         let (model, weighted_residual) = (&self.model[bins.clone()], &weighted_residual[bins.clone()]);
         vector::run(Pull { scale, model, weighted_residual, back: &mut back[bins] })
     }
@@ -225,7 +309,7 @@ impl<'a> ImagingProblem<'a> {
         self.model_applications += 1;
         self.response.apply(v, out, &mut self.constants);
         for k in 0..self.response.profiles() {
-            let scale = self.brightness_of.slope / self.continuum[k];
+            let scale = self.brightness_of[k].slope / self.continuum[k];
             for j in self.response.bins(k) {
                 out[j] = scale * (out[j] - self.model[j] * self.constants[k]);
             }
@@ -249,9 +333,11 @@ impl Problem for ImagingProblem<'_> {
 
     fn linearise(&mut self, s: &[f64]) -> f64 {
         self.model_applications += 1;
-        let brightness_of = self.brightness_of;
-        combine(&mut self.brightness, s, |_, s| brightness_of.at(s));
-        self.response.apply(&self.brightness, &mut self.model, &mut self.continuum);
+        let ImagingProblem { response, brightness_of, brightness, model, continuum, .. } = self;
+        response.apply_each(brightness, model, continuum, |first, map| {
+            let brightness_of = brightness_of[first];
+            combine(map, s, |_, s| brightness_of.at(s));
+        });
         let ImagingProblem { response, data, model, weighted_residual, continuum, differences, .. } = self;
         let chi2_of = |(k, continuum): (usize, &f64)| {
             let (bins, continuum) = (response.bins(k), *continuum);
@@ -274,11 +360,19 @@ impl Problem for ImagingProblem<'_> {
         self.model_applications += 2;
         self.single_applications += if N::SINGLE { 2 } else { 0 };
         let exact = which == Curvature::Exact;
-        let ImagingProblem { response, data, model, weighted_residual, continuum, differences, bins: weighed, .. } =
-            self;
-        let slope = self.brightness_of.slope;
+        let ImagingProblem {
+            response,
+            data,
+            brightness_of,
+            model,
+            weighted_residual,
+            continuum,
+            differences,
+            bins: weighed,
+            ..
+        } = self;
         response.apply_and_back(v, out, |k, line, d_continuum| {
-            let (bins, scale) = (response.bins(k), slope / continuum[k]);
+            let (bins, scale) = (response.bins(k), brightness_of[k].slope / continuum[k]);
             vector::run(Bend {
                 data,
                 bins,

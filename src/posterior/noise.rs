@@ -138,7 +138,7 @@ pub fn by_continuum(
     settings: ErrorSettings,
 ) -> Result<MeasuredErrors, NoiseError> {
     let reach_kms = values[Parameter::Vsini] + BEYOND * star.line.sigma_kms;
-    let of = |profile| Scatter::of(profile, whole.step_kms, values[Parameter::Vsys], reach_kms);
+    let of = |profile| Scatter::of(profile, values[Parameter::Vsys], reach_kms);
     let scatter: Vec<Scatter> = whole.profiles.iter().map(of).collect();
     let all: Scatter = scatter.iter().cloned().sum();
     let continuum = all.ratio(FEWEST.0).map(rounded);
@@ -147,7 +147,8 @@ pub fn by_continuum(
         Weights::PerProfile => relative(&scatter)?,
     };
     let counts = settings.measured && continuum.is_some();
-    let correlated_bins = if counts { rounded(all.correlated_bins(star.line.sigma_kms / whole.step_kms)) } else { 1.0 };
+    let correlated_bins =
+        if counts { rounded(all.correlated_bins(star.line.sigma_kms / whole.step_kms())) } else { 1.0 };
     let sigma_scale = continuum.filter(|_| settings.measured).map(|scale| rounded(scale * correlated_bins.sqrt()));
     Ok(MeasuredErrors { sigma_scale, continuum, residual: None, correlated_bins, profiles })
 }

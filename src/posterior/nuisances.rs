@@ -63,7 +63,8 @@ const ZERO_POINT: usize = 3;
 /// other.
 #[derive(Clone, Debug, Default)]
 pub struct Nuisances {
-    priors: LineAndContinuum,
+    /// Standard deviations of the priors of line and continuum, of each bin; empty without any.
+    priors: Vec<[f64; 3]>,
     /// Standard deviation of the velocity zero points (km/s).
     zero_point_kms: f64,
     /// Change of the depths per standard deviation of the prior, for each that is not fixed.
@@ -83,17 +84,27 @@ struct Correction {
 impl Nuisances {
     /// Of `observations`, with priors of these standard deviations; a standard deviation of 0 fixes a nuisance at 0.
     pub fn new(priors: LineAndContinuum, observations: &Observations) -> Self {
-        let rows: Vec<[f64; 3]> = observations.profiles.iter().flat_map(|p| templates_of(p, observations)).collect();
-        let of_one = |(i, sd): (usize, f64)| (i, rows.iter().map(|row| row[i] * sd).collect());
-        let free = priors.numbers().into_iter().enumerate().filter(|(_, sd)| *sd > 0.0);
+        Nuisances::of_sets(&[(priors, observations)])
+    }
+
+    /// Of several data sets, one after the other, each with priors of its own.
+    pub fn of_sets(sets: &[(LineAndContinuum, &Observations)]) -> Self {
+        let profiles = || sets.iter().flat_map(|(_, set)| &set.profiles);
+        let rows: Vec<[f64; 3]> =
+            sets.iter().flat_map(|(_, set)| set.profiles.iter().flat_map(|p| templates_of(p, set))).collect();
+        let of_bins = |(priors, set): &(LineAndContinuum, &Observations)| vec![priors.numbers(); set.len()];
+        let priors: Vec<[f64; 3]> = sets.iter().flat_map(of_bins).collect();
+        let free = (0..ZERO_POINT).filter(|i| priors.iter().any(|sd| sd[*i] > 0.0));
+        let of_one = |i: usize| (i, rows.iter().zip(&priors).map(|(row, sd)| row[i] * sd[i]).collect());
         let templates = free.map(of_one).collect();
         let mut end = 0;
-        let bins = observations.profiles.iter().map(|profile| {
+        let bins = profiles().map(|profile| {
             end += profile.sigma.len();
             end - profile.sigma.len()..end
         });
-        let sigma: Vec<f64> = observations.profiles.iter().flat_map(|profile| profile.sigma.clone()).collect();
-        Nuisances { priors, templates, ..Nuisances::default() }.of_profiles(&bins.collect::<Vec<_>>(), &sigma)
+        let bins: Vec<Range<usize>> = bins.collect();
+        let sigma: Vec<f64> = profiles().flat_map(|profile| profile.sigma.clone()).collect();
+        Nuisances { priors, templates, ..Nuisances::default() }.of_profiles(&bins, &sigma)
     }
 
     /// The same with velocity zero points of this standard deviation (km/s) in place of those that there were. The
@@ -120,15 +131,18 @@ impl Nuisances {
             correct(&columns, &sigma[first..first + bins.len()], &mut corrections);
             first += bins.len();
         }
-        Nuisances { templates, corrections, ..*self }
+        let has_priors = !self.priors.is_empty();
+        let priors = profiles.iter().filter(|_| has_priors).flat_map(|bins| self.priors[bins.clone()].to_vec());
+        Nuisances { priors: priors.collect(), zero_point_kms: self.zero_point_kms, templates, corrections }
     }
 
     /// How the depths of the profile with these `bins` change with line and continuum, per standard deviation of their
     /// priors (bins, nuisances).
     pub fn line_and_continuum_of(&self, bins: Range<usize>) -> DMatrix<f64> {
-        let columns: Vec<&Vec<f64>> =
-            self.templates.iter().filter(|(i, _)| *i != ZERO_POINT).map(|(_, template)| template).collect();
-        DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][bins.start + j])
+        let columns = self.templates.iter().filter(|(i, _)| *i != ZERO_POINT).map(|(_, all)| &all[bins.clone()]);
+        // what is none of this data set's is no column
+        let columns: Vec<&[f64]> = columns.filter(|own| own.iter().any(|x| *x != 0.0)).collect();
+        DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][j])
     }
 
     /// Whether there is none.
@@ -168,7 +182,7 @@ impl Nuisances {
     /// data)`; the change of its depths that they make is added to `depth`.
     pub fn estimate(&self, bins: Range<usize>, weighted_residual: &[f64], depth: &mut [f64]) -> Estimate {
         let mut numbers = [0.0; ZERO_POINT + 1];
-        let [offset, slope, width] = self.priors.numbers();
+        let [offset, slope, width] = self.priors.get(bins.start).copied().unwrap_or_default();
         let sd = [offset, slope, width, self.zero_point_kms];
         for (i, template) in &self.templates {
             let template = &template[bins.clone()];
@@ -183,15 +197,14 @@ impl Nuisances {
 
 /// Templates of every bin of a profile.
 fn templates_of(profile: &Profile, observations: &Observations) -> Vec<[f64; 3]> {
-    let step = observations.step_kms;
     let bins = profile.intensity.len();
     let mean = |j: usize| {
-        let velocity = profile.velocity_kms(j, step);
+        let velocity = profile.velocity_kms(j);
         let (sum, count) = observations.profiles.iter().fold((0.0, 0.0), |(sum, count), other| {
             // rounding of VRAD does not lose the last bin
-            let position = (velocity - other.first_velocity_kms) / step;
+            let position = (velocity - other.first_velocity_kms) / other.step_kms;
             match position > -1e-6 && position < other.intensity.len() as f64 - 1.0 + 1e-6 {
-                true => (sum + 1.0 - other.intensity_at(velocity, step), count + 1.0),
+                true => (sum + 1.0 - other.intensity_at(velocity), count + 1.0),
                 false => (sum, count),
             }
         });

@@ -54,6 +54,8 @@ pub struct Simulation {
     pub continuum: LineAndContinuum,
     /// Standard deviation of the velocity zero points of the profiles (km/s).
     pub velocity_jitter_kms: f64,
+    /// Velocity that is added to all profiles (km/s).
+    pub zero_point_kms: f64,
     /// Over how many bins the noise is correlated: the sum of its correlations with all bins of a long profile, 1 for
     /// white noise.
     pub correlated_bins: f64,
@@ -77,7 +79,8 @@ impl Simulation {
         let state = self.truth.state();
         let zero_points = self.zero_points_kms();
         // a line that is farther to the red by its zero point is the line seen from bins that are farther to the blue
-        let first = |k: usize| zero_points.get(k).map_or(self.first_velocity_kms, |v| self.first_velocity_kms - v);
+        let own = self.first_velocity_kms - self.zero_point_kms;
+        let first = |k: usize| zero_points.get(k).map_or(own, |v| own - v);
         let profiles = self.times_d.iter().enumerate().map(|(k, time)| (*time, first(k), self.bins)).collect();
         let sampling = Sampling { step_kms: self.step_kms, profiles };
         let response = Response::new(&grid, star, &state, &sampling);
@@ -100,11 +103,12 @@ impl Simulation {
         let profile = |(intensity, time_d): (&[f64], &f64)| Profile {
             time_d: *time_d,
             first_velocity_kms: self.first_velocity_kms,
+            step_kms: self.step_kms,
             intensity: intensity.to_vec(),
             sigma: vec![self.sigma(); self.bins],
         };
         let profiles = intensity.chunks_exact(self.bins).zip(&self.times_d).map(profile).collect();
-        Observations { step_kms: self.step_kms, profiles }
+        Observations { profiles }
     }
 
     /// What is wrong with each profile by itself; empty if nothing is.

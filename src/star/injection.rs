@@ -23,22 +23,22 @@ const END: usize = 4;
 
 /// `observations` with the velocities of all `orbits` added to every profile's own.
 pub fn inject(observations: &Observations, star: &StarSettings, orbits: &[Orbit]) -> Observations {
-    let step_kms = observations.step_kms;
     let velocity = |profile: &Profile| {
         let cycle = star.cycle(profile.time_d);
         orbits.iter().map(|orbit| orbit.velocity_kms(cycle)).sum()
     };
-    let profiles = observations.profiles.iter().map(|profile| shifted(profile, step_kms, velocity(profile))).collect();
-    Observations { step_kms, profiles }
+    let profiles = observations.profiles.iter().map(|profile| shifted(profile, velocity(profile))).collect();
+    Observations { profiles }
 }
 
-/// `profile`, in bins of `step_kms`, with its line `velocity_kms` further to the red.
-pub fn shifted(profile: &Profile, step_kms: f64, velocity_kms: f64) -> Profile {
-    let bins = velocity_kms / step_kms;
+/// `profile` with its line `velocity_kms` further to the red.
+pub fn shifted(profile: &Profile, velocity_kms: f64) -> Profile {
+    let bins = velocity_kms / profile.step_kms;
     let variance: Vec<f64> = profile.sigma.iter().map(|sigma| sigma * sigma).collect();
     Profile {
         time_d: profile.time_d,
         first_velocity_kms: profile.first_velocity_kms,
+        step_kms: profile.step_kms,
         intensity: resampled(&profile.intensity, bins),
         sigma: linear(&variance, bins).into_iter().map(f64::sqrt).collect(),
     }
@@ -112,7 +112,7 @@ mod tests {
         let first_velocity_kms = -72.0;
         let velocity = |j: usize| first_velocity_kms + j as f64 * STEP;
         let intensity = (0..81).map(|j| 1.0 - 0.3 * (-0.5 * ((velocity(j) - centre) / 3.2).powi(2)).exp()).collect();
-        Profile { time_d: 0.0, first_velocity_kms, intensity, sigma: vec![1e-3; 81] }
+        Profile { time_d: 0.0, first_velocity_kms, step_kms: STEP, intensity, sigma: vec![1e-3; 81] }
     }
 
     fn apart(a: &Profile, b: &Profile) -> f64 {
@@ -122,17 +122,17 @@ mod tests {
     #[test]
     fn a_shifted_line_is_the_line_elsewhere() {
         for velocity in [0.0, 1e-9, 0.1, 0.45, -0.9, 1.8, -3.7, 20.123] {
-            let moved = shifted(&gaussian(1.3), STEP, velocity);
+            let moved = shifted(&gaussian(1.3), velocity);
             // the interpolation's 1e-5 of a depth of 0.3
             assert!(apart(&moved, &gaussian(1.3 + velocity)) < 3e-6, "{velocity}");
-            let moment = |p: &Profile| p.first_moment(STEP).value_kms;
+            let moment = |p: &Profile| p.first_moment().value_kms;
             assert!((moment(&moved) - moment(&gaussian(1.3)) - velocity).abs() < 1e-4, "{velocity}");
             assert_eq!(moved.sigma, vec![1e-3; 81]);
             assert_eq!(moved.first_velocity_kms, -72.0);
         }
         let still = gaussian(1.3);
-        assert!(apart(&shifted(&still, STEP, 0.0), &still) < 1e-15);
-        assert!(apart(&shifted(&shifted(&still, STEP, 0.7), STEP, -0.7), &still) < 6e-6);
+        assert!(apart(&shifted(&still, 0.0), &still) < 1e-15);
+        assert!(apart(&shifted(&shifted(&still, 0.7), -0.7), &still) < 6e-6);
     }
 
     /// The numbers that the documentation gives.
@@ -141,9 +141,9 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let n = 200_000;
         let intensity: Vec<f64> = (0..n).map(|_| rng.sample::<f64, _>(StandardNormal)).collect();
-        let noise = Profile { time_d: 0.0, first_velocity_kms: 0.0, intensity, sigma: vec![1.0; n] };
+        let noise = Profile { time_d: 0.0, first_velocity_kms: 0.0, step_kms: STEP, intensity, sigma: vec![1.0; n] };
         for (part, variance, neighbours) in [(0.0, 1.0, 0.0), (0.25, 0.965, 0.036), (0.5, 0.930, 0.074)] {
-            let moved = shifted(&noise, STEP, part * STEP).intensity;
+            let moved = shifted(&noise, part * STEP).intensity;
             let product = |lag: usize| moved.iter().zip(&moved[lag..]).map(|(a, b)| a * b).sum::<f64>() / n as f64;
             // variance and correlation of n deviates are known to sqrt(2/n) and 1/sqrt(n), 0.003 and 0.002
             assert!((product(0) - variance).abs() < 0.012, "{part}: {}", product(0));

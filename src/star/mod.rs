@@ -9,7 +9,8 @@
 //! 3. `placement` puts pixels into cells of a velocity grid (`sorting`, `filling`, `block`), `deposit` adds their
 //!    brightness up there (`kernel`).
 //! 4. `convolution` makes bins of that (`correlate`) with the local line (`line_profile`, `voigt`).
-//! 5. [`response`] goes through these steps, and back. `nearby` has a quicker way for a star that differs little.
+//! 5. [`response`] goes through these steps, and back, for one data set, `stacked` for several. `nearby` has a quicker
+//!    way for a star that differs little.
 //!
 //! Beside that: [`observation`] has profiles and what they measure by themselves, [`injection`] puts an orbit into
 //! them, [`planet`] says what is quoted of an orbit.
@@ -35,6 +36,7 @@ pub mod response;
 pub mod rotation;
 mod sorting;
 pub mod spots;
+mod stacked;
 mod view;
 mod voigt;
 
@@ -43,9 +45,10 @@ pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;
 pub use orbit::Orbit;
-pub use response::{Response, Sampling};
+pub use response::Sampling;
 pub use rotation::Rotation;
 pub use spots::{Disc, Facula, Life, Spot};
+pub use stacked::{Response, Seen};
 
 /// The star. [`Surface`] may have other values for some of it.
 #[derive(Clone, Debug, PartialEq)]

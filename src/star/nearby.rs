@@ -2,8 +2,8 @@
 
 use super::deposit::{Arranged, Observed};
 use super::grid::SurfaceGrid;
-use super::response::{Response, Sampling, observed};
-use super::{StarSettings, StarState};
+use super::response::{Part, observed};
+use super::{Response, Seen, StarSettings, StarState};
 use std::sync::Arc;
 
 /// How far (rad) a point of the surface may be from where it was: so far beyond the limb pixels have places, for 2 %
@@ -21,18 +21,21 @@ const LARGEST_MOVE_OF_SPREAD: f64 = 0.01;
 /// Largest spread: a pixel that comes into sight point by point may move by as much.
 const LARGEST_SPREAD: f64 = 4.0;
 
-/// A star, and how its pixels were sorted.
+/// A star, and how its pixels were sorted for each data set.
 #[derive(Clone, Debug)]
 pub struct Nearby {
     state: StarState,
-    pixels: Arranged,
+    pixels: Vec<Arranged>,
 }
 
 impl Nearby {
     /// What responses close to a state of star and planet have in common.
-    pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        let star = &star.with(&state.surface);
-        Nearby { state: *state, pixels: Arranged::new(&observed(grid, star, state, sampling), MARGIN) }
+    pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
+        let arranged = |set: &Seen| {
+            let star = set.star(star).with(&state.surface);
+            Arranged::new(&observed(grid, &star, state, &set.sampling), MARGIN)
+        };
+        Nearby { state: *state, pixels: sets.iter().map(arranged).collect() }
     }
 
     /// The response at a state that is close by; nothing at any other. Everything but the state is to be the same as
@@ -42,18 +45,21 @@ impl Nearby {
         grid: &SurfaceGrid,
         star: &StarSettings,
         state: &StarState,
-        sampling: &Sampling,
+        sets: &[Seen],
     ) -> Option<Response> {
-        let star = &star.with(&state.surface);
-        let observed = observed(grid, star, state, sampling);
-        self.is_close(&observed)
-            .then(|| Response::shifted(Arc::new(self.pixels.deposit(&observed)), star, state, sampling))
+        let part = |(pixels, set): (&Arranged, &Seen)| {
+            let star = &set.star(star).with(&state.surface);
+            let observed = observed(grid, star, state, &set.sampling);
+            self.is_close(pixels, &observed)
+                .then(|| Part::shifted(Arc::new(pixels.deposit(&observed)), star, state, &set.sampling))
+        };
+        self.pixels.iter().zip(sets).map(part).collect::<Option<Vec<_>>>().map(Response::stacked)
     }
 
     /// Whether all pixels are where they were, nearly.
-    fn is_close(&self, star: &Observed) -> bool {
+    fn is_close(&self, pixels: &Arranged, star: &Observed) -> bool {
         let &Observed { grid, state, ref since_epoch_d, step_kms, .. } = star;
-        if step_kms != self.pixels.step_kms {
+        if step_kms != pixels.step_kms {
             return false;
         }
         let longest = since_epoch_d.iter().fold(0.0, |longest: f64, time| longest.max(time.abs()));
@@ -76,7 +82,7 @@ impl Nearby {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation};
+    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation, Sampling};
 
     const STAR: StarSettings = StarSettings {
         rotation_period_d: 3.0,
@@ -98,8 +104,8 @@ mod tests {
         }
     }
 
-    fn sampling() -> Sampling {
-        Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (2.0 * k as f64, -50.0, 57)).collect() }
+    fn sampling() -> [Seen; 1] {
+        [Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (2.0 * k as f64, -50.0, 57)).collect() }.into()]
     }
 
     #[test]
@@ -119,7 +125,7 @@ mod tests {
             let others = [[0.0; 4], [1e-3, 0.0, 0.01, 0.0], [-2e-4, 5e-4, -0.015, -0.2], [0.0, 0.0, 0.0199, 0.0]];
             for [rotation, shear, tilt, vsini] in others {
                 let state = star(moves * rotation, moves * shear, tilt, moves * vsini);
-                let sorted = Response::new(grid, &STAR, &state, sampling);
+                let sorted = Response::of_sets(grid, &STAR, &state, sampling);
                 let again = nearby.response(grid, &STAR, &state, sampling).expect("a star close by");
                 let [(line, continuum), (line_again, continuum_again)] = [&sorted, &again].map(|response| {
                     let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);

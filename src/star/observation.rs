@@ -9,6 +9,8 @@ pub struct Profile {
     pub time_d: f64,
     /// Velocity of the centre of the first bin (km/s), after subtraction of the profile's own `VRAD`.
     pub first_velocity_kms: f64,
+    /// Width of a velocity bin (km/s).
+    pub step_kms: f64,
     /// Intensity in units of the continuum, one number a bin.
     pub intensity: Vec<f64>,
     /// Standard error of each intensity (positive).
@@ -24,32 +26,32 @@ pub struct RadialVelocity {
     pub sigma_kms: f64,
 }
 
-/// A set of line profiles that share the width of their velocity bins.
+/// Line profiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observations {
-    /// Width of a velocity bin (km/s).
-    pub step_kms: f64,
-    /// The profiles in the order of the list.
+    /// The profiles in the order of the list; those of several data sets one set after the other.
     pub profiles: Vec<Profile>,
 }
 
 impl Observations {
-    /// Whether these can be the profiles of a star: two at least, in bins of a positive width, with as many errors as
+    /// Whether these can be the profiles of a star: two at least, in bins of one positive width, with as many errors as
     /// intensities, all finite and the errors positive.
     ///
     /// # Errors
     /// The first thing that is wrong, in words.
     pub fn check(&self) -> Result<(), String> {
-        if !(self.step_kms > 0.0 && self.step_kms.is_finite()) {
-            return Err(format!("velocity bins of {} km/s: must be above 0", self.step_kms));
-        }
         if self.profiles.len() < 2 {
             return Err(format!("{} profile: spots and a planet are told apart by two at least", self.profiles.len()));
         }
+        let step = self.step_kms();
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(format!("velocity bins of {step} km/s: must be above 0"));
+        }
         for (k, profile) in self.profiles.iter().enumerate() {
-            let Profile { time_d, first_velocity_kms, intensity, sigma } = profile;
+            let Profile { time_d, first_velocity_kms, step_kms, intensity, sigma } = profile;
             let problem = match (intensity.len(), sigma.len()) {
                 (0, _) => "has no bin".to_owned(),
+                _ if *step_kms != step => format!("has bins of {step_kms} km/s, and the first profile of {step}"),
                 (bins, errors) if bins != errors => format!("has {bins} intensities and {errors} errors"),
                 _ if !(time_d.is_finite() && first_velocity_kms.is_finite()) => {
                     format!("is at {time_d} d and begins at {first_velocity_kms} km/s: must be finite")
@@ -71,19 +73,25 @@ impl Observations {
     /// A profile that has none there, in words.
     pub fn within(&self, (low, high): (f64, f64)) -> Result<Self, String> {
         let cut = |(k, profile): (usize, &Profile)| {
-            let inside = |j: &usize| (low..=high).contains(&profile.velocity_kms(*j, self.step_kms));
+            let inside = |j: &usize| (low..=high).contains(&profile.velocity_kms(*j));
             let mut bins = (0..profile.intensity.len()).filter(inside);
             let first = bins.next().ok_or_else(|| format!("profile {k} has no bin from {low} to {high} km/s"))?;
             let bins = first..bins.next_back().unwrap_or(first) + 1;
             Ok(Profile {
                 time_d: profile.time_d,
-                first_velocity_kms: profile.velocity_kms(first, self.step_kms),
+                first_velocity_kms: profile.velocity_kms(first),
+                step_kms: profile.step_kms,
                 intensity: profile.intensity[bins.clone()].to_vec(),
                 sigma: profile.sigma[bins].to_vec(),
             })
         };
         let profiles = self.profiles.iter().enumerate().map(cut).collect::<Result<_, String>>()?;
-        Ok(Observations { step_kms: self.step_kms, profiles })
+        Ok(Observations { profiles })
+    }
+
+    /// Width of the bins of the first profile (km/s), which all profiles of a data set share; NaN where there is none.
+    pub fn step_kms(&self) -> f64 {
+        self.profiles.first().map_or(f64::NAN, |profile| profile.step_kms)
     }
 
     /// Number of data (bins of all profiles together).
@@ -112,7 +120,7 @@ impl Observations {
 
     /// Radial velocity of every profile by its first moment, see [`Profile::first_moment`].
     pub fn first_moments(&self) -> Vec<RadialVelocity> {
-        self.profiles.iter().map(|p| p.first_moment(self.step_kms)).collect()
+        self.profiles.iter().map(|p| p.first_moment()).collect()
     }
 
     /// The same in units of a continuum that is at `level` here.
@@ -127,20 +135,20 @@ impl Observations {
     /// velocity range holds whole, whatever the spots, because every pixel's line has the same one (`docs/method.md`
     /// section 1).
     pub fn mean_equivalent_width_kms(&self) -> f64 {
-        let area = |p: &Profile| p.intensity.iter().map(|i| 1.0 - i).sum::<f64>() * self.step_kms;
+        let area = |p: &Profile| p.intensity.iter().map(|i| 1.0 - i).sum::<f64>() * p.step_kms;
         self.profiles.iter().map(area).sum::<f64>() / self.profiles.len() as f64
     }
 }
 
 impl Profile {
     /// Velocity of bin `j` (km/s).
-    pub fn velocity_kms(&self, j: usize, step_kms: f64) -> f64 {
-        self.first_velocity_kms + j as f64 * step_kms
+    pub fn velocity_kms(&self, j: usize) -> f64 {
+        self.first_velocity_kms + j as f64 * self.step_kms
     }
 
     /// Intensity (linear between bins) at a velocity (km/s) within the profile, which has two bins or more.
-    pub fn intensity_at(&self, velocity_kms: f64, step_kms: f64) -> f64 {
-        let position = (velocity_kms - self.first_velocity_kms) / step_kms;
+    pub fn intensity_at(&self, velocity_kms: f64) -> f64 {
+        let position = (velocity_kms - self.first_velocity_kms) / self.step_kms;
         let below = (position.floor().max(0.0) as usize).min(self.intensity.len() - 2);
         let part = (position - below as f64).clamp(0.0, 1.0);
         // rounding of VRAD does not mix neighbours
@@ -150,17 +158,17 @@ impl Profile {
 
     /// Radial velocity `sum v (1-I) / sum (1-I)` over all bins, and its error from those of the bins,
     /// `sqrt(sum sigma^2 (v - RV)^2) / |sum (1-I)|`. Not finite where the profile has no area.
-    pub fn first_moment(&self, step_kms: f64) -> RadialVelocity {
+    pub fn first_moment(&self) -> RadialVelocity {
         let depth: Vec<f64> = self.intensity.iter().map(|i| 1.0 - i).collect();
-        let value_kms = self.first_moment_of(&depth, step_kms);
-        let arm = |(j, sigma): (usize, &f64)| (sigma * (self.velocity_kms(j, step_kms) - value_kms)).powi(2);
+        let value_kms = self.first_moment_of(&depth);
+        let arm = |(j, sigma): (usize, &f64)| (sigma * (self.velocity_kms(j) - value_kms)).powi(2);
         let variance: f64 = self.sigma.iter().enumerate().map(arm).sum();
         RadialVelocity { value_kms, sigma_kms: variance.sqrt() / depth.iter().sum::<f64>().abs() }
     }
 
     /// First moment (km/s) of other depths `1 - I`, a model's say, in the bins of this profile.
-    pub fn first_moment_of(&self, depth: &[f64], step_kms: f64) -> f64 {
-        let moment = |(j, depth): (usize, &f64)| self.velocity_kms(j, step_kms) * depth;
+    pub fn first_moment_of(&self, depth: &[f64]) -> f64 {
+        let moment = |(j, depth): (usize, &f64)| self.velocity_kms(j) * depth;
         depth.iter().enumerate().map(moment).sum::<f64>() / depth.iter().sum::<f64>()
     }
 }

@@ -1,5 +1,5 @@
-//! The linear part of the forward model: a map of the surface to the line depth and continuum of every profile, before
-//! the division of one by the other; and its transpose.
+//! The linear part of the forward model: a map of the surface to the line depth and continuum of every profile of one
+//! data set, before the division of one by the other; and its transpose. `stacked` puts those of several sets together.
 //!
 //! `docs/method.md` section 1: `sum_p w x l(v - v_p - V_k)` for every bin and `sum_p w x` for every profile.
 
@@ -10,10 +10,10 @@ use super::line_profile::LineKernel;
 use super::{StarSettings, StarState};
 use crate::numerics::vector::{self, Instructions, Number, Task};
 use crate::star::observation::Observations;
-use nalgebra::DMatrix;
+use nalgebra::DMatrixView;
 use std::sync::Arc;
 
-/// When and at which velocities the star is observed.
+/// When and at which velocities a data set observes the star.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampling {
     /// Width of a velocity bin (km/s).
@@ -26,7 +26,7 @@ impl Sampling {
     /// The sampling of a set of observations.
     pub fn of(observations: &Observations) -> Self {
         let profile = |p: &crate::star::observation::Profile| (p.time_d, p.first_velocity_kms, p.intensity.len());
-        Sampling { step_kms: observations.step_kms, profiles: observations.profiles.iter().map(profile).collect() }
+        Sampling { step_kms: observations.step_kms(), profiles: observations.profiles.iter().map(profile).collect() }
     }
 
     /// Number of bins of all profiles together.
@@ -44,9 +44,9 @@ pub const MOST_NODES: f64 = 65_535.0;
 /// them.
 pub const MOST_STEPS_PER_BIN: f64 = 200.0;
 
-/// The response of a sampled set of profiles to a map of the star.
+/// The response of a data set to a map of the star.
 #[derive(Clone, Debug)]
-pub struct Response {
+pub(super) struct Part {
     deposit: Arc<Deposit>,
     convolutions: Convolutions,
     /// First bin of each profile, and the end.
@@ -54,26 +54,18 @@ pub struct Response {
     contrast: f64,
 }
 
-impl Response {
+impl Part {
     /// The response at one state of star and planet.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
         let star = &star.with(&state.surface);
         let deposit = Deposit::new(&observed(grid, star, state, sampling));
-        Response::shifted(Arc::new(deposit), star, state, sampling)
-    }
-
-    /// Size of the velocity grid that a response takes: grid steps a bin, and nodes. Refuse more than
-    /// [`MOST_STEPS_PER_BIN`] or [`MOST_NODES`] before a response is asked for.
-    pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
-        let star = star.with(&state.surface);
-        let steps = LineKernel::steps_per_bin(star.line, step_kms) as f64;
-        (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
+        Part::shifted(Arc::new(deposit), star, state, sampling)
     }
 
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is
     /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        Response::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling)
+        Part::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling)
     }
 
     /// The response of deposits, which orbit and systemic velocity shift.
@@ -94,7 +86,7 @@ impl Response {
             (first_velocity - shift - deposit.origin_kms(), bins)
         });
         let convolutions = Convolutions::new(&kernel, grid, profiles);
-        Response { deposit, convolutions, starts, contrast: star.contrast }
+        Part { deposit, convolutions, starts, contrast: star.contrast }
     }
 
     fn rows(&self) -> Rows {
@@ -133,7 +125,8 @@ impl Response {
     }
 
     /// Number of data.
-    pub fn data_len(&self) -> usize {
+    #[cfg(test)]
+    fn data_len(&self) -> usize {
         self.starts[self.starts.len() - 1]
     }
 
@@ -143,7 +136,7 @@ impl Response {
         vector::run(Apply { response: self, x, line, continuum });
     }
 
-    /// Transpose of [`Response::apply`]; `out` is overwritten.
+    /// Transpose of [`Part::apply`]; `out` is overwritten.
     pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         vector::run(ApplyTranspose { response: self, line, continuum, out });
@@ -157,24 +150,19 @@ impl Response {
         vector::run(ApplyAndBack { response: self, x, out, weigh });
     }
 
-    /// Normalised depth `1 - I` of every bin for a brightness map: the observable of `docs/method.md` section 1.
-    pub fn depths(&self, brightness: &[f64]) -> Vec<f64> {
-        let mut depths = vec![0.0; self.data_len()];
-        let mut continuum = vec![0.0; self.profiles()];
-        self.apply(brightness, &mut depths, &mut continuum);
-        for (k, continuum) in continuum.iter().enumerate() {
-            depths[self.bins(k)].iter_mut().for_each(|depth| *depth /= continuum);
-        }
-        depths
+    /// Normalised depth `1 - I` of every bin of a star that changes: profile k sees the brightness map in column k
+    /// (pixels, profiles).
+    pub fn depths_of_each(&self, brightness: DMatrixView<f64>, depths: &mut [f64]) {
+        vector::run(OfEach { response: self, brightness, depths });
     }
+}
 
-    /// The same of a star that changes: profile k sees the brightness map in column k (pixels, profiles).
-    pub fn depths_of_each(&self, brightness: &DMatrix<f64>) -> Vec<f64> {
-        assert_eq!(brightness.shape(), (self.pixels(), self.profiles()), "a map of each profile");
-        let mut depths = vec![0.0; self.data_len()];
-        vector::run(OfEach { response: self, brightness, depths: &mut depths });
-        depths
-    }
+/// Size of the velocity grid that a response takes: grid steps a bin, and nodes. Refuse more than
+/// [`MOST_STEPS_PER_BIN`] or [`MOST_NODES`] before a response is asked for.
+pub fn velocity_grid(star: &StarSettings, state: &StarState, step_kms: f64) -> (f64, f64) {
+    let star = star.with(&state.surface);
+    let steps = LineKernel::steps_per_bin(star.line, step_kms) as f64;
+    (steps, Deposit::nodes_at(state, star.limb_darkening, step_kms / steps))
 }
 
 /// A star, its surface that of the state, as it is observed.
@@ -191,7 +179,7 @@ pub(super) fn observed<'a>(
 
 /// One profile after another, in one direction: the rows of the grid are left as that direction left them.
 struct Pass<'a, N> {
-    response: &'a Response,
+    response: &'a Part,
     nodes: Vec<f64>,
     /// What cells leave on their nodes, or what they are given there.
     of_cells: Vec<N>,
@@ -199,7 +187,7 @@ struct Pass<'a, N> {
 }
 
 impl<'a, N: Number> Pass<'a, N> {
-    fn new(response: &'a Response) -> Self {
+    fn new(response: &'a Part) -> Self {
         Pass { response, nodes: vec![0.0; response.deposit.nodes], of_cells: Vec::new(), rows: response.rows() }
     }
 
@@ -226,7 +214,7 @@ impl<'a, N: Number> Pass<'a, N> {
 }
 
 struct Apply<'a> {
-    response: &'a Response,
+    response: &'a Part,
     x: &'a [f64],
     line: &'a mut [f64],
     continuum: &'a mut [f64],
@@ -246,8 +234,8 @@ impl Task for Apply<'_> {
 }
 
 struct OfEach<'a> {
-    response: &'a Response,
-    brightness: &'a DMatrix<f64>,
+    response: &'a Part,
+    brightness: DMatrixView<'a, f64>,
     depths: &'a mut [f64],
 }
 
@@ -267,7 +255,7 @@ impl Task for OfEach<'_> {
 }
 
 struct ApplyTranspose<'a> {
-    response: &'a Response,
+    response: &'a Part,
     line: &'a [f64],
     continuum: &'a [f64],
     out: &'a mut [f64],
@@ -289,7 +277,7 @@ impl Task for ApplyTranspose<'_> {
 
 /// Profile by profile.
 struct ApplyAndBack<'a, N, F> {
-    response: &'a Response,
+    response: &'a Part,
     x: &'a [N],
     out: &'a mut [N],
     weigh: F,
@@ -358,7 +346,7 @@ mod tests {
         let sampling = Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (0.7 * k as f64, -50.0, 57)).collect() };
         let grid = SurfaceGrid::equal_area(700, Quadrature::Gauss2x2);
         // built and shifted by this processor's instructions: both see the same pairs
-        let response = &Response::new(&grid, &star, &state, &sampling);
+        let response = &Part::new(&grid, &star, &state, &sampling);
         let (x, y, z) = (noise(grid.len()), noise(response.data_len()), noise(response.profiles()));
         let profiles = || (vec![f64::NAN; y.len()], vec![f64::NAN; z.len()], vec![f64::NAN; x.len()]);
         let (mut line, mut continuum, mut map) = profiles();

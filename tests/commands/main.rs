@@ -11,6 +11,7 @@ mod batch;
 mod bright_and_dark;
 mod cli;
 mod compare;
+mod data_sets;
 mod export;
 mod faults;
 mod grid;

@@ -51,7 +51,7 @@ fn the_demo_resolves() {
     // Planck at 550 nm, 3500 K over 5500 K, and 2.5 km/s with c / 65000 / 2.3548 = 1.9586 km/s in quadrature.
     assert!((settings.star.contrast - 0.0654).abs() < 1e-3, "{}", settings.star.contrast);
     assert!((settings.star.line.sigma_kms - 3.1759).abs() < 1e-3);
-    let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
+    let ObservationSource::Simulate(simulation) = &settings.sets[0].source else { panic!() };
     assert_eq!((simulation.spots.len(), simulation.times_d.len(), simulation.bins), (12, 50, 57));
     assert!((simulation.times_d[49] - 2.94 * 3.0).abs() < 1e-12);
     assert_eq!(simulation.truth, settings.values);
@@ -65,7 +65,7 @@ fn the_demo_resolves() {
 fn the_seven_dimensional_config_starts_off_the_truth() {
     let settings = config::load(&shipped("paper_7d.json")).unwrap();
     assert_eq!(settings.free.len(), 7);
-    let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
+    let ObservationSource::Simulate(simulation) = &settings.sets[0].source else { panic!() };
     let demo = config::load(&shipped("demo.json")).unwrap();
     assert_eq!(simulation.truth, demo.values);
     // Widths of `docs/method.md` section 5; gamma times Omega_eq for the shear.
@@ -80,8 +80,8 @@ fn the_seven_dimensional_config_starts_off_the_truth() {
 fn the_landscape_of_the_paper_is_of_the_same_data() {
     let settings = config::load(&shipped("paper_grid.json")).unwrap();
     let seven = config::load(&shipped("paper_7d.json")).unwrap();
-    assert_eq!((&settings.source, &settings.star), (&seven.source, &seven.star));
-    let ObservationSource::Simulate(simulation) = &settings.source else { panic!() };
+    assert_eq!((&settings.sets[0].source, &settings.star), (&seven.sets[0].source, &seven.star));
+    let ObservationSource::Simulate(simulation) = &settings.sets[0].source else { panic!() };
     assert_eq!(settings.values, simulation.truth);
     let plan = settings.require_grid().unwrap();
     assert_eq!((plan.grid.len(), settings.imaging.pixels), (3375, 5000));
@@ -91,14 +91,14 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 #[test]
 fn lo_peg_resolves() {
     let settings = config::load(&shipped("lopeg.json")).unwrap();
-    assert_eq!(settings.equivalent_width, EquivalentWidth::Auto);
-    let ObservationSource::Files { path, options, .. } = &settings.source else { panic!() };
+    assert_eq!(settings.sets[0].equivalent_width, EquivalentWidth::Auto);
+    let ObservationSource::Files { path, options, .. } = &settings.sets[0].source else { panic!() };
     assert!(path.ends_with("configs/../../shared/data/lopeg/observations.txt"));
     assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 1.0));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
         let data = dimcmc::internals::data::io::lsd::read(list, options).unwrap().observations;
-        assert!((settings.star_for(&data).unwrap().line.equivalent_width_kms - 2.6700).abs() < 1e-3);
+        assert!((settings.star_for(&settings.sets[0], &data).unwrap().line.equivalent_width_kms - 2.6700).abs() < 1e-3);
     }
 }
 
@@ -152,7 +152,7 @@ const INTERFACE_EXAMPLE: &str = r#"{
 fn the_example_of_the_interface_resolves() {
     let settings = config::from_json(INTERFACE_EXAMPLE.as_bytes(), Path::new("dir/x.json")).unwrap();
     assert!(
-        matches!(&settings.source, ObservationSource::Files { path, .. } if path == Path::new("dir/observations.txt"))
+        matches!(&settings.sets[0].source, ObservationSource::Files { path, .. } if path == Path::new("dir/observations.txt"))
     );
     assert_eq!((settings.imaging.pixels, settings.free.len()), (5000, 3));
 }
@@ -197,7 +197,7 @@ fn accepted_spellings() {
     }
     let noiseless = demo().to_string().replace("\"snr\":1000.0", "\"snr\":null");
     let settings = config::from_json(noiseless.as_bytes(), Path::new("x")).unwrap();
-    assert!(matches!(&settings.source, ObservationSource::Simulate(s) if s.snr.is_none()));
+    assert!(matches!(&settings.sets[0].source, ObservationSource::Simulate(s) if s.snr.is_none()));
     assert!(settings.resolved["observations"]["simulate"]["snr"].is_null());
 }
 

@@ -47,13 +47,14 @@ struct Page<'a> {
 }
 
 impl<'a> Page<'a> {
-    /// What a `$ref`, or a choice of something and null, refers to.
+    /// What a `$ref`, or a choice of something and null or a list of it, refers to.
     fn resolve(&self, part: &'a Value) -> &'a Value {
         if let Some(reference) = part["$ref"].as_str() {
             return &self.schema["$defs"][reference.rsplit('/').next().unwrap()];
         }
-        let choices: Option<Vec<&Value>> =
-            part["anyOf"].as_array().map(|all| all.iter().filter(|c| c["type"] != "null").collect());
+        let choices: Option<Vec<&Value>> = part["anyOf"]
+            .as_array()
+            .map(|all| all.iter().filter(|c| c["type"] != "null" && c["items"].is_null()).collect());
         match choices.unwrap_or_default()[..] {
             [only] => self.resolve(only),
             _ => part,

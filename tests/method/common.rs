@@ -70,7 +70,8 @@ pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
     Imager {
         grid,
         star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
+        sets: vec![oracle.sampling.clone().into()],
+        zero_points: Vec::new(),
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     }

@@ -501,3 +501,30 @@ fn ln_z_of_a_model_that_is_not_linear_is_the_integral() {
     // what the second order of the model does within the width of the integrand
     assert!((found - wanted).abs() < 0.02, "{found}, not {wanted}");
 }
+
+#[test]
+fn numbers_that_epochs_share_are_integrated_out_as_dense_algebra_does_it() {
+    let problem = Problem::of_degree_3(field(0.3, 1.2, Lifetime::Days(4.0), 0.1));
+    let quadratic = problem.dense();
+    // the first number of the first three epochs moves together, and so does that of the last two
+    let mut columns = DMatrix::zeros(10, 2);
+    (0..5).for_each(|k| columns[(2 * k, usize::from(k > 2))] = 1.0);
+    let (mean, sd) = (DVector::from_vec(vec![0.2, -0.4]), DVector::from_vec(vec![0.7, 1.9]));
+    let slopes = problem.slopes();
+    let common = &slopes * &columns * DMatrix::from_diagonal(&sd);
+    let factor = (problem.covariance() + &common * common.transpose()).cholesky().unwrap();
+    let residual = problem.residual() - &slopes * &columns * &mean;
+    let dual = factor.solve(&residual);
+    let dense = Quadratic {
+        ln_evidence: -0.5 * (residual.dot(&dual) + factor.ln_determinant() + problem.data() as f64 * TAU.ln()),
+        gradient: slopes.tr_mul(&dual),
+        information: slopes.tr_mul(&factor.solve(&slopes)),
+    };
+    let integrated = quadratic.integrated(&columns, &mean, &sd).unwrap();
+    // rounding errors of two ways of the same algebra
+    assert!(difference(&integrated, &dense) < 1e-10, "{}", difference(&integrated, &dense));
+    // a prior of no width moves, and that is all
+    let held = quadratic.integrated(&columns, &mean, &DVector::zeros(2)).unwrap();
+    assert!((held.ln_evidence - quadratic.at(&(&columns * &mean))).abs() < 1e-9);
+    assert!((&held.information - &quadratic.information).amax() < 1e-9 * quadratic.information.amax());
+}

@@ -184,10 +184,11 @@ fn made(depth: impl Fn(f64) -> f64) -> Observations {
     let profile = Profile {
         time_d: 0.0,
         first_velocity_kms: -50.0,
+        step_kms: 1.0,
         intensity: velocities.map(|v| 1.0 - depth(v)).collect(),
         sigma: vec![1e-3; 101],
     };
-    Observations { step_kms: 1.0, profiles: vec![profile.clone(), profile] }
+    Observations { profiles: vec![profile.clone(), profile] }
 }
 
 #[test]

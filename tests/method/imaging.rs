@@ -24,11 +24,12 @@ fn chi2_is_the_sum_of_squared_residuals_over_their_errors() {
     let profile = |time_d, intensity: [f64; 2], sigma: [f64; 2]| Profile {
         time_d,
         first_velocity_kms: -1.0,
+        step_kms: 2.0,
         intensity: intensity.to_vec(),
         sigma: sigma.to_vec(),
     };
     let profiles = vec![profile(0.0, [0.9, 1.0], [0.1, 0.2]), profile(1.0, [0.8, 0.7], [0.5, 0.05])];
-    let data = Data::of(&Observations { step_kms: 2.0, profiles });
+    let data = Data::of(&Observations { profiles });
     let close = |a: &[f64], b: [f64; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0));
     assert!(close(&data.depth, [0.1, 0.0, 0.2, 0.3]), "{:?}", data.depth);
     assert!(close(&data.inverse_variance, [100.0, 25.0, 4.0, 400.0]), "{:?}", data.inverse_variance);

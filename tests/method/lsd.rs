@@ -46,7 +46,7 @@ fn vrad_is_subtracted_before_the_cut() {
     let dir = folder();
     let read = read(dir.path(), &ReadOptions { velocity_range_kms: Some((-5.4, 5.4)), sigma_scale: 0.5 }).unwrap();
     assert_eq!(read.times_d(), [1.5, 2.5]);
-    assert!((read.step_kms - 1.8).abs() < 1e-12);
+    assert!((read.step_kms() - 1.8).abs() < 1e-12);
     let [a, b] = &read.profiles[..] else { panic!() };
     // a: -9 + 2 + 1.8 = -5.2 up to 3.8 + ... <= 5.4; b: -5.4 to 5.4, edges included.
     assert!((a.first_velocity_kms + 5.2).abs() < 1e-9 && a.intensity.len() == 6, "{a:?}");
@@ -60,14 +60,15 @@ fn what_is_written_reads_back() {
     let profiles = (0..12).map(|k| Profile {
         time_d: 2456886.39347 + k as f64 / 7.0,
         first_velocity_kms: -50.4,
+        step_kms: 1.8,
         intensity: (0..57).map(|j| 1.0 - 0.1 * ((j * k) as f64).sin().abs() / 3.0).collect(),
         sigma: vec![1e-3 / 3.0; 57],
     });
-    let written = Observations { step_kms: 1.8, profiles: profiles.collect() };
+    let written = Observations { profiles: profiles.collect() };
     let dir = tempfile::tempdir().unwrap();
     lsd::write(dir.path(), &written).unwrap();
     let back = read(dir.path(), &options(Some((-50.4, 50.4)))).unwrap();
-    assert!((back.step_kms - 1.8).abs() < 1e-9);
+    assert!((back.step_kms() - 1.8).abs() < 1e-9);
     for (w, b) in written.profiles.iter().zip(&back.profiles) {
         assert_eq!(w.time_d, b.time_d);
         assert!((w.first_velocity_kms - b.first_velocity_kms).abs() < 1e-9);

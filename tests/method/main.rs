@@ -1,6 +1,7 @@
 //! The method against independent numbers, limit cases and itself: the library alone.
 
 mod common;
+mod data_sets;
 mod marginal;
 
 mod chain;

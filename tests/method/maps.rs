@@ -57,8 +57,7 @@ fn changing_star() -> (Scene, [Vec<f64>; 2]) {
     let scenes: Vec<Scene> = (0..cycles.len()).map(of).collect();
     let truth = [0, last].map(|k| scenes[k].true_spot_filling().unwrap());
     let profiles = scenes.iter().map(|scene| scene.observations.profiles[0].clone()).collect();
-    let step_kms = scenes[0].observations.step_kms;
-    (with_profiles(Observations { step_kms, profiles }, 0.0), truth)
+    (with_profiles(Observations { profiles }, 0.0), truth)
 }
 
 /// Of the upper half of the star and a little more: what is below is hardly seen.

@@ -23,11 +23,12 @@ const PRIORS: LineAndContinuum =
 /// The oracle's data as observations.
 fn observations(imager: &Imager) -> Observations {
     let mut bins = imager.data.depth.iter().zip(&imager.data.inverse_variance);
-    let profiles = imager.sampling.profiles.iter().map(|&(time_d, first_velocity_kms, n)| {
+    let step_kms = imager.sets[0].sampling.step_kms;
+    let profiles = imager.profiles().map(|(time_d, first_velocity_kms, n)| {
         let (intensity, sigma) = bins.by_ref().take(n).map(|(d, w)| (1.0 - d, w.powf(-0.5))).unzip();
-        Profile { time_d, first_velocity_kms, intensity, sigma }
+        Profile { time_d, first_velocity_kms, step_kms, intensity, sigma }
     });
-    Observations { step_kms: imager.sampling.step_kms, profiles: profiles.collect() }
+    Observations { profiles: profiles.collect() }
 }
 
 fn with_nuisances(pixels: usize, priors: LineAndContinuum) -> Imager {
@@ -50,7 +51,7 @@ fn chi2_is_the_least_over_all_nuisances() {
     let imager = with_nuisances(1000, PRIORS);
     let mut problem = imager.problem(imager.response(&truth(&oracle()).state()));
     let chi2 = problem.linearise(&vec![0.05; imager.grid.len()]);
-    let bins = imager.sampling.profiles[0].2;
+    let bins = imager.sets[0].sampling.profiles[0].2;
     let mean = |j: usize| imager.data.depth.iter().skip(j).step_by(bins).sum::<f64>() / 50.0;
     let mut least = 0.0;
     for (k, (model, observed)) in problem.model().chunks(bins).zip(imager.data.depth.chunks(bins)).enumerate() {
@@ -162,7 +163,7 @@ fn an_orbit_is_found_under_wandering_continua() {
     assert!(fit.summary.residual_rms < 1.05e-3, "{}", fit.summary.residual_rms);
     // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth
     // of the prior
-    let ObservationSource::Simulate(simulation) = &scene.settings.source else { panic!() };
+    let ObservationSource::Simulate(simulation) = &scene.settings.sets[0].source else { panic!() };
     for i in 0..3 {
         let (found, injected): (Vec<f64>, Vec<f64>) =
             fit.nuisances.iter().zip(simulation.nuisances()).map(|(a, b)| (a.numbers()[i], b.numbers()[i])).unzip();

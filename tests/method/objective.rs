@@ -20,7 +20,8 @@ fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
     let imager = Imager {
         grid: SurfaceGrid::equal_area(1200, Quadrature::Gauss2x2),
         star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
+        sets: vec![oracle.sampling.clone().into()],
+        zero_points: Vec::new(),
         data: oracle.data.clone(),
         entropy: entropy.unwrap_or(Entropy::new(oracle.default_spot)),
     };

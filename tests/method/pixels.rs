@@ -15,7 +15,8 @@ fn vsini(pixels: usize) -> (f64, f64) {
     let imager = Imager {
         grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
         star: oracle.star.clone(),
-        sampling: oracle.sampling.clone(),
+        sets: vec![oracle.sampling.clone().into()],
+        zero_points: Vec::new(),
         data: oracle.data.clone(),
         entropy: Entropy::new(oracle.default_spot),
     };

@@ -4,7 +4,7 @@
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Planet, Star};
 use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
 use super::{Automatic, EquivalentWidth, ImagingSettings, VelocityJitter};
-use crate::posterior::noise::Weights;
+use crate::posterior::objective::ObjectiveKind;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -89,6 +89,7 @@ impl Draft {
     }
 
     fn sections(&self) -> Sections {
+        let integrated = self.imaging.objective == ObjectiveKind::MarginalLikelihood;
         Sections {
             schema: self.schema.clone(),
             star: self.star(),
@@ -99,9 +100,8 @@ impl Draft {
                 velocity_range_kms: Some(self.velocity_range_kms.into()),
                 sigma_scale: Some(self.sigma_scale),
                 continuum_level: self.continuum_level,
-                weights: Weights::default(),
-                velocity_jitter_kms: self.velocity_jitter,
-                simulate: None,
+                velocity_jitter_kms: Some(self.velocity_jitter).filter(|jitter| integrated || !jitter.is_default()),
+                ..ObservationsSection::default()
             },
             imaging: self.imaging.clone(),
             parameters: PerParameter {

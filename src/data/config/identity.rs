@@ -30,20 +30,19 @@ pub fn first_difference(then: &Value, now: &Value) -> Option<String> {
     Some(format!("{key} ({first} then, {second} now)"))
 }
 
-/// The first key in which two resolved configs do not ask for the same model: star, instrument and image, whatever the
-/// values of the parameters that may be free.
-pub fn model_difference(first: &Value, second: &Value) -> Option<Difference> {
-    ["star", "instrument", "imaging"].iter().find_map(|name| section_difference(name, first, second))
-}
-
 /// Whether two resolved configs count velocity zero points alike.
 pub fn jitter_difference(first: &Value, second: &Value) -> Option<Difference> {
     const KEY: &str = "velocity_jitter_kms";
-    let [first, second] = [first, second].map(|resolved| &resolved["observations"][KEY]);
+    // of several data sets it is one for all
+    let [first, second] = [first, second].map(|resolved| {
+        let observations = &resolved["observations"];
+        &observations.get(0).unwrap_or(observations)[KEY]
+    });
     difference(&format!("observations.{KEY}"), first, second)
 }
 
-/// The same within one section, which need not be there.
+/// The first key of a section, which need not be there, in which two resolved configs do not ask for the same model,
+/// whatever the values of the parameters that may be free.
 pub fn section_difference(name: &str, first: &Value, second: &Value) -> Option<Difference> {
     let without_parameters = |resolved: &Value| {
         let mut section = resolved.get(name).cloned().unwrap_or(Value::Null);

@@ -5,6 +5,7 @@
 //! and every error names the file and the key.
 
 mod automatic;
+mod data_sets;
 mod domain;
 mod draft;
 mod error;
@@ -16,6 +17,7 @@ mod raw_parts;
 mod resolve;
 mod resolve_grid;
 mod resolve_observations;
+mod resolve_sets;
 mod resolve_simulation;
 mod resolve_star;
 mod settings;
@@ -25,12 +27,13 @@ mod written;
 
 pub use crate::sampling::ensemble::SamplerSettings;
 pub use automatic::Automatic;
+pub use data_sets::ZeroPoint;
 pub use draft::Draft;
 pub use error::ConfigError;
-pub use identity::{Difference, first_difference, jitter_difference, model_difference, section_difference};
+pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use jitter::VelocityJitter;
 pub use resolve_grid::MOST_NODES;
-pub use settings::{GridSettings, ImagingSettings, ObservationSource, Settings};
+pub use settings::{DataSetSettings, GridSettings, ImagingSettings, ObservationSource, Settings};
 pub use spots::Hyperparameter;
 pub use written::Config;
 

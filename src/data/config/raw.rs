@@ -3,7 +3,8 @@
 //! Fields of `PerParameter` and the observations are in `raw_parts`.
 
 use super::EquivalentWidth;
-use super::raw_parts::{Grid, ObservationsSection, PerParameter, PriorSection};
+use super::data_sets::DataSets;
+use super::raw_parts::{Grid, PerParameter, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,8 +25,8 @@ pub(super) struct Config {
     /// The planet; without it there is none (K = 0). Where a parameter is free, this is the start.
     #[serde(default)]
     pub planet: Planet,
-    /// The line profiles, observed or simulated: either `path` or `simulate`.
-    pub observations: ObservationsSection,
+    /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its own.
+    pub observations: DataSets,
     /// The Doppler image.
     #[serde(default)]
     pub imaging: ImagingSettings,

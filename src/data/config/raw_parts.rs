@@ -1,8 +1,11 @@
 //! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
 
 use super::automatic::Automatic;
+use super::data_sets::ZeroPoint;
 use super::jitter::VelocityJitter;
+use super::raw::Line;
 use crate::posterior::noise::Weights;
+use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::Parameter;
 use crate::posterior::simulate::{RandomSpots, Schedule};
 use schemars::JsonSchema;
@@ -160,10 +163,14 @@ pub(super) enum PriorKind {
     Periodic,
 }
 
-/// The line profiles: either `path` (with its options), or `simulate`.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+/// The line profiles of a data set: either `path` (with its options), or `simulate`.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObservationsSection {
+    /// Name of the data set, in results, and the folder that `dimcmc simulate` writes it to: letters, digits, `-`, `_`
+    /// and `.`. "set1", "set2", ... if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The list of profiles, `FILE TIME_DAYS [VRAD_KMS]` a line, relative to the folder of this config. Times are days,
     /// of the middle of each exposure, all counted from one zero point: BJD_TDB, whole or less a constant. Velocities
     /// are barycentric: those of the profiles, or what VRAD, which is subtracted from them, makes of them. Without the
@@ -185,11 +192,37 @@ pub(super) struct ObservationsSection {
     #[serde(default, skip_serializing_if = "Weights::is_default")]
     pub weights: Weights,
     /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
-    /// beside that of the bins; 0 if not given. It should be small against the width of the local line. "fitted": as
-    /// large as the profiles say at the config's values, before anything else.
-    #[serde(default, skip_serializing_if = "VelocityJitter::is_default")]
-    pub velocity_jitter_kms: VelocityJitter,
-    /// Simulated profiles of the star and planet of this config.
+    /// beside that of the bins. It should be small against the width of the local line. "fitted": as large as the
+    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the objective
+    /// "marginal-likelihood", and 0 with others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_jitter_kms: Option<VelocityJitter>,
+    /// Resolving power of this set's spectrograph, in place of `instrument.resolving_power`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resolving_power: Option<f64>,
+    /// Local line of this set, in place of `star.line`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<Line>,
+    /// Wavelength (nm) of this set, at which the temperatures give the brightness of a spot, in place of
+    /// `star.wavelength_nm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wavelength_nm: Option<f64>,
+    /// Brightness of a spot over that of the photosphere in this set, in place of what the star has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<f64>,
+    /// Line and continuum of each profile of this set, in place of `imaging.nuisances`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nuisances: Option<LineAndContinuum>,
+    /// Velocity (km/s) that all profiles of this set have too much, one number; 0 if not given. "fitted", for one of
+    /// several sets: integrated out, with a Gaussian prior of 3 km/s around 0; in maps it is held where it is most
+    /// probable.
+    #[serde(default, skip_serializing_if = "ZeroPoint::is_default")]
+    pub zero_point_kms: ZeroPoint,
+    /// With `path`: windows of time `[start, end]` (d), transits for example: profiles within are left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exclude: Vec<[f64; 2]>,
+    /// Simulated profiles of the star and planet of this config. Of several data sets the first one has the spots, for
+    /// all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateSection>,
 }
@@ -238,6 +271,9 @@ pub(super) struct SimulateSection {
     /// the same seed and added to its velocity; 0 if not given.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub velocity_jitter_kms: f64,
+    /// Velocity (km/s), from -100 to 100, that is added to all profiles; 0 if not given.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub zero_point_kms: f64,
     /// Over how many bins the noise is correlated, from 1 (white noise, if not given) to 1000: c makes correlations of
     /// ((c - 1) / (c + 1))^m at a distance of m bins, which add up to c. The variance of a bin stays.
     #[serde(default = "one", skip_serializing_if = "is_one")]

@@ -6,7 +6,7 @@ use super::identity::fingerprint;
 use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
-use super::resolve_observations::resolve_observations;
+use super::resolve_sets::resolve_sets;
 use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
 use crate::posterior::marginal;
@@ -21,8 +21,9 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
-    let source = resolve_observations(&mut raw, &star, &values, path)?;
-    check_imaging(&raw.imaging, raw.observations.velocity_jitter_kms)?;
+    let sets = resolve_sets(&mut raw, &star, &values, path)?;
+    let velocity_jitter = resolve_jitter(&mut raw);
+    check_imaging(&raw.imaging, velocity_jitter)?;
     resolve_field(&mut raw, &mut values)?;
     let free = resolve_free(&mut raw, &mut values)?;
     check_sampler(&raw.sampler, free.len())?;
@@ -42,10 +43,9 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         path: path.into(),
         star,
         mass_msun: raw.star.mass_msun,
-        equivalent_width: raw.star.line.equivalent_width_kms,
         values,
-        source,
-        velocity_jitter: raw.observations.velocity_jitter_kms,
+        sets,
+        velocity_jitter,
         imaging: raw.imaging,
         free,
         sampler: raw.sampler,
@@ -53,6 +53,20 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         sha256: fingerprint(&resolved),
         resolved,
     })
+}
+
+/// The velocity jitter, its default filled in. A field takes zero points that nobody told it of for spots that change
+/// or for planets.
+fn resolve_jitter(raw: &mut Config) -> VelocityJitter {
+    let integrated = raw.imaging.objective == ObjectiveKind::MarginalLikelihood;
+    let usual = if integrated { VelocityJitter::Fitted } else { VelocityJitter::default() };
+    let sections = &mut raw.observations.sections;
+    let jitter = sections[0].velocity_jitter_kms.unwrap_or(usual);
+    // that of all data sets
+    for section in sections {
+        section.velocity_jitter_kms = Some(jitter).filter(|jitter| integrated || !jitter.is_default());
+    }
+    jitter
 }
 
 /// The parameters as the config gives them; those of the surface where they are free or on an axis.

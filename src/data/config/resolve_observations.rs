@@ -2,8 +2,7 @@
 
 use super::domain::{check_size, check_value, most};
 use super::error::Fault;
-use super::raw::Config;
-use super::raw_parts::{SimulateSection, VelocitySection};
+use super::raw_parts::{ObservationsSection, SimulateSection, VelocitySection};
 use super::resolve::{automatic, check_nuisances, check_pixels, positive};
 use super::resolve_simulation::{facula, spots, times_d};
 use super::{Automatic, ObservationSource, VelocityJitter};
@@ -18,17 +17,18 @@ use std::path::Path;
 /// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
 const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Resolves `observations`; fills the default of `sigma_scale`. `config` is the config's path, whose folder paths start
-/// from.
+/// Resolves the data set at `key`; fills the default of its `sigma_scale`. `config` is the config's path, whose folder
+/// paths start from.
 pub(super) fn resolve_observations(
-    raw: &mut Config,
+    section: &mut ObservationsSection,
+    key: &str,
     star: &StarSettings,
     values: &ParameterValues,
     config: &Path,
 ) -> Result<ObservationSource, Fault> {
-    let section = &mut raw.observations;
-    if let VelocityJitter::Known(kms) = section.velocity_jitter_kms {
-        check_jitter("observations.velocity_jitter_kms", kms)?;
+    let at = |field: &str| format!("{key}.{field}");
+    if let Some(VelocityJitter::Known(kms)) = section.velocity_jitter_kms {
+        check_jitter(&at("velocity_jitter_kms"), kms)?;
     }
     let path = match (&section.path, &section.simulate) {
         (Some(path), None) => path,
@@ -38,49 +38,55 @@ pub(super) fn resolve_observations(
                 ("sigma_scale", section.sigma_scale.is_some()),
                 ("continuum_level", section.continuum_level.is_some()),
                 ("weights", !section.weights.is_default()),
+                ("exclude", !section.exclude.is_empty()),
             ];
             if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
-                return Err(Fault::new(format!("observations.{name}"), "for observations from files only"));
+                return Err(Fault::new(at(name), "for observations from files only"));
             }
             if star.line.equivalent_width_kms.is_nan() {
                 return Err(Fault::new("star.line.equivalent_width_kms", "auto is for observations from files only"));
             }
-            return Ok(ObservationSource::Simulate(simulation(simulate, star, values)?));
+            return Ok(ObservationSource::Simulate(simulation(simulate, star, values, key)?));
         }
-        (Some(_), Some(_)) => return Err(Fault::new("observations", "give either path or simulate, not both")),
-        (None, None) => return Err(Fault::new("observations", "give path (of the list of profiles) or simulate")),
+        (Some(_), Some(_)) => return Err(Fault::new(key, "give either path or simulate, not both")),
+        (None, None) => return Err(Fault::new(key, "give path (of the list of profiles) or simulate")),
     };
     if path.as_os_str().is_empty() {
-        return Err(Fault::new("observations.path", "is empty"));
+        return Err(Fault::new(at("path"), "is empty"));
     }
     let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Fixed(ReadOptions::default().sigma_scale));
-    automatic("observations.sigma_scale", sigma_scale)?;
+    automatic(&at("sigma_scale"), sigma_scale)?;
     let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
     let sigma_scale = if errors.measured { 1.0 } else { sigma_scale.value() };
     for end in section.velocity_range_kms.into_iter().flatten() {
-        check_size("observations.velocity_range_kms", end, most::VELOCITY_KMS)?;
+        check_size(&at("velocity_range_kms"), end, most::VELOCITY_KMS)?;
     }
     let continuum_level = section.continuum_level.unwrap_or(1.0);
     if !CONTINUUM_LEVELS.contains(&continuum_level) {
         let (min, max) = (CONTINUUM_LEVELS.start(), CONTINUUM_LEVELS.end());
         let problem = format!("{continuum_level} must be from {min} to {max}");
-        return Err(Fault::new("observations.continuum_level", problem));
+        return Err(Fault::new(at("continuum_level"), problem));
     }
     if let Some([min, max]) = section.velocity_range_kms
         && min >= max
     {
         let problem = format!("first velocity {min} must be below last velocity {max}");
-        return Err(Fault::new("observations.velocity_range_kms", problem));
+        return Err(Fault::new(at("velocity_range_kms"), problem));
     }
     let options = ReadOptions { velocity_range_kms: section.velocity_range_kms.map(Into::into), sigma_scale };
     let path = config.parent().unwrap_or(Path::new("")).join(path);
     Ok(ObservationSource::Files { path, options, continuum_level, errors })
 }
 
-fn simulation(section: &SimulateSection, star: &StarSettings, values: &ParameterValues) -> Result<Simulation, Fault> {
-    let at = |field: &str| format!("observations.simulate.{field}");
+fn simulation(
+    section: &SimulateSection,
+    star: &StarSettings,
+    values: &ParameterValues,
+    set: &str,
+) -> Result<Simulation, Fault> {
+    let at = |field: &str| format!("{set}.simulate.{field}");
     let faculae = section.faculae.iter().enumerate().map(|(k, f)| facula(f, &at(&format!("faculae[{k}]"))));
-    let times_d = times_d(section, star)?;
+    let times_d = times_d(section, star, set)?;
     if let Some(snr) = section.snr {
         positive(&at("snr"), snr)?;
     }
@@ -90,6 +96,11 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
     check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
     check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
+    if !(section.zero_point_kms.abs() <= LARGEST_JITTER_KMS) {
+        let problem =
+            format!("{} must be from -{LARGEST_JITTER_KMS} to {LARGEST_JITTER_KMS} km/s", section.zero_point_kms);
+        return Err(Fault::new(at("zero_point_kms"), problem));
+    }
     if !(section.correlated_bins >= 1.0 && section.correlated_bins <= MOST_CORRELATED_BINS) {
         let problem = format!("{} must be from 1 (white noise) to {MOST_CORRELATED_BINS}", section.correlated_bins);
         return Err(Fault::new(at("correlated_bins"), problem));
@@ -100,7 +111,7 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         truth[parameter] = value;
     }
     Ok(Simulation {
-        spots: spots(section, star, &truth, &times_d)?,
+        spots: spots(section, star, &truth, &times_d, set)?,
         faculae: faculae.collect::<Result<_, _>>()?,
         truth,
         times_d,
@@ -112,6 +123,7 @@ fn simulation(section: &SimulateSection, star: &StarSettings, values: &Parameter
         pixels: section.pixels,
         continuum,
         velocity_jitter_kms: section.velocity_jitter_kms,
+        zero_point_kms: section.zero_point_kms,
         correlated_bins: section.correlated_bins,
     })
 }

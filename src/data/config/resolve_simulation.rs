@@ -12,15 +12,17 @@ use crate::star::{Disc, Facula, Life, Spot, StarSettings};
 const MOST_PROFILES: usize = 10_000;
 const MOST_SPOTS: f64 = 10_000.0;
 
-fn at(field: &str) -> String {
-    format!("observations.simulate.{field}")
+/// Where a key of the simulation of a data set stands.
+fn at(set: &str, field: &str) -> String {
+    format!("{set}.simulate.{field}")
 }
 
 /// Times of the profiles (d).
-pub(super) fn times_d(section: &SimulateSection, star: &StarSettings) -> Result<Vec<f64>, Fault> {
+pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str) -> Result<Vec<f64>, Fault> {
+    let at = |field: &str| at(set, field);
     let cycles = match (&section.cycles, &section.schedule) {
         (Some(cycles), None) => cycles,
-        (None, Some(schedule)) => return scheduled(schedule, star),
+        (None, Some(schedule)) => return scheduled(schedule, star, set),
         (Some(_), Some(_)) => return Err(Fault::new(at("schedule"), "give either cycles or schedule, not both")),
         (None, None) => return Err(Fault::new(at("cycles"), "missing, give cycles or schedule")),
     };
@@ -36,10 +38,10 @@ pub(super) fn times_d(section: &SimulateSection, star: &StarSettings) -> Result<
     Ok(times_d)
 }
 
-fn scheduled(schedule: &Schedule, star: &StarSettings) -> Result<Vec<f64>, Fault> {
+fn scheduled(schedule: &Schedule, star: &StarSettings, set: &str) -> Result<Vec<f64>, Fault> {
     let Schedule { nights, seasons, season_spacing_d, per_night: [fewest, largest], night_hours, clouds, .. } =
         *schedule;
-    let key = |field: &str| at(&format!("schedule.{field}"));
+    let key = |field: &str| at(set, &format!("schedule.{field}"));
     within(&key("nights"), nights as f64, [1.0, 1000.0])?;
     within(&key("seasons"), seasons as f64, [1.0, 100.0])?;
     check_size(&key("season_spacing_d"), season_spacing_d, most::TIME)?;
@@ -77,9 +79,11 @@ pub(super) fn spots(
     star: &StarSettings,
     truth: &ParameterValues,
     times_d: &[f64],
+    set: &str,
 ) -> Result<Vec<Spot>, Fault> {
+    let at = |field: &str| at(set, field);
     let drawn = match &section.random_spots {
-        Some(random) => random_spots(random, truth, times_d)?,
+        Some(random) => random_spots(random, truth, times_d, set)?,
         None => Vec::new(),
     };
     let listed = section.spots.iter().enumerate().map(|(k, spot)| (spot, at(&format!("spots[{k}]"))));
@@ -87,8 +91,13 @@ pub(super) fn spots(
     all.map(|(numbers, key)| spot(numbers, star, truth, &key)).collect()
 }
 
-fn random_spots(random: &RandomSpots, truth: &ParameterValues, times_d: &[f64]) -> Result<Vec<Vec<f64>>, Fault> {
-    let key = |field: &str| at(&format!("random_spots.{field}"));
+fn random_spots(
+    random: &RandomSpots,
+    truth: &ParameterValues,
+    times_d: &[f64],
+    set: &str,
+) -> Result<Vec<Vec<f64>>, Fault> {
+    let key = |field: &str| at(set, &format!("random_spots.{field}"));
     within(&key("number"), random.number as f64, [1.0, MOST_SPOTS])?;
     if let Some(lifetime_d) = random.lifetime_d {
         positive(&key("lifetime_d"), lifetime_d)?;

@@ -1,18 +1,20 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
+use super::data_sets::ZeroPoint;
 use super::spots::Hyperparameter;
 use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
 use crate::posterior::marginal::Known;
+use crate::posterior::marginal::zero_points::HeldZeroPoint;
 use crate::posterior::noise::ErrorSettings;
 use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, UnresolvedSpots};
 use crate::posterior::simulate::Simulation;
 use crate::sampling::landscape::Grid;
 use crate::star::observation::Observations;
-use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
+use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN, velocity_grid};
 use crate::star::{BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,17 +25,14 @@ use std::path::PathBuf;
 pub struct Settings {
     /// The config file.
     pub path: PathBuf,
-    /// The star. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through
-    /// [`Settings::star_for`].
+    /// The star, whatever data sets say of it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN.
     pub star: StarSettings,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
-    /// Where the equivalent width of the line comes from.
-    pub equivalent_width: EquivalentWidth,
     /// The parameters as the config gives them: the fixed ones, and the start of the free ones.
     pub values: ParameterValues,
-    /// Where the profiles come from.
-    pub source: ObservationSource,
+    /// The data sets, one at least.
+    pub sets: Vec<DataSetSettings>,
     /// Scatter of the profiles' velocity zero points.
     pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
@@ -49,6 +48,40 @@ pub struct Settings {
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
     /// `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
     pub sha256: String,
+}
+
+/// A data set.
+#[derive(Clone, Debug)]
+pub struct DataSetSettings {
+    /// Where it stands in the config.
+    pub key: String,
+    /// Its name.
+    pub name: String,
+    /// The star as it sees it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through
+    /// [`Settings::star_for`].
+    pub star: StarSettings,
+    /// Where the equivalent width of the line comes from.
+    pub equivalent_width: EquivalentWidth,
+    /// Where the profiles come from.
+    pub source: ObservationSource,
+    /// Line and continuum of each profile.
+    pub nuisances: Option<LineAndContinuum>,
+    /// Velocity that all profiles have too much.
+    pub zero_point: ZeroPoint,
+    /// Where one that is fitted is held, once it is known.
+    pub held: Option<HeldZeroPoint>,
+    /// Windows of time (d) whose profiles are left out.
+    pub exclude: Vec<[f64; 2]>,
+}
+
+impl DataSetSettings {
+    /// Level of the continuum in its files.
+    pub fn continuum_level(&self) -> f64 {
+        match self.source {
+            ObservationSource::Files { continuum_level, .. } => continuum_level,
+            ObservationSource::Simulate(_) => 1.0,
+        }
+    }
 }
 
 /// Where the profiles come from.
@@ -166,20 +199,22 @@ impl Settings {
         self.grid.as_ref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
     }
 
-    /// The star, its equivalent width measured on `observations` if that is [`EquivalentWidth::Auto`].
+    /// The star as a data `set` sees it, its equivalent width measured on its `observations` if that is
+    /// [`EquivalentWidth::Auto`].
     ///
     /// # Errors
     /// If the equivalent width so measured is not positive.
-    pub fn star_for(&self, observations: &Observations) -> Result<StarSettings, ConfigError> {
-        let mut star = self.star.clone();
-        if self.equivalent_width == EquivalentWidth::Auto {
-            let beside = match self.imaging.nuisances.is_some_and(|priors| priors.continuum_offset > 0.0) {
+    pub fn star_for(&self, set: &DataSetSettings, observations: &Observations) -> Result<StarSettings, ConfigError> {
+        let mut star = set.star.clone();
+        if set.equivalent_width == EquivalentWidth::Auto {
+            let beside = match set.nuisances.is_some_and(|priors| priors.continuum_offset > 0.0) {
                 true => self.above_its_continuum(&star, observations),
                 false => None,
             };
             let width = beside.unwrap_or_else(|| observations.mean_equivalent_width_kms());
             if !(width.is_finite() && width > 0.0) {
-                let problem = format!("auto gives {width} km/s: the observed profiles are no absorption line");
+                let of = if self.sets.len() > 1 { format!(" for {}", set.key) } else { String::new() };
+                let problem = format!("auto gives {width} km/s{of}: the observed profiles are no absorption line");
                 return Err(self.fault("star.line.equivalent_width_kms", &problem));
             }
             star.line.equivalent_width_kms = width;
@@ -203,7 +238,7 @@ impl Settings {
         for profile in &observations.profiles {
             let bins = profile.intensity.len();
             let centre = self.values[Parameter::Vsys];
-            let distance = |j: usize| profile.velocity_kms(j, observations.step_kms) - centre;
+            let distance = |j: usize| profile.velocity_kms(j) - centre;
             let area = |depth: &dyn Fn(usize) -> f64| {
                 let side = |sign: f64| {
                     let beyond: Vec<f64> = (0..bins).filter(|j| sign * distance(*j) > reach_kms).map(depth).collect();
@@ -219,14 +254,19 @@ impl Settings {
         Some(observed / expected)
     }
 
-    /// Whether profiles in velocity bins of `step_kms` can be computed at `values`.
+    /// Whether profiles of `star` in velocity bins of `step_kms` can be computed at `values`.
     ///
     /// # Errors
     /// If the local line is so narrow, or the star so fast, that the velocity grid grows out of hand.
-    pub fn check_velocity_grid(&self, values: &ParameterValues, step_kms: f64) -> Result<(), ConfigError> {
-        let (steps, nodes) = Response::velocity_grid(&self.star, &values.state(), step_kms);
+    pub fn check_velocity_grid(
+        &self,
+        star: &StarSettings,
+        values: &ParameterValues,
+        step_kms: f64,
+    ) -> Result<(), ConfigError> {
+        let (steps, nodes) = velocity_grid(star, &values.state(), step_kms);
         if steps.is_nan() || steps > MOST_STEPS_PER_BIN {
-            let sigma = self.star.line.sigma_kms;
+            let sigma = star.line.sigma_kms;
             let problem = format!("{sigma} (with the instrument) is too narrow for velocity bins of {step_kms} km/s");
             return Err(self.fault("star.line.sigma_kms", &problem));
         }
@@ -242,7 +282,7 @@ impl Settings {
         Ok(())
     }
 
-    /// The config with other observations in place of its own, those of a list at `path`; cut and errors of observed
+    /// The config, of one data set, with other observations in place of its own, those of a list at `path`; cut and errors of observed
     /// ones stay.
     pub fn with_observations(&self, path: &str) -> serde_json::Value {
         let mut config = self.resolved.clone();
@@ -261,6 +301,13 @@ impl Settings {
             }
         }
         config
+    }
+
+    /// The faculae of a simulated star, as the config has them.
+    pub fn faculae_as_written(&self) -> Option<serde_json::Value> {
+        let observations = &self.resolved["observations"];
+        let first = observations.get(0).unwrap_or(observations);
+        first["simulate"].get("faculae").cloned()
     }
 
     /// What is known of the field of spots before the profiles, where maps are integrated over.
@@ -298,7 +345,7 @@ const FEWEST_BESIDE: usize = 2;
 /// How much of its line an unspotted star shows within the velocities of `observations`.
 fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
     let depths = unspotted(star, values, observations);
-    let areas = depths.iter().sum::<f64>() * observations.step_kms / observations.profiles.len() as f64;
+    let areas = depths.iter().sum::<f64>() * observations.step_kms() / observations.profiles.len() as f64;
     areas / star.line.equivalent_width_kms
 }
 

@@ -59,20 +59,20 @@ impl Change {
         let Patient { settings, .. } = patient;
         let mut all: Vec<Change> = VSINI.map(Change::Vsini).into();
         all.extend(LINE_WIDTH.map(Change::LineWidth));
-        if settings.star.line.gamma_kms == 0.0 && settings.values.given(Parameter::LineSigma).is_none() {
+        if settings.sets[0].star.line.gamma_kms == 0.0 && settings.values.given(Parameter::LineSigma).is_none() {
             all.extend(WINGS.map(|(gamma, sigma)| Change::Wings(gamma, sigma)));
         }
         if settings.imaging.brightness == BrightnessModel::Spots {
             all.push(Change::BrightAndDark);
         }
         all.extend(PERIOD.map(Change::Period));
-        if settings.equivalent_width != EquivalentWidth::Auto
+        if settings.sets[0].equivalent_width != EquivalentWidth::Auto
             && settings.values.given(Parameter::EquivalentWidth).is_none()
         {
             all.push(Change::MeasuredStrength);
         }
         all.extend(level(patient).map(Change::Level));
-        if settings.imaging.nuisances.is_none() {
+        if settings.sets[0].nuisances.is_none() {
             all.push(Change::Offsets);
         }
         all.extend(range(patient).map(|(from, to)| Change::Range(from, to)));
@@ -153,13 +153,13 @@ impl Change {
         match self {
             Change::Vsini(factor) => settings.values[Parameter::Vsini] *= factor,
             Change::LineWidth(factor) => {
-                settings.star.line.sigma_kms *= factor;
+                settings.sets[0].star.line.sigma_kms *= factor;
                 if settings.values.given(Parameter::LineSigma).is_some() {
                     settings.values[Parameter::LineSigma] *= factor;
                 }
             }
             Change::Wings(gamma, sigma) => {
-                let line = &mut settings.star.line;
+                let line = &mut settings.sets[0].star.line;
                 let (total, instrument) = (line.sigma_kms, line.instrumental_sigma_kms);
                 line.gamma_kms = gamma * total;
                 line.sigma_kms = before_spectrograph(sigma * total, instrument).hypot(instrument);
@@ -167,10 +167,11 @@ impl Change {
             Change::BrightAndDark => settings.imaging.brightness = BrightnessModel::BrightAndDark,
             // the orbit, if there is one, keeps its period in days
             Change::Period(factor) => settings.values[Parameter::OmegaEq] /= factor,
-            Change::MeasuredStrength => settings.equivalent_width = EquivalentWidth::Auto,
+            Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::Auto,
             Change::Level(level) => changed.observations = changed.observations.over_continuum(*level),
             Change::Offsets => {
-                settings.imaging.nuisances = Some(LineAndContinuum { continuum_offset: OFFSET, ..Default::default() });
+                let offsets = LineAndContinuum { continuum_offset: OFFSET, ..Default::default() };
+                settings.sets[0].nuisances = Some(offsets);
             }
             Change::Range(from, to) => changed.observations = within(patient, *from, *to)?,
         }
@@ -209,7 +210,7 @@ fn before_spectrograph(total_kms: f64, instrument_kms: f64) -> f64 {
 
 /// Width of the local line (km/s) before the spectrograph, to two decimals.
 fn local_sigma(patient: &Patient) -> f64 {
-    let line = &patient.settings.star.line;
+    let line = &patient.settings.sets[0].star.line;
     let local = (line.sigma_kms.powi(2) - line.instrumental_sigma_kms.powi(2)).max(0.0).sqrt();
     let sigma = patient.settings.values.given(Parameter::LineSigma).unwrap_or(local);
     (100.0 * sigma).round() / 100.0
@@ -229,7 +230,7 @@ fn level(patient: &Patient) -> Option<f64> {
     let (centre, reach) = line(patient);
     let side = |sign: f64| {
         let beside = |profile: &Profile| -> Vec<f64> {
-            let distance = |j: usize| sign * (profile.velocity_kms(j, profiles.step_kms) - centre);
+            let distance = |j: usize| sign * (profile.velocity_kms(j) - centre);
             let bins = profile.intensity.iter().enumerate();
             bins.filter(|(j, _)| (reach..=2.0 * reach).contains(&distance(*j))).map(|(_, i)| *i).collect()
         };
@@ -244,9 +245,9 @@ fn level(patient: &Patient) -> Option<f64> {
 fn range(patient: &Patient) -> Option<(f64, f64)> {
     const WIDE: f64 = 1.5;
     let (centre, reach) = line(patient);
-    let step = patient.observations.step_kms;
+    let step = patient.observations.step_kms();
     let first = |p: &Profile| p.first_velocity_kms;
-    let last = |p: &Profile| p.velocity_kms(p.intensity.len() - 1, step);
+    let last = |p: &Profile| p.velocity_kms(p.intensity.len() - 1);
     let profiles = &patient.observations.profiles;
     let from = profiles.iter().map(first).fold(f64::NEG_INFINITY, f64::max);
     let to = profiles.iter().map(last).fold(f64::INFINITY, f64::min);
@@ -258,10 +259,10 @@ fn range(patient: &Patient) -> Option<(f64, f64)> {
 /// The observations within other velocities, errors scaled as those that are used.
 fn within(patient: &Patient, from: f64, to: f64) -> Option<Observations> {
     const FEWEST: usize = 5;
-    let step = patient.observations.step_kms;
+    let step = patient.observations.step_kms();
     let source = patient.whole.unwrap_or(&patient.observations);
     let cut = |(profile, used): (&Profile, &Profile)| {
-        let inside = |j: &usize| (from..=to).contains(&profile.velocity_kms(*j, step));
+        let inside = |j: &usize| (from..=to).contains(&profile.velocity_kms(*j));
         let bins: Vec<usize> = (0..profile.intensity.len()).filter(inside).collect();
         let first = *bins.first().filter(|_| bins.len() >= FEWEST)?;
         // the factor on the errors of a profile is that of its first bin in use
@@ -269,11 +270,12 @@ fn within(patient: &Patient, from: f64, to: f64) -> Option<Observations> {
         let scale = used.sigma.first()? / profile.sigma.get(same)?;
         Some(Profile {
             time_d: profile.time_d,
-            first_velocity_kms: profile.velocity_kms(first, step),
+            first_velocity_kms: profile.velocity_kms(first),
+            step_kms: step,
             intensity: bins.iter().map(|&j| profile.intensity[j]).collect(),
             sigma: bins.iter().map(|&j| scale * profile.sigma[j]).collect(),
         })
     };
     let profiles = source.profiles.iter().zip(&patient.observations.profiles).map(cut).collect::<Option<Vec<_>>>()?;
-    Some(Observations { step_kms: step, profiles })
+    Some(Observations { profiles })
 }

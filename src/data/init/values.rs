@@ -95,7 +95,7 @@ impl Values {
         }
         line::note_continuum(&look, continuum_level, ledger);
         let line_sigma_kms = line::sigma_kms(&look, model, known, ledger);
-        let velocity_range_kms = line::velocity_range(&look, model, whole.step_kms, known, ledger);
+        let velocity_range_kms = line::velocity_range(&look, model, whole.step_kms(), known, ledger);
         let profiles = whole.profiles.len();
         Ok(Values {
             look,
@@ -262,7 +262,7 @@ impl Values {
             "{} profiles of {bins} bins of {:.3} km/s, from {first:.3} to {last:.3} ({:.3} d); S/N {:.0} a bin by \
             their errors",
             whole.profiles.len(),
-            whole.step_kms,
+            whole.step_kms(),
             last - first,
             1.0 / self.look.noise.quoted
         )

@@ -127,8 +127,8 @@ fn read_entries(list: &Path, bytes: &[u8], entries: &[Entry], options: &ReadOpti
         profiles.push(in_star_frame(entry, RawProfile { axis, ..raw }, options)?);
     }
     match first {
-        Some((_, axis)) => Ok(DataSet {
-            observations: Observations { step_kms: axis.step, profiles },
+        Some(_) => Ok(DataSet {
+            observations: Observations { profiles },
             sha256: format!("{:x}", hash.finalize()),
             remarks: found.remarks(entries.len()),
         }),
@@ -241,6 +241,7 @@ fn in_star_frame(entry: &Entry, raw: RawProfile, options: &ReadOptions) -> Resul
     Ok(Profile {
         time_d: entry.time_d,
         first_velocity_kms: axis.at(begin),
+        step_kms: axis.step,
         intensity: raw.intensity[begin..=last].to_vec(),
         sigma,
     })

@@ -202,7 +202,7 @@ impl MapResult<'_> {
         for (k, (profile, model)) in self.observations.profiles.iter().zip(&self.fit.model).enumerate() {
             let cycle = self.imager.star.cycle(profile.time_d);
             for (j, model) in model.iter().enumerate() {
-                let velocity = profile.velocity_kms(j, self.observations.step_kms);
+                let velocity = profile.velocity_kms(j);
                 let (observed, sigma) = (profile.intensity[j], profile.sigma[j]);
                 let residual = observed - model;
                 table.row(&[k as f64, profile.time_d, cycle, velocity, observed, sigma, *model, residual]);

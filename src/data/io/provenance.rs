@@ -1,5 +1,6 @@
 //! What every result says of where it came from.
 
+use crate::posterior::marginal::zero_points::HeldZeroPoint;
 use crate::posterior::noise::MeasuredErrors;
 use crate::posterior::objective::target::ChosenTarget;
 use crate::posterior::zero_points::MeasuredJitter;
@@ -33,9 +34,40 @@ pub struct Measured {
     /// `observations.velocity_jitter_kms`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_jitter: Option<MeasuredJitter>,
+    /// Each of several data sets, in the order of the profiles.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<MeasuredSet>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
+}
+
+/// One of several data sets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredSet {
+    /// Its name.
+    pub name: String,
+    /// Number of its profiles.
+    pub profiles: usize,
+    /// Its `sigma_scale` and `weights`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors: Option<MeasuredErrors>,
+    /// Its `zero_point_kms`: where it is held in maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zero_point: Option<HeldZeroPoint>,
+}
+
+impl MeasuredSet {
+    /// It in words.
+    pub fn line(&self) -> String {
+        let zero_point = self
+            .zero_point
+            .as_ref()
+            .map(|held| format!(", zero point {:.4} +- {:.4} km/s, integrated out", held.value_kms, held.sigma_kms));
+        let errors = self.errors.as_ref().map(|errors| format!(", errors {}", errors.line()));
+        let (name, profiles) = (&self.name, self.profiles);
+        format!("{name}: {profiles} profiles{}{}", zero_point.unwrap_or_default(), errors.unwrap_or_default())
+    }
 }
 
 impl Measured {
@@ -46,7 +78,8 @@ impl Measured {
 
     /// That the model does not fit as well as the continuum promises, where the errors say so.
     pub fn misfit_text(&self) -> Option<String> {
-        self.errors.as_ref().and_then(MeasuredErrors::misfit_text)
+        let of_sets = self.sets.iter().filter_map(|set| set.errors.as_ref());
+        self.errors.iter().chain(of_sets).find_map(MeasuredErrors::misfit_text)
     }
 
     /// It in words, label and text a line.
@@ -55,6 +88,7 @@ impl Measured {
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("velocity jitter", jitter.line()));
-        profiles.chain(errors).chain(jitter).chain(target).collect()
+        let sets = self.sets.iter().map(|set| ("data set", set.line()));
+        profiles.chain(sets).chain(errors).chain(jitter).chain(target).collect()
     }
 }

@@ -31,6 +31,9 @@ pub struct Truth {
     /// The velocity zero point of each profile (km/s), which is not part of `orbit_kms`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zero_points_kms: Vec<f64>,
+    /// The zero point of the whole data set (km/s), which is not part of `orbit_kms` either; if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zero_point_kms: Option<f64>,
     /// Over how many bins the noise is correlated, where it is not white.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correlated_bins: Option<f64>,

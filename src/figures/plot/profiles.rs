@@ -5,6 +5,7 @@ use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::lsd::{self, ReadOptions};
 use crate::data::io::map::{ChangingFitFile, FIT, FitFile, MapKind, UNCHANGING};
+use crate::data::io::periodogram::DATA_SET;
 use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, GREY, VERMILION};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
@@ -26,6 +27,8 @@ pub(super) struct Line {
     pub model: Vec<f64>,
     /// That of a star that does not change, beside that of one that does; empty without.
     pub unchanging: Vec<f64>,
+    /// Number of its data set, where there are several.
+    pub data_set: Option<usize>,
 }
 
 impl Line {
@@ -50,10 +53,12 @@ pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let observed = table.column_within("observed", ANY)?;
     let [sigma, model] = [table.column("sigma")?, table.column("model")?];
     let (time_d, unchanging) = (table.column_within("time_d", ANY)?, table.column(UNCHANGING).ok());
+    let data_set = table.column(DATA_SET).ok();
     let mut lines: Vec<Line> = Vec::new();
     for k in 0..numbers.len() {
         if k == 0 || numbers[k] != numbers[k - 1] {
-            lines.push(Line { time_d: time_d[k], cycle: cycle[k], ..Line::default() });
+            let data_set = data_set.map(|of| of[k] as usize);
+            lines.push(Line { time_d: time_d[k], cycle: cycle[k], data_set, ..Line::default() });
         }
         let line = lines.last_mut().expect("the first row begins a profile");
         line.velocity_kms.push(velocity[k]);
@@ -74,11 +79,12 @@ pub(super) fn simulated(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let line = |profile: &crate::star::observation::Profile| Line {
         time_d: profile.time_d,
         cycle: (profile.time_d - epoch) / period,
-        velocity_kms: (0..profile.intensity.len()).map(|j| profile.velocity_kms(j, observations.step_kms)).collect(),
+        velocity_kms: (0..profile.intensity.len()).map(|j| profile.velocity_kms(j)).collect(),
         observed: profile.intensity.clone(),
         sigma: profile.sigma.clone(),
         model: Vec::new(),
         unchanging: Vec::new(),
+        data_set: None,
     };
     sorted(observations.profiles.iter().map(line).collect(), &list)
 }
@@ -118,6 +124,9 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         phase. Bars \
          beside the profiles are plus and minus one standard error."
     );
+    if lines.iter().any(|line| line.data_set.is_some()) {
+        figure.caption += " In parentheses: the number of the data set.";
+    }
     let [low, high] = extent(lines, |line| &line.observed);
     let spacing = 0.5 * (high - low);
     let (margin, top, bottom) = (15.0, 25.0, 30.0);
@@ -174,7 +183,8 @@ fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     let sigma = line.sigma.iter().sum::<f64>() / line.sigma.len().max(1) as f64;
     let half = 0.5 * (panel.place(last, 0.0)[1] - panel.place(last, 2.0 * sigma)[1]);
     figure.polyline("sigma", &[[bar, middle - half], [bar, middle + half]], Stroke::new(BLACK, 1.0));
-    let text = format!("{turns:.0} + {:.3}", line.phase());
+    let data_set = line.data_set.map_or_else(String::new, |s| format!(" ({s})"));
+    let text = format!("{turns:.0} + {:.3}{data_set}", line.phase());
     figure.text(&text, [bar + 3.0, middle + 2.3], TINY, Align::Left, 0.0);
 }
 

@@ -3,6 +3,7 @@
 use crate::data::io::csv::Columns;
 use crate::data::io::lsd::{self, ReadOptions};
 use crate::data::io::map::{FIT, MAP};
+use crate::data::io::provenance::Measured;
 use crate::figures::plot::PlotError;
 use crate::runs::origin;
 use serde::Deserialize;
@@ -19,6 +20,7 @@ pub(super) struct About {
     data_sha256: Option<String>,
     profiles: Option<usize>,
     time_span_d: Option<[f64; 2]>,
+    measured: Measured,
 }
 
 impl About {
@@ -59,6 +61,8 @@ pub(super) fn lines(folder: &Path, title: &str, about: &About) -> Vec<(String, S
     }
     let mut lines = vec![("Star".to_owned(), format!("{}: {}", name(config).unwrap_or(title), star.join(", ")))];
     lines.extend(Data::of(folder, about).map(|data| ("Data".to_owned(), data.text())));
+    let sets = about.measured.sets.iter().map(|set| ("Data set".to_owned(), set.line()));
+    lines.extend(sets);
     lines
 }
 

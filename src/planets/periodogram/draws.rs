@@ -5,8 +5,8 @@
 //! periods are one matrix, times a square root of the information, times the deviates. Each block of draws has its own
 //! stream of random numbers, so that the number of threads does not matter.
 
-use super::orbits::{Trial, design};
-use crate::planets::velocities::VelocityQuadratic;
+use super::jitter::{Jitters, Level};
+use super::orbits::{design, scan};
 use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -22,32 +22,52 @@ const ROWS: usize = 1024;
 /// Directions of the gradient with less than this part of the largest variance do not move.
 const STILL: f64 = 1e-13;
 
-/// The highest Delta ln L over the trial periods of each of `draws` gradients.
-pub fn maxima(quadratic: &VelocityQuadratic, trials: &[Trial], draws: usize, seed: u64) -> Vec<f64> {
-    let rows = whitened(quadratic, trials);
+/// The highest Delta ln L over the trial frequencies of each of `draws` gradients, the jitter being what suits best
+/// without an orbit and with each.
+pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -> Vec<f64> {
+    let rows: Vec<DMatrix<f64>> = jitters.levels.iter().map(|level| whitened(level, frequencies)).collect();
+    let profiles = jitters.levels[0].quadratic.len();
     let block = |block: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(block as u64);
         let size = DRAWS.min(draws - block * DRAWS);
-        let deviates = DMatrix::from_fn(rows.ncols(), size, |_, _| rng.sample::<f64, _>(StandardNormal));
-        let mut highest = vec![0.0f64; size];
-        for first in (0..rows.nrows()).step_by(ROWS) {
-            let amplitudes = rows.rows(first, ROWS.min(rows.nrows() - first)) * &deviates;
-            for (highest, column) in highest.iter_mut().zip(amplitudes.column_iter()) {
-                let pairs = column.as_slice().chunks_exact(2).map(|w| 0.5 * (w[0] * w[0] + w[1] * w[1]));
-                *highest = pairs.fold(*highest, f64::max);
+        let deviates = DMatrix::from_fn(profiles, size, |_, _| rng.sample::<f64, _>(StandardNormal));
+        if jitters.is_none() {
+            return highest(&rows[0], &deviates);
+        }
+        let squares = (&jitters.rotation * &deviates).map(|amplitude| amplitude * amplitude);
+        let (mut without, mut with) = (vec![f64::NEG_INFINITY; size], vec![f64::NEG_INFINITY; size]);
+        for (level, rows) in jitters.levels.iter().zip(&rows) {
+            for (k, highest) in highest(rows, &deviates).into_iter().enumerate() {
+                let alone = level.constant + level.squares.dot(&squares.column(k));
+                without[k] = without[k].max(alone);
+                with[k] = with[k].max(alone + highest);
             }
         }
-        highest
+        with.iter().zip(&without).map(|(with, without)| with - without).collect()
     };
     (0..draws.div_ceil(DRAWS)).into_par_iter().flat_map_iter(block).collect()
 }
 
-/// `L^-1 X' S` of all periods, two rows each, S S' being the information.
-fn whitened(quadratic: &VelocityQuadratic, trials: &[Trial]) -> DMatrix<f64> {
-    let bounded: Vec<&Trial> = trials.iter().filter(|t| t.orbit.is_some()).collect();
+/// The highest Delta ln L of each column of deviates.
+fn highest(rows: &DMatrix<f64>, deviates: &DMatrix<f64>) -> Vec<f64> {
+    let mut highest = vec![0.0f64; deviates.ncols()];
+    for first in (0..rows.nrows()).step_by(ROWS) {
+        let amplitudes = rows.rows(first, ROWS.min(rows.nrows() - first)) * deviates;
+        for (highest, column) in highest.iter_mut().zip(amplitudes.column_iter()) {
+            let pairs = column.as_slice().chunks_exact(2).map(|w| 0.5 * (w[0] * w[0] + w[1] * w[1]));
+            *highest = pairs.fold(*highest, f64::max);
+        }
+    }
+    highest
+}
+
+/// `L^-1 X' S` of all periods, two rows each, S S' being the covariance of the gradient.
+fn whitened(level: &Level, frequencies: &[f64]) -> DMatrix<f64> {
+    let mut bounded = scan(&level.quadratic, frequencies);
+    bounded.retain(|trial| trial.orbit.is_some());
     let frequencies: Vec<f64> = bounded.iter().map(|t| t.frequency).collect();
-    let mut columns = root(&quadratic.information) * design(&quadratic.cycles, &frequencies);
+    let mut columns = &level.root * design(&level.quadratic.cycles, &frequencies);
     for (j, trial) in bounded.iter().enumerate() {
         let Some(factor) = trial.information.cholesky().map(|c| c.l()) else { continue };
         for i in 0..columns.nrows() {
@@ -61,7 +81,7 @@ fn whitened(quadratic: &VelocityQuadratic, trials: &[Trial]) -> DMatrix<f64> {
 
 /// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do
 /// draws.
-fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let mut eigen = covariance.clone().symmetric_eigen();
     let still = STILL * eigen.eigenvalues.max();
     eigen.eigenvalues.apply(|variance| *variance = if *variance > still { variance.sqrt() } else { 0.0 });

@@ -2,11 +2,12 @@
 //!
 //! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z) exp(-z)`, hence `FAP = 1 -
 //! exp(-tau)` (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). W comes from the
-//! upper tail of the draws by maximum likelihood, those below the tail counting as such.
+//! upper tail of the draws by maximum likelihood, those below the tail counting as such. Where a jitter of unknown size
+//! stands beside the orbit high peaks are more frequent, as in the F-test: z is taken times a rate, which is found along
+//! with W.
 
 use super::draws::maxima;
-use super::orbits::Trial;
-use crate::planets::velocities::VelocityQuadratic;
+use super::jitter::Jitters;
 
 /// The tail to which W is fitted: this part of the draws.
 const TAIL: f64 = 0.1;
@@ -28,6 +29,8 @@ pub struct FalseAlarm {
 pub struct Tail {
     /// Number of independent peaks that the search looks at, but for a factor of order 1.
     pub w: f64,
+    /// The rate: 1 where the noise is known.
+    pub rate: f64,
 }
 
 /// A false-alarm probability, by both ways.
@@ -43,16 +46,35 @@ pub struct Probability {
 
 impl Tail {
     /// Fits W to the upper tail of `maxima`, sorted from low to high.
-    fn fit(maxima: &[f64]) -> Self {
-        let unit = Tail { w: 1.0 };
+    fn fit(maxima: &[f64], rate: f64) -> Self {
+        let unit = Tail { w: 1.0, rate };
         let below = maxima.len() - (TAIL * maxima.len() as f64).ceil() as usize;
         let above: f64 = maxima[below..].iter().map(|z| unit.peaks(*z)).sum();
-        Tail { w: (maxima.len() - below) as f64 / (above + below as f64 * unit.peaks(maxima[below])) }
+        let w = (maxima.len() - below) as f64 / (above + below as f64 * unit.peaks(maxima[below]));
+        Tail { w, rate }
+    }
+
+    /// The same with the rate that the draws are most likely with.
+    fn fit_with_rate(maxima: &[f64]) -> Self {
+        const RATES: usize = 90;
+        let all = (0..=RATES).map(|k| Tail::fit(maxima, 0.1 + 0.01 * k as f64));
+        all.max_by(|a, b| a.log_likelihood(maxima).total_cmp(&b.log_likelihood(maxima))).expect("rates")
+    }
+
+    /// ln of the density of the draws in the tail, those below it counting as such: sum of `ln(-d tau / dz) - tau`.
+    fn log_likelihood(&self, maxima: &[f64]) -> f64 {
+        let below = maxima.len() - (TAIL * maxima.len() as f64).ceil() as usize;
+        let of = |z: &f64| {
+            let scaled = (self.rate * z).max(0.5);
+            let slope = self.rate * (1.0 - 0.5 / scaled).max(1e-12);
+            (self.peaks(*z) * slope).ln() - self.peaks(*z)
+        };
+        maxima[below..].iter().map(of).sum::<f64>() - below as f64 * self.peaks(maxima[below])
     }
 
     /// tau: mean number of peaks above `delta_ln_l`; it falls from 1/2 on.
     fn peaks(&self, delta_ln_l: f64) -> f64 {
-        let z = delta_ln_l.max(0.5);
+        let z = (self.rate * delta_ln_l).max(0.5);
         self.w * z.sqrt() * (-z).exp()
     }
 
@@ -84,11 +106,11 @@ impl Probability {
 }
 
 impl FalseAlarm {
-    /// From `draws` gradients without a planet.
-    pub fn draw(quadratic: &VelocityQuadratic, trials: &[Trial], draws: usize, seed: u64) -> Self {
-        let mut maxima = maxima(quadratic, trials, draws, seed);
+    /// From `draws` gradients without a planet, for a search at these frequencies.
+    pub fn draw(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -> Self {
+        let mut maxima = maxima(jitters, frequencies, draws, seed);
         maxima.sort_by(f64::total_cmp);
-        let tail = Tail::fit(&maxima);
+        let tail = if jitters.is_none() { Tail::fit(&maxima, 1.0) } else { Tail::fit_with_rate(&maxima) };
         FalseAlarm { maxima, tail }
     }
 
@@ -123,23 +145,22 @@ mod tests {
     use super::super::orbits::scan;
     use super::super::sample::{self, uneven};
     use super::*;
+    use crate::planets::velocities::VelocityQuadratic;
     use nalgebra::DVector;
 
-    fn star() -> (VelocityQuadratic, Vec<Trial>) {
+    fn star() -> (VelocityQuadratic, Vec<f64>) {
         let cycles = uneven(30, 3.0);
         let quadratic = sample::correlated(&cycles, &DVector::zeros(30), 5);
         let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
-        let trials = scan(&quadratic, &frequencies.per_cycle);
-        (quadratic, trials)
+        (quadratic, frequencies.per_cycle)
     }
 
     /// Kolmogorov-Smirnov: gradients of the null model itself, drawn another way, have uniform false-alarm
     /// probabilities.
     #[test]
     fn the_probability_is_uniform_under_its_own_null() {
-        let (quadratic, trials) = star();
-        let frequencies: Vec<f64> = trials.iter().map(|t| t.frequency).collect();
-        let alarm = FalseAlarm::draw(&quadratic, &trials, 10_000, 1);
+        let (quadratic, frequencies) = star();
+        let alarm = FalseAlarm::draw(&Jitters::none(&quadratic), &frequencies, 10_000, 1);
         let factor = quadratic.information.clone().cholesky().unwrap().unpack();
         let n = 1000;
         let mut found: Vec<f64> = (0..n)
@@ -158,9 +179,10 @@ mod tests {
 
     #[test]
     fn the_tail_agrees_with_the_draws() {
-        let (quadratic, trials) = star();
-        let few = FalseAlarm::draw(&quadratic, &trials, 10_000, 1);
-        let many = FalseAlarm::draw(&quadratic, &trials, 200_000, 2);
+        let (quadratic, frequencies) = star();
+        let jitters = Jitters::none(&quadratic);
+        let few = FalseAlarm::draw(&jitters, &frequencies, 10_000, 1);
+        let many = FalseAlarm::draw(&jitters, &frequencies, 200_000, 2);
         for p in [0.05, 0.01, 1e-3] {
             let z = many.level(p);
             let found = few.tail.probability(z);
@@ -173,11 +195,13 @@ mod tests {
 
     #[test]
     fn draws_do_not_depend_on_threads() {
-        let (quadratic, trials) = star();
-        let draw = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| FalseAlarm::draw(&quadratic, &trials, 1001, 3))
-        };
-        assert_eq!(draw(1), draw(3));
+        let (quadratic, frequencies) = star();
+        for jitters in [Jitters::none(&quadratic), Jitters::new(&quadratic, 0.1)] {
+            let draw = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| FalseAlarm::draw(&jitters, &frequencies, 1001, 3))
+            };
+            assert_eq!(draw(1), draw(3));
+        }
     }
 }

@@ -8,6 +8,7 @@ mod draws;
 pub mod eccentric;
 pub mod false_alarm;
 pub mod frequencies;
+mod jitter;
 pub mod kepler;
 pub mod limits;
 pub mod offset;
@@ -23,6 +24,7 @@ pub mod window;
 pub use eccentric::KeplerianOrbit;
 pub use false_alarm::FalseAlarm;
 pub use frequencies::{Frequencies, FrequencyError, FrequencySettings};
+pub use jitter::Jitters;
 pub use orbits::{CircularOrbit, Trial};
 pub use peaks::Peak;
 pub use rotation::{Imitation, RotationPeriods};
@@ -30,6 +32,7 @@ pub use two_planets::TwoOrbits;
 
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
+use jitter::BestTrial;
 use limits::{detection_limit_kms, upper_limit_kms};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -96,24 +99,39 @@ impl Search {
         frequencies: &Frequencies,
         settings: SearchSettings,
     ) -> Result<Self, Unbounded> {
-        let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+        Search::with_jitter(&Jitters::none(quadratic), frequencies, settings)
+    }
+
+    /// The same beside a velocity jitter of unknown size.
+    ///
+    /// # Errors
+    /// [`Unbounded`].
+    pub fn with_jitter(
+        jitters: &Jitters,
+        frequencies: &Frequencies,
+        settings: SearchSettings,
+    ) -> Result<Self, Unbounded> {
+        let trials = jitters.scan(&frequencies.per_cycle);
+        let quadratic = &jitters.as_found().quadratic;
         let Frequencies { time_base_cycles, rotation_period_d, .. } = *frequencies;
         let window_peaks = window_peaks(&quadratic.cycles, frequencies);
         let rotation = RotationPeriods::new(&quadratic.cycles, rotation_period_d, &window_peaks, time_base_cycles);
-        let peaks = peaks::peaks(quadratic, frequencies, &trials, &rotation);
+        let peaks = peaks::peaks(jitters, frequencies, &trials, &rotation);
         if peaks.is_empty() {
             return Err(Unbounded);
         }
-        let false_alarm = FalseAlarm::draw(quadratic, &trials, settings.draws, settings.seed);
+        let false_alarm = FalseAlarm::draw(jitters, &frequencies.per_cycle, settings.draws, settings.seed);
         let level = false_alarm.level(CANDIDATE_FAP);
-        let row = |trial: &Trial| Row {
-            trial: *trial,
-            k_upper95_kms: upper_limit_kms(trial, CREDENCE),
-            window: window(&quadratic.cycles, trial.frequency),
-            k_limit50_kms: detection_limit_kms(trial, level, 0.5),
-            k_limit95_kms: detection_limit_kms(trial, level, 0.95),
+        // what would be found is told by the jitter of the star as it is
+        let as_found = orbits::scan(quadratic, &frequencies.per_cycle);
+        let row = |(best, as_found): (&BestTrial, &Trial)| Row {
+            trial: best.trial_above_no_planet(),
+            k_upper95_kms: upper_limit_kms(&best.trial, CREDENCE),
+            window: window(&quadratic.cycles, as_found.frequency),
+            k_limit50_kms: detection_limit_kms(as_found, level, 0.5),
+            k_limit95_kms: detection_limit_kms(as_found, level, 0.95),
         };
-        let rows = trials.par_iter().map(row).collect();
+        let rows = trials.par_iter().zip(&as_found).map(row).collect();
         Ok(Search { rows, peaks, rotation, false_alarm })
     }
 
@@ -135,10 +153,11 @@ impl Search {
 
 /// sigma_K at `Porb = Prot` over its median over trial periods away from it: how much worse an orbit is bounded where
 /// the star's spots imitate one. `None` where the data bound none there.
-pub fn co_rotation_penalty(quadratic: &VelocityQuadratic, frequencies: &Frequencies, rows: &[Row]) -> Option<f64> {
+pub fn co_rotation_penalty(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> Option<f64> {
     let here = orbits::at(quadratic, 1.0).orbit?.sigma_k_kms;
-    let away = |row: &&Row| (row.trial.frequency - 1.0).abs() * frequencies.time_base_cycles > 1.0;
-    let mut others: Vec<f64> = rows.iter().filter(away).filter_map(|row| Some(row.trial.orbit?.sigma_k_kms)).collect();
+    let away = |trial: &&Trial| (trial.frequency - 1.0).abs() * frequencies.time_base_cycles > 1.0;
+    let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+    let mut others: Vec<f64> = trials.iter().filter(away).filter_map(|t| Some(t.orbit?.sigma_k_kms)).collect();
     others.sort_by(f64::total_cmp);
     others.get(others.len() / 2).map(|median| here / median)
 }

@@ -4,6 +4,7 @@
 //! errors of K, period and phase together.
 
 use super::frequencies::Frequencies;
+use super::jitter::{BestTrial, Jitters};
 use super::orbits::{CircularOrbit, SIGMA_OF_UNKNOWN_PHASE, Trial, amplitudes, mid_cycle, phi, velocities};
 use super::refine::{Maximum, Model};
 use super::rotation::{Imitation, RotationPeriods};
@@ -103,13 +104,13 @@ pub fn refined(quadratic: &VelocityQuadratic, frequencies: &Frequencies, start: 
 }
 
 /// The peaks, from high to low.
-pub fn peaks(
-    quadratic: &VelocityQuadratic,
+pub(super) fn peaks(
+    jitters: &Jitters,
     frequencies: &Frequencies,
-    trials: &[Trial],
+    trials: &[BestTrial],
     rotation: &RotationPeriods,
 ) -> Vec<Peak> {
-    let height = |k: usize| trials[k].orbit.map_or(f64::NEG_INFINITY, |orbit| orbit.delta_ln_l);
+    let height = |k: usize| trials[k].delta_ln_l;
     let last = trials.len() - 1;
     let is_peak = |k: &usize| {
         let (before, after) = (if *k > 0 { height(k - 1) } else { f64::NEG_INFINITY }, height((k + 1).min(last)));
@@ -121,7 +122,8 @@ pub fn peaks(
     let kept = |(rank, k): &(usize, usize)| *rank < KEPT.0 || height(*k) > best - KEPT_BELOW;
     let mut peaks: Vec<Peak> = Vec::new();
     for (_, k) in found.into_iter().enumerate().filter(kept).take(KEPT.1) {
-        let Trial { frequency, orbit: Some(orbit), .. } = trials[k] else { continue };
+        let Trial { frequency, orbit: Some(orbit), .. } = trials[k].trial else { continue };
+        let level = &jitters.levels[trials[k].level];
         let on_edge = k == 0 || k == last;
         let porb_over_prot = 1.0 / frequency;
         let start = Peak {
@@ -133,7 +135,8 @@ pub fn peaks(
             alias: None,
             imitation: None,
         };
-        let peak = if on_edge { start } else { refined(quadratic, frequencies, &start) };
+        let mut peak = if on_edge { start } else { refined(&level.quadratic, frequencies, &start) };
+        peak.orbit.delta_ln_l += level.ln_l;
         let near = |other: &Peak| {
             let apart = (1.0 / other.porb_over_prot - 1.0 / peak.porb_over_prot).abs();
             apart * frequencies.time_base_cycles < SAME_PEAK
@@ -157,17 +160,17 @@ pub fn peaks(
 #[cfg(test)]
 mod tests {
     use super::super::frequencies::FrequencySettings;
-    use super::super::orbits::scan;
     use super::super::sample::{self, uneven};
     use super::super::window::window_peaks;
     use super::*;
 
     fn search(quadratic: &VelocityQuadratic, settings: FrequencySettings) -> Vec<Peak> {
         let frequencies = Frequencies::new(&quadratic.cycles, 1.0, settings).unwrap();
-        let trials = scan(quadratic, &frequencies.per_cycle);
+        let jitters = Jitters::none(quadratic);
+        let trials = jitters.scan(&frequencies.per_cycle);
         let window = window_peaks(&quadratic.cycles, &frequencies);
         let rotation = RotationPeriods::new(&quadratic.cycles, 1.0, &window, frequencies.time_base_cycles);
-        peaks(quadratic, &frequencies, &trials, &rotation)
+        peaks(&jitters, &frequencies, &trials, &rotation)
     }
 
     #[test]

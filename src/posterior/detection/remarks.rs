@@ -172,7 +172,7 @@ impl Detection {
                 ),
             ));
         }
-        let profiles = imager.sampling.profiles.len();
+        let profiles = imager.profiles().count();
         if profiles < FEW {
             remarks.push(Remark::against(
                 "there are few profiles",

@@ -84,8 +84,9 @@ pub fn robustness(
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };
+    let times_d = imager.times_d();
     let without = |night: &Vec<usize>| {
-        let times = || night.iter().map(|&k| imager.sampling.profiles[k].0);
+        let times = || night.iter().map(|&k| times_d[k]);
         let view: Result<View, DetectionError> = View::new(&imager.without(night), values, settings, None);
         WithoutNight {
             span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
@@ -93,9 +94,8 @@ pub fn robustness(
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };
-    let times: Vec<f64> = imager.sampling.profiles.iter().map(|profile| profile.0).collect();
-    let mut nights = nights(&times);
-    nights.retain(|night| times.len() - night.len() >= FEWEST);
+    let mut nights = nights(&times_d);
+    nights.retain(|night| times_d.len() - night.len() >= FEWEST);
     if nights.len() < 2 {
         nights.clear();
     }

@@ -229,7 +229,7 @@ fn displaced<'a>(imager: &'a Imager, response: Response, map: &[f64]) -> Imaging
 /// The response with all profiles shifted by `h` (km/s).
 fn shifted(imager: &Imager, response: &Response, values: &ParameterValues, h: f64) -> Response {
     let state = moved(values, &[(Parameter::Vsys, h)]).state();
-    response.with_velocities(&imager.star, &state, &imager.sampling)
+    imager.with_velocities(response, &state)
 }
 
 fn moved(values: &ParameterValues, moves: &[(Parameter, f64)]) -> ParameterValues {

@@ -40,12 +40,10 @@ impl Continuum {
     /// Of profiles whose line reaches `reach_kms` to either side of `centre_kms`; `None` where hardly any continuum is
     /// beside it.
     pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Option<Self> {
-        let step_kms = observations.step_kms;
-        let scatter: Scatter =
-            observations.profiles.iter().map(|p| Scatter::of(p, step_kms, centre_kms, reach_kms)).sum();
+        let scatter: Scatter = observations.profiles.iter().map(|p| Scatter::of(p, centre_kms, reach_kms)).sum();
         // bins of which several are correlated are so many fewer, and quoted errors may be wrong
         let larger = scatter.ratio(1).unwrap_or(1.0).powi(2) * scatter.correlated_bins(f64::INFINITY);
-        let sides = |profile| sides(profile, step_kms, centre_kms, reach_kms, larger);
+        let sides = |profile| sides(profile, centre_kms, reach_kms, larger);
         let sides = observations.profiles.iter().map(sides).collect::<Option<Vec<Sides>>>()?;
         let half = |sign: f64| -> Vec<(f64, f64)> {
             let of = |s: &Sides| (0.5 * (s.red.0 + sign * s.blue.0), 0.25 * (s.red.1 + s.blue.1));
@@ -64,9 +62,9 @@ impl Continuum {
 }
 
 /// Mean levels on either side of the line, their variances `larger` than those by the quoted errors.
-fn sides(profile: &Profile, step_kms: f64, centre_kms: f64, reach_kms: f64, larger: f64) -> Option<Sides> {
+fn sides(profile: &Profile, centre_kms: f64, reach_kms: f64, larger: f64) -> Option<Sides> {
     let side = |sign: f64| {
-        let distance = |j: usize| sign * (profile.velocity_kms(j, step_kms) - centre_kms);
+        let distance = |j: usize| sign * (profile.velocity_kms(j) - centre_kms);
         let beside = |j: &usize| (reach_kms..=OUTER * reach_kms).contains(&distance(*j));
         let bins: Vec<usize> = (0..profile.intensity.len()).filter(beside).collect();
         let count = bins.len() as f64;

@@ -55,8 +55,8 @@ impl MeanProfile {
     /// # Errors
     /// If fewer than five bins are common to all profiles.
     pub fn of(observations: &Observations) -> Result<Self, LookError> {
-        let step = observations.step_kms;
-        let last = |p: &Profile| p.velocity_kms(p.intensity.len() - 1, step);
+        let step = observations.step_kms();
+        let last = |p: &Profile| p.velocity_kms(p.intensity.len() - 1);
         let profiles = &observations.profiles;
         let first = profiles.iter().map(|p| p.first_velocity_kms).fold(f64::NEG_INFINITY, f64::max);
         let end = profiles.iter().map(last).fold(f64::INFINITY, f64::min);
@@ -67,7 +67,7 @@ impl MeanProfile {
         }
         let count = profiles.len() as f64;
         let velocities = (0..=bins as usize).map(|j| first + j as f64 * step);
-        let depth = velocities.map(|v| profiles.iter().map(|p| 1.0 - p.intensity_at(v, step)).sum::<f64>() / count);
+        let depth = velocities.map(|v| profiles.iter().map(|p| 1.0 - p.intensity_at(v)).sum::<f64>() / count);
         let variance: f64 = profiles.iter().map(|p| super::median(p.sigma.clone()).powi(2)).sum();
         Ok(MeanProfile {
             first_velocity_kms: first,

@@ -53,9 +53,9 @@ impl std::iter::Sum for Scatter {
 impl Scatter {
     /// The continuum of `profile` beside a line that reaches `reach_kms` to either side of `centre_kms`, as far again,
     /// about a straight line on each side: neither level nor slope counts.
-    pub fn of(profile: &Profile, step_kms: f64, centre_kms: f64, reach_kms: f64) -> Self {
+    pub fn of(profile: &Profile, centre_kms: f64, reach_kms: f64) -> Self {
         let side = |sign: f64| {
-            let distance = move |j: usize| sign * (profile.velocity_kms(j, step_kms) - centre_kms);
+            let distance = move |j: usize| sign * (profile.velocity_kms(j) - centre_kms);
             let inside = move |j: &usize| (reach_kms..=OUTER * reach_kms).contains(&distance(*j));
             let bins: Vec<usize> = (0..profile.intensity.len()).filter(inside).collect();
             about_a_line(bins.iter().map(|&j| (j as f64, profile.intensity[j], profile.sigma[j].powi(-2))))
@@ -133,9 +133,8 @@ fn mean_products(bins: usize, lags: usize) -> DMatrix<f64> {
 impl Noise {
     /// Errors of profiles whose line reaches `reach_kms` to either side of `centre_kms`.
     pub fn of(observations: &Observations, centre_kms: f64, reach_kms: f64) -> Self {
-        let step = observations.step_kms;
         let beside = |profile: &Profile| -> Vec<f64> {
-            let distance = |j: usize| (profile.velocity_kms(j, step) - centre_kms).abs();
+            let distance = |j: usize| (profile.velocity_kms(j) - centre_kms).abs();
             let bins = profile.intensity.iter().enumerate();
             bins.filter(|(j, _)| (reach_kms..=OUTER * reach_kms).contains(&distance(*j))).map(|(_, i)| *i).collect()
         };

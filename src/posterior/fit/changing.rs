@@ -224,8 +224,8 @@ pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &F
         FilteredVelocity {
             time_d: profile.time_d,
             cycle,
-            observed: profile.first_moment(observations.step_kms),
-            modelled_kms: profile.first_moment_of(depth, observations.step_kms),
+            observed: profile.first_moment(),
+            modelled_kms: profile.first_moment_of(depth),
             orbit_kms: state.vsys_kms + state.orbit.velocity_kms(cycle),
         }
     };
@@ -308,7 +308,7 @@ impl Modelled {
     /// Of maps of these coefficients (H, profiles).
     fn of(imager: &Imager, basis: &Basis, marginal: &Marginal, coefficients: &DMatrix<f64>) -> Self {
         let response = marginal.design.response();
-        let mut depth = response.depths_of_each(&basis.brightness(coefficients, marginal.design.contrast()));
+        let mut depth = response.depths_of_each(&marginal.design.brightness(basis, coefficients));
         let slopes: Vec<f64> =
             marginal.slopes(imager, basis, &[]).iter().flat_map(|slopes| slopes.iter().copied()).collect();
         let with_jitter = imager.clone().with_zero_points(marginal.assumed.jitter_kms, &slopes);
@@ -368,7 +368,7 @@ fn velocities(
     marginal: &Marginal,
     modelled: &Modelled,
 ) -> Result<Vec<VelocityWithoutSpots>, FieldError> {
-    let free = marginal.expansion(imager, basis, &[])?.velocities(&[]).radial_velocities().ok();
+    let free = marginal.known_zero_points(imager, basis, &[])?.velocities(&[]).radial_velocities().ok();
     let state = marginal.values.state();
     let velocity = |(k, (profile, depth)): (usize, (&Profile, &[f64]))| {
         let cycle = imager.star.cycle(profile.time_d);
@@ -376,8 +376,8 @@ fn velocities(
         VelocityWithoutSpots {
             time_d: profile.time_d,
             cycle,
-            observed: profile.first_moment(observations.step_kms),
-            modelled_kms: profile.first_moment_of(depth, observations.step_kms),
+            observed: profile.first_moment(),
+            modelled_kms: profile.first_moment_of(depth),
             orbit_kms: state.vsys_kms + state.orbit.velocity_kms(cycle),
             rv_kms,
             rv_sigma_kms: variance.sqrt(),

@@ -89,7 +89,7 @@ fn bare_slopes(imager: &Imager, response: &Response, state: &StarState) -> Vec<f
     let bare = vec![1.0; response.pixels()];
     let at = |h: f64| {
         let shifted = StarState { vsys_kms: state.vsys_kms + h, ..*state };
-        response.with_velocities(&imager.star, &shifted, &imager.sampling).depths(&bare)
+        imager.with_velocities(response, &shifted).depths(&bare)
     };
     let (above, below) = (at(VELOCITY_STEP_KMS), at(-VELOCITY_STEP_KMS));
     above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * VELOCITY_STEP_KMS)).collect()

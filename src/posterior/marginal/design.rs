@@ -23,6 +23,8 @@ pub struct Basis {
     pub(super) watched: DMatrix<f64>,
     /// How exactly maps are found.
     pub(super) settling: Settling,
+    /// Times that maps are found with a jitter, along their slopes from time to time.
+    pub(super) jittered: usize,
 }
 
 impl Basis {
@@ -37,13 +39,14 @@ impl Basis {
             watched: on_pixels.select_columns(&watched),
             on_pixels: on_pixels.transpose(),
             settling: Settling { tolerance: 1e-3, ..Settling::default() },
+            jittered: 1,
         }
     }
 
     /// The same where ln Z is compared with that of neighbours: good to some 0.003.
     pub fn exact(grid: &SurfaceGrid) -> Self {
         let settling = Settling { tolerance: 2e-4, ..Settling::default() };
-        Basis { settling, ..Basis::new(grid) }
+        Basis { settling, jittered: 2, ..Basis::new(grid) }
     }
 
     /// The same where differences of ln Z need be good to a few tenths only.
@@ -61,11 +64,6 @@ impl Basis {
     /// Spot filling factors (pixels, columns) of maps with these `coefficients` (H, columns).
     pub fn filling(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
         (&self.on_pixels * coefficients).add_scalar(MEAN_FILLING)
-    }
-
-    /// Brightness of the same over that of the photosphere, for spots of that `contrast`.
-    pub fn brightness(&self, coefficients: &DMatrix<f64>, contrast: f64) -> DMatrix<f64> {
-        self.filling(coefficients).map(|filling| 1.0 - (1.0 - contrast) * filling)
     }
 }
 
@@ -133,9 +131,15 @@ impl Design {
         columns.iter().enumerate().map(|(k, columns)| self.condensed.tell(k, columns)).collect()
     }
 
-    /// Brightness of a spot over that of the photosphere.
-    pub fn contrast(&self) -> f64 {
-        self.response.contrast()
+    /// Brightness over that of the photosphere (pixels, profiles) of maps with these `coefficients` (H, profiles), as
+    /// each profile sees it.
+    pub fn brightness(&self, basis: &Basis, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut brightness = basis.filling(coefficients);
+        for (k, mut map) in brightness.column_iter_mut().enumerate() {
+            let contrast = self.response.contrast(k);
+            map.apply(|filling| *filling = 1.0 - (1.0 - contrast) * *filling);
+        }
+        brightness
     }
 
     /// The response that it was made with.
@@ -145,7 +149,7 @@ impl Design {
 
     /// Model depths of profile `k` for a map of these coefficients, and its continuum.
     fn depths(&self, k: usize, coefficients: &DVector<f64>) -> (DVector<f64>, f64) {
-        let q = 1.0 - self.contrast();
+        let q = 1.0 - self.response.contrast(k);
         let bare = 1.0 - q * MEAN_FILLING;
         let continuum = bare * self.bare_continuum[k] - q * self.continuum.column(k).dot(coefficients);
         let line = &self.bare_line[k] * bare;
@@ -154,19 +158,20 @@ impl Design {
 
     /// The profiles linearised around maps of these coefficients (H, profiles), without slopes.
     pub fn epochs(&self, imager: &Imager, maps: &DMatrix<f64>) -> Vec<Epoch> {
+        let times_d = imager.times_d();
         (0..self.response.profiles())
             .into_par_iter()
-            .map(|k| self.epoch(imager, k, &maps.column(k).into_owned()))
+            .map(|k| self.epoch(times_d[k], k, &maps.column(k).into_owned()))
             .collect()
     }
 
-    fn epoch(&self, imager: &Imager, k: usize, coefficients: &DVector<f64>) -> Epoch {
+    fn epoch(&self, time_d: f64, k: usize, coefficients: &DVector<f64>) -> Epoch {
         let (model, continuum) = self.depths(k, coefficients);
-        let scale = -(1.0 - self.contrast()) / continuum;
+        let scale = -(1.0 - self.response.contrast(k)) / continuum;
         let mut jacobian = &self.line[k] * scale;
         jacobian.ger(-scale, &model, &self.continuum.column(k), 1.0);
         Epoch {
-            time_d: imager.sampling.profiles[k].0,
+            time_d,
             jacobian,
             variance: DVector::repeat(model.len(), 1.0),
             slopes: DMatrix::zeros(model.len(), 0),

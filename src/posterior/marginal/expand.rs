@@ -1,16 +1,16 @@
 //! ln Z to second order in the velocities of the profiles and in the star's own parameters.
 
-use super::{Basis, Marginal};
+use super::{Basis, Marginal, zero_points};
 use crate::field::{FieldError, Quadratic};
 use crate::posterior::expansion::{Expansion, VELOCITY_STEP_KMS, coordinates, stellar_step};
-use crate::posterior::imaging::Imager;
+use crate::posterior::imaging::{Imager, ZeroPointPrior};
 use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::star::Response;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 impl Marginal {
-    /// ln Z, the jitter counted.
+    /// ln Z, the jitter counted, those zero points held that are otherwise integrated out.
     pub fn ln_evidence(&self) -> f64 {
         self.settled.evidence.ln_evidence()
     }
@@ -21,9 +21,47 @@ impl Marginal {
     /// # Errors
     /// [`FieldError`].
     pub fn expansion(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
-        let Quadratic { ln_evidence, gradient, information } = self.quadratic(imager, basis, stellar)?;
+        let quadratic = self.quadratic(imager, basis, stellar)?;
+        if imager.zero_points.is_empty() {
+            return Ok(self.expanded(imager, stellar, quadratic));
+        }
+        let of_each = |number: &dyn Fn(&ZeroPointPrior) -> f64| {
+            DVector::from_iterator(imager.zero_points.len(), imager.zero_points.iter().map(number))
+        };
+        let (mean, sd) = (of_each(&|prior| prior.mean_kms), of_each(&|prior| prior.sd_kms));
+        let columns = zero_points::columns(imager, quadratic.gradient.len());
+        let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
+        Ok(self.expanded(imager, stellar, quadratic))
+    }
+
+    /// The same, those zero points of data sets held that are otherwise integrated out.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn known_zero_points(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> Result<Expansion, FieldError> {
+        Ok(self.expanded(imager, stellar, self.quadratic(imager, basis, stellar)?))
+    }
+
+    /// ln Z, the jitter counted and zero points of data sets integrated out.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn ln_evidence_of_sets(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
+        match imager.zero_points.is_empty() {
+            true => Ok(self.ln_evidence()),
+            false => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
+        }
+    }
+
+    fn expanded(&self, imager: &Imager, stellar: &[Parameter], quadratic: Quadratic) -> Expansion {
+        let Quadratic { ln_evidence, gradient, information } = quadratic;
         let cycles = imager.cycles();
-        Ok(Expansion {
+        Expansion {
             values: self.values,
             centre: coordinates(&self.values, &cycles, stellar),
             cycles,
@@ -32,7 +70,7 @@ impl Marginal {
             gradient,
             noise: information.clone(),
             information,
-        })
+        }
     }
 
     fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
@@ -75,7 +113,7 @@ impl Marginal {
 
     fn response(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
         match moved {
-            None => self.design.response().with_velocities(&imager.star, &values.state(), &imager.sampling),
+            None => imager.with_velocities(self.design.response(), &values.state()),
             Some(_) => imager.response(&values.state()),
         }
     }

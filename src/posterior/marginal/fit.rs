@@ -217,8 +217,17 @@ pub fn fit(
         })?,
         None => {
             let rough = basis.roughly();
-            let start = |assumed: &Assumed| Marginal::new(imager, &rough, Arc::clone(&design), values, *assumed, None);
-            let best = highest(starts(&known).par_iter().with_max_len(1).map(start).collect(), &known)?;
+            let start = |of_field: &Vec<Assumed>| {
+                let mut found: Vec<Result<Marginal, FieldError>> = Vec::new();
+                for assumed in of_field {
+                    // with a jitter from the maps without one
+                    let before = found.last().and_then(|before| before.as_ref().ok());
+                    found.push(Marginal::new(imager, &rough, Arc::clone(&design), values, *assumed, before));
+                }
+                found
+            };
+            let tried = starts(&known).par_iter().with_max_len(1).flat_map_iter(start).collect();
+            let best = highest(tried, &known)?;
             at(best.assumed, Some(&best))?
         }
     };
@@ -231,8 +240,8 @@ pub fn fit(
     Fitted { marginal, ln_evidence, at_bounds }.checked()
 }
 
-/// Where a fit may start: several lifetimes, with and without a jitter, as far as they are not known.
-fn starts(known: &Known) -> Vec<Assumed> {
+/// Where a fit may start: several lifetimes, each with and without a jitter, as far as they are not known.
+fn starts(known: &Known) -> Vec<Vec<Assumed>> {
     let lifetimes: Vec<Lifetime> = match known.lifetime {
         Some(lifetime) => vec![lifetime],
         None => {
@@ -246,9 +255,9 @@ fn starts(known: &Known) -> Vec<Assumed> {
     let field = |lifetime: &Lifetime| Field { spectrum, kernel: Kernel::of(*lifetime) };
     let assumed = |lifetime: &Lifetime| {
         let field = field(lifetime);
-        jitters.iter().map(move |jitter_kms| Assumed { field, jitter_kms: *jitter_kms }).collect::<Vec<_>>()
+        jitters.iter().map(|jitter_kms| Assumed { field, jitter_kms: *jitter_kms }).collect()
     };
-    lifetimes.iter().flat_map(assumed).collect()
+    lifetimes.iter().map(assumed).collect()
 }
 
 /// The one with the highest ln Z, or the last error.

@@ -113,7 +113,10 @@ impl MarginalPosterior {
         let star = moves.iter().any(|(p, _)| STELLAR.contains(p));
         let here: Marginal = self.marginal_at(values, star)?;
         match slopes {
-            None => Ok(Displaced { ln_evidence: here.ln_evidence(), slopes: None }),
+            None => {
+                let ln_evidence = here.ln_evidence_of_sets(&self.imager, &self.basis)?;
+                Ok(Displaced { ln_evidence, slopes: None })
+            }
             Some(star) => {
                 let expansion = here.expansion(&self.imager, &self.basis, star)?;
                 Ok(Displaced { ln_evidence: expansion.log_likelihood, slopes: Some(expansion.gradient) })

@@ -1,12 +1,9 @@
 //! The most probable maps of a fitted field at any times, with their errors (`docs/method.md` section 9).
 
-use super::{Basis, Marginal};
-use crate::field::{Epoch, FieldError, Settled, Sought, settle};
+use super::{Assumed, Basis, Marginal};
+use crate::field::{Epoch, Evidence, FieldError, Settled, Sought, settle};
 use crate::posterior::imaging::Imager;
 use nalgebra::DMatrix;
-
-/// Times that maps are found with a jitter along the slopes of those before.
-const JITTERED: usize = 2;
 
 /// Maps at some times.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,15 +24,28 @@ impl Maps {
 }
 
 impl Marginal {
-    /// The same where the jitter is noise of the profiles, along their slopes at the most probable maps. Maps that know
-    /// nothing of it explain zero points by spots, so slopes and maps are found [`JITTERED`] times in turn: slopes of
-    /// other maps than these would seem to tell the velocities of the profiles from their zero points.
+    /// The same maps, the jitter no noise of the profiles.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub(super) fn with_jitter(mut self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
+    pub fn without_jitter(&self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
+        let Settled { coefficients, .. } = &self.settled;
+        let epochs = self.design.epochs(imager, coefficients);
+        let compression = basis.settling.compression;
+        let evidence = Evidence::new(self.assumed.field, &basis.degrees, &epochs, coefficients, compression)?;
+        let settled = Settled { evidence, ..self.settled.clone() };
+        Ok(Marginal { assumed: Assumed { jitter_kms: 0.0, ..self.assumed }, settled, ..self.clone() })
+    }
+
+    /// The same where the jitter is noise of the profiles, along their slopes at the most probable maps. Maps that know
+    /// nothing of it explain zero points by spots, so slopes and maps are found in turn, so many times: slopes of other
+    /// maps than these would seem to tell the velocities of the profiles from their zero points.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub(super) fn with_jitter(mut self, imager: &Imager, basis: &Basis, times: usize) -> Result<Self, FieldError> {
         let sought = Sought { field: self.assumed.field, degrees: &basis.degrees, watched: &basis.watched };
-        for _ in 0..JITTERED {
+        for _ in 0..times {
             let slopes = self.design.condensed(&self.slopes(imager, basis, &[]));
             let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
                 Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])

@@ -10,7 +10,8 @@
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
 //! 5. [`Maps`]: the most probable maps at any times, with their errors.
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
-//! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 7. [`zero_points`]: the velocity zero points of data sets, before anything else.
+//! 8. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 
 pub mod change;
 mod condense;
@@ -20,6 +21,7 @@ mod fit;
 mod forecast;
 mod maps;
 mod posterior;
+pub mod zero_points;
 
 pub use change::Change;
 pub use design::{Basis, Design};
@@ -40,6 +42,9 @@ pub const MEAN_FILLING: f64 = 0.06;
 /// Largest degree of the harmonics: finer than the line resolves. With 18, what is left over of a star of 40 km/s at
 /// S/N 1000 is taken for spots that change.
 pub const DEGREE: usize = 36;
+
+/// Times that maps are found with a jitter, along the slopes of those before, from maps without one.
+const JITTERED: usize = 2;
 
 /// What is assumed before the data, beside the parameters of star and orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +88,7 @@ pub struct Marginal {
 
 impl Marginal {
     /// At `values`, whose design is given. Maps are found from those of a star and field `nearby`, or else from
-    /// uniform ones.
+    /// uniform ones; with a jitter then from those without.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -98,20 +103,26 @@ impl Marginal {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         let start = match nearby {
             Some(nearby) => nearby.settled.coefficients.clone(),
-            None => DMatrix::zeros(basis.degrees.len(), imager.sampling.profiles.len()),
+            None => DMatrix::zeros(basis.degrees.len(), imager.profiles().count()),
         };
+        let values = assumed.among(values);
+        if let Some(nearby) = nearby.filter(|_| assumed.jitter_kms > 0.0) {
+            let begun = Marginal { values, assumed, design, settled: nearby.settled.clone() };
+            let times = if nearby.assumed.jitter_kms > 0.0 { basis.jittered } else { JITTERED };
+            return begun.with_jitter(imager, basis, times);
+        }
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
         let by = nearby.map(|nearby| &nearby.settled.evidence);
         let settled = settle(linearise, sought, start, by, &basis.settling)?;
-        let marginal = Marginal { values: assumed.among(values), assumed, design, settled };
+        let marginal = Marginal { values, assumed, design, settled };
         match assumed.jitter_kms {
             0.0 => Ok(marginal),
-            _ => marginal.with_jitter(imager, basis),
+            _ => marginal.with_jitter(imager, basis, JITTERED),
         }
     }
 
     /// The brightness of each pixel (rows) in the most probable map of each profile (columns).
     pub fn brightness(&self, basis: &Basis) -> DMatrix<f64> {
-        basis.brightness(&self.settled.coefficients, self.design.contrast())
+        self.design.brightness(basis, &self.settled.coefficients)
     }
 }

@@ -139,7 +139,7 @@ impl MarginalPosterior {
             Anew::Maps => (self.with_maps_anew(&values), SLOPES),
             Anew::Star => {
                 let here = self.marginal_at(values, true);
-                (here.map(|here| here.ln_evidence()), harmonics)
+                (here.and_then(|here| here.ln_evidence_of_sets(&self.imager, &self.basis)), harmonics)
             }
         };
         match ln_evidence {

@@ -9,6 +9,7 @@ fn profile(first_velocity_kms: f64, phase: f64) -> Profile {
     Profile {
         time_d: phase,
         first_velocity_kms,
+        step_kms: 2.0,
         intensity: (0..20).map(|j| 1.0 - depth(j) + 0.01 * (phase + j as f64).sin()).collect(),
         sigma: (0..20).map(|j| 1e-3 * (1.5 + (0.7 * j as f64 + phase).cos())).collect(),
     }
@@ -16,7 +17,7 @@ fn profile(first_velocity_kms: f64, phase: f64) -> Profile {
 
 /// Two profiles whose bins stand between each other's.
 fn observations() -> Observations {
-    Observations { step_kms: 2.0, profiles: vec![profile(-20.0, 0.0), profile(-17.3, 1.0)] }
+    Observations { profiles: vec![profile(-20.0, 0.0), profile(-17.3, 1.0)] }
 }
 
 /// Dense weights of profile `k`: what they make of every unit vector.

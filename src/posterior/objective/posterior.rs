@@ -10,8 +10,8 @@ use super::warm_start::{WarmStart, nearest, place, sampled, worthwhile};
 use crate::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
 use crate::posterior::imaging::{Imager, ImagingProblem};
 use crate::sampling::log_density::{Evaluation, Gradient, LogDensity, Status};
-use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN};
-use crate::star::{Nearby, Response};
+use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN, velocity_grid};
+use crate::star::{Nearby, Response, Seen};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -191,7 +191,7 @@ impl Posterior {
         let state = self.space.values_at(theta).state();
         match &self.nearby {
             Some(nearby) => self.imager.response_near(nearby, &state),
-            None => self.reference.response.with_velocities(&self.imager.star, &state, &self.imager.sampling),
+            None => self.imager.with_velocities(&self.reference.response, &state),
         }
     }
 
@@ -308,10 +308,12 @@ pub fn is_physical(imager: &Imager, values: &ParameterValues, theta: &[f64]) -> 
         return false;
     }
     let state = values.state();
-    let (steps, nodes) = Response::velocity_grid(&imager.star, &state, imager.sampling.step_kms);
-    nodes <= MOST_NODES
-        && steps <= MOST_STEPS_PER_BIN
-        && imager.star.with(&state.surface).is_possible()
+    let is_seen = |set: &Seen| {
+        let star = set.star(&imager.star);
+        let (steps, nodes) = velocity_grid(&star, &state, set.sampling.step_kms);
+        nodes <= MOST_NODES && steps <= MOST_STEPS_PER_BIN && star.with(&state.surface).is_possible()
+    };
+    imager.sets.iter().all(is_seen)
         && fastest.is_finite()
         && fastest <= LARGEST_VSINI_KMS
         && values[Parameter::Vsini] > 0.0
@@ -371,7 +373,7 @@ impl Gradient for Posterior {
             let shifted = self.space.to_physical(&shifted);
             let response = if self.space.free()[i].parameter.only_shifts() {
                 let state = self.space.values_at(&shifted).state();
-                response.with_velocities(&self.imager.star, &state, &self.imager.sampling)
+                self.imager.with_velocities(&response, &state)
             } else {
                 self.response(&shifted)
             };

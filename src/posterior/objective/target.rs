@@ -133,14 +133,14 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
 
 /// First moment (km/s) of every profile, of `depths` in the bins of the data.
 fn moments(imager: &Imager, depths: &[f64]) -> Vec<f64> {
-    let step_kms = imager.sampling.step_kms;
     let mut first = 0;
-    let moment = |&(time_d, first_velocity_kms, bins): &(f64, f64, usize)| {
-        let profile = Profile { time_d, first_velocity_kms, intensity: Vec::new(), sigma: Vec::new() };
+    let moment = |(step_kms, (time_d, first_velocity_kms, bins)): (f64, (f64, f64, usize))| {
+        let profile = Profile { time_d, first_velocity_kms, step_kms, intensity: Vec::new(), sigma: Vec::new() };
         first += bins;
-        profile.first_moment_of(&depths[first - bins..first], step_kms)
+        profile.first_moment_of(&depths[first - bins..first])
     };
-    imager.sampling.profiles.iter().map(moment).collect()
+    let steps = imager.sets.iter().flat_map(|set| set.sampling.profiles.iter().map(|_| set.sampling.step_kms));
+    steps.zip(imager.profiles()).map(moment).collect()
 }
 
 /// Root mean square about the mean.

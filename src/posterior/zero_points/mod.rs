@@ -171,6 +171,6 @@ fn unspotted_slopes(imager: &Imager, values: &ParameterValues) -> Vec<f64> {
 /// line.
 fn photon_error_kms(imager: &Imager, slopes: &[f64]) -> Option<f64> {
     let information: f64 = slopes.iter().zip(&imager.data.inverse_variance).map(|(d, w)| d * d * w).sum();
-    let error = (imager.sampling.profiles.len() as f64 / information).sqrt();
+    let error = (imager.profiles().count() as f64 / information).sqrt();
     error.is_finite().then_some(error)
 }

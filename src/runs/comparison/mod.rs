@@ -149,6 +149,12 @@ impl Comparison {
         if of_one_map && imaging.unresolved_spots == UnresolvedSpots::Fitted {
             comparison.notes.push("the chain counts unresolved spots as noise, the landscape does not".into());
         }
+        if imaging.objective != pair.grid_objective {
+            let (chain, landscape) = (imaging.objective.name(), pair.grid_objective.name());
+            comparison.notes.push(format!(
+                "the chain is by the objective {chain}, the landscape by {landscape}: differences are those of the methods"
+            ));
+        }
         Ok(comparison)
     }
 }

@@ -1,12 +1,12 @@
-//! A run and a landscape that belong together: the same data, star, image and objective, and axes that the chain
-//! samples.
+//! A run and a landscape that belong together: the same data and star, of one objective the same image, and axes that
+//! the chain samples.
 
 use crate::data::config::{self, Config, Difference, Settings};
 use crate::data::io::effort::Effort;
 use crate::data::io::journal;
 use crate::data::io::landscape;
 use crate::data::io::lines::JournalError;
-use crate::posterior::objective::Parameter;
+use crate::posterior::objective::{ObjectiveKind, Parameter};
 use crate::runs::grid_scan::{HEADER, Header, NODES};
 use crate::runs::manifest::Manifest;
 use crate::runs::origin::{Origin, OriginError};
@@ -26,6 +26,8 @@ pub struct Pair {
     pub chain: Chain,
     /// What the landscape was begun with.
     pub header: Header,
+    /// The objective of the landscape.
+    pub grid_objective: ObjectiveKind,
     /// All its nodes.
     pub landscape: Landscape,
     /// How long the run took, and the landscape, where that is recorded.
@@ -85,7 +87,8 @@ impl Pair {
         }
         let chain = journal::read(&run.join(CHAIN), &manifest.shape())?;
         let efforts = [run, grid].map(Effort::read);
-        Ok(Pair { manifest, settings, chain, header, landscape, efforts })
+        let grid_objective = grid_settings.imaging.objective;
+        Ok(Pair { manifest, settings, chain, header, grid_objective, landscape, efforts })
     }
 
     /// Number of a sampled parameter among the axes.
@@ -112,17 +115,21 @@ const TURNS: i32 = 10;
 fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_settings: &Settings) -> Option<String> {
     let (run, grid) = (&manifest.origin, &header.origin);
     let both = |d: Difference| format!("{} ({} in the run, {} in the landscape)", d.key, d.first, d.second);
-    if let Some(key) = config::model_difference(&run.config, &grid.config) {
-        return Some(both(key));
-    }
+    let is_integrated = |settings: &Settings| settings.imaging.objective == ObjectiveKind::MarginalLikelihood;
+    let same_method = is_integrated(settings) == is_integrated(grid_settings);
+    // one map and all maps have images, zero points and spots of their own: they are what is compared
+    let sections = if same_method { &["star", "instrument", "imaging"][..] } else { &["star", "instrument"] };
+    let model = sections.iter().find_map(|name| config::section_difference(name, &run.config, &grid.config));
     // data of other zero points are the same data
-    if let Some(key) = config::jitter_difference(&run.config, &grid.config) {
+    let jitter = || config::jitter_difference(&run.config, &grid.config).filter(|_| same_method);
+    if let Some(key) = model.or_else(jitter) {
         return Some(both(key));
     }
     if let Some(name) = header.grid.names().find(|name| !manifest.names.iter().any(|sampled| sampled == name)) {
         return Some(format!("{name} is an axis of the landscape and not sampled in the run"));
     }
-    let fixed = |p: &Parameter| !manifest.names.iter().any(|name| name == p.name());
+    let of_both = |p: &Parameter| same_method || !p.is_of_field();
+    let fixed = |p: &Parameter| of_both(p) && !manifest.names.iter().any(|name| name == p.name());
     let differ = |p: &Parameter| !settings.values.agrees(&grid_settings.values, *p);
     if let Some(p) = Parameter::ALL.into_iter().filter(fixed).find(differ) {
         let (first, second) = (settings.values[p], grid_settings.values[p]);

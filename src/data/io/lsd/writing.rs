@@ -28,7 +28,7 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError>
     for (k, profile) in observations.profiles.iter().enumerate() {
         let name = format!("p{k:03}.prof");
         let title = format!("Synthetic Stokes I profile {k}");
-        save(&folder.join(&name), &profile_text(&title, profile, 0.0, observations.step_kms))?;
+        save(&folder.join(&name), &profile_text(&title, profile, 0.0))?;
         // Writing to a String cannot fail.
         let _ = writeln!(list, "{name} {}", profile.time_d);
     }
@@ -55,17 +55,17 @@ pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], wh
     for (k, (profile, Label { file, vrad_kms })) in observations.profiles.iter().zip(labels).enumerate() {
         let name = format!("p{k:03}.prof");
         let title = format!("{file} {what}");
-        save(&folder.join(&name), &profile_text(&title, profile, *vrad_kms, observations.step_kms))?;
+        save(&folder.join(&name), &profile_text(&title, profile, *vrad_kms))?;
         // Writing to a String cannot fail.
         let _ = writeln!(list, "{name} {} {vrad_kms}  # {file}", profile.time_d);
     }
     save(&folder.join(LIST), &list)
 }
 
-fn profile_text(title: &str, profile: &Profile, vrad_kms: f64, step_kms: f64) -> String {
+fn profile_text(title: &str, profile: &Profile, vrad_kms: f64) -> String {
     let mut text = format!("*** {title}\n {} 2\n", profile.intensity.len());
     for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
-        let velocity = profile.velocity_kms(j, step_kms) + vrad_kms;
+        let velocity = profile.velocity_kms(j) + vrad_kms;
         let _ = writeln!(text, "{velocity:16.9} {intensity:.12} {sigma:.12e}");
     }
     text

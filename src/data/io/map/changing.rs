@@ -4,8 +4,8 @@
 use super::{CONVENTIONS, FILES};
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
-use crate::data::io::periodogram::FieldRecord;
-use crate::data::io::provenance::Provenance;
+use crate::data::io::periodogram::{DATA_SET, FieldRecord};
+use crate::data::io::provenance::{MeasuredSet, Provenance};
 use crate::posterior::fit::{ChangingFit, ChangingSummary, Checks, MapAt};
 use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::MEAN_FILLING;
@@ -62,6 +62,9 @@ pub struct ChangingMapFile {
     pub parameters: ParameterValues,
     /// Brightness of a spot over that of the photosphere.
     pub contrast: f64,
+    /// Each of several data sets, in the order of the profiles.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub data_sets: Vec<MeasuredSet>,
     /// The field of spots that was integrated over.
     pub field: FieldRecord,
     /// Mean filling factor that is assumed: profiles do not tell it.
@@ -135,21 +138,26 @@ impl ChangingMapResult<'_> {
             latitude_deg: degrees(latitude),
             area_fraction: area.clone(),
             maps: self.fit.maps.clone(),
+            data_sets: self.provenance.measured.sets.clone(),
         }
     }
 
     fn profiles(&self) -> Table {
         let columns = ["profile", "time_d", "cycle", "velocity_kms", "observed", "sigma", "model", "residual"];
         let unchanging = self.fit.unchanging_model.as_ref();
-        let mut table = Table::new(&[&columns[..], if unchanging.is_some() { &[UNCHANGING] } else { &[] }].concat());
+        let set_of = self.imager.set_of_each();
+        let beside: Vec<&str> =
+            unchanging.map(|_| UNCHANGING).into_iter().chain((!set_of.is_empty()).then_some(DATA_SET)).collect();
+        let mut table = Table::new(&[&columns[..], &beside].concat());
         for (k, (profile, model)) in self.observations.profiles.iter().zip(&self.fit.model).enumerate() {
             let cycle = self.imager.star.cycle(profile.time_d);
             for (j, model) in model.iter().enumerate() {
-                let velocity = profile.velocity_kms(j, self.observations.step_kms);
+                let velocity = profile.velocity_kms(j);
                 let (observed, sigma) = (profile.intensity[j], profile.sigma[j]);
                 let mut row =
                     vec![k as f64, profile.time_d, cycle, velocity, observed, sigma, *model, observed - model];
                 row.extend(unchanging.map(|unchanging| unchanging[k][j]));
+                row.extend(set_of.get(k).map(|s| *s as f64));
                 table.row(&row);
             }
         }
@@ -159,11 +167,14 @@ impl ChangingMapResult<'_> {
     fn velocities(&self) -> Table {
         let columns =
             ["time_d", "cycle", "observed_kms", "sigma_kms", "modelled_kms", "orbit_kms", "rv_kms", "rv_sigma_kms"];
-        let mut table = Table::new(&columns);
-        for v in &self.fit.velocities {
+        let set_of = self.imager.set_of_each();
+        let beside: &[&str] = if set_of.is_empty() { &[] } else { &[DATA_SET] };
+        let mut table = Table::new(&[&columns[..], beside].concat());
+        for (k, v) in self.fit.velocities.iter().enumerate() {
             let (value_kms, sigma_kms) = (v.observed.value_kms, v.observed.sigma_kms);
             let free = [v.modelled_kms, v.orbit_kms, v.rv_kms, v.rv_sigma_kms];
-            table.row(&[&[v.time_d, v.cycle, value_kms, sigma_kms][..], &free].concat());
+            let own: Vec<f64> = set_of.get(k).map(|s| *s as f64).into_iter().collect();
+            table.row(&[&[v.time_d, v.cycle, value_kms, sigma_kms][..], &free, &own].concat());
         }
         table
     }

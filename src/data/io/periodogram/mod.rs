@@ -67,6 +67,9 @@ const COLUMNS: [&str; 12] = [
     "k_limit95_kms",
 ];
 
+/// Column of the number of each profile's data set, from 1, where there are several.
+pub const DATA_SET: &str = "data_set";
+
 /// Name of what was found.
 pub const FILE: &str = "periodogram.json";
 
@@ -97,7 +100,8 @@ impl PeriodogramResult<'_> {
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
     fn velocities(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let quadratic = &self.detection.last().quadratic;
+        let last = self.detection.last();
+        let quadratic = last.zero_points_held.as_ref().unwrap_or(&last.quadratic);
         let n = quadratic.len();
         let missing = |_| (DVector::from_element(n, f64::NAN), DMatrix::from_element(n, n, f64::NAN));
         quadratic.radial_velocities().unwrap_or_else(missing)
@@ -105,11 +109,15 @@ impl PeriodogramResult<'_> {
 
     fn rv(&self, velocities: &DVector<f64>, covariance: &DMatrix<f64>) -> Table {
         let moments = ["first_moment_kms", "first_moment_sigma_kms", "filtered_kms"];
-        let mut table = Table::new(&[&["time_d", "cycle", "rv_kms", "rv_sigma_kms"][..], &moments].concat());
+        let set_of = self.imager.set_of_each();
+        let sets: &[&str] = if set_of.is_empty() { &[] } else { &[DATA_SET] };
+        let mut table = Table::new(&[&["time_d", "cycle", "rv_kms", "rv_sigma_kms"][..], &moments, sets].concat());
         for (k, v) in self.planet_free.velocities.iter().enumerate() {
             let (rv, sigma) = (velocities[k], covariance[(k, k)].sqrt());
             let moment = v.observed;
-            table.row(&[v.time_d, v.cycle, rv, sigma, moment.value_kms, moment.sigma_kms, v.filtered_kms()]);
+            let mut row = vec![v.time_d, v.cycle, rv, sigma, moment.value_kms, moment.sigma_kms, v.filtered_kms()];
+            row.extend(set_of.get(k).map(|s| *s as f64));
+            table.row(&row);
         }
         table
     }

@@ -1,0 +1,210 @@
+//! The data sets of a config: what each says of itself, and what only one of them may say.
+
+use super::data_sets::ZeroPoint;
+use super::domain::{check_size, most};
+use super::error::Fault;
+use super::raw::{Config, Instrument};
+use super::raw_parts::ObservationsSection;
+use super::resolve::check_nuisances;
+use super::resolve_observations::resolve_observations;
+use super::resolve_simulation::{spots, times_d};
+use super::resolve_star::resolve_star;
+use super::{DataSetSettings, ObservationSource};
+use crate::posterior::objective::{ObjectiveKind, Parameter, ParameterValues};
+use crate::star::StarSettings;
+use std::path::Path;
+
+/// Zero points beyond it (km/s) are a mistake.
+const LARGEST_ZERO_POINT_KMS: f64 = 100.0;
+
+/// Longest name of a set.
+const LONGEST_NAME: usize = 40;
+
+/// Resolves all data sets of `raw`, the star's own settings being `star`. `config` is the config's path, whose folder
+/// paths start from.
+pub(super) fn resolve_sets(
+    raw: &mut Config,
+    star: &StarSettings,
+    values: &ParameterValues,
+    config: &Path,
+) -> Result<Vec<DataSetSettings>, Fault> {
+    check_several(raw)?;
+    let mut sets = Vec::new();
+    for s in 0..raw.observations.sections.len() {
+        let key = raw.observations.key(s);
+        let (star, equivalent_width) = star_of(raw, s, &key, star, values)?;
+        let section = &mut raw.observations.sections[s];
+        let source = resolve_observations(section, &key, &star, values, config)?;
+        if let Some(priors) = &section.nuisances {
+            let name = |name: &str| format!("{key}.nuisances.{name}");
+            check_nuisances(priors, ["continuum_offset", "continuum_slope", "equivalent_width"].map(name))?;
+        }
+        if let ZeroPoint::Known(kms) = section.zero_point_kms
+            && !(kms.abs() <= LARGEST_ZERO_POINT_KMS)
+        {
+            let problem = format!("{kms} must be from -{LARGEST_ZERO_POINT_KMS} to {LARGEST_ZERO_POINT_KMS} km/s");
+            return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
+        }
+        sets.push(DataSetSettings {
+            name: section.name.clone().unwrap_or_else(|| format!("set{}", s + 1)),
+            star,
+            equivalent_width,
+            source,
+            nuisances: section.nuisances.or(raw.imaging.nuisances),
+            zero_point: section.zero_point_kms,
+            held: None,
+            exclude: exclude(section, &key)?,
+            key,
+        });
+    }
+    names(&sets)?;
+    of_one_star(raw, &mut sets)?;
+    Ok(sets)
+}
+
+/// What several sets need, and what one has no use for.
+fn check_several(raw: &Config) -> Result<(), Fault> {
+    let sections = &raw.observations.sections;
+    let objective = raw.imaging.objective;
+    if sections.len() > 1 && objective != ObjectiveKind::MarginalLikelihood {
+        let problem = format!(
+            "{:?} makes one map of a star that does not change: several data sets or seasons take \
+             \"marginal-likelihood\"",
+            objective.name()
+        );
+        return Err(Fault::new("imaging.objective", problem));
+    }
+    for (s, section) in sections.iter().enumerate() {
+        let key = raw.observations.key(s);
+        if sections.len() == 1 && section.zero_point_kms == ZeroPoint::Fitted {
+            let problem = "of one data set alone the zero point is the systemic velocity: see star.vsys_kms";
+            return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
+        }
+        if section.velocity_jitter_kms != sections[0].velocity_jitter_kms {
+            let problem = format!("must be as in {}: the jitter is one of all data sets", raw.observations.key(0));
+            return Err(Fault::new(format!("{key}.velocity_jitter_kms"), problem));
+        }
+        if section.simulate.is_some() != sections[0].simulate.is_some() {
+            return Err(Fault::new(key, "either all data sets are simulated, or none is"));
+        }
+    }
+    Ok(())
+}
+
+/// The star as a set sees it: with its own line, spot contrast and resolving power, where it has any.
+fn star_of(
+    raw: &Config,
+    s: usize,
+    key: &str,
+    star: &StarSettings,
+    values: &ParameterValues,
+) -> Result<(StarSettings, super::EquivalentWidth), Fault> {
+    let section = &raw.observations.sections[s];
+    let ObservationsSection { line, wavelength_nm, contrast, resolving_power, .. } = section;
+    let mut own = raw.star.clone();
+    let held = |parameter: Parameter, name: &str| match values.given(parameter) {
+        Some(_) if parameter.is_surface() => {
+            let problem = format!("parameters.{} is free, and is that of all data sets", parameter.name());
+            Err(Fault::new(format!("{key}.{name}"), problem))
+        }
+        _ => Ok(()),
+    };
+    if let Some(line) = line {
+        held(Parameter::LineSigma, "line")?;
+        held(Parameter::EquivalentWidth, "line")?;
+        own.line = line.clone();
+    }
+    if let Some(wavelength_nm) = wavelength_nm {
+        held(Parameter::Contrast, "wavelength_nm")?;
+        if contrast.is_some() || own.contrast.is_some() {
+            let problem = "a contrast is given, which knows no wavelength: give star.photosphere_k and .spot_k instead";
+            return Err(Fault::new(format!("{key}.wavelength_nm"), problem));
+        }
+        own.wavelength_nm = *wavelength_nm;
+    }
+    if contrast.is_some() {
+        held(Parameter::Contrast, "contrast")?;
+        (own.contrast, own.photosphere_k, own.spot_k) = (*contrast, None, None);
+    }
+    let instrument = Instrument { resolving_power: resolving_power.or(raw.instrument.resolving_power) };
+    let equivalent_width = own.line.equivalent_width_kms;
+    if line.is_none() && wavelength_nm.is_none() && contrast.is_none() && resolving_power.is_none() {
+        return Ok((star.clone(), equivalent_width));
+    }
+    let star = resolve_star(&mut own, &instrument).map_err(|fault| {
+        // what the star and the instrument say is sound by itself
+        let name = fault.key.trim_start_matches("star.").trim_start_matches("instrument.");
+        Fault::new(format!("{key}.{name}"), fault.problem)
+    })?;
+    Ok((star, equivalent_width))
+}
+
+fn exclude(section: &ObservationsSection, key: &str) -> Result<Vec<[f64; 2]>, Fault> {
+    for (k, [start, end]) in section.exclude.iter().enumerate() {
+        let key = format!("{key}.exclude[{k}]");
+        check_size(&key, *start, most::TIME)?;
+        check_size(&key, *end, most::TIME)?;
+        if start >= end {
+            return Err(Fault::new(key, format!("the start {start} must be before the end {end}")));
+        }
+    }
+    Ok(section.exclude.clone())
+}
+
+/// Names are folders of `simulate`, and labels.
+fn names(sets: &[DataSetSettings]) -> Result<(), Fault> {
+    for (s, set) in sets.iter().enumerate() {
+        let fault = |problem: String| Err(Fault::new(format!("{}.name", set.key), problem));
+        let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+        if set.name.is_empty()
+            || set.name.len() > LONGEST_NAME
+            || !set.name.chars().all(plain)
+            || set.name.starts_with('.')
+        {
+            let problem = format!("{:?} must be 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'", set.name);
+            return fault(problem);
+        }
+        if let Some(other) = sets[..s].iter().find(|other| other.name.eq_ignore_ascii_case(&set.name)) {
+            return fault(format!("{:?} is the name of {} already: each set needs its own", set.name, other.key));
+        }
+    }
+    Ok(())
+}
+
+/// Of several simulated sets the first has the star: its spots are those of all.
+fn of_one_star(raw: &Config, sets: &mut [DataSetSettings]) -> Result<(), Fault> {
+    let Some(first) = raw.observations.sections[0].simulate.as_ref().filter(|_| sets.len() > 1) else {
+        return Ok(());
+    };
+    let mut times = Vec::new();
+    let mut seeds: Vec<u64> = Vec::new();
+    for (s, (section, set)) in raw.observations.sections.iter().zip(&*sets).enumerate() {
+        let Some(own) = &section.simulate else { continue };
+        let given = [
+            ("spots", !own.spots.is_empty()),
+            ("random_spots", own.random_spots.is_some()),
+            ("faculae", !own.faculae.is_empty()),
+            ("truth", !own.truth.entries().is_empty()),
+        ];
+        if let Some((name, _)) = given.iter().find(|(_, given)| *given && s > 0) {
+            let problem = format!("all data sets see one star: that is for {}.simulate", sets[0].key);
+            return Err(Fault::new(format!("{}.simulate.{name}", set.key), problem));
+        }
+        if seeds.contains(&own.seed) {
+            let problem = format!("{} is the seed of another data set, whose noise would be the same", own.seed);
+            return Err(Fault::new(format!("{}.simulate.seed", set.key), problem));
+        }
+        seeds.push(own.seed);
+        times.extend(times_d(own, &set.star, &set.key)?);
+    }
+    let key = sets[0].key.clone();
+    let ObservationSource::Simulate(simulation) = &sets[0].source else { return Ok(()) };
+    let (truth, faculae) = (simulation.truth, simulation.faculae.clone());
+    let spots = spots(first, &sets[0].star, &truth, &times, &key)?;
+    for set in sets {
+        if let ObservationSource::Simulate(simulation) = &mut set.source {
+            (simulation.truth, simulation.spots, simulation.faculae) = (truth, spots.clone(), faculae.clone());
+        }
+    }
+    Ok(())
+}

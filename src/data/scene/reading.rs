@@ -1,0 +1,110 @@
+//! One data set of a config: its profiles read or simulated, those of excluded times left out, errors as they are
+//! asked for.
+
+use super::{SceneError, fingerprint, measured_errors};
+use crate::data::config::{ConfigError, DataSetSettings, ObservationSource, Settings};
+use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
+use crate::posterior::noise::{ErrorSettings, MeasuredErrors};
+use crate::star::observation::{Observations, Profile};
+
+/// What became of a data set.
+pub(super) struct Part {
+    pub observations: Observations,
+    /// SHA-256 (hex) of the bytes of its files, or of the numbers.
+    pub sha256: String,
+    pub errors: Option<MeasuredErrors>,
+    /// What a reader of results must know.
+    pub remarks: Vec<String>,
+}
+
+impl Part {
+    /// Reads or simulates a `set` of `settings`.
+    pub fn read(settings: &Settings, set: &DataSetSettings) -> Result<Self, SceneError> {
+        match &set.source {
+            ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
+                let data = lsd::read(path, options)?;
+                let (mut observations, mut remarks) = (data.observations, data.remarks);
+                let left_out = leave_out(settings, set, &mut observations)?;
+                remarks.extend(remark(left_out));
+                let as_quoted = *wanted == ErrorSettings::default();
+                if as_quoted && *continuum_level == 1.0 {
+                    return Ok(Part { observations, sha256: data.sha256, errors: None, remarks });
+                }
+                let mut observations = observations.over_continuum(*continuum_level);
+                let errors = match as_quoted {
+                    true => None,
+                    false => {
+                        let mut whole = lsd::read(path, &ReadOptions::default())?.observations;
+                        leave_out(settings, set, &mut whole)?;
+                        let whole = whole.over_continuum(*continuum_level);
+                        let measured = measured_errors(settings, set, *wanted, &whole, &observations)?;
+                        measured.apply(&mut observations);
+                        Some(measured)
+                    }
+                };
+                let sha256 = fingerprint(&observations);
+                Ok(Part { observations, sha256, errors, remarks })
+            }
+            ObservationSource::Simulate(simulation) => {
+                settings.check_velocity_grid(&set.star, &simulation.truth, simulation.step_kms)?;
+                let observations = simulation.observe(&set.star);
+                let sha256 = fingerprint(&observations);
+                Ok(Part { observations, sha256, errors: None, remarks: Vec::new() })
+            }
+        }
+    }
+}
+
+/// The profiles of a `set` in their whole width, as they are in their files, with what the list says of each.
+pub(super) fn whole(settings: &Settings, set: &DataSetSettings) -> Result<(Observations, Vec<Label>), LsdError> {
+    match &set.source {
+        ObservationSource::Files { path, .. } => {
+            let mut whole = lsd::read(path, &ReadOptions::default())?.observations;
+            let times_d = whole.times_d();
+            let labels = lsd::labels(path)?.into_iter().zip(times_d);
+            let labels = labels.filter(|(_, time_d)| !is_excluded(set, *time_d)).map(|(label, _)| label).collect();
+            whole.profiles.retain(|profile| !is_excluded(set, profile.time_d));
+            Ok((whole, labels))
+        }
+        ObservationSource::Simulate(simulation) => {
+            let whole = simulation.observe(&set.star);
+            let of = if settings.sets.len() > 1 { format!(" of {}", set.name) } else { String::new() };
+            let name = |k: usize| Label { file: format!("simulated profile {k}{of}"), vrad_kms: 0.0 };
+            let labels = (0..whole.profiles.len()).map(name).collect();
+            Ok((whole, labels))
+        }
+    }
+}
+
+fn is_excluded(set: &DataSetSettings, time_d: f64) -> bool {
+    set.exclude.iter().any(|[start, end]| (*start..=*end).contains(&time_d))
+}
+
+/// Leaves out the profiles of excluded times; says how many they are, of how many.
+fn leave_out(
+    settings: &Settings,
+    set: &DataSetSettings,
+    observations: &mut Observations,
+) -> Result<(usize, usize), ConfigError> {
+    let all = observations.profiles.len();
+    observations.profiles.retain(|profile: &Profile| !is_excluded(set, profile.time_d));
+    let left = observations.profiles.len();
+    let fewest = if settings.sets.len() > 1 { 1 } else { 2 };
+    match left < all && left < fewest {
+        true => {
+            let problem = format!(
+                "leaves {left} of {all} profiles, {fewest} at least {} needed",
+                match fewest {
+                    1 => "is",
+                    _ => "are",
+                }
+            );
+            Err(settings.fault(&format!("{}.exclude", set.key), &problem))
+        }
+        false => Ok((all - left, all)),
+    }
+}
+
+fn remark((left_out, all): (usize, usize)) -> Option<String> {
+    (left_out > 0).then(|| format!("{left_out} of {all} left out: they lie within the times of exclude"))
+}

@@ -1,0 +1,195 @@
+//! A velocity jitter of unknown size beside the orbit: zero points of all profiles that scatter by s.
+//!
+//! With zero points integrated out `ln L(V)` of information I becomes that of information `(1 + s^2 I)^-1 I`. What is
+//! taken for jitter without a planet may be the planet: with few profiles a strong one hides behind its own noise. So s
+//! is what suits best, without an orbit and with each orbit, as in the F-test of a periodogram of unknown noise. Stars
+//! without a planet, whose zero points scatter as was found without one, are judged in the same way.
+
+use super::draws::root;
+use super::orbits::{CircularOrbit, Trial, scan};
+use crate::planets::velocities::VelocityQuadratic;
+use nalgebra::{DMatrix, DVector};
+
+/// Sizes that are tried, of the one found without a planet.
+const SIZES: [f64; 6] = [0.0, 0.25, 0.5, std::f64::consts::FRAC_1_SQRT_2, 1.0, std::f64::consts::SQRT_2];
+
+/// ln L of the velocities beside jitters of several sizes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Jitters {
+    pub(super) levels: Vec<Level>,
+    /// From deviates to amplitudes along the eigenvectors of I; without rows where there is no jitter.
+    pub(super) rotation: DMatrix<f64>,
+}
+
+/// One size.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Level {
+    /// ln L of the velocities.
+    pub quadratic: VelocityQuadratic,
+    /// ln L at velocities 0, above that of the best size.
+    pub ln_l: f64,
+    /// From deviates to the gradient of a star without a planet.
+    pub root: DMatrix<f64>,
+    /// ln L at velocities 0 of such a star: a constant, and a factor on the square of each amplitude.
+    pub constant: f64,
+    pub squares: DVector<f64>,
+}
+
+/// A trial period with the size of the jitter that suits its orbit best.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BestTrial {
+    /// With that size, its height above no planet with the same.
+    pub trial: Trial,
+    /// Number of the size.
+    pub level: usize,
+    /// Height above no planet with the size that suits this best.
+    pub delta_ln_l: f64,
+}
+
+impl BestTrial {
+    /// The trial with its height above no planet.
+    pub fn trial_above_no_planet(&self) -> Trial {
+        let delta_ln_l = self.delta_ln_l;
+        Trial { orbit: self.trial.orbit.map(|orbit| CircularOrbit { delta_ln_l, ..orbit }), ..self.trial }
+    }
+}
+
+impl Jitters {
+    /// No jitter.
+    pub fn none(quadratic: &VelocityQuadratic) -> Self {
+        let level = Level {
+            quadratic: quadratic.clone(),
+            ln_l: 0.0,
+            root: root(&quadratic.information),
+            constant: 0.0,
+            squares: DVector::zeros(0),
+        };
+        Jitters { levels: vec![level], rotation: DMatrix::zeros(0, 0) }
+    }
+
+    /// Beside that `without` one, `found_kms` being its standard deviation (km/s) in the absence of a planet.
+    pub fn new(without: &VelocityQuadratic, found_kms: f64) -> Self {
+        let eigen = without.information.clone().symmetric_eigen();
+        let (lambda, u) = (eigen.eigenvalues.map(|l| l.max(0.0)), eigen.eigenvectors);
+        let among = |d: DVector<f64>| &u * DMatrix::from_diagonal(&d) * u.transpose();
+        // the gradient of a star without a planet has this standard deviation along each eigenvector
+        let sd = lambda.map(|l| (l + (found_kms * l).powi(2)).sqrt());
+        let pulled = u.tr_mul(&without.gradient);
+        let level = |size: f64| {
+            let variance = (size * found_kms).powi(2);
+            let left = lambda.map(|l| 1.0 / (1.0 + variance * l));
+            let constant = 0.5 * left.map(f64::ln).sum();
+            let information = among(lambda.component_mul(&left));
+            Level {
+                ln_l: constant + 0.5 * variance * pulled.component_mul(&pulled).dot(&left),
+                quadratic: VelocityQuadratic {
+                    cycles: without.cycles.clone(),
+                    gradient: &u * pulled.component_mul(&left),
+                    information: 0.5 * (&information + information.transpose()),
+                },
+                root: among(sd.component_mul(&left)),
+                constant,
+                squares: left.component_mul(&sd.map(|sd| 0.5 * variance * sd * sd)),
+            }
+        };
+        let mut levels = SIZES.map(level).to_vec();
+        let best = levels.iter().map(|level| level.ln_l).fold(f64::NEG_INFINITY, f64::max);
+        levels.iter_mut().for_each(|level| level.ln_l -= best);
+        Jitters { levels, rotation: u.transpose() }
+    }
+
+    /// With the size that suits the star without a planet best.
+    pub(super) fn as_found(&self) -> &Level {
+        self.levels.iter().find(|level| level.ln_l == 0.0).unwrap_or(&self.levels[0])
+    }
+
+    /// Whether there is none.
+    pub fn is_none(&self) -> bool {
+        self.levels.len() == 1
+    }
+
+    /// The best orbit at every frequency (orbits a rotation cycle), with the jitter that suits it best; where no orbit
+    /// is bounded, with none.
+    pub(super) fn scan(&self, frequencies: &[f64]) -> Vec<BestTrial> {
+        let of_level = |(level, of): (usize, &Level)| {
+            let height = |trial: &Trial| trial.orbit.map_or(f64::NEG_INFINITY, |orbit| of.ln_l + orbit.delta_ln_l);
+            let best = |trial: Trial| BestTrial { delta_ln_l: height(&trial), trial, level };
+            scan(&of.quadratic, frequencies).into_iter().map(best).collect::<Vec<_>>()
+        };
+        let mut levels = self.levels.iter().enumerate().map(of_level);
+        let mut best = levels.next().unwrap_or_default();
+        for level in levels {
+            for (best, next) in best.iter_mut().zip(level) {
+                if next.delta_ln_l > best.delta_ln_l {
+                    *best = next;
+                }
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample::{self, uneven};
+    use super::super::{Frequencies, FrequencySettings, Search, SearchSettings};
+    use super::*;
+
+    /// Against the covariance of the velocities, by dense algebra.
+    #[test]
+    fn a_jitter_adds_to_the_covariance() {
+        let n = 8;
+        let cycles = uneven(n, 4.0);
+        let rv = 0.3 * sample::normal(n, 3);
+        let without = sample::correlated(&cycles, &rv, 5);
+        let jitters = Jitters::new(&without, 0.2);
+        let covariance = without.information.clone().try_inverse().unwrap();
+        let density = |s: f64| {
+            let c = &covariance + DMatrix::identity(n, n) * s * s;
+            (c.clone().try_inverse().unwrap(), -0.5 * c.determinant().ln())
+        };
+        let ln_l = |s: f64| -0.5 * rv.dot(&(density(s).0 * &rv)) + density(s).1;
+        for (level, size) in jitters.levels.iter().zip(SIZES) {
+            let inverse = density(0.2 * size).0;
+            assert!((&level.quadratic.information - &inverse).norm() < 1e-9 * inverse.norm());
+            assert!((&level.quadratic.gradient - &inverse * &rv).norm() < 1e-9 * inverse.norm());
+            let above = ln_l(0.2 * size) - ln_l(0.0);
+            assert!((level.ln_l - jitters.levels[0].ln_l - above).abs() < 1e-9, "{size}");
+            // gradients of a star without a planet: C(s)^-1 C(0.2) C(s)^-1
+            let c = &covariance + DMatrix::identity(n, n) * 0.04;
+            let expected = &inverse * c * &inverse;
+            assert!((&level.root * level.root.transpose() - &expected).norm() < 1e-9 * expected.norm());
+        }
+    }
+
+    fn search(n: usize, k_kms: f64, jitter_kms: f64, seed: u64) -> f64 {
+        let cycles = uneven(n, 4.0);
+        let rv = sample::orbit(&cycles, k_kms, 1.7, 0.3)
+            + 0.03 * sample::normal(n, 1000 + seed)
+            + jitter_kms * sample::normal(n, 2000 + seed);
+        let without = sample::independent(&cycles, &rv, &DVector::from_element(n, 0.03));
+        let found_kms = (rv.norm_squared() / n as f64 - 9e-4).max(0.0).sqrt();
+        let frequencies = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap();
+        let settings = SearchSettings { draws: 1000, seed: 1 };
+        let found = Search::with_jitter(&Jitters::new(&without, found_kms), &frequencies, settings).unwrap();
+        found.false_alarm.probability(found.best().orbit.delta_ln_l).value()
+    }
+
+    /// Twelve velocities: all of a planet of 0.6 km/s looks like a jitter at first.
+    #[test]
+    fn a_strong_planet_does_not_hide_behind_its_own_jitter() {
+        let found: Vec<f64> = (0..3).map(|seed| search(12, 0.6, 0.0, seed)).collect();
+        assert!(found.iter().all(|p| *p < 1e-3), "{found:?}");
+    }
+
+    /// A jitter alone: false-alarm probabilities are uniform.
+    #[test]
+    fn a_jitter_is_no_planet() {
+        let mut found: Vec<f64> = (0..60).map(|seed| search(15, 0.0, 0.2, seed)).collect();
+        found.sort_by(f64::total_cmp);
+        let apart = |(k, p): (usize, &f64)| (p - (k as f64 + 0.5) / 60.0).abs();
+        let distance = found.iter().enumerate().map(apart).fold(0.0, f64::max);
+        // exceeded once in a thousand by chance: 1.95 / sqrt(60)
+        assert!(distance < 0.25 && found[0] > 1e-4, "{distance} {found:?}");
+    }
+}

@@ -1,0 +1,203 @@
+//! The response of several data sets, one after the other: each has its own local line, spot contrast and velocity
+//! axis, and all see one star. A single set is the usual case.
+
+use super::grid::SurfaceGrid;
+use super::response::{Part, Sampling};
+use super::{LocalLine, StarSettings, StarState};
+use crate::numerics::vector::Number;
+use nalgebra::DMatrix;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// What a data set sees: when and at which velocities, and what of the star looks different through it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Seen {
+    /// Local line, instrumental broadening included; that of the star's settings if `None`.
+    pub line: Option<LocalLine>,
+    /// Brightness of a wholly spotted pixel over that of the photosphere; that of the star's settings if `None`.
+    pub contrast: Option<f64>,
+    /// Times and velocity bins.
+    pub sampling: Sampling,
+}
+
+impl From<Sampling> for Seen {
+    fn from(sampling: Sampling) -> Self {
+        Seen { line: None, contrast: None, sampling }
+    }
+}
+
+impl Seen {
+    /// The star as this set sees it.
+    pub fn star<'a>(&self, star: &'a StarSettings) -> Cow<'a, StarSettings> {
+        if self.line.is_none() && self.contrast.is_none() {
+            return Cow::Borrowed(star);
+        }
+        let (line, contrast) = (self.line.unwrap_or(star.line), self.contrast.unwrap_or(star.contrast));
+        Cow::Owned(StarSettings { line, contrast, ..star.clone() })
+    }
+}
+
+/// The response of all profiles to a map of the star.
+#[derive(Clone, Debug)]
+pub struct Response {
+    parts: Vec<Part>,
+    /// First bin of each profile, and the end.
+    starts: Vec<usize>,
+    /// Of each profile, which set it is of.
+    set_of: Vec<usize>,
+}
+
+impl Response {
+    /// The response of one data set at one state of star and planet.
+    pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+        Response::stacked(vec![Part::new(grid, star, state, sampling)])
+    }
+
+    /// The response of data `sets`.
+    pub fn of_sets(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
+        let part = |set: &Seen| Part::new(grid, &set.star(star), state, &set.sampling);
+        Response::stacked(sets.iter().map(part).collect())
+    }
+
+    /// Of its parts, one a data set.
+    pub(super) fn stacked(parts: Vec<Part>) -> Self {
+        let (mut starts, mut set_of) = (vec![0], Vec::new());
+        for (s, part) in parts.iter().enumerate() {
+            let end = starts[starts.len() - 1];
+            starts.extend((0..part.profiles()).map(|k| end + part.bins(k).end));
+            set_of.extend((0..part.profiles()).map(|_| s));
+        }
+        Response { parts, starts, set_of }
+    }
+
+    /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the lines are
+    /// shifted.
+    pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
+        let shifted = |(part, set): (&Part, &Seen)| part.with_velocities(&set.star(star), state, &set.sampling);
+        Response::stacked(self.parts.iter().zip(sets).map(shifted).collect())
+    }
+
+    /// Brightness of a spot over that of the photosphere, as profile `k` sees it, in the state that this was made at.
+    pub fn contrast(&self, k: usize) -> f64 {
+        self.parts[self.set_of[k]].contrast()
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.parts[0].pixels()
+    }
+
+    /// Number of profiles.
+    pub fn profiles(&self) -> usize {
+        self.set_of.len()
+    }
+
+    /// Number of visible (pixel, profile) pairs.
+    pub fn pairs(&self) -> usize {
+        self.parts.iter().map(Part::pairs).sum()
+    }
+
+    /// Memory (bytes) that a pass over all pairs reads.
+    pub fn bytes(&self) -> usize {
+        self.parts.iter().map(Part::bytes).sum()
+    }
+
+    /// Bins of profile `k` within the data.
+    pub fn bins(&self, k: usize) -> Range<usize> {
+        self.starts[k]..self.starts[k + 1]
+    }
+
+    /// Number of data.
+    pub fn data_len(&self) -> usize {
+        self.starts[self.profiles()]
+    }
+
+    /// Each part with its profiles and its bins.
+    fn places(&self) -> impl Iterator<Item = (&Part, Range<usize>, Range<usize>)> {
+        self.parts.iter().scan(0, |first, part| {
+            let profiles = *first..*first + part.profiles();
+            *first = profiles.end;
+            let bins = self.starts[profiles.start]..self.starts[profiles.end];
+            Some((part, profiles, bins))
+        })
+    }
+
+    /// Line depth of every bin and continuum of every profile for the map `x`.
+    pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
+        assert_eq!(continuum.len(), self.profiles());
+        for (part, profiles, bins) in self.places() {
+            part.apply(x, &mut line[bins], &mut continuum[profiles]);
+        }
+    }
+
+    /// The same of maps that are another one in each data set, as the brightness of spots is: `fill` is given the first
+    /// profile of the set, and makes its `map`.
+    pub fn apply_each(
+        &self,
+        map: &mut [f64],
+        line: &mut [f64],
+        continuum: &mut [f64],
+        fill: impl Fn(usize, &mut [f64]),
+    ) {
+        for (part, profiles, bins) in self.places() {
+            fill(profiles.start, map);
+            part.apply(map, &mut line[bins], &mut continuum[profiles]);
+        }
+    }
+
+    /// Transpose of [`Response::apply`]; `out` is overwritten.
+    pub fn apply_transpose(&self, line: &[f64], continuum: &[f64], out: &mut [f64]) {
+        assert_eq!(continuum.len(), self.profiles());
+        self.summed(out, |part, profiles, bins, out| part.apply_transpose(&line[bins], &continuum[profiles], out));
+    }
+
+    /// The transpose of what `weigh` makes of the line depth and continuum of every profile for the map `x`: given the
+    /// number of a profile, the depth of its bins, and its continuum, it replaces the depths, and returns what replaces
+    /// the continuum. `out` is overwritten. It goes there and back profile by profile: what a large map's pass reads
+    /// comes from memory, and is read once. Maps in single precision are good to six digits, and faster.
+    pub fn apply_and_back<N: Number>(
+        &self,
+        x: &[N],
+        out: &mut [N],
+        mut weigh: impl FnMut(usize, &mut [f64], f64) -> f64,
+    ) {
+        self.summed(out, |part, profiles, _, out| {
+            part.apply_and_back(x, out, |k, line, continuum| weigh(profiles.start + k, line, continuum));
+        });
+    }
+
+    /// The sum over the parts of what each makes of a map.
+    fn summed<N: Number>(&self, out: &mut [N], mut make: impl FnMut(&Part, Range<usize>, Range<usize>, &mut [N])) {
+        let mut own = Vec::new();
+        for (s, (part, profiles, bins)) in self.places().enumerate() {
+            if s == 0 {
+                make(part, profiles, bins, out);
+                continue;
+            }
+            own.resize(out.len(), N::default());
+            make(part, profiles, bins, &mut own);
+            out.iter_mut().zip(&own).for_each(|(out, own)| *out = N::of((*out).into() + (*own).into()));
+        }
+    }
+
+    /// Normalised depth `1 - I` of every bin for a brightness map: the observable of `docs/method.md` section 1.
+    pub fn depths(&self, brightness: &[f64]) -> Vec<f64> {
+        let mut depths = vec![0.0; self.data_len()];
+        let mut continuum = vec![0.0; self.profiles()];
+        self.apply(brightness, &mut depths, &mut continuum);
+        for (k, continuum) in continuum.iter().enumerate() {
+            depths[self.bins(k)].iter_mut().for_each(|depth| *depth /= continuum);
+        }
+        depths
+    }
+
+    /// The same of a star that changes: profile k sees the brightness map in column k (pixels, profiles).
+    pub fn depths_of_each(&self, brightness: &DMatrix<f64>) -> Vec<f64> {
+        assert_eq!(brightness.shape(), (self.pixels(), self.profiles()), "a map of each profile");
+        let mut depths = vec![0.0; self.data_len()];
+        for (part, profiles, bins) in self.places() {
+            part.depths_of_each(brightness.columns_range(profiles), &mut depths[bins]);
+        }
+        depths
+    }
+}

@@ -1,0 +1,131 @@
+//! Several data sets in one config: two spectrographs in two seasons, a transit left out.
+
+use super::desk::{Desk, says};
+use serde_json::{Value, json};
+
+const CONFIG: &str = "config.json";
+
+/// A star seen by two spectrographs, simulated.
+fn two_sets() -> Value {
+    let cycles = |first: f64| (0..7).map(|k| first + 0.37 * f64::from(k)).collect::<Vec<f64>>();
+    json!({
+        "star": { "rotation_period_d": 3.0, "inclination_deg": 60.0, "vsini_kms": 22.0, "contrast": 0.3,
+                  "line": { "sigma_kms": 3.0, "equivalent_width_kms": 6.0 } },
+        "planet": { "k_kms": 0.15, "porb_over_prot": 1.7, "phi": 0.3 },
+        "imaging": { "pixels": 200, "objective": "marginal-likelihood" },
+        "parameters": { "k_kms": { "prior": "uniform", "min": 0, "max": 1 }, "phi": { "prior": "periodic" } },
+        "sampler": { "ensembles": 2, "walkers": 10, "steps": 2, "ess": 1e6 },
+        "observations": [
+            { "name": "blue", "resolving_power": 50000,
+              "simulate": { "random_spots": { "number": 8, "lifetime_d": 20, "seed": 4 }, "cycles": cycles(0.0),
+                            "velocity_kms": { "min": -33.0, "max": 33.0, "step": 3.0 }, "pixels": 1000 } },
+            { "name": "red", "resolving_power": 90000, "contrast": 0.4, "zero_point_kms": "fitted",
+              "simulate": { "cycles": cycles(83.2), "velocity_kms": { "min": -32.0, "max": 32.0, "step": 2.0 },
+                            "seed": 2, "zero_point_kms": 0.3, "pixels": 1000 } }
+        ]
+    })
+}
+
+/// The same read from the files that `simulate` has written to `data`.
+fn from_files(config: &Value) -> Value {
+    let mut config = config.clone();
+    for set in config["observations"].as_array_mut().unwrap() {
+        let path = format!("data/{}/observations.txt", set["name"].as_str().unwrap());
+        let set = set.as_object_mut().unwrap();
+        set.remove("simulate");
+        set.insert("path".into(), json!(path));
+    }
+    config
+}
+
+#[test]
+fn two_spectrographs_from_files_to_a_chain() {
+    let desk = Desk::new(two_sets());
+    says(&desk.succeed(&["simulate", CONFIG, "--out", "data"]), &["data set", "blue", "red"]);
+    assert_eq!(desk.json("data/red/truth.json")["zero_point_kms"], 0.3);
+    let mut config = from_files(&two_sets());
+    // times are 3 d a cycle: the profile at cycle 0.37 lies in a transit
+    config["observations"][0]["exclude"] = json!([[1.0, 1.2]]);
+    desk.write("star.json", &config.to_string());
+    let said = desk.succeed(&["map", "star.json", "--out", "map"]);
+    says(&said, &["blue: 1 of 7 left out", "red: 7 profiles, zero point"]);
+    let map = desk.json("map/map.json");
+    let sets = map["data_sets"].as_array().unwrap();
+    assert_eq!((sets[0]["name"].as_str(), sets[0]["profiles"].as_u64()), (Some("blue"), Some(6)));
+    let held = &sets[1]["zero_point"];
+    let (value, sigma) = (held["value_kms"].as_f64().unwrap(), held["sigma_kms"].as_f64().unwrap());
+    assert!((value - 0.3).abs() < 3.0 * sigma && sigma < 0.2, "{value} +- {sigma}");
+    let rv = desk.read("map/rv.csv");
+    assert!(rv.starts_with("time_d") && rv.lines().next().unwrap().ends_with(",data_set"));
+    assert_eq!(rv.lines().skip(1).filter(|line| line.ends_with(",2")).count(), 7);
+    desk.succeed(&["plot", "map"]);
+    desk.succeed(&["sample", "star.json", "--out", "run"]);
+    desk.succeed(&["report", "run"]);
+    says(&desk.read("run/report.html"), &["blue: 6 profiles", "red: 7 profiles"]);
+}
+
+#[test]
+fn a_list_of_one_is_that_one() {
+    let mut config = two_sets();
+    let one = config["observations"][0].clone();
+    config["observations"] = one.clone();
+    let desk = Desk::new(config.clone());
+    config["observations"] = json!([one]);
+    desk.write("list.json", &config.to_string());
+    for (config, out) in [(CONFIG, "one"), ("list.json", "list")] {
+        desk.succeed(&["map", config, "--out", out]);
+    }
+    for file in ["map.json", "profiles.csv", "rv.csv", "fit.json"] {
+        assert!(desk.read(&format!("one/{file}")) == desk.read(&format!("list/{file}")), "{file}");
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_by_its_key() {
+    let refused = |edit: &dyn Fn(&mut Value), parts: &[&str]| {
+        let mut config = two_sets();
+        edit(&mut config);
+        says(&Desk::new(config).refusal(&["map", CONFIG, "--out", "map"]), parts);
+    };
+    let set =
+        |s: usize, key: &'static str, value: Value| move |c: &mut Value| c["observations"][s][key] = value.clone();
+    refused(&set(1, "name", json!("Blue")), &["observations[1].name", "observations[0]"]);
+    refused(&set(1, "name", json!("a/b")), &["observations[1].name", "letters"]);
+    refused(&set(1, "pth", json!("x")), &["unknown key observations[1].pth", "path"]);
+    refused(&set(1, "resolving_power", json!(-1)), &["observations[1].resolving_power", "above 0"]);
+    refused(&set(1, "wavelength_nm", json!(500)), &["observations[1].wavelength_nm", "contrast"]);
+    refused(&set(1, "velocity_jitter_kms", json!(0.1)), &["observations[1].velocity_jitter_kms", "observations[0]"]);
+    refused(&set(1, "zero_point_kms", json!(1000)), &["observations[1].zero_point_kms", "100"]);
+    refused(&set(1, "path", json!("x")), &["observations[1]", "not both"]);
+    refused(&set(0, "exclude", json!([[1, 2]])), &["observations[0].exclude", "files"]);
+    refused(&|c| c["imaging"]["objective"] = json!("spottedness"), &["imaging.objective", "marginal-likelihood"]);
+    refused(&|c| c["observations"] = json!([]), &["observations", "empty"]);
+    refused(
+        &|c| c["observations"][1]["simulate"]["spots"] = json!([[0, 0, 10, 1]]),
+        &["observations[1].simulate.spots", "one star"],
+    );
+    refused(&|c| c["observations"][1]["simulate"]["seed"] = json!(1), &["observations[1].simulate.seed", "noise"]);
+    refused(
+        &|c| c["parameters"]["contrast"] = json!({ "prior": "uniform", "min": 0, "max": 0.9 }),
+        &["observations[1].contrast", "parameters.contrast"],
+    );
+    refused(
+        &|c| {
+            c["observations"].as_array_mut().unwrap().remove(0);
+            c["observations"][0]["simulate"]["spots"] = json!([]);
+        },
+        &["observations[0].zero_point_kms", "star.vsys_kms"],
+    );
+    let desk = Desk::new(two_sets());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let mut config = from_files(&two_sets());
+    config["observations"][1]["exclude"] = json!([[0, 1000]]);
+    desk.write("star.json", &config.to_string());
+    says(&desk.refusal(&["map", "star.json", "--out", "map"]), &["observations[1].exclude", "leaves 0 of 7"]);
+    config["observations"][1]["exclude"] = json!([[5, 4]]);
+    desk.write("star.json", &config.to_string());
+    says(&desk.refusal(&["map", "star.json", "--out", "map"]), &["observations[1].exclude[0]", "before"]);
+    config["observations"][1] = two_sets()["observations"][1].clone();
+    desk.write("star.json", &config.to_string());
+    says(&desk.refusal(&["map", "star.json", "--out", "map"]), &["observations[1]", "either all"]);
+}
