@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,10 +88,6 @@ class LogPosterior:
         self.ndim = len(self.names)
         self.optimum, self.sd = self._core.optimum()
 
-    @overload
-    def __call__(self, theta: NDArray[np.float64]) -> Any: ...
-    @overload
-    def __call__(self, theta: ArrayLike) -> Any: ...
     def __call__(self, theta: ArrayLike) -> Any:
         """ln of the posterior density, up to a constant: minus infinity outside of the prior.
 

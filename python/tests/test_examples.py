@@ -6,6 +6,7 @@ import ast
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -100,3 +101,15 @@ def test_every_public_name_is_documented() -> None:
             if not method.startswith("_") and (callable(what) or isinstance(what, property)):
                 documented = getattr(thing, method).__doc__ if callable(what) else what.__doc__
                 assert documented, f"{name}.{method} has no docstring"
+
+
+def test_the_same_versions_as_the_program() -> None:
+    """Or else all dependencies are compiled twice, and results may differ."""
+
+    def versions(file: str) -> set[tuple[str, str]]:
+        return set(re.findall(r'name = "([^"]+)"\nversion = "([^"]+)"', (ROOT / file).read_text()))
+
+    missing = versions("Cargo.lock") - versions("python/Cargo.lock")
+    # what only the program's tests and its feature mpi need is not there
+    differ = {one for one in missing if one[0] in {name for name, _ in versions("python/Cargo.lock")}}
+    assert not differ, "cp Cargo.lock python/ and cargo fetch --manifest-path python/Cargo.toml"

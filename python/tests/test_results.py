@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pickle
+import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,8 @@ import dimcmc
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     """The command line that comes with the package."""
-    program = Path(sys.executable).with_name("dimcmc")
+    program = shutil.which("dimcmc", path=sysconfig.get_path("scripts"))
+    assert program, "the package is not installed"
     return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
@@ -140,6 +143,7 @@ def test_an_optimum_in_numbers(config: dimcmc.Config) -> None:
 
 
 def test_a_simulation_in_numbers(simulation: dimcmc.Simulation) -> None:
+    assert simulation.sets == [simulation.observations]
     assert simulation.observations.intensity.shape == (12, 41)
     assert simulation.truth.parameters.k_kms == 0.3
     with pytest.raises(ValueError, match="observations.simulate: missing"):
