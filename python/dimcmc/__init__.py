@@ -10,6 +10,7 @@ A config says which star, which profiles and which parameters are free; the func
 ==================  =========================================================
 `Config`            star, observations, image, free parameters, sampler
 `Observations`      line profiles as arrays
+`plan`              which planets would profiles show that are not yet taken?
 `simulate`          profiles of a star with spots and a planet
 `map`               the spots, and whether the model fits
 `periodogram`       is there a planet, at which period?
@@ -23,10 +24,10 @@ Velocities are in km/s, times and periods in days, angles in degrees, as their n
 
 from ._config import Config, Section
 from ._core import __version__
-from ._functions import map, optimise, periodogram, sample, simulate
+from ._functions import map, optimise, periodogram, plan, sample, simulate
 from ._observations import Observations
 from ._posterior import LogPosterior
-from ._results import Figure, Maps, Optimum, Periodogram, Record, Result, Simulation
+from ._results import Figure, Maps, Optimum, Periodogram, Plan, Record, Result, Simulation
 from ._run import Run
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "Observations",
     "Optimum",
     "Periodogram",
+    "Plan",
     "Record",
     "Result",
     "Run",
@@ -46,6 +48,7 @@ __all__ = [
     "map",
     "optimise",
     "periodogram",
+    "plan",
     "sample",
     "simulate",
 ]

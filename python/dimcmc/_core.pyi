@@ -44,6 +44,13 @@ def map(
 def periodogram(
     config: _Config, observations: _Arrays | None, options: _Options, out: str, manner: _Manner
 ) -> str: ...
+def plan(
+    configs: Sequence[_Config],
+    nights: Sequence[int],
+    options: tuple[float | None, float | None, bool, int, int, int],
+    out: str,
+    manner: _Manner,
+) -> str: ...
 def optimise(config: _Config, observations: _Arrays | None, out: str, manner: _Manner) -> str: ...
 def sample(
     config: _Config,

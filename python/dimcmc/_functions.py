@@ -12,10 +12,10 @@ from . import _core
 from ._config import Config
 from ._observations import Observations
 from ._progress import shown
-from ._results import Maps, Optimum, Periodogram, Scratch, Simulation
+from ._results import Maps, Optimum, Periodogram, Plan, Scratch, Simulation
 from ._run import Run
 
-__all__ = ["map", "optimise", "periodogram", "sample", "simulate"]
+__all__ = ["map", "optimise", "periodogram", "plan", "sample", "simulate"]
 
 ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
 Folder = str | os.PathLike[str]
@@ -174,14 +174,81 @@ def periodogram(
     """
     if planets not in (1, 2):
         raise ValueError(f"planets: must be 1 or 2, not {planets}")
-    if not 1000 <= draws <= 10_000_000:
-        raise ValueError(f"draws: must be from 1000 to 10000000, not {draws}")
+    _check_draws(draws)
     options = (min_period_d, max_period_d, oversampling, eccentric, planets == 2, fixed, draws, seed)
     text = Config(config)._as_text(observations is not None)
     with _folder(out, force) as (folder, scratch), shown("periodogram", progress) as show:
         manner = (_threads(threads), show)
         said = _core.periodogram(text, _arrays(observations), options, os.fspath(folder), manner)
     return Periodogram(folder, said, scratch)
+
+
+def plan(
+    configs: ConfigLike | Sequence[ConfigLike],
+    *,
+    nights: Sequence[int] = (),
+    min_period_d: float | None = None,
+    max_period_d: float | None = None,
+    fixed: bool = False,
+    maps: int = 8,
+    draws: int = 4000,
+    seed: int = 1,
+    out: Folder | None = None,
+    force: bool = False,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Plan:
+    """Forecast which planets a schedule would show, before any profile is taken.
+
+    Parameters
+    ----------
+    configs : Config, dict, str, path, or a list of these
+        One or several schedules: ``observations.simulate`` of a star not yet observed, or observed profiles with a
+        section ``plan``.
+    nights : sequence of int
+        Numbers of nights, each a schedule.
+    min_period_d, max_period_d : float, optional
+        Shortest and longest period (d) searched.
+    fixed : bool
+        Hold parameters that the config leaves free at its values, instead of integrating them out.
+    maps : int
+        Spot maps drawn, of which medians are taken; 0 for lines of a star without spots.
+    draws : int
+        Number of stars without a planet that false alarms are taken from, from 1000 to 10 million.
+    seed : int
+        Seed of both.
+    out : str or path, optional
+        Folder for the files; by default one that goes with the result.
+    force : bool
+        Write into the folder even if it is not empty.
+    threads : int, optional
+        Number of threads; all processors by default. Results do not depend on it.
+    progress : bool, optional
+        Show progress; by default in notebooks and on terminals.
+
+    Returns
+    -------
+    Plan
+
+    Examples
+    --------
+    >>> forecast = dimcmc.plan("configs/plan.json", nights=[8, 12, 16])          # doctest: +SKIP
+    >>> forecast.periods["k95_kms"].min()                                        # doctest: +SKIP
+    """
+    if not 0 <= maps <= 1000:
+        raise ValueError(f"maps: must be from 0 to 1000, not {maps}")
+    _check_draws(draws)
+    if any(not 1 <= number <= 1000 for number in nights):
+        raise ValueError(f"nights: must be numbers from 1 to 1000, not {list(nights)}")
+    single = isinstance(configs, (Config, Mapping, str, os.PathLike))
+    schedules = [configs] if single else list(configs)
+    if not schedules:
+        raise ValueError("configs: give one at least")
+    texts = [Config(one)._as_text() for one in schedules]
+    options = (min_period_d, max_period_d, fixed, maps, draws, seed)
+    with _folder(out, force) as (folder, scratch), shown("plan", progress) as show:
+        said = _core.plan(texts, list(nights), options, os.fspath(folder), (_threads(threads), show))
+    return Plan(folder, said, scratch)
 
 
 def optimise(
@@ -302,6 +369,11 @@ def sample(
             (_threads(threads), show),
         )
     return Run(folder, None, scratch)
+
+
+def _check_draws(draws: int) -> None:
+    if not 1000 <= draws <= 10_000_000:
+        raise ValueError(f"draws: must be from 1000 to 10000000, not {draws}")
 
 
 def _arrays(observations: Observations | None) -> Any:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from . import _core
 from ._observations import Observations
 
-__all__ = ["Figure", "Maps", "Optimum", "Periodogram", "Record", "Result", "Simulation"]
+__all__ = ["Figure", "Maps", "Optimum", "Periodogram", "Plan", "Record", "Result", "Simulation"]
 
 _R = TypeVar("_R", bound="Result")
 
@@ -273,6 +273,20 @@ class Periodogram(Result):
     def periods(self) -> dict[str, NDArray[np.float64]]:
         """The periodogram, a number for each trial period: the columns of `periodogram.csv`."""
         return self._table("periodogram.csv")
+
+
+class Plan(Result):
+    """Which planets schedules would show, from `plan`."""
+
+    @property
+    def summary(self) -> Record:
+        """Each schedule, as it grows, and the best of them (`plan.json`)."""
+        return self._json("plan.json")
+
+    @property
+    def periods(self) -> dict[str, NDArray[np.float64]]:
+        """Error of K and K detected (km/s) at every period, for each schedule: the columns of `plan.csv`."""
+        return self._table("plan.csv")
 
 
 class Optimum(Result):

@@ -3,7 +3,10 @@
 use crate::fault::Fault;
 use crate::job::{Job, attend};
 use crate::scene::{Arrays, ConfigText, NewArrays, Source, arrays};
-use dimcmc::{Failure, Figure, Format, Maps, OptimumFile, Periodogram, PeriodogramOptions, Scene, Simulated};
+use dimcmc::{
+    Failure, Figure, Forecast, Format, FrequencySettings, Maps, OptimumFile, Periodogram, PeriodogramOptions,
+    PlanSettings, Scene, Simulated,
+};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -93,6 +96,33 @@ pub fn periodogram(
         create(job, out)?;
         found.write(out)?;
         Ok(found.table().trim_end().to_owned())
+    })
+}
+
+/// Options of `plan`: shortest and longest period, fixed; maps, draws, seed.
+type PlanOptions = (Option<f64>, Option<f64>, bool, usize, usize, u64);
+
+/// `dimcmc plan`.
+#[pyfunction]
+pub fn plan(
+    py: Python,
+    configs: Vec<ConfigText>,
+    nights: Vec<usize>,
+    options: PlanOptions,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    let (min_period_d, max_period_d, fixed, maps, draws, seed) = options;
+    let periods = FrequencySettings { min_period_d, max_period_d, oversampling: None };
+    let settings = PlanSettings { maps, draws, seed, fixed };
+    attend(py, manner.0, manner.1, move |job| {
+        job.say("reading");
+        let configs = configs.iter().map(ConfigText::config).collect::<Result<Vec<_>, _>>()?;
+        let forecast = Forecast::of(&configs, &nights, periods, &settings, &|what| job.say(what));
+        let forecast = forecast.map_err(Failure::plan)?;
+        create(job, &out)?;
+        forecast.write(&out).map_err(Fault::from)?;
+        Ok(forecast.table().trim_end().to_owned())
     })
 }
 

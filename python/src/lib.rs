@@ -30,6 +30,7 @@ fn _core(module: &Bound<PyModule>) -> PyResult<()> {
         wrap_pyfunction!(calls::simulate, module)?,
         wrap_pyfunction!(calls::map, module)?,
         wrap_pyfunction!(calls::periodogram, module)?,
+        wrap_pyfunction!(calls::plan, module)?,
         wrap_pyfunction!(calls::optimise, module)?,
         wrap_pyfunction!(run::sample, module)?,
         wrap_pyfunction!(run::read_run, module)?,

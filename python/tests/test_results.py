@@ -43,7 +43,7 @@ def test_a_chain_is_that_of_the_command_line(star: Path, run: dimcmc.Run, tmp_pa
     assert np.array_equal(dimcmc.Run.open(tmp_path / "run").chain, run.chain)
 
 
-@pytest.mark.parametrize("name", ["simulate", "map", "periodogram", "optimise"])
+@pytest.mark.parametrize("name", ["plan", "simulate", "map", "periodogram", "optimise"])
 def test_files_are_those_of_the_command_line(name: str, star: Path, tmp_path: Path) -> None:
     done = command(name, star, "--out", tmp_path / "theirs")
     assert done.returncode == 0, done.stderr
@@ -140,6 +140,20 @@ def test_an_optimum_in_numbers(config: dimcmc.Config) -> None:
     config.parameters = {}
     with pytest.raises(ValueError, match="parameters"):
         dimcmc.optimise(config)
+
+
+def test_a_plan_in_numbers(config: dimcmc.Config) -> None:
+    other = config.copy()
+    other.observations.simulate.snr = 500.0
+    forecast = dimcmc.plan([config, other], maps=1, draws=1000)
+    assert forecast.summary.best == 1 and len(forecast.summary.schedules) == 2
+    first = forecast.periods["schedule"] == 1
+    assert np.nanmin(forecast.periods["k95_kms"][first]) < np.nanmin(forecast.periods["k95_kms"][~first])
+    for wrong, words in [({"maps": -1}, "maps"), ({"nights": [0]}, "nights"), ({"draws": 1}, "draws")]:
+        with pytest.raises(ValueError, match=words):
+            dimcmc.plan(config, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="one at least"):
+        dimcmc.plan([])
 
 
 def test_a_simulation_in_numbers(simulation: dimcmc.Simulation) -> None:

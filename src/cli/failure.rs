@@ -20,6 +20,7 @@ use crate::runs::grid_scan::GridScanError;
 use crate::runs::maps::MapError;
 use crate::runs::origin::OriginError;
 use crate::runs::periodogram::PeriodogramError;
+use crate::runs::plan::{CampaignError, ForecastError, PlanError};
 use crate::runs::run::RunError;
 use crate::runs::simulated::SimulateError;
 use std::error::Error;
@@ -106,6 +107,17 @@ impl Failure {
                 Failure::reference(&config, error)
             }
             error @ PeriodogramError::Detection { .. } => Failure::failed(error),
+        }
+    }
+
+    /// No plan.
+    pub fn plan(error: ForecastError) -> Self {
+        match error {
+            ForecastError::Campaign(CampaignError::Scene(error)) => error.into(),
+            ForecastError::Campaign(error @ CampaignError::Nights { .. }) => Failure::input(error.to_string()),
+            ForecastError::TooFewTimes { .. } => Failure::input(error.to_string()),
+            ForecastError::Plan(PlanError::Frequencies(error)) => Failure::of(error),
+            error => Failure::failed(error),
         }
     }
 

@@ -24,6 +24,7 @@ mod merge;
 mod optimise;
 mod output;
 mod periodogram;
+mod plan;
 mod plot;
 mod progress;
 mod report;
@@ -81,6 +82,7 @@ fn threads(text: &str) -> Result<NonZeroUsize, String> {
 enum Command {
     Init(init::Args),
     Import(import::Args),
+    Plan(plan::Args),
     Simulate(simulate::Args),
     Inject(inject::Args),
     Map(map::Args),
@@ -126,6 +128,7 @@ fn run(cli: &Cli) -> Result<(), Failure> {
     match &cli.command {
         Command::Init(args) => init::run(args, &cli.global),
         Command::Import(args) => import::run(args, &cli.global),
+        Command::Plan(args) => plan::run(args, &cli.global),
         Command::Simulate(args) => simulate::run(args),
         Command::Inject(args) => inject::run(args),
         Command::Map(args) => map::run(args, &cli.global),

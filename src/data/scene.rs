@@ -1,20 +1,20 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
+mod imaging;
 mod reading;
 
 use crate::data::config::{
-    Automatic, Config, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter, ZeroPoint,
+    Automatic, Config, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter,
 };
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
-use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
-use crate::posterior::imaging::{Imager, ZeroPointPrior};
-use crate::posterior::marginal::{Known, zero_points as set_zero_points};
+use crate::posterior::imaging::Imager;
+use crate::posterior::marginal::Known;
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::posterior::objective::{
     FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
@@ -23,8 +23,11 @@ use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
-use crate::star::{BrightnessModel, Orbit, Quadrature, Sampling, Seen, Spot, StarSettings, SurfaceGrid};
+use crate::star::{BrightnessModel, Orbit, Quadrature, Spot, SurfaceGrid};
+use imaging::hold_zero_points;
 use reading::Part;
+
+pub use imaging::imager;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -438,61 +441,6 @@ impl Scene {
             measured: self.measured.clone(),
         }
     }
-}
-
-/// What the observations of all data sets are imaged with.
-///
-/// # Errors
-/// Settings that make no sense with these observations.
-pub fn imager(settings: &Settings, parts: &[Observations]) -> Result<Imager, ConfigError> {
-    let mut stars = Vec::new();
-    for (set, part) in settings.sets.iter().zip(parts) {
-        settings.check_velocity_grid(&set.star, &settings.values, part.step_kms())?;
-        stars.push(settings.star_for(set, part)?);
-    }
-    let star = stars[0].clone();
-    let seen = |(own, part): (&StarSettings, &Observations)| Seen {
-        line: Some(own.line).filter(|line| *line != star.line),
-        contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast),
-        sampling: Sampling::of(part),
-    };
-    let sets: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
-    let all = Observations { profiles: parts.iter().flat_map(|part| part.profiles.iter().cloned()).collect() };
-    let mut imager = Imager::of_sets(star, sets, &all, settings.imaging.pixels, settings.imaging.entropy());
-    if settings.sets.iter().any(|set| set.nuisances.is_some()) {
-        let priors = settings.sets.iter().map(|set| set.nuisances.unwrap_or_default());
-        imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
-    }
-    for (s, set) in settings.sets.iter().enumerate() {
-        match set.zero_point {
-            ZeroPoint::Known(0.0) => {}
-            ZeroPoint::Known(kms) => imager.move_set(s, kms),
-            ZeroPoint::Fitted => {
-                let held = set.held.map_or(0.0, |held| held.value_kms);
-                let prior = ZeroPointPrior { set: s, mean_kms: 0.0, sd_kms: set_zero_points::PRIOR_KMS };
-                imager.zero_points.push(prior);
-                imager.move_zero_point(imager.zero_points.len() - 1, held);
-            }
-        }
-    }
-    Ok(imager)
-}
-
-/// Finds the zero points of data sets that are fitted, if they are not known yet, and holds them in `imager`.
-fn hold_zero_points(settings: &mut Settings, imager: &mut Imager) -> Result<(), ConfigError> {
-    let unknown = |set: &&mut DataSetSettings| set.zero_point == ZeroPoint::Fitted;
-    if imager.zero_points.is_empty() || settings.sets.iter().any(|set| set.held.is_some()) {
-        return Ok(());
-    }
-    let usual = FrequencySettings::default();
-    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok();
-    let first = imager.zero_points[0].set;
-    let held = set_zero_points::hold(imager, settings.values, settings.known_field(), frequencies.as_ref())
-        .map_err(|e| settings.fault(&format!("{}.zero_point_kms", settings.sets[first].key), &e.to_string()))?;
-    for (set, held) in settings.sets.iter_mut().filter(unknown).zip(held) {
-        set.held = Some(held);
-    }
-    Ok(())
 }
 
 /// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The

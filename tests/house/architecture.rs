@@ -48,6 +48,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "maps",
             "periodogram",
             "simulated",
+            "plan",
             "pool",
             "manifest",
             "grid_scan",

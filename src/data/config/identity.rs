@@ -5,8 +5,8 @@ use crate::posterior::objective::Parameter;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, the star's
-/// mass, and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
+/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the
+/// star's mass, and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
@@ -85,6 +85,7 @@ fn decisive(resolved: &Value) -> Value {
     if let Some(top) = value.as_object_mut() {
         top.remove("$schema");
         top.remove("grid");
+        top.remove("plan");
         if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut) {
             star.remove("mass_msun");
         }

@@ -32,6 +32,7 @@ pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use jitter::VelocityJitter;
+pub use raw_parts::PlanSection;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{DataSetSettings, GridSettings, ImagingSettings, ObservationSource, Settings};
 pub use spots::Hyperparameter;

@@ -4,7 +4,7 @@
 
 use super::EquivalentWidth;
 use super::data_sets::DataSets;
-use super::raw_parts::{Grid, PerParameter, PriorSection};
+use super::raw_parts::{Grid, PerParameter, PlanSection, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,6 +27,9 @@ pub(super) struct Config {
     pub planet: Planet,
     /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its own.
     pub observations: DataSets,
+    /// What is planned beside the observations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<PlanSection>,
     /// The Doppler image.
     #[serde(default)]
     pub imaging: ImagingSettings,

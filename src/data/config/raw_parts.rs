@@ -227,6 +227,22 @@ pub(super) struct ObservationsSection {
     pub simulate: Option<SimulateSection>,
 }
 
+/// Profiles that are planned beside those of `observations`, for the command `plan` alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanSection {
+    /// When they are taken.
+    #[serde(default)]
+    pub schedule: Schedule,
+    /// Time of the first night (d), on the time scale of the observations; the day after the last profile, if not
+    /// given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_d: Option<f64>,
+    /// Signal-to-noise ratio of each bin, above 0; that of the observed profiles, if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snr: Option<f64>,
+}
+
 /// Simulated profiles.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -7,6 +7,7 @@ use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
 use super::resolve_sets::resolve_sets;
+use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
 use crate::posterior::marginal;
@@ -21,6 +22,7 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
+    raw.plan.as_ref().map_or(Ok(()), check_plan)?;
     let sets = resolve_sets(&mut raw, &star, &values, path)?;
     let velocity_jitter = resolve_jitter(&mut raw);
     check_imaging(&raw.imaging, velocity_jitter)?;
@@ -45,6 +47,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         mass_msun: raw.star.mass_msun,
         values,
         sets,
+        plan: raw.plan,
         velocity_jitter,
         imaging: raw.imaging,
         free,

@@ -2,7 +2,7 @@
 
 use super::data_sets::ZeroPoint;
 use super::spots::Hyperparameter;
-use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, VelocityJitter};
+use super::{Automatic, ConfigError, EquivalentWidth, PlanSection, SamplerSettings, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
@@ -33,6 +33,8 @@ pub struct Settings {
     pub values: ParameterValues,
     /// The data sets, one at least.
     pub sets: Vec<DataSetSettings>,
+    /// What is planned beside them.
+    pub plan: Option<PlanSection>,
     /// Scatter of the profiles' velocity zero points.
     pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
@@ -46,7 +48,7 @@ pub struct Settings {
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
-    /// `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    /// `plan`, `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
     pub sha256: String,
 }
 

@@ -98,6 +98,11 @@ impl Config {
         key.split('.').try_fold(&self.json, |place, name| place.get(name))
     }
 
+    /// The file that it was read from, or what errors name in its place.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// As text, laid out for people.
     pub fn to_json(&self) -> String {
         to_text(&self.json)

@@ -3,8 +3,8 @@
 //! expansion becomes the next place to expand it around, as long as ln Z rises and until that place stays.
 
 use super::{
-    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, ROUNDS, SearchError, SearchSettings, Stage,
-    shift, within,
+    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, SearchError, SearchSettings, Stage, shift,
+    within,
 };
 use crate::field::FieldError;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
@@ -15,8 +15,14 @@ use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::{Basis, Fitted, Forecast, MarginalPosterior, fit};
 use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues};
 use crate::posterior::surrogate::Surrogate;
-use crate::sampling::log_density::LogDensity as _;
+use crate::sampling::log_density::{Evaluation, LogDensity as _};
 use crate::sampling::optimise::climb;
+
+/// Places that ln Z is expanded around at most: from an inclination that is far off it takes some.
+const MOST_ROUNDS: usize = 12;
+
+/// Parts of the way to the top of an expansion that are tried.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 
 /// A round that is lower than the one before by this much in log-probability is not followed.
 const DOWN: f64 = 0.1;
@@ -38,7 +44,7 @@ pub(super) fn find(
         None => without_search(imager, space, settings)?,
     };
     let mut highest: Option<Found> = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         at(Stage::Reference);
         let values = space.clone().with_field_of(&field).values_at(&theta);
         let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, jitter_kms) else { break };
@@ -51,13 +57,11 @@ pub(super) fn find(
         let Ok(mut next) = forecast(&posterior).and_then(|forecast| Ok(climb(&forecast, &theta, &|| ())?)) else {
             break;
         };
+        let left_over = shift(space, &theta, &next);
+        (next.theta, next.evaluation) = uphill(&posterior, (&theta, here), &next.theta);
         let moved = shift(space, &theta, &next);
-        let next_theta = next.theta.clone();
-        next.evaluation = posterior.evaluate(&next.theta);
-        if next.evaluation.log_prob < here.log_prob || !next.evaluation.log_prob.is_finite() {
-            (next.theta, next.evaluation) = (theta, here);
-        }
-        theta = next_theta;
+        next.converged &= left_over < REFERENCE_SHIFT || moved > 0.0;
+        theta.clone_from(&next.theta);
         let posterior = Density::Integrated(Box::new(posterior));
         highest = Some(Found { posterior, optimum: next, attempts: Vec::new(), detection: None });
         if moved < REFERENCE_SHIFT {
@@ -70,6 +74,23 @@ pub(super) fn find(
         found.attempts = attempts(posterior, &found.optimum.theta)?;
     }
     Ok(found)
+}
+
+/// The first of ever shorter parts of the way from a point to the top of the expansion around it that leads up; the
+/// point itself, where none does. Far from the best star the expansion promises too much.
+fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64]) -> (Vec<f64>, Evaluation) {
+    let space = posterior.space();
+    let (theta, here) = from;
+    let (a, b) = (space.to_sampling(theta), space.to_sampling(to));
+    let at = |share: f64| -> Vec<f64> { a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect() };
+    let tried = SHARES.iter().map(|share| {
+        let there = space.to_physical(&at(*share));
+        let evaluation = posterior.evaluate(&there);
+        (there, evaluation)
+    });
+    let mut higher = tried.filter(|(_, e)| e.log_prob.is_finite() && e.log_prob >= here.log_prob);
+    let found = higher.next();
+    found.unwrap_or_else(|| (theta.to_vec(), here))
 }
 
 /// Where to begin: vector, field and jitter.

@@ -1,6 +1,6 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, NOTHING, Table, Tone, changing, injection, is_empty, run, verdicts};
+use super::{Chapter, NOTHING, Table, Tone, changing, injection, is_empty, planned, run, verdicts};
 use crate::data::io::map::{FIT, FitFile, MAP, MapKind};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::periodogram::{self, PeakRecord, PeriodogramFile};
@@ -12,7 +12,7 @@ use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterV
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
 use crate::runs::optimum::{self, OptimumFile};
-use crate::runs::{limits, manifest, origin};
+use crate::runs::{limits, manifest, origin, plan};
 use crate::sampling::landscape::Axis;
 use crate::sampling::log_density::Status;
 use std::collections::BTreeMap;
@@ -35,6 +35,7 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError
         optimum::FILE => best(&origin::read(folder, file)?),
         comparison::FILE => compared(&origin::read(folder, file)?),
         limits::JSON => injection::limits(&origin::read(folder, file)?),
+        plan::JSON => planned::chapter(&origin::read(folder, file)?),
         truth::FILE => match origin::read(folder, file)? {
             TruthFile::Injected(truth) => injection::injection(&truth),
             TruthFile::Simulated(truth) => simulation(&truth),

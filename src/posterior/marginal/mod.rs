@@ -12,6 +12,7 @@
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
 //! 7. [`zero_points`]: the velocity zero points of data sets, before anything else.
 //! 8. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 9. [`Planned`]: what profiles that are not yet taken will say of velocities.
 
 pub mod change;
 mod condense;
@@ -20,6 +21,7 @@ mod expand;
 mod fit;
 mod forecast;
 mod maps;
+mod planned;
 mod posterior;
 pub mod zero_points;
 
@@ -28,6 +30,7 @@ pub use design::{Basis, Design};
 pub use fit::{Fitted, Known, NoFit, bounds, fit, usual_value};
 pub use forecast::Forecast;
 pub use maps::Maps;
+pub use planned::Planned;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};
