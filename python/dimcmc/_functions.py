@@ -240,8 +240,7 @@ def plan(
     _check_draws(draws)
     if any(not 1 <= number <= 1000 for number in nights):
         raise ValueError(f"nights: must be numbers from 1 to 1000, not {list(nights)}")
-    single = isinstance(configs, (Config, Mapping, str, os.PathLike))
-    schedules = [configs] if single else list(configs)
+    schedules = [configs] if isinstance(configs, (Config, Mapping, str, os.PathLike)) else configs
     if not schedules:
         raise ValueError("configs: give one at least")
     texts = [Config(one)._as_text() for one in schedules]

@@ -1,7 +1,7 @@
 //! Calls that write the files of a command into a folder, and say in text what that command prints.
 
 use crate::fault::Fault;
-use crate::job::{Job, attend};
+use crate::job::{Job, attend, soon};
 use crate::scene::{Arrays, ConfigText, NewArrays, Source, arrays};
 use dimcmc::{
     Failure, Figure, Forecast, Format, FrequencySettings, Maps, OptimumFile, Periodogram, PeriodogramOptions,
@@ -162,11 +162,11 @@ pub fn export(py: Python, run: PathBuf, format: &str, out: Option<PathBuf>, repl
         }
     };
     let out = out.unwrap_or_else(|| format.place(&run));
-    Ok(py.detach(|| dimcmc::export(&run, format, &out, replace)).map_err(Fault::from)?)
+    Ok(soon(py, || dimcmc::export(&run, format, &out, replace).map_err(Fault::from))??)
 }
 
 fn drawn(py: Python, folder: &Path) -> PyResult<Vec<Figure>> {
-    Ok(py.detach(|| dimcmc::figures(folder, None)).map_err(Fault::from)?)
+    Ok(soon(py, || dimcmc::figures(folder, None).map_err(Fault::from))??)
 }
 
 /// Names of the figures of what a folder holds.

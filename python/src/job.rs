@@ -10,7 +10,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The calling thread looks for Ctrl-C and news so often.
@@ -104,6 +104,29 @@ fn pool(threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
     // a pool of the parent is never dropped: its threads could not be waited for
     pools.push((process, number, Arc::clone(&pool)));
     Ok(pool)
+}
+
+/// The process that the package was imported in.
+static IMPORTED: OnceLock<u32> = OnceLock::new();
+
+/// Notes where the package is imported.
+pub fn imported() {
+    IMPORTED.get_or_init(std::process::id);
+}
+
+/// The result of `work`, which is done soon, on the calling thread; without the interpreter's lock.
+///
+/// In a process that was forked off since the import, rayon's own threads are not there: another pool takes their
+/// place.
+///
+/// # Errors
+/// Threads that cannot be begun.
+pub fn soon<T: Send>(py: Python, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    if IMPORTED.get() == Some(&std::process::id()) {
+        return Ok(py.detach(work));
+    }
+    let pool = pool(None)?;
+    Ok(py.detach(|| pool.install(work)))
 }
 
 /// The result of `work`, done on so many threads. `progress` is called with the share done (or `None`) and a text.

@@ -19,6 +19,7 @@ fn command_line(py: Python, arguments: Vec<OsString>) -> u8 {
 
 #[pymodule]
 fn _core(module: &Bound<PyModule>) -> PyResult<()> {
+    job::imported();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<posterior::LogPosterior>()?;
     for function in [

@@ -2,7 +2,7 @@
 
 use crate::calls::Manner;
 use crate::fault::Fault;
-use crate::job::attend;
+use crate::job::{attend, soon};
 use crate::scene::{Arrays, ConfigText, Source};
 use dimcmc::{Failure, LogDensity as _};
 use numpy::{AllowTypeChange, PyArray1, PyArrayLikeDyn, PyArrayMethods as _, PyUntypedArrayMethods as _};
@@ -71,7 +71,7 @@ impl LogPosterior {
     ) -> PyResult<Bound<'py, PyAny>> {
         if self.is_one(&theta)? {
             let theta = contiguous(&theta);
-            return Ok(py.detach(|| self.0.evaluate(&theta).log_prob).into_pyobject(py)?.into_any());
+            return Ok(soon(py, || self.0.evaluate(&theta).log_prob)?.into_pyobject(py)?.into_any());
         }
         // the computation may outlive the array
         let (all, posterior) = (contiguous(&theta).into_owned(), Arc::clone(&self.0));

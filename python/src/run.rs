@@ -2,7 +2,7 @@
 
 use crate::calls::Manner;
 use crate::fault::Fault;
-use crate::job::attend;
+use crate::job::{attend, soon};
 use crate::scene::{Arrays, ConfigText, Source};
 use dimcmc::{Chain, Conclusion, Failure, Meter, Pool, Run, Scene, StartFrom, StopReason};
 use numpy::PyArray1;
@@ -88,7 +88,7 @@ pub fn is_false_start(folder: PathBuf) -> bool {
 /// log-probabilities and numbers beside them `[step, ensemble, walker]`, all flat.
 #[pyfunction]
 pub fn read_run(py: Python, folder: PathBuf) -> PyResult<Bound<PyDict>> {
-    let (conclusion, chain) = py.detach(|| read(&folder))?;
+    let (conclusion, chain) = soon(py, || read(&folder))??;
     let content = PyDict::new(py);
     let draws = PyDict::new(py);
     for (name, values) in conclusion.draws(&chain) {

@@ -121,3 +121,21 @@ def test_calls_cost_little(log_posterior: dimcmc.LogPosterior) -> None:
 def test_of_the_wrong_config(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="parameters"):
         dimcmc.LogPosterior({**SMALL, "parameters": {}})
+
+
+def test_a_forked_process_where_maps_are_integrated_over(config: dimcmc.Config) -> None:
+    """One evaluation is spread over threads there, and those of the parent are not in its child."""
+    if "fork" not in multiprocessing.get_all_start_methods():
+        pytest.skip("no fork here")
+    config.update({"imaging": {"objective": "marginal-likelihood"}, "sampler": {"walkers": 14}})
+    integrated = dimcmc.LogPosterior(config)
+    expected = integrated(integrated.optimum)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply_async(integrated, (integrated.optimum,)).get(timeout=60) == expected
+        # pickled and made again there
+        assert pool.apply_async(_evaluated, (pickle.dumps(integrated),)).get(timeout=60) == expected
+
+
+def _evaluated(pickled: bytes) -> float:
+    again = pickle.loads(pickled)
+    return float(again(again.optimum))
