@@ -36,9 +36,10 @@ mod search;
 mod signals;
 mod simulate;
 
-use failure::Failure;
+pub use failure::Failure;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 
 /// The version, with the commit that it was built from where that is known.
@@ -110,15 +111,13 @@ fn command() -> clap::Command {
     groups::grouped(Cli::command())
 }
 
-/// The whole program: reads the command line, runs the command, prints what went wrong.
-pub fn main() -> std::process::ExitCode {
-    console::end(run(&parse()))
-}
-
-/// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to
-/// do.
-fn parse() -> Cli {
-    Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|e| e.exit())
+/// The whole program: reads its `arguments`, the name of the program first, runs the command, prints what went wrong.
+/// The exit code.
+///
+/// Prints help or what is wrong with the arguments, and ends the process, where that is all there is to do.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let matches = command().get_matches_from(arguments);
+    console::end(run(&Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())))
 }
 
 /// Runs the command.

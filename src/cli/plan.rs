@@ -3,12 +3,9 @@
 use super::output::Output;
 use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
-use crate::data::scene::SceneError;
 use crate::numerics::text::shown;
-use crate::planets::periodogram::{FrequencyError, FrequencySettings};
-use crate::runs::plan::{
-    CSV, Campaign, CampaignError, JSON, Outlook, PlanError, PlanFile, PlanSettings, compared_d, outlook, range_d,
-};
+use crate::planets::periodogram::FrequencySettings;
+use crate::runs::plan::{CSV, Forecast, JSON, PlanSettings};
 use std::path::PathBuf;
 
 /// Forecast which planets a schedule would show, before any profile is taken
@@ -62,62 +59,17 @@ fn nights(text: &str) -> Result<usize, String> {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     args.output.spare(&args.configs, |name| [CSV, JSON].contains(&name))?;
+    let configs = args.configs.iter().map(|path| Config::load(path)).collect::<Result<Vec<_>, _>>()?;
+    let Args { min_period_d, max_period_d, maps, draws, seed, fixed, .. } = *args;
+    let periods = FrequencySettings { min_period_d, max_period_d, oversampling: None };
+    let settings = PlanSettings { maps: usize::from(maps), draws: draws as usize, seed, fixed };
     let spinner = progress::bar(global, None, "reading");
-    let found = forecast(args, &|message| spinner.set_message(message));
+    let forecast =
+        Forecast::of(&configs, &args.nights, periods, &settings, &|message| spinner.set_message(message.to_owned()));
     spinner.finish_and_clear();
-    let (campaigns, outlooks, range) = found?;
-    let looked: Vec<(&Campaign, &[Outlook])> =
-        campaigns.iter().zip(&outlooks).map(|(campaign, outlooks)| (campaign, outlooks.as_slice())).collect();
-    let file = PlanFile::new(&looked, range, &compared_d(&campaigns, range), &settings(args));
+    let forecast = forecast.map_err(Failure::plan)?;
     let folder = args.output.create()?;
-    file.write(&looked, folder)?;
-    console::line(format_args!("{}\nwritten: {}: {CSV}, {JSON}", file.table(), shown(folder)));
+    forecast.write(folder)?;
+    console::line(format_args!("{}\nwritten: {}: {CSV}, {JSON}", forecast.table(), shown(folder)));
     Ok(())
-}
-
-fn settings(args: &Args) -> PlanSettings {
-    let Args { maps, draws, seed, fixed, .. } = *args;
-    PlanSettings { maps: usize::from(maps), draws: draws as usize, seed, fixed }
-}
-
-type Forecast = (Vec<Campaign>, Vec<Vec<Outlook>>, [f64; 2]);
-
-fn forecast(args: &Args, report: &dyn Fn(String)) -> Result<Forecast, Failure> {
-    let mut campaigns = Vec::new();
-    for path in &args.configs {
-        report(format!("reading {}", shown(path)));
-        let config = Config::load(path).map_err(Failure::of)?;
-        campaigns.extend(Campaign::of(&config, &args.nights).map_err(not_begun)?);
-    }
-    let wanted =
-        FrequencySettings { min_period_d: args.min_period_d, max_period_d: args.max_period_d, oversampling: None };
-    let range = range_d(&campaigns, wanted).map_err(|error| periods(args, error))?;
-    let one = |campaign: &Campaign| {
-        report(campaign.name.clone());
-        outlook(campaign, range, &settings(args)).map_err(|error| match error {
-            PlanError::Frequencies(error) => periods(args, error),
-            error => Failure::failed(error),
-        })
-    };
-    let outlooks = campaigns.iter().map(one).collect::<Result<_, _>>()?;
-    Ok((campaigns, outlooks, range))
-}
-
-fn not_begun(error: CampaignError) -> Failure {
-    match error {
-        CampaignError::Scene(SceneError::Config(error)) => Failure::of(error),
-        CampaignError::Scene(SceneError::Observations(error)) => Failure::of(error),
-        CampaignError::Field { .. } => Failure::failed(error),
-        CampaignError::Nights { .. } => Failure::input(error.to_string()),
-    }
-}
-
-fn periods(args: &Args, error: FrequencyError) -> Failure {
-    match error {
-        FrequencyError::TooFewTimes(_) => {
-            let names: Vec<String> = args.configs.iter().map(|path| shown(path)).collect();
-            Failure::input(format!("{}: {error}", names.join(", ")))
-        }
-        error => Failure::of(error),
-    }
 }

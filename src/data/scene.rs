@@ -12,7 +12,7 @@ use crate::data::evidence::EvidenceRecord;
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::data::io::truth::Truth;
-use crate::data::search::{self, Found, SearchError, SearchSettings};
+use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
@@ -227,6 +227,19 @@ impl Scene {
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
     }
 
+    /// The config file, or what stands for it: what errors name.
+    pub fn path(&self) -> &Path {
+        &self.settings.path
+    }
+
+    /// That the config leaves a parameter free, as searches and chains need.
+    ///
+    /// # Errors
+    /// A config that does not.
+    pub fn require_free(&self) -> Result<(), ConfigError> {
+        self.settings.require_free().map(drop)
+    }
+
     /// What becomes of the spots in a blind search.
     #[doc(hidden)]
     pub fn spots(&self) -> Spots {
@@ -275,7 +288,15 @@ impl Scene {
     /// # Errors
     /// No map, or no start that leads anywhere.
     pub fn optimise(&self) -> Result<Found, SearchError> {
-        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), &|_| ())
+        self.optimise_with(&|_| ())
+    }
+
+    /// The same; `report` is told at every evaluation how far the search has come, from any thread.
+    ///
+    /// # Errors
+    /// As [`Scene::optimise`].
+    pub fn optimise_with(&self, report: &(dyn Fn(Progress) + Sync)) -> Result<Found, SearchError> {
+        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), report)
     }
 
     /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected

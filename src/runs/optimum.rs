@@ -1,5 +1,6 @@
 //! What `optimise` found: `optimum.json`, and the same as a table.
 
+use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::io::provenance::Provenance;
 use crate::data::scene::Scene;
 use crate::data::search::{Attempt, Found};
@@ -14,6 +15,7 @@ use crate::sampling::optimise::Optimum;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// Name of the file.
 pub const FILE: &str = "optimum.json";
@@ -111,6 +113,14 @@ impl OptimumFile {
             time_span_d: scene.observations.time_span_d(),
             provenance: scene.provenance(),
         }
+    }
+
+    /// Writes `optimum.json` into `folder`, which must exist.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_json(&folder.join(FILE), self)
     }
 
     /// A table of the parameters and a verdict.

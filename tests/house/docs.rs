@@ -20,8 +20,18 @@ const README_BYTES: usize = 8000;
 const LONGEST_LINE: usize = 120;
 
 /// Where people write.
-const WRITTEN: [&str; 9] =
-    ["src", "tests", "benches", "examples", ".ci", "build.rs", "Cargo.toml", "CONTRIBUTING.md", "CHANGELOG.md"];
+const WRITTEN: [&str; 10] = [
+    "src",
+    "tests",
+    "benches",
+    "examples",
+    "python",
+    ".ci",
+    "build.rs",
+    "Cargo.toml",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+];
 
 struct Page {
     /// Relative to the root.

@@ -10,6 +10,7 @@ pub mod parameters;
 pub mod posterior;
 mod prediction;
 pub mod prior;
+mod quantile;
 mod quoted;
 pub mod reference;
 pub mod target;

@@ -114,6 +114,14 @@ pub fn write(contents: &Contents, format: Format, out: &Path, replace: bool) -> 
     Ok(targets(format, contents.chain.shape().ensembles, out))
 }
 
+/// Writes the chain of the run in the folder `run`, as [`write`] does.
+///
+/// # Errors
+/// [`ExportError`].
+pub fn export(run: &Path, format: Format, out: &Path, replace: bool) -> Result<Vec<PathBuf>, ExportError> {
+    write(&Contents::read(run)?, format, out, replace)
+}
+
 /// Whether the chain can be exported so, and the export may go to `out`.
 fn check(contents: &Contents, format: Format, out: &Path, replace: bool) -> Result<(), ExportError> {
     let ensembles = contents.chain.shape().ensembles;

@@ -10,10 +10,12 @@
 
 mod campaign;
 mod file;
+mod forecast;
 mod outlook;
 
 pub use campaign::{Campaign, CampaignError, SpotsSource};
 pub use file::{AfterRecord, CSV, ExpectedRecord, JSON, PlanFile, ScheduleRecord, SpotsRecord, WindowRecord};
+pub use forecast::{Forecast, ForecastError};
 pub use outlook::{Expected, Outlook};
 
 use crate::field::FieldError;
