@@ -7,17 +7,20 @@ mod reading;
 use crate::data::config::{
     Automatic, Config, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter,
 };
+use crate::data::ephemeris::Ephemeris;
+use crate::data::evidence::EvidenceRecord;
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
+use crate::planets::velocities::VelocityQuadratic;
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
 use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::Known;
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::posterior::objective::{
-    FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
+    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
 };
 use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
@@ -29,6 +32,7 @@ use reading::Part;
 
 pub use imaging::imager;
 use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What stands for the list of profiles in the config of profiles that are in no file.
@@ -181,6 +185,10 @@ impl Scene {
         parts: Vec<Observations>,
         errors: Vec<Option<MeasuredErrors>>,
     ) -> Result<Self, ConfigError> {
+        let times = || parts.iter().flat_map(|part| part.times_d());
+        if let Some(first) = times().reduce(f64::min).zip(times().reduce(f64::max)) {
+            Ephemeris::check(&settings, [first.0, first.1])?;
+        }
         let mut imager = imager(&settings, &parts)?;
         let correlated_bins = errors.iter().flatten().map(|errors| errors.correlated_bins).fold(1.0, f64::max);
         imager.data.correlated_bins = correlated_bins;
@@ -408,7 +416,7 @@ impl Scene {
             profiles => coverage.iter().sum::<f64>() / profiles as f64,
         };
         let state = simulation.truth.state();
-        let velocity = |time: &f64| state.vsys_kms + state.orbit.velocity_kms(self.imager.star.cycle(*time));
+        let velocity = |time: &f64| state.vsys_kms + state.motion.velocity_kms(self.imager.star.cycle(*time));
         Truth {
             parameters: simulation.truth,
             spots: simulation.spots.iter().map(Spot::written).collect(),
@@ -428,6 +436,22 @@ impl Scene {
             times_d: simulation.times_d.clone(),
             provenance: self.provenance(),
         }
+    }
+
+    /// Bayes factors of planets under the priors of the config, from the star's quadratic without a planet.
+    #[doc(hidden)]
+    pub fn evidence(&self, quadratic: &VelocityQuadratic) -> Option<EvidenceRecord> {
+        EvidenceRecord::of(&self.settings.free, self.space.clock(), self.settings.sampler.seed, quadratic)
+    }
+
+    /// The simulated values by name, ephemerides among them where the config names them.
+    #[doc(hidden)]
+    pub fn named_truth(&self) -> Option<BTreeMap<String, f64>> {
+        let truth = self.truth?;
+        let own = Parameter::ALL.into_iter().filter_map(|p| Some((p, truth.given(p)?)));
+        let named = self.space.free().iter().map(|f| f.parameter).zip(self.space.theta_of(&truth));
+        let named = named.filter(|(p, value)| p.is_ephemeris() && value.is_finite());
+        Some(own.chain(named).map(|(p, value)| (p.name().to_owned(), value)).collect())
     }
 
     /// What results say of where they came from.
@@ -512,7 +536,9 @@ fn measured_errors(
 
 fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
-    ParameterSpace::new(free.to_vec(), settings.values, mid, base, imager.star.rotation_period_d)
+    let star = &imager.star;
+    ParameterSpace::new(free.to_vec(), settings.values, mid, base, star.rotation_period_d)
+        .of_star(star.epoch_d, settings.mass_msun)
 }
 
 /// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of bins,

@@ -2,7 +2,7 @@
 
 use crate::data::scene::Scene;
 use crate::data::search::Found;
-use crate::posterior::objective::ParameterSpace;
+use crate::posterior::objective::{Elements, Parameter, ParameterSpace, Prior};
 use crate::runs::origin::{Origin, OriginError};
 use crate::runs::pool::Target;
 use crate::runs::run::RunError;
@@ -58,7 +58,18 @@ impl LogPosterior {
 
     /// The parameters at `unit`, a point of the unit cube: what nested samplers call a prior transform.
     pub fn prior_transform(&self, unit: &[f64]) -> Vec<f64> {
-        self.space().free().iter().zip(unit).map(|(free, u)| free.prior.quantile(*u)).collect()
+        let free = self.space().free();
+        let mut theta: Vec<f64> = free.iter().zip(unit).map(|(free, u)| free.prior.quantile(*u)).collect();
+        for planet in &Elements::PLANETS {
+            let place = |p: Parameter| free.iter().position(|f| f.parameter == p);
+            // of two coordinates in one disc the second is even along the chord at the first
+            if let [Some(x), Some(y)] = planet.shape.map(place)
+                && let Prior::Disc { max_eccentricity } = free[x].prior
+            {
+                theta[y] = (2.0 * unit[y] - 1.0) * (max_eccentricity - theta[x] * theta[x]).max(0.0).sqrt();
+            }
+        }
+        theta
     }
 
     /// Log-probabilities of the vectors that stand one after the other in `thetas`, on the threads of rayon's current

@@ -6,8 +6,8 @@
 //! 2. [`origin`] and [`manifest`] are what a folder was begun with.
 //! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`maps`] the star there,
 //!    [`simulated`] what it was made with; [`periodogram`], [`blind_search`] and [`limits`] are searches for orbits,
-//!    [`plan`] says what profiles not yet taken would show. [`log_posterior`] is the density of a chain for samplers
-//!    elsewhere.
+//!    [`known_planet`] what is said of a planet of known ephemeris, [`plan`] what profiles not yet taken would show.
+//!    [`log_posterior`] is the density of a chain for samplers elsewhere.
 //! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] holds a chain against a
 //!    landscape, [`experiments`] has the rows of the paper.
 //! 5. [`export`] writes a chain for other programs. A new format is a file of it, and a variant of `Format` in
@@ -21,6 +21,7 @@ pub mod comparison;
 pub mod experiments;
 pub mod export;
 pub mod grid_scan;
+pub mod known_planet;
 pub mod limits;
 pub mod log_posterior;
 pub mod manifest;

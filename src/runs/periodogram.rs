@@ -1,5 +1,6 @@
 //! The blind search as `periodogram` makes it: with its options, how far it depends on choices, and all files.
 
+use crate::data::evidence::EvidenceRecord;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::periodogram::PeriodogramResult;
 use crate::data::io::provenance::Provenance;
@@ -11,6 +12,9 @@ use crate::posterior::detection::{
 };
 use crate::posterior::expansion::nuisances;
 use crate::posterior::fit::Explained;
+use crate::posterior::objective::for_blind_search;
+use crate::runs::blind_search::with_known;
+use crate::runs::known_planet::known_planets;
 use std::path::{Path, PathBuf};
 
 /// What to search for, and how.
@@ -77,6 +81,7 @@ pub struct Periodogram<'a> {
     planet_free: Explained,
     at_best: Explained,
     remarks: Vec<Remark>,
+    evidence: Option<EvidenceRecord>,
     provenance: Provenance,
     /// What is said of the best orbit.
     pub verdict: Verdict,
@@ -116,7 +121,8 @@ impl<'a> Periodogram<'a> {
             .map_err(|error| PeriodogramError::Frequencies { config: config(), error })?;
         let settings = options.settings(scene);
         let failed = |error| PeriodogramError::Detection { config: config(), error };
-        let (imager, values) = (&scene.imager, scene.settings.values);
+        let imager = &scene.imager;
+        let values = for_blind_search(scene.settings.values, &scene.settings.free);
         let at = |stage| report(&message(stage));
         let detection = Detection::find(imager, values, frequencies, &settings, &at).map_err(failed)?;
         report("other targets, without each night");
@@ -126,8 +132,22 @@ impl<'a> Periodogram<'a> {
         let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
         let evidence = Evidence { imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
         let remarks = detection.remarks(&evidence);
-        let (verdict, provenance) = (detection.verdict(&remarks), scene.provenance());
-        Ok(Periodogram { scene, settings, detection, choices, planet_free, at_best, remarks, provenance, verdict })
+        let of_the_star: Vec<Remark> =
+            remarks.iter().filter(|remark| !detection.of_the_period().contains(remark)).cloned().collect();
+        let known = known_planets(scene, &settings, &detection, &of_the_star);
+        let (verdict, remarks) = with_known(known, detection.verdict(&remarks), remarks, of_the_star);
+        Ok(Periodogram {
+            evidence: scene.evidence(&detection.planet_free.quadratic),
+            provenance: scene.provenance(),
+            scene,
+            settings,
+            detection,
+            choices,
+            planet_free,
+            at_best,
+            remarks,
+            verdict,
+        })
     }
 
     fn result(&self) -> PeriodogramResult<'_> {
@@ -136,6 +156,7 @@ impl<'a> Periodogram<'a> {
             detection: &self.detection,
             verdict: &self.verdict,
             remarks: &self.remarks,
+            evidence: self.evidence.as_ref(),
             robustness: &self.choices,
             settings: &self.settings,
             planet_free: &self.planet_free,

@@ -13,7 +13,7 @@
 //!    way for a star that differs little.
 //!
 //! Beside that: [`observation`] has profiles and what they measure by themselves, [`injection`] puts an orbit into
-//! them, [`planet`] says what is quoted of an orbit.
+//! them, [`planet`] says what is quoted of an orbit ([`kepler`] has its anomalies), [`stability`] whether two can last.
 
 mod block;
 pub mod brightness;
@@ -23,6 +23,7 @@ mod deposit;
 mod filling;
 pub mod grid;
 pub mod injection;
+pub mod kepler;
 mod kernel;
 pub mod limb_darkening;
 mod line_profile;
@@ -36,6 +37,7 @@ pub mod response;
 pub mod rotation;
 mod sorting;
 pub mod spots;
+pub mod stability;
 mod stacked;
 mod view;
 mod voigt;
@@ -44,7 +46,7 @@ pub use brightness::{Brightness, BrightnessModel};
 pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;
-pub use orbit::Orbit;
+pub use orbit::{Eccentric, Motion, Orbit, Shape};
 pub use response::Sampling;
 pub use rotation::Rotation;
 pub use spots::{Disc, Facula, Life, Spot};
@@ -138,8 +140,8 @@ pub struct StarState {
     pub vsini_kms: f64,
     /// Systemic velocity (km/s).
     pub vsys_kms: f64,
-    /// Orbit of the planet.
-    pub orbit: Orbit,
+    /// Orbit of the planet, or orbits of both.
+    pub motion: Motion,
     /// What differs from the star's settings.
     pub surface: Surface,
 }

@@ -12,7 +12,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("star", &[], &["numerics"]),
     ("maxent", &[], &["numerics"]),
     ("field", &[], &["numerics"]),
-    ("planets", &["velocities", "verdict", "periodogram"], &["numerics"]),
+    ("planets", &["velocities", "verdict", "periodogram", "evidence"], &["numerics", "star::kepler"]),
     ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics", "planets::verdict"]),
     (
         "posterior",
@@ -35,7 +35,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ),
     (
         "data",
-        &["io", "config", "search", "scene", "diagnosis", "init", "import"],
+        &["evidence", "io", "config", "ephemeris", "search", "scene", "diagnosis", "init", "import"],
         &["numerics", "star", "maxent", "field", "planets", "sampling", "posterior"],
     ),
     (

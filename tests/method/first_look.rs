@@ -65,6 +65,7 @@ fn with_line(
         pixels: 3000,
         continuum: Default::default(),
         velocity_jitter_kms: 0.0,
+        zero_point_kms: 0.0,
         correlated_bins: 1.0,
     };
     simulation.observe(&star)

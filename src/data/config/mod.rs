@@ -17,6 +17,7 @@ mod raw_parts;
 mod resolve;
 mod resolve_grid;
 mod resolve_observations;
+mod resolve_orbits;
 mod resolve_sets;
 mod resolve_simulation;
 mod resolve_star;

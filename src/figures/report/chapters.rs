@@ -8,7 +8,7 @@ use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::planets::verdict::probability;
-use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterValues, definition};
+use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
 use crate::runs::optimum::{self, OptimumFile};
@@ -242,7 +242,7 @@ fn best(file: &OptimumFile) -> Chapter {
     };
     let mut rows: Vec<Vec<String>> = file.names.iter().map(of).collect();
     let mut notes: Vec<String> = file.names.iter().filter_map(|name| note(name)).collect();
-    for name in OrbitQuantity::ALL.map(OrbitQuantity::name) {
+    for name in Quoted::all().map(Quoted::name).filter(|name| !file.names.iter().any(|free| free == name)) {
         if let Some(Estimate { value, sd }) = file.derived.get(name) {
             rows.push(row(name, Some(*value), Some(*sd), file.derived_truth.get(name).copied()));
             notes.extend(note(name));

@@ -24,10 +24,23 @@ impl Prior {
                 let (a, b) = (min.to_radians().cos(), max.to_radians().cos());
                 (a + u * (b - a)).acos().to_degrees()
             }
+            Prior::Disc { max_eccentricity } => max_eccentricity.sqrt() * in_disc(u),
             Prior::Periodic => return self.wrap(u),
         };
         value.clamp(low, high)
     }
+}
+
+/// The quantile of one coordinate of a point in the unit disc, by bisection: the share below x is
+/// `1/2 + (x sqrt(1 - x^2) + asin x) / pi`.
+fn in_disc(u: f64) -> f64 {
+    let (mut low, mut high) = (-1.0_f64, 1.0_f64);
+    for _ in 0..HALVINGS {
+        let x = 0.5 * (low + high);
+        let below = 0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / std::f64::consts::PI;
+        if below < u { low = x } else { high = x }
+    }
+    0.5 * (low + high)
 }
 
 /// The quantile of a standard normal deviate between two bounds, by bisection.
@@ -71,6 +84,7 @@ mod tests {
             (Prior::Normal { mean: -2.0, sd: 0.1, min: 0.0, max: f64::INFINITY }, 0.0),
             (Prior::Normal { mean: 2.0, sd: 0.1, min: f64::NEG_INFINITY, max: 0.0 }, -0.2),
             (Prior::Isotropic { min: 20.0, max: 55.0 }, 20.0),
+            (Prior::Disc { max_eccentricity: 0.49 }, -0.7),
             (Prior::Periodic, 0.0),
         ];
         for (prior, low) in examples {
