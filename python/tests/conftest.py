@@ -34,7 +34,7 @@ SMALL: dict[str, Any] = {
         "k_kms": {"prior": "uniform", "min": 0.0, "max": 1.0},
         "phi": {"prior": "periodic"},
     },
-    "sampler": {"ensembles": 2, "walkers": 8, "steps": 30, "ess": 100.0, "rhat": 1.1},
+    "sampler": {"ensembles": 2, "walkers": 10, "steps": 30, "ess": 100.0, "rhat": 1.1},
 }
 
 

@@ -78,7 +78,7 @@ def test_wrong_sources(tmp_path: Path) -> None:
 
 def test_several_keys_at_once(config: dimcmc.Config) -> None:
     config.update({"observations": {"simulate": None, "path": "observations.txt"}, "sampler": {"steps": 5}})
-    assert config.observations.path == "observations.txt" and config.sampler.walkers == 8
+    assert config.observations.path == "observations.txt" and config.sampler.walkers == 10
 
 
 def test_saved_and_read_again(config: dimcmc.Config, tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_the_same_versions_as_the_program() -> None:
     def versions(file: str) -> set[tuple[str, str]]:
         return set(re.findall(r'name = "([^"]+)"\nversion = "([^"]+)"', (ROOT / file).read_text()))
 
-    missing = versions("Cargo.lock") - versions("python/Cargo.lock")
-    # what only the program's tests and its feature mpi need is not there
-    differ = {one for one in missing if one[0] in {name for name, _ in versions("python/Cargo.lock")}}
+    ours, theirs = versions("python/Cargo.lock"), versions("Cargo.lock")
+    names = {name for name, _ in theirs}
+    differ = {one for one in ours - theirs if one[0] in names}
     assert not differ, "cp Cargo.lock python/ and cargo fetch --manifest-path python/Cargo.toml"

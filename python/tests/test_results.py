@@ -66,7 +66,7 @@ def test_the_command_line_comes_along(star: Path, tmp_path: Path) -> None:
 
 def test_a_run_in_numbers(run: dimcmc.Run) -> None:
     steps, ensembles, walkers, parameters = run.chain.shape
-    assert (ensembles, walkers, run.names) == (2, 8, ["k_kms", "phi"]) and parameters == 2
+    assert (ensembles, walkers, run.names) == (2, 10, ["k_kms", "phi"]) and parameters == 2
     assert run.log_prob.shape == (steps, ensembles, walkers) == run.numbers["chi2"].shape
     kept = run.chain[run.summary.discarded_steps :]
     assert np.array_equal(run.samples["k_kms"], kept[..., 0].ravel())
