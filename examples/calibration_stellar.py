@@ -123,7 +123,8 @@ def table(args):
             cells = [name, objective, str(len(of)), share(off < sd), share(off < 2 * sd)]
             lines.append("| " + " | ".join(cells + [f"{np.median(sd):.3g}", f"{np.median(off):.3g}"]) + " |")
     failed = [f"- {row['seed']}, {row['objective']}: {row['error']}" for row in rows if row["error"]]
-    text = args.out.read_text() if args.out.exists() else "# Stellar parameters of stars that change\n\n<!-- table -->\n"
+    fresh = "# Stellar parameters of stars that change\n\n<!-- table -->\n"
+    text = args.out.read_text() if args.out.exists() else fresh
     head = text[: text.index("<!-- table -->")]
     args.out.write_text(head + "\n".join(["<!-- table -->", "", *lines, "", *failed]).rstrip() + "\n")
 

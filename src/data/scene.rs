@@ -541,8 +541,8 @@ fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> Parame
         .of_star(star.epoch_d, settings.mass_msun)
 }
 
-/// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of bins,
-/// and velocity, intensity and sigma of each bin.
+/// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of
+/// bins, and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
     let step = observations.step_kms();
     let mut hash = Sha256::new();

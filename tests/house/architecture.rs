@@ -27,8 +27,8 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "surrogate",
             "simulate",
             "noise",
-            "fit",
             "detection",
+            "fit",
             "zero_points",
         ],
         &["numerics", "star", "maxent", "field", "planets", "sampling"],
@@ -43,6 +43,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
         &[
             "cluster",
             "origin",
+            "known_planet",
             "blind_search",
             "limits",
             "maps",

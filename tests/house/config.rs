@@ -152,9 +152,8 @@ const INTERFACE_EXAMPLE: &str = r#"{
 #[test]
 fn the_example_of_the_interface_resolves() {
     let settings = config::from_json(INTERFACE_EXAMPLE.as_bytes(), Path::new("dir/x.json")).unwrap();
-    assert!(
-        matches!(&settings.sets[0].source, ObservationSource::Files { path, .. } if path == Path::new("dir/observations.txt"))
-    );
+    let is_there = |path: &Path| path == Path::new("dir/observations.txt");
+    assert!(matches!(&settings.sets[0].source, ObservationSource::Files { path, .. } if is_there(path)));
     assert_eq!((settings.imaging.pixels, settings.free.len()), (5000, 3));
 }
 

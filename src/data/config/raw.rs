@@ -26,7 +26,8 @@ pub(super) struct Config {
     /// The planet; without it there is none (K = 0). Where a parameter is free, this is the start.
     #[serde(default)]
     pub planet: Planet,
-    /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its own.
+    /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its
+    /// own.
     pub observations: DataSets,
     /// What is planned beside the observations.
     #[serde(default, skip_serializing_if = "Option::is_none")]

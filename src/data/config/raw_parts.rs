@@ -254,8 +254,8 @@ pub(super) struct ObservationsSection {
     pub weights: Weights,
     /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
     /// beside that of the bins. It should be small against the width of the local line. "fitted": as large as the
-    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the objective
-    /// "marginal-likelihood", and 0 with others.
+    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the
+    /// objective "marginal-likelihood", and 0 with others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_jitter_kms: Option<VelocityJitter>,
     /// Resolving power of this set's spectrograph, in place of `instrument.resolving_power`.

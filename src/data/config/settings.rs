@@ -284,8 +284,8 @@ impl Settings {
         Ok(())
     }
 
-    /// The config, of one data set, with other observations in place of its own, those of a list at `path`; cut and errors of observed
-    /// ones stay.
+    /// The config, of one data set, with other observations in place of its own, those of a list at `path`; cut and
+    /// errors of observed ones stay.
     pub fn with_observations(&self, path: &str) -> serde_json::Value {
         let mut config = self.resolved.clone();
         if let Some(top) = config.as_object_mut() {

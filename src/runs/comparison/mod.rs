@@ -152,7 +152,8 @@ impl Comparison {
         if imaging.objective != pair.grid_objective {
             let (chain, landscape) = (imaging.objective.name(), pair.grid_objective.name());
             comparison.notes.push(format!(
-                "the chain is by the objective {chain}, the landscape by {landscape}: differences are those of the methods"
+                "the chain is by the objective {chain}, the landscape by {landscape}: differences are those of the \
+                methods"
             ));
         }
         Ok(comparison)
