@@ -144,7 +144,8 @@ fn main() {
         let kernel = Kernel::of(Lifetime::Days(LIFETIME_D));
         Assumed { field: Field { kernel, ..field }, ..star.campaign.assumed }
     };
-    let ways: [(&str, &dyn Fn(&Star) -> (Assumed, usize)); 5] = [
+    type Way<'a> = (&'a str, &'a dyn Fn(&Star) -> (Assumed, usize));
+    let ways: [Way; 5] = [
         ("usual spots", &|star| (star.campaign.assumed, 8)),
         ("usual spots of their lifetime", &|star| (told(star), 8)),
         ("typical spots", &|_| (typical, 8)),

@@ -26,7 +26,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
     let simulated = Simulated::of(&Config::load(&args.config)?)?;
-    args.output.spare(&simulated.read(), |name| lsd::is_written(name) || name == truth::FILE)?;
+    args.output.spare(simulated.read(), |name| lsd::is_written(name) || name == truth::FILE)?;
     let folder = args.output.create()?;
     simulated.write(folder)?;
     let lines = simulated.lines().into_iter();

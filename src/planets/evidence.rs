@@ -255,7 +255,7 @@ fn ln_along_ray(a: f64, g: f64, prior: &Density) -> f64 {
     // where the parabola has fallen by so much below its highest point within the bounds
     let reach = (REACH * REACH * sigma * sigma + (peak - top).powi(2)).sqrt();
     let (from, to) = (low.max(top - reach), high.min(top + reach));
-    if !(to > from) {
+    if to.is_nan() || to <= from {
         return f64::NEG_INFINITY;
     }
     let half = 0.5 * (to - from) / NODES as f64;

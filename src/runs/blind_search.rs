@@ -109,7 +109,7 @@ impl BlindSearch {
         }
         let planets = scene.evidence(&found.planet_free.quadratic);
         let (verdict, mut remarks) =
-            with_known(known_planets(scene, &settings, &found, &of_the_star), verdict, remarks, of_the_star);
+            with_known(known_planets(scene, &settings, found, &of_the_star), verdict, remarks, of_the_star);
         remarks.extend(planets.iter().map(|planets| Remark::note(planets.sentence.clone())));
         Ok(BlindSearch { verdict, rotation: Some(found.blind.rotation.clone()), remarks, evidence: planets })
     }

@@ -39,7 +39,8 @@ pub fn check(
     // Kepler's third law
     let ratio = (outer.orbit.porb_over_prot / inner.orbit.porb_over_prot).powf(2.0 / 3.0);
     let [e1, e2] = [inner, outer].map(|planet| planet.shape.eccentricity());
-    if !(1.0 + e1 < ratio * (1.0 - e2)) {
+    let (apastron, periastron) = (1.0 + e1, ratio * (1.0 - e2));
+    if periastron.is_nan() || apastron >= periastron {
         return Err(Unstable::Crossing);
     }
     let Some(mass_msun) = mass_msun else { return Ok(()) };

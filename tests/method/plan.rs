@@ -34,7 +34,7 @@ fn planned_information_is_that_of_dense_algebra() {
         let planned = Planned::new(imager, values, Assumed { field, jitter_kms }, &[], None);
         for maps in [planned.mean_maps(), planned.drawn_maps(4).unwrap()] {
             let part = vec![0, 1, 3];
-            let found = planned.velocities(&maps, &[part.clone()]).unwrap().remove(0);
+            let found = planned.velocities(&maps, std::slice::from_ref(&part)).unwrap().remove(0);
             let expected = dense(&scene, &field, jitter_kms, &maps, &part);
             assert_eq!(found.cycles, part.iter().map(|k| imager.cycles()[*k]).collect::<Vec<_>>());
             let off = (&found.information - &expected).amax() / expected.amax();

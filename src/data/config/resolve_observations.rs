@@ -96,7 +96,7 @@ fn simulation(
         .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
     check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
     check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
-    if !(section.zero_point_kms.abs() <= LARGEST_JITTER_KMS) {
+    if section.zero_point_kms.is_nan() || section.zero_point_kms.abs() > LARGEST_JITTER_KMS {
         let problem =
             format!("{} must be from -{LARGEST_JITTER_KMS} to {LARGEST_JITTER_KMS} km/s", section.zero_point_kms);
         return Err(Fault::new(at("zero_point_kms"), problem));

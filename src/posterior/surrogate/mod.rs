@@ -251,7 +251,10 @@ impl Surrogate {
 /// Tables of two planets, each with the other at the best of its own: of the two orders, the one that ends higher.
 type Tables = (f64, Vec<(usize, PeriodTable)>);
 
-fn pair(table: &dyn Fn(usize, &[f64]) -> Option<(PeriodTable, f64)>, centre: &[f64]) -> Option<Tables> {
+/// The table of a planet's periods, by its number and the place of all parameters, with its height.
+type OfPlanet<'a> = dyn Fn(usize, &[f64]) -> Option<(PeriodTable, f64)> + 'a;
+
+fn pair(table: &OfPlanet, centre: &[f64]) -> Option<Tables> {
     let order = |first: usize, second: usize| -> Option<Tables> {
         let mut beside = centre.to_vec();
         beside[first] = table(first, &beside)?.0.highest().0;
