@@ -441,7 +441,7 @@ fn keys(name: &str, path: &Path) -> Vec<String> {
     };
     match name {
         // a matrix of numbers
-        "covariance.csv" => Vec::new(),
+        "covariance.csv" | "covariance_m2s2.csv" => Vec::new(),
         _ if name.ends_with(".csv") => text.lines().next().unwrap().split(',').map(str::to_owned).collect(),
         _ if name.ends_with(".jsonl") => of(text.lines().last().unwrap()),
         _ => of(&text),
