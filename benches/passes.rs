@@ -120,7 +120,7 @@ fn others(scene: &Scene, pixels: usize, table: &mut Table) {
     let (imager, state) = (&scene.imager, truth(scene));
     let response = imager.response(&state);
     let build = || imager.response(black_box(&state));
-    let shift = || imager.with_velocities(response, black_box(&state));
+    let shift = || imager.with_velocities(&response, black_box(&state));
     let mut only_passes = Passes::new(&response);
     let single = || only_passes.run_single(&response, 2);
     let mut candidates = [

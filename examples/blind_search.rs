@@ -51,6 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         detection: &detection,
         verdict: &detection.verdict(&remarks),
         remarks: &remarks,
+        evidence: None,
         robustness: &choices,
         settings: &settings,
         planet_free: &explained(&detection.planet_free),

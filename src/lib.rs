@@ -146,15 +146,27 @@ pub mod internals {
     }
 }
 
-pub use cli::main as command_line;
+pub use cli::{Failure, main as command_line};
 pub use data::config::{Config, ConfigError};
+pub use data::io::lsd::{LsdError, write_numbers as write_observations};
 pub use data::scene::{Scene, SceneError};
-pub use data::search::Found;
+pub use data::search::{Found, Progress};
+pub use figures::drawing::Figure;
+pub use figures::plot::{PlotError, figures};
+pub use planets::periodogram::FrequencySettings;
 pub use planets::verdict::{Finding, Remark, Signal, Verdict};
 pub use posterior::fit::{ChangingFit, ChangingSummary, Fit, FitSummary, MapAt, NoField, VelocityWithoutSpots};
 pub use posterior::objective::{Parameter, Posterior, Prior};
 pub use runs::blind_search::BlindSearch;
-pub use runs::run::{Run, RunError};
+pub use runs::export::{ExportError, Format, export};
+pub use runs::log_posterior::LogPosterior;
+pub use runs::maps::{MapError, Maps};
+pub use runs::optimum::OptimumFile;
+pub use runs::periodogram::{Periodogram, PeriodogramError, PeriodogramOptions};
+pub use runs::plan::{Forecast, ForecastError, PlanSettings};
+pub use runs::pool::Pool;
+pub use runs::run::{Conclusion, Meter, Pace, Run, RunError, StartFrom};
+pub use runs::simulated::{SimulateError, Simulated};
 pub use sampling::chain::{Chain, ParameterSummary, Record, Summary};
 pub use sampling::ensemble::{EnsembleError, SamplerSettings, StopReason, sample};
 pub use sampling::log_density::{Evaluation, LogDensity, Status};

@@ -1,11 +1,10 @@
 //! `dimcmc analyse`: credible intervals and convergence of a run.
 
 use super::{Failure, Global, console};
-use crate::data::io::atomic::write_json;
 use crate::data::io::journal;
 use crate::runs::manifest::Manifest;
-use crate::runs::run::{CHAIN, SUMMARY};
-use crate::sampling::chain::{Chain, table};
+use crate::runs::run::{CHAIN, Conclusion};
+use crate::sampling::chain::Chain;
 use std::path::{Path, PathBuf};
 
 /// Credible intervals and convergence of a run
@@ -28,15 +27,8 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
 
 /// Writes the summary of `chain` into `folder` and prints its table.
 pub fn report(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<(), Failure> {
-    let settings = manifest.settings(folder).map_err(Failure::of)?;
-    let (summary, _) = manifest
-        .summarise(&settings, chain)
-        .map_err(|e| Failure::input(format!("{}: {e}", folder.join(CHAIN).display())))?;
-    write_json(&folder.join(SUMMARY), &summary)?;
-    console::line(table(&summary, manifest.truth(&settings, &summary).as_ref()).trim_end());
-    let notes = summary.remarks.iter().cloned().chain(manifest.warnings()).chain(manifest.co_rotation(&summary));
-    for warning in notes {
-        console::line(format_args!("note: {warning}"));
-    }
+    let conclusion = Conclusion::of(folder, manifest, chain).map_err(|e| Failure::run(folder, e))?;
+    conclusion.write(folder).map_err(|e| Failure::run(folder, e))?;
+    console::line(conclusion.text);
     Ok(())
 }

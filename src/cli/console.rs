@@ -6,7 +6,6 @@ use super::Failure;
 use crate::numerics::text::escaped;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal as _, Write as _};
-use std::process::ExitCode;
 use std::sync::Mutex;
 
 /// What the system said when results could not be printed for the first time.
@@ -60,11 +59,11 @@ pub fn error_below_progress(message: impl Display) {
 }
 
 /// The end of a command: its error, if it has one, and the exit code.
-pub fn end(result: Result<(), Failure>) -> ExitCode {
+pub fn end(result: Result<(), Failure>) -> u8 {
     let lost = LOST.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take();
     let lost = lost.map(|problem| Failure::failed(format!("standard output: cannot write: {problem}")));
     match result.and_then(|()| lost.map_or(Ok(()), Err)) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             error(&failure);
             failure.exit_code()

@@ -1,24 +1,28 @@
-//! `dimcmc export`: a run's chain for other programs.
+//! `dimcmc export`: a run's chain, or the velocities of a search, for other programs.
 
 use super::{Failure, Global, console};
 use crate::numerics::text::shown;
 use crate::runs::export::{self, Contents};
 use std::path::PathBuf;
 
-/// Write a run's chain for other programs
+/// Write a run's chain, or the velocities of a search, for other programs
 ///
 /// Without --out it goes beside the chain in the run's folder: chain.zarr, chain.h5, chain.csv, or chain_1.txt,
 /// chain.paramnames, ... The warm-up is told apart as `analyse` does it. A run may be exported while it grows.
+/// Of a folder of `periodogram`, --format rv writes the velocities free of spots to the folder rv in it: tables for
+/// radvel, juliet, kima and pyaneti, the full covariance with a likelihood for radvel and tinygp, and how much is lost
+/// without it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc export runs/demo --format zarr\n  \
-                        dimcmc export runs/demo --format getdist --out getdist/demo")]
+                        dimcmc export runs/demo --format getdist --out getdist/demo\n  \
+                        dimcmc export runs/demo_periodogram --format rv")]
 pub struct Args {
-    /// Folder of the run
+    /// Folder of the run, or of the search
     run: PathBuf,
     /// For which program
     #[arg(long, value_enum)]
     format: Format,
-    /// File (emcee, csv), folder (zarr) or beginning of the names of files (getdist)
+    /// File (emcee, csv), folder (zarr, rv) or beginning of the names of files (getdist)
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
     /// Replace an earlier export
@@ -36,6 +40,8 @@ enum Format {
     Getdist,
     /// pandas and others: a row a line of the chain
     Csv,
+    /// RV packages: the velocities of a search with their covariance
+    Rv,
 }
 
 /// Runs the command.
@@ -45,6 +51,7 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
         Format::Emcee => export::Format::Emcee,
         Format::Getdist => export::Format::Getdist,
         Format::Csv => export::Format::Csv,
+        Format::Rv => return velocities(args),
     };
     let out = args.out.clone().unwrap_or_else(|| format.place(&args.run));
     let contents = Contents::read(&args.run)?;
@@ -54,5 +61,14 @@ pub fn run(args: &Args, _global: &Global) -> Result<(), Failure> {
     if !contents.summary.converged {
         console::line("note: the chain has not converged, `dimcmc analyse` says what to do");
     }
+    Ok(())
+}
+
+/// Writes the velocities of a search.
+fn velocities(args: &Args) -> Result<(), Failure> {
+    let out = args.out.clone().unwrap_or_else(|| args.run.join("rv"));
+    let names: Vec<String> =
+        export::velocities::write(&args.run, &out, args.force)?.iter().map(|path| shown(path)).collect();
+    console::line(format_args!("written: {}", names.join(", ")));
     Ok(())
 }

@@ -11,16 +11,21 @@ use crate::data::io::lsd::LsdError;
 use crate::data::scene::SceneError;
 use crate::data::search::SearchError;
 use crate::figures::plot::PlotError;
+use crate::planets::periodogram::FrequencyError;
+use crate::posterior::detection::DetectionError;
 use crate::posterior::objective::ReferenceError;
 use crate::runs::comparison::PairError;
 use crate::runs::export::ExportError;
 use crate::runs::grid_scan::GridScanError;
+use crate::runs::maps::MapError;
 use crate::runs::origin::OriginError;
+use crate::runs::periodogram::PeriodogramError;
+use crate::runs::plan::{CampaignError, ForecastError, PlanError};
 use crate::runs::run::RunError;
+use crate::runs::simulated::SimulateError;
 use std::error::Error;
 use std::io::ErrorKind;
 use std::path::Path;
-use std::process::ExitCode;
 
 /// Exit code of bad usage or input.
 const INPUT: u8 = 2;
@@ -82,6 +87,40 @@ impl Failure {
         }
     }
 
+    /// No map.
+    pub fn maps(error: MapError) -> Self {
+        match &error {
+            MapError::Reference { .. } => Failure::input(error.to_string()),
+            MapError::Times(problem) => Failure::input(format!("--times: {problem}")),
+            MapError::Field { .. } => Failure::failed(error),
+        }
+    }
+
+    /// No periodogram.
+    pub fn periodogram(error: PeriodogramError) -> Self {
+        match error {
+            PeriodogramError::Frequencies { config, error: error @ FrequencyError::TooFewTimes(_) } => {
+                Failure::input(format!("{}: observations: {error}", config.display()))
+            }
+            PeriodogramError::Frequencies { error, .. } => Failure::of(error),
+            PeriodogramError::Detection { config, error: DetectionError::Reference(error) } => {
+                Failure::reference(&config, error)
+            }
+            error @ PeriodogramError::Detection { .. } => Failure::failed(error),
+        }
+    }
+
+    /// No plan.
+    pub fn plan(error: ForecastError) -> Self {
+        match error {
+            ForecastError::Campaign(CampaignError::Scene(error)) => error.into(),
+            ForecastError::Campaign(error @ CampaignError::Nights { .. }) => Failure::input(error.to_string()),
+            ForecastError::TooFewTimes { .. } => Failure::input(error.to_string()),
+            ForecastError::Plan(PlanError::Frequencies(error)) => Failure::of(error),
+            error => Failure::failed(error),
+        }
+    }
+
     /// A search in the config at `path` that found nothing.
     pub fn search(path: &Path, error: SearchError) -> Self {
         match error {
@@ -98,7 +137,7 @@ impl Failure {
             RunError::Origin(error) => Failure::origin(path, error),
             RunError::Write(_) | RunError::Folder { .. } | RunError::Chain(_) => Failure::failed(error),
             RunError::Ensemble(error) => Failure::input(format!("{}: {error}", path.display())),
-            RunError::Merged(_) => Failure::of(error),
+            RunError::Merged(_) | RunError::Analysis { .. } => Failure::of(error),
             RunError::PriorStart | RunError::UnresolvedSpots(_) => {
                 Failure::input(format!("{}: {error}", path.display()))
             }
@@ -126,8 +165,13 @@ impl Failure {
     }
 
     /// The code for the shell.
-    pub fn exit_code(&self) -> ExitCode {
-        ExitCode::from(self.code)
+    pub fn exit_code(&self) -> u8 {
+        self.code
+    }
+
+    /// Whether it is bad usage or input, which the user can put right.
+    pub fn is_input(&self) -> bool {
+        self.code == INPUT
     }
 }
 
@@ -152,6 +196,20 @@ impl From<SceneError> for Failure {
             SceneError::Config(error) => error.into(),
             SceneError::Observations(error) => error.into(),
             SceneError::LightCurve(error) => Failure::of(error),
+        }
+    }
+}
+
+impl From<SimulateError> for Failure {
+    fn from(error: SimulateError) -> Self {
+        match error {
+            SimulateError::Scene(error) => error.into(),
+            error @ (SimulateError::Nothing { .. } | SimulateError::ObservedLight { .. }) => {
+                Failure::input(error.to_string())
+            }
+            SimulateError::WriteLight(error) => error.into(),
+            error @ SimulateError::Folder { .. } => Failure::failed(error),
+            SimulateError::Write(error) => error.into(),
         }
     }
 }

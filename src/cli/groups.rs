@@ -4,7 +4,7 @@ use clap::Command;
 
 /// Groups of commands with their titles. A command that is in none is shown last, by itself.
 const GROUPS: &[(&str, &[&str])] = &[
-    ("Begin", &["init", "import", "simulate", "inject"]),
+    ("Begin", &["init", "import", "plan", "simulate", "inject"]),
     ("Image and search", &["map", "periodogram", "limits", "optimise", "grid"]),
     ("Sample", &["sample", "analyse", "compare", "merge", "batch"]),
     ("Show and pass on", &["plot", "report", "export", "reproduce"]),

@@ -8,6 +8,7 @@ use crate::numerics::text::shown;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
 use crate::posterior::detection::{DetectionError, DetectionSettings};
 use crate::posterior::expansion::nuisances;
+use crate::posterior::objective::for_blind_search;
 use crate::runs::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
 use crate::runs::pool::Brief;
 use crate::star::Orbit;
@@ -81,7 +82,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     remarks(&scene);
     let settings = settings(args, &scene)?;
     let spinner = progress::bar(global, None, "reconstructing without a planet");
-    let shortcut = Shortcut::new(&scene.imager, scene.settings.values, &settings);
+    let shortcut =
+        Shortcut::new(&scene.imager, for_blind_search(scene.settings.values, &scene.settings.free), &settings);
     spinner.finish_and_clear();
     let shortcut = shortcut.map_err(|e| failure(args, e))?;
     let orbits = orbits(args, &shortcut)?;

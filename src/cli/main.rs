@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    dimcmc::command_line()
+    dimcmc::command_line(std::env::args_os()).into()
 }

@@ -24,6 +24,7 @@ mod merge;
 mod optimise;
 mod output;
 mod periodogram;
+mod plan;
 mod plot;
 mod progress;
 mod report;
@@ -35,9 +36,10 @@ mod search;
 mod signals;
 mod simulate;
 
-use failure::Failure;
+pub use failure::Failure;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 
 /// The version, with the commit that it was built from where that is known.
@@ -80,6 +82,7 @@ fn threads(text: &str) -> Result<NonZeroUsize, String> {
 enum Command {
     Init(init::Args),
     Import(import::Args),
+    Plan(plan::Args),
     Simulate(simulate::Args),
     Inject(inject::Args),
     Map(map::Args),
@@ -108,15 +111,13 @@ fn command() -> clap::Command {
     groups::grouped(Cli::command())
 }
 
-/// The whole program: reads the command line, runs the command, prints what went wrong.
-pub fn main() -> std::process::ExitCode {
-    console::end(run(&parse()))
-}
-
-/// The command that was asked for; prints help or what is wrong, and ends the program, where that is all there is to
-/// do.
-fn parse() -> Cli {
-    Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|e| e.exit())
+/// The whole program: reads its `arguments`, the name of the program first, runs the command, prints what went wrong.
+/// The exit code.
+///
+/// Prints help or what is wrong with the arguments, and ends the process, where that is all there is to do.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let matches = command().get_matches_from(arguments);
+    console::end(run(&Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())))
 }
 
 /// Runs the command.
@@ -127,6 +128,7 @@ fn run(cli: &Cli) -> Result<(), Failure> {
     match &cli.command {
         Command::Init(args) => init::run(args, &cli.global),
         Command::Import(args) => import::run(args, &cli.global),
+        Command::Plan(args) => plan::run(args, &cli.global),
         Command::Simulate(args) => simulate::run(args),
         Command::Inject(args) => inject::run(args),
         Command::Map(args) => map::run(args, &cli.global),

@@ -3,7 +3,6 @@
 use super::output::{Output, remarks};
 use super::search::search;
 use super::{Failure, Global, console};
-use crate::data::io::atomic::write_json;
 use crate::data::scene::Scene;
 use crate::runs::optimum::{self, OptimumFile};
 use std::path::PathBuf;
@@ -31,7 +30,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let found = search(global, &args.config, &scene, &scene.space)?;
     let file = OptimumFile::new(&scene, &found);
     let folder = args.output.create()?;
-    write_json(&folder.join(optimum::FILE), &file)?;
+    file.write(folder)?;
     console::print(file.table());
     Ok(())
 }

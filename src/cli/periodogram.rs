@@ -2,14 +2,11 @@
 
 use super::output::Output;
 use super::{Failure, Global, console, progress};
-use crate::data::io::periodogram::{FILES, PeriodogramResult};
+use crate::data::io::periodogram::FILES;
 use crate::data::scene::Scene;
 use crate::numerics::text::shown;
-use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
-use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, Stage, View, robustness};
-use crate::posterior::expansion::nuisances;
-use crate::posterior::fit::Explained;
-use std::path::{Path, PathBuf};
+use crate::runs::periodogram::{Periodogram, PeriodogramOptions};
+use std::path::PathBuf;
 
 /// Search for a planet at every period, the star's spots marginalised out
 ///
@@ -49,7 +46,7 @@ pub struct Args {
     #[arg(long)]
     fixed: bool,
     /// Number of stars without a planet
-    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(long, value_name = "N", default_value_t = PeriodogramOptions::DRAWS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
     /// Seed of the draws
@@ -62,78 +59,26 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
-    let frequencies = frequencies(args, &scene)?;
-    let settings = settings(args, &scene);
     let spinner = progress::bar(global, None, "reconstructing");
-    let report = |stage| spinner.set_message(message(stage));
-    let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &report);
-    let choices = found.as_ref().map(|found| {
-        spinner.set_message("other targets, without each night");
-        robustness(&scene.imager, scene.settings.values, &settings, found)
-    });
+    let found = Periodogram::of(&scene, &options(args), &|what| spinner.set_message(what.to_owned()));
     spinner.finish_and_clear();
-    let choices = choices.map_err(|e| failure(&args.config, *e))?;
-    let detection = found.map_err(|e| failure(&args.config, e))?;
-    let explained = |view: &View| Explained::new(&scene.imager, &scene.observations, view);
-    let at_best = explained(detection.last());
-    let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
-    let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
-    let remarks = detection.remarks(&evidence);
-    let result = PeriodogramResult {
-        imager: &scene.imager,
-        detection: &detection,
-        verdict: &detection.verdict(&remarks),
-        remarks: &remarks,
-        robustness: &choices,
-        settings: &settings,
-        planet_free: &explained(&detection.planet_free),
-        at_best: &at_best,
-        truth: scene.truth,
-        mass_msun: scene.settings.mass_msun,
-        provenance: &scene.provenance(),
-    };
+    let found = found.map_err(Failure::periodogram)?;
     let folder = args.output.create()?;
-    result.write(folder)?;
-    let (table, files) = (result.table(), result.files().join(", "));
-    let measured: String = scene.measured.lines().iter().map(|(label, text)| format!("{label}: {text}\n")).collect();
-    console::line(format_args!("{table}{measured}written: {}: {files}", shown(folder)));
+    found.write(folder)?;
+    let (table, files) = (found.table(), found.files().join(", "));
+    console::line(format_args!("{table}written: {}: {files}", shown(folder)));
     Ok(())
 }
 
-fn frequencies(args: &Args, scene: &Scene) -> Result<Frequencies, Failure> {
-    let Args { min_period_d, max_period_d, oversampling, .. } = *args;
-    let settings = FrequencySettings { min_period_d, max_period_d, oversampling };
-    let rotation_period_d = scene.imager.star.rotation_period_d;
-    Frequencies::new(&scene.imager.cycles(), rotation_period_d, settings).map_err(|error| match error {
-        FrequencyError::TooFewTimes(_) => Failure::input(format!("{}: observations: {error}", args.config.display())),
-        error => Failure::of(error),
-    })
-}
-
-fn settings(args: &Args, scene: &Scene) -> DetectionSettings {
-    DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target.value(),
-        nuisances: if args.fixed { Vec::new() } else { nuisances(&scene.settings.free) },
-        search: SearchSettings { draws: args.draws as usize, seed: args.seed },
+fn options(args: &Args) -> PeriodogramOptions {
+    PeriodogramOptions {
+        min_period_d: args.min_period_d,
+        max_period_d: args.max_period_d,
+        oversampling: args.oversampling,
         eccentric: args.eccentric,
         second_planet: args.planets == 2,
-        spots: scene.spots(),
-    }
-}
-
-fn message(stage: Stage) -> String {
-    match stage {
-        Stage::PlanetFree => "reconstructing without a planet".to_owned(),
-        Stage::Change => "looking whether the star changes".to_owned(),
-        Stage::Search => "searching, false alarms".to_owned(),
-        Stage::BestOrbit(round) => format!("reconstructing at the best orbit, round {round}"),
-        Stage::SecondPlanet => "searching for a second planet".to_owned(),
-    }
-}
-
-fn failure(config: &Path, error: DetectionError) -> Failure {
-    match error {
-        DetectionError::Reference(error) => Failure::reference(config, error),
-        error => Failure::failed(format!("{}: {error}", config.display())),
+        fixed: args.fixed,
+        draws: args.draws as usize,
+        seed: args.seed,
     }
 }

@@ -5,16 +5,14 @@ use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
 use crate::data::config::Config;
-use crate::data::io::effort::{EFFORT, Effort};
+use crate::data::io::effort::EFFORT;
 use crate::data::scene::Scene;
 use crate::runs::manifest;
-use crate::runs::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
-use crate::sampling::chain::advice::growth_needed;
-use crate::sampling::chain::{Convergence, Goals, Record};
+use crate::runs::run::{CHAIN, Meter, Pace, Run, RunError, SUMMARY, StartFrom};
 use crate::sampling::ensemble::{MOST_STEPS, StopReason};
-use crate::sampling::log_density::Status;
+use indicatif::{HumanDuration, ProgressBar};
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Sample the posterior of the free parameters
 ///
@@ -98,10 +96,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         run.map_err(failed)?
     };
     signals.defer();
-    let mut meter = Meter::new(global, &run);
-    let reason = run.go(&pool, |records, convergence| meter.step(records, convergence));
-    meter.bar.finish_and_clear();
-    let noted = Effort::add(folder, !resume, began.elapsed().as_secs_f64(), pool.size());
+    let bar = progress::bar(global, Some(BAR), "first step");
+    let mut meter = Meter::new(&run);
+    let reason = run.go(&pool, |records, convergence| show(&bar, &meter.step(records, convergence)));
+    bar.finish_and_clear();
+    let noted = Run::note_effort(folder, !resume, began.elapsed().as_secs_f64(), pool.size());
     match reason.map_err(failed)? {
         StopReason::Interrupted => {
             let step = run.chain.steps().saturating_sub(1);
@@ -112,86 +111,27 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             )))
         }
         StopReason::Converged | StopReason::StepLimit => {
-            noted?;
+            noted.map_err(failed)?;
             analyse::report(folder, &run.manifest, &run.chain)
         }
     }
 }
 
-/// What is shown while a chain grows.
-struct Meter {
-    bar: indicatif::ProgressBar,
-    names: Vec<String>,
-    goals: Goals,
-    began: Instant,
-    first_step: usize,
-    last_step: usize,
-    evaluations: usize,
-    accepted: usize,
-    moved: usize,
-    /// R-hat and ESS of the parameters farthest from their goals, at the last look.
-    convergence: Option<String>,
-    /// The step at which the goals should be reached, if one can tell.
-    goal_step: Option<f64>,
-}
-
 /// Divisions of the bar.
 const BAR: u64 = 1000;
 
-impl Meter {
-    fn new(global: &Global, run: &Run) -> Self {
-        Meter {
-            bar: progress::bar(global, Some(BAR), "first step"),
-            names: run.manifest.names.clone(),
-            goals: *run.goals(),
-            began: Instant::now(),
-            first_step: run.chain.steps().saturating_sub(1),
-            last_step: run.last_step(),
-            evaluations: 0,
-            accepted: 0,
-            moved: 0,
-            convergence: None,
-            goal_step: None,
-        }
-    }
-
-    fn step(&mut self, records: &[Record], convergence: Option<&Convergence>) {
-        self.evaluations += records.iter().filter(|r| r.proposed != Status::OutsidePrior).count();
-        self.accepted += records.iter().filter(|r| r.accepted).count();
-        self.moved += records.len();
-        let step = records.first().map_or(0, |r| r.step);
-        if let Some(convergence) = convergence {
-            self.look(step, convergence);
-        }
-        let elapsed = self.began.elapsed().as_secs_f64();
-        let per_step = elapsed / step.saturating_sub(self.first_step).max(1) as f64;
-        let limit = self.last_step as f64;
-        let end = self.goal_step.map_or(limit, |goal| goal.min(limit));
-        let left = Duration::from_secs_f64(per_step * (end - step as f64).max(0.0));
-        self.bar.set_position((BAR as f64 * step as f64 / end.max(1.0)) as u64);
-        let mut message = format!(
-            "{step}/{}, {}{:#} left, {:.0} rec/s, acceptance {:.2}",
-            self.last_step,
-            // until the goals are in sight, the step limit is all that is known
-            if self.goal_step.is_none() { "at most " } else { "" },
-            indicatif::HumanDuration(left),
-            self.evaluations as f64 / elapsed.max(1e-9),
-            self.accepted as f64 / self.moved as f64,
-        );
-        if let Some(convergence) = &self.convergence {
-            message = format!("{message}, {convergence}");
-        }
-        self.bar.set_message(message);
-    }
-
-    /// The parameter that is farthest from its goals.
-    fn look(&mut self, step: usize, convergence: &Convergence) {
-        let named = || convergence.diagnostics.iter().zip(&self.names);
-        let rhat = named().filter_map(|(d, name)| Some((d.rhat?, name))).max_by(|a, b| a.0.total_cmp(&b.0));
-        let ess = named().filter_map(|(d, _)| d.ess).reduce(f64::min);
-        if let Some(((rhat, name), ess)) = rhat.zip(ess) {
-            self.convergence = Some(format!("R-hat {rhat:.3} ({name}), ESS {ess:.0} of {:.0}", self.goals.ess));
-            self.goal_step = growth_needed(convergence, &self.goals).map(|growth| growth * step as f64);
-        }
-    }
+/// Shows how far a chain has come.
+fn show(bar: &ProgressBar, pace: &Pace) {
+    bar.set_position((BAR as f64 * pace.step as f64 / pace.end.max(1.0)) as u64);
+    let convergence = pace.convergence.as_ref().map(|words| format!(", {words}")).unwrap_or_default();
+    bar.set_message(format!(
+        "{}/{}, {}{:#} left, {:.0} rec/s, acceptance {:.2}{convergence}",
+        pace.step,
+        pace.last_step,
+        // until the goals are in sight, the step limit is all that is known
+        if pace.in_sight { "" } else { "at most " },
+        HumanDuration(pace.left),
+        pace.rate,
+        pace.acceptance,
+    ));
 }

@@ -2,7 +2,7 @@
 
 use super::{Failure, Global, progress};
 use crate::data::scene::Scene;
-use crate::data::search::{Found, Progress, SearchSettings, Stage, find};
+use crate::data::search::{Found, Progress, SearchSettings, find};
 use crate::posterior::objective::ParameterSpace;
 use std::path::Path;
 use std::time::Instant;
@@ -18,14 +18,8 @@ pub fn search(global: &Global, path: &Path, scene: &Scene, space: &ParameterSpac
 }
 
 fn message(Progress { stage, evaluations }: Progress, elapsed_s: f64) -> String {
-    let stage = match stage {
-        Stage::FirstImage => "reconstructing at the config's values".to_string(),
-        Stage::Climbing { done, starts } => format!("searching, {done} of {starts} climbs done"),
-        Stage::Reference => "reference image and trade-off curve".to_string(),
-        Stage::Refining => "refining the best parameters".to_string(),
-    };
     match evaluations {
-        0 => stage,
+        0 => stage.to_string(),
         n => format!("{stage}, {n} reconstructions, {:.0}/s", n as f64 / elapsed_s.max(1e-9)),
     }
 }

@@ -5,8 +5,8 @@
 
 use super::failure::{INTERRUPTED, RESUME};
 use super::{Failure, console};
-use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
-use signal_hook::iterator::Signals as Incoming;
+use signal_hook::consts::SIGINT;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
@@ -25,10 +25,9 @@ impl Signals {
         let signals = Signals { stop: Arc::default(), deferred: Arc::default(), code: Arc::new(INTERRUPTED.into()) };
         let Signals { stop, deferred, code } = &signals;
         let (stop, deferred, code) = (Arc::clone(stop), Arc::clone(deferred), Arc::clone(code));
-        let mut incoming = Incoming::new([SIGINT, SIGTERM, SIGUSR1])
-            .map_err(|e| Failure::failed(format!("signals cannot be caught: {e}")))?;
+        let incoming = incoming().map_err(|e| Failure::failed(format!("signals cannot be caught: {e}")))?;
         std::thread::spawn(move || {
-            for signal in &mut incoming {
+            for signal in incoming {
                 let by_hand = signal == SIGINT;
                 if !by_hand {
                     code.store(RESUME, Ordering::SeqCst);
@@ -67,6 +66,34 @@ impl Signals {
     pub fn interrupted(&self, message: impl std::fmt::Display) -> Failure {
         Failure::interrupted(self.code.load(Ordering::SeqCst), message)
     }
+}
+
+/// The signals that come, one after the other, waited for.
+#[cfg(unix)]
+fn incoming() -> io::Result<impl Iterator<Item = i32> + Send> {
+    use signal_hook::consts::{SIGTERM, SIGUSR1};
+    let mut all = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGUSR1])?;
+    Ok(std::iter::from_fn(move || all.forever().next()))
+}
+
+/// The same where signals only set flags.
+#[cfg(not(unix))]
+fn incoming() -> io::Result<impl Iterator<Item = i32> + Send> {
+    const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
+    let signals = [SIGINT, signal_hook::consts::SIGTERM];
+    let flags = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+    for (signal, flag) in signals.into_iter().zip(&flags) {
+        signal_hook::flag::register(signal, Arc::clone(flag))?;
+    }
+    Ok(std::iter::from_fn(move || {
+        loop {
+            let come = signals.iter().zip(&flags).find(|(_, flag)| flag.swap(false, Ordering::SeqCst));
+            if let Some((signal, _)) = come {
+                return Some(*signal);
+            }
+            std::thread::sleep(LOOK);
+        }
+    }))
 }
 
 /// That nothing has begun yet.

@@ -8,6 +8,8 @@
 
 pub mod config;
 pub mod diagnosis;
+pub mod ephemeris;
+pub mod evidence;
 pub mod import;
 pub mod init;
 pub mod io;

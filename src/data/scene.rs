@@ -1,35 +1,42 @@
 //! What every command begins with: a config file, the observations it names or simulates, and what they are imaged
 //! with.
 
+mod imaging;
 mod light_curves;
 mod reading;
 
 use crate::data::config::{
     Automatic, Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
-    VelocityJitter, ZeroPoint,
+    VelocityJitter,
 };
+use crate::data::ephemeris::Ephemeris;
+use crate::data::evidence::EvidenceRecord;
 use crate::data::io::FileError;
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
 use crate::data::io::truth::Truth;
-use crate::data::search::{self, Found, SearchError, SearchSettings};
-use crate::planets::periodogram::{Frequencies, FrequencySettings};
+use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
+use crate::planets::velocities::VelocityQuadratic;
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
-use crate::posterior::imaging::{Imager, ZeroPointPrior};
-use crate::posterior::marginal::{Known, zero_points as set_zero_points};
+use crate::posterior::imaging::Imager;
+use crate::posterior::marginal::Known;
 use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
 use crate::posterior::objective::{
-    FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
+    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
 };
 use crate::posterior::photometry::Flux;
 use crate::posterior::simulate::Simulation;
 use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
-use crate::star::{BrightnessModel, Orbit, Quadrature, Sampling, Seen, Spot, StarSettings, SurfaceGrid};
+use crate::star::{BrightnessModel, Orbit, Quadrature, Spot, SurfaceGrid};
+use imaging::hold_zero_points;
 use reading::Part;
+
+pub use imaging::imager;
 use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What stands for the list of profiles in the config of profiles that are in no file.
@@ -188,6 +195,10 @@ impl Scene {
         parts: Vec<Observations>,
         errors: Vec<Option<MeasuredErrors>>,
     ) -> Result<Self, ConfigError> {
+        let times = || parts.iter().flat_map(|part| part.times_d());
+        if let Some(first) = times().reduce(f64::min).zip(times().reduce(f64::max)) {
+            Ephemeris::check(&settings, [first.0, first.1])?;
+        }
         let mut imager = imager(&settings, &parts)?;
         let correlated_bins = errors.iter().flatten().map(|errors| errors.correlated_bins).fold(1.0, f64::max);
         imager.data.correlated_bins = correlated_bins;
@@ -224,6 +235,19 @@ impl Scene {
         let space = space(&settings.free, &settings, &imager);
         let data_sha256 = light_curves::fingerprint(fingerprint(&observations), &settings);
         Ok(Scene { settings, observations, data_sha256, truth: None, measured, imager, space })
+    }
+
+    /// The config file, or what stands for it: what errors name.
+    pub fn path(&self) -> &Path {
+        &self.settings.path
+    }
+
+    /// That the config leaves a parameter free, as searches and chains need.
+    ///
+    /// # Errors
+    /// A config that does not.
+    pub fn require_free(&self) -> Result<(), ConfigError> {
+        self.settings.require_free().map(drop)
     }
 
     /// What becomes of the spots in a blind search.
@@ -274,7 +298,15 @@ impl Scene {
     /// # Errors
     /// No map, or no start that leads anywhere.
     pub fn optimise(&self) -> Result<Found, SearchError> {
-        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), &|_| ())
+        self.optimise_with(&|_| ())
+    }
+
+    /// The same; `report` is told at every evaluation how far the search has come, from any thread.
+    ///
+    /// # Errors
+    /// As [`Scene::optimise`].
+    pub fn optimise_with(&self, report: &(dyn Fn(Progress) + Sync)) -> Result<Found, SearchError> {
+        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), report)
     }
 
     /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected
@@ -408,7 +440,7 @@ impl Scene {
             profiles => coverage.iter().sum::<f64>() / profiles as f64,
         };
         let state = simulation.truth.state();
-        let velocity = |time: &f64| state.vsys_kms + state.orbit.velocity_kms(self.imager.star.cycle(*time));
+        let velocity = |time: &f64| state.vsys_kms + state.motion.velocity_kms(self.imager.star.cycle(*time));
         Truth {
             parameters: simulation.truth,
             spots: simulation.spots.iter().map(Spot::written).collect(),
@@ -430,6 +462,22 @@ impl Scene {
         }
     }
 
+    /// Bayes factors of planets under the priors of the config, from the star's quadratic without a planet.
+    #[doc(hidden)]
+    pub fn evidence(&self, quadratic: &VelocityQuadratic) -> Option<EvidenceRecord> {
+        EvidenceRecord::of(&self.settings.free, self.space.clock(), self.settings.sampler.seed, quadratic)
+    }
+
+    /// The simulated values by name, ephemerides among them where the config names them.
+    #[doc(hidden)]
+    pub fn named_truth(&self) -> Option<BTreeMap<String, f64>> {
+        let truth = self.truth?;
+        let own = Parameter::ALL.into_iter().filter_map(|p| Some((p, truth.given(p)?)));
+        let named = self.space.free().iter().map(|f| f.parameter).zip(self.space.theta_of(&truth));
+        let named = named.filter(|(p, value)| p.is_ephemeris() && value.is_finite());
+        Some(own.chain(named).map(|(p, value)| (p.name().to_owned(), value)).collect())
+    }
+
     /// What results say of where they came from.
     #[doc(hidden)]
     pub fn provenance(&self) -> Provenance {
@@ -441,62 +489,6 @@ impl Scene {
             measured: self.measured.clone(),
         }
     }
-}
-
-/// What the observations of all data sets are imaged with.
-///
-/// # Errors
-/// Settings that make no sense with these observations.
-pub fn imager(settings: &Settings, parts: &[Observations]) -> Result<Imager, ConfigError> {
-    let mut stars = Vec::new();
-    for (set, part) in settings.sets.iter().zip(parts) {
-        settings.check_velocity_grid(&set.star, &settings.values, part.step_kms())?;
-        stars.push(settings.star_for(set, part)?);
-    }
-    let star = stars[0].clone();
-    let seen = |(own, part): (&StarSettings, &Observations)| Seen {
-        line: Some(own.line).filter(|line| *line != star.line),
-        contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast),
-        sampling: Sampling::of(part),
-    };
-    let sets: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
-    let all = Observations { profiles: parts.iter().flat_map(|part| part.profiles.iter().cloned()).collect() };
-    let mut imager = Imager::of_sets(star, sets, &all, settings.imaging.pixels, settings.imaging.entropy());
-    if settings.sets.iter().any(|set| set.nuisances.is_some()) {
-        let priors = settings.sets.iter().map(|set| set.nuisances.unwrap_or_default());
-        imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
-    }
-    imager.light_curves = light_curves::near(settings, &all)?;
-    for (s, set) in settings.sets.iter().enumerate() {
-        match set.zero_point {
-            ZeroPoint::Known(0.0) => {}
-            ZeroPoint::Known(kms) => imager.move_set(s, kms),
-            ZeroPoint::Fitted => {
-                let held = set.held.map_or(0.0, |held| held.value_kms);
-                let prior = ZeroPointPrior { set: s, mean_kms: 0.0, sd_kms: set_zero_points::PRIOR_KMS };
-                imager.zero_points.push(prior);
-                imager.move_zero_point(imager.zero_points.len() - 1, held);
-            }
-        }
-    }
-    Ok(imager)
-}
-
-/// Finds the zero points of data sets that are fitted, if they are not known yet, and holds them in `imager`.
-fn hold_zero_points(settings: &mut Settings, imager: &mut Imager) -> Result<(), ConfigError> {
-    let unknown = |set: &&mut DataSetSettings| set.zero_point == ZeroPoint::Fitted;
-    if imager.zero_points.is_empty() || settings.sets.iter().any(|set| set.held.is_some()) {
-        return Ok(());
-    }
-    let usual = FrequencySettings::default();
-    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok();
-    let first = imager.zero_points[0].set;
-    let held = set_zero_points::hold(imager, settings.values, settings.known_field(), frequencies.as_ref())
-        .map_err(|e| settings.fault(&format!("{}.zero_point_kms", settings.sets[first].key), &e.to_string()))?;
-    for (set, held) in settings.sets.iter_mut().filter(unknown).zip(held) {
-        set.held = Some(held);
-    }
-    Ok(())
 }
 
 /// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
@@ -568,11 +560,13 @@ fn measured_errors(
 
 fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
-    ParameterSpace::new(free.to_vec(), settings.values, mid, base, imager.star.rotation_period_d)
+    let star = &imager.star;
+    ParameterSpace::new(free.to_vec(), settings.values, mid, base, star.rotation_period_d)
+        .of_star(star.epoch_d, settings.mass_msun)
 }
 
-/// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of bins,
-/// and velocity, intensity and sigma of each bin.
+/// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of
+/// bins, and velocity, intensity and sigma of each bin.
 pub fn fingerprint(observations: &Observations) -> String {
     let step = observations.step_kms();
     let mut hash = Sha256::new();

@@ -133,6 +133,17 @@ pub enum Stage {
     Refining,
 }
 
+impl std::fmt::Display for Stage {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Stage::FirstImage => f.write_str("reconstructing at the config's values"),
+            Stage::Climbing { done, starts } => write!(f, "searching, {done} of {starts} climbs done"),
+            Stage::Reference => f.write_str("reference image and trade-off curve"),
+            Stage::Refining => f.write_str("refining the best parameters"),
+        }
+    }
+}
+
 /// The reference is rebuilt until the optimum stays within this many standard deviations of it.
 const REFERENCE_SHIFT: f64 = 0.3;
 

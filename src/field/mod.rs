@@ -18,7 +18,7 @@
 //!    misfits and slopes.
 //! 5. [`Evidence::derivatives`]: of ln Z, with respect to the hyperparameters.
 //! 6. [`Evidence::coefficients_at`], [`Evidence::means`] and [`Evidence::standard_deviations`]: the field after the
-//!    data, at any time.
+//!    data, at any time. [`Field::drawn`] and [`Evidence::drawn`]: fields drawn before and after the data.
 //!
 //! Inside, `compress` finds the few numbers of an epoch that say something of the field, and `dense` has the products
 //! and the Cholesky factor in which nearly all of the time goes.
@@ -26,6 +26,7 @@
 mod compress;
 mod dense;
 mod derivatives;
+mod draws;
 mod epoch;
 mod evidence;
 mod harmonics;

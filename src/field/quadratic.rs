@@ -20,8 +20,8 @@ impl Quadratic {
         self.ln_evidence + self.gradient.dot(v) - 0.5 * (&self.information * v).dot(v)
     }
 
-    /// The same where numbers x of a Gaussian of this `mean` and standard deviations `sd` are added, `v + columns x`, and
-    /// integrated out. `None` where the information is not finite.
+    /// The same where numbers x of a Gaussian of this `mean` and standard deviations `sd` are added, `v + columns x`,
+    /// and integrated out. `None` where the information is not finite.
     pub fn integrated(&self, columns: &DMatrix<f64>, mean: &DVector<f64>, sd: &DVector<f64>) -> Option<Self> {
         let shift = columns * mean;
         let pulled_by = &self.information * &shift;

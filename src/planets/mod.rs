@@ -6,8 +6,11 @@
 //! `window` which periods spots and nights imitate, `limits` what K may be. `eccentric` and `two_planets` have what is
 //! searched for on request.
 //!
+//! [`evidence`] has Bayes factors of models with and without planets.
+//!
 //! The thresholds (false-alarm probabilities of candidate and detection among them) are constants of [`verdict`].
 
+pub mod evidence;
 pub mod periodogram;
 pub mod velocities;
 pub mod verdict;

@@ -4,6 +4,7 @@
 //! anywhere in the blind search. A detection also needs that nothing speaks against it; otherwise it is a candidate,
 //! and the sentence names the reasons. Whether a chain has converged is another question, and is not part of it.
 
+use crate::numerics::normal;
 use serde::{Deserialize, Serialize};
 
 /// Above this false-alarm probability no planet is needed.
@@ -75,11 +76,61 @@ pub struct Verdict {
     pub signal: Option<Signal>,
     /// What speaks against a planet, in a few words each.
     pub against: Vec<String>,
+    /// Of a planet of known ephemeris, of which no other period is searched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known: Option<Known>,
+}
+
+/// A planet whose period and conjunction are known: K is all that is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Known {
+    /// K over its standard error, of a star without a planet, where K may have either sign.
+    pub significance: f64,
+    /// 95 % upper limit on K (km/s), for K of 0 or more.
+    pub k_upper95_kms: f64,
+}
+
+/// The probability that a standard normal number exceeds `z`.
+pub fn one_sided(z: f64) -> f64 {
+    normal::cumulative(-z)
+}
+
+/// 95 % upper limit on a number of 0 or more of which `value +- sigma` is measured.
+pub fn upper95(value: f64, sigma: f64) -> f64 {
+    const HALVINGS: usize = 200;
+    let least = -value / sigma;
+    // of what lies above zero, a twentieth is above the limit
+    let beyond = 0.05 * one_sided(least);
+    if beyond < f64::MIN_POSITIVE {
+        // so far below zero what is left is exponential
+        return 0.05f64.recip().ln() * sigma / least;
+    }
+    let (mut low, mut high) = (least, least.max(0.0) + 40.0);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if one_sided(middle) > beyond { low = middle } else { high = middle }
+    }
+    value + sigma * low
 }
 
 impl Verdict {
+    /// Of a planet of known ephemeris: `alone` is K with its error where there is no planet in the model, `signal`
+    /// where there is. The false-alarm probability is that of one period, one-sided.
+    pub fn of_known(alone: [f64; 2], signal: Signal, remarks: &[Remark]) -> Self {
+        let significance = alone[0] / alone[1];
+        if !significance.is_finite() {
+            return Verdict::not_judged("the profiles do not bound K at this ephemeris");
+        }
+        let k_upper95_kms = upper95(signal.k_kms, signal.sigma_k_kms);
+        Verdict::judged(one_sided(significance), signal, remarks, Some(Known { significance, k_upper95_kms }))
+    }
+
     /// Of a signal with that false-alarm probability.
     pub fn new(false_alarm_probability: f64, signal: Signal, remarks: &[Remark]) -> Self {
+        Verdict::judged(false_alarm_probability, signal, remarks, None)
+    }
+
+    fn judged(false_alarm_probability: f64, signal: Signal, remarks: &[Remark], known: Option<Known>) -> Self {
         if false_alarm_probability.is_nan() {
             return Verdict::not_judged("there is no false-alarm probability");
         }
@@ -94,13 +145,17 @@ impl Verdict {
             p if p < CANDIDATE_FAP => Finding::Candidate,
             _ => Finding::NoPlanetNeeded,
         };
-        let sentence = sentence(finding, false_alarm_probability, &signal, &against);
+        let sentence = match known {
+            Some(known) => sentence_of_known(finding, false_alarm_probability, &signal, &known, &against),
+            None => sentence(finding, false_alarm_probability, &signal, &against),
+        };
         Verdict {
             finding,
             sentence,
             false_alarm_probability: Some(false_alarm_probability),
             signal: Some(signal),
             against,
+            known,
         }
     }
 
@@ -111,7 +166,7 @@ impl Verdict {
         };
         let mut all: Vec<Remark> = self.against.iter().map(|short| Remark::against(short, "")).collect();
         all.extend_from_slice(remarks);
-        Verdict::new(probability, signal, &all)
+        Verdict::judged(probability, signal, &all, self.known)
     }
 
     /// Where there is no judgement, and why.
@@ -122,13 +177,37 @@ impl Verdict {
             false_alarm_probability: None,
             signal: None,
             against: Vec::new(),
+            known: None,
         }
     }
 }
 
+fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Known, against: &[String]) -> String {
+    let Signal { period_d, k_kms, sigma_k_kms } = *signal;
+    let Known { significance, k_upper95_kms } = *known;
+    let digits = digits(sigma_k_kms);
+    let head = match finding {
+        Finding::NoPlanetNeeded => "The known planet is not seen",
+        Finding::Candidate => "The known planet is indicated, not detected",
+        Finding::Detection => "The known planet is detected",
+        Finding::NotJudged => return String::new(),
+    };
+    let against = if against.is_empty() { String::new() } else { format!(" Against it: {}.", against.join("; ")) };
+    format!(
+        "{head}: {period_d:.4} d, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s, {significance:.1} sigma \
+         (one-sided; false-alarm probability of this one period {}); K is below {k_upper95_kms:.digits$} km/s (95 %).\
+         {against}",
+        probability(chance)
+    )
+}
+
+fn digits(sigma: f64) -> usize {
+    if sigma > 0.0 { (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 }
+}
+
 fn sentence(finding: Finding, false_alarm_probability: f64, signal: &Signal, against: &[String]) -> String {
     let Signal { period_d, k_kms, sigma_k_kms } = *signal;
-    let digits = if sigma_k_kms > 0.0 { (1.0 - sigma_k_kms.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 };
+    let digits = digits(sigma_k_kms);
     let orbit = format!("{period_d:.4} d, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s");
     let chance = format!("false-alarm probability {}", probability(false_alarm_probability));
     match finding {
@@ -168,6 +247,28 @@ mod tests {
     use super::*;
 
     const SIGNAL: Signal = Signal { period_d: 5.0692, k_kms: 0.1034, sigma_k_kms: 0.0108 };
+
+    #[test]
+    fn a_known_planet_is_judged_by_its_own_period() {
+        // 1.6449 sigma one-sided is 5 %, and 1.96 sigma are the limit of a number whose bound at zero does not matter
+        assert!((one_sided(1.6449) - 0.05).abs() < 1e-5);
+        assert!((upper95(1.0, 0.01) - (1.0 + 0.016449)).abs() < 1e-6);
+        assert!((upper95(0.0, 1.0) - 1.95996).abs() < 1e-4);
+        assert!(
+            upper95(-3.0, 1.0) > 0.0
+                && upper95(-60.0, 1.0) > 0.0
+                && upper95(-60.0, 1.0) < 0.06
+                && (upper95(-36.0, 1.0) * 36.0 - 3.0).abs() < 0.02
+        );
+        let verdict = Verdict::of_known([0.1, 0.01], SIGNAL, &[]);
+        assert_eq!(verdict.finding, Finding::Detection);
+        assert!(verdict.sentence.contains("10.0 sigma"), "{}", verdict.sentence);
+        let less = verdict.with(&[Remark::against("one night decides", "")]);
+        assert_eq!(less.finding, Finding::Candidate);
+        assert!(less.sentence.ends_with("Against it: one night decides."), "{}", less.sentence);
+        assert_eq!(Verdict::of_known([0.01, 0.01], SIGNAL, &[]).finding, Finding::NoPlanetNeeded);
+        assert_eq!(Verdict::of_known([0.0, 0.0], SIGNAL, &[]).finding, Finding::NotJudged);
+    }
 
     #[test]
     fn one_number_and_what_speaks_against_it_decide() {

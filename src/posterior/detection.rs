@@ -10,7 +10,7 @@ mod remarks;
 mod robustness;
 
 pub use remarks::Evidence;
-pub use robustness::{AtTarget, Robustness, WithoutNight, robustness};
+pub use robustness::{AtTarget, Robustness, WithoutNight, nights, robustness};
 
 use crate::field::{FieldError, Lifetime};
 use crate::maxent::Termination;
@@ -225,13 +225,9 @@ impl View {
             let quadratic = expansion.velocities(nuisances);
             let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
             let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
-            return Ok(View {
-                expansion,
-                regularised: quadratic.clone(),
-                quadratic,
-                zero_points_held: held.map(|held| held.velocities(nuisances)),
-                seen: Seen::Integrated(Box::new(fitted)),
-            });
+            let zero_points_held = held.map(|held| held.velocities(nuisances));
+            let (regularised, seen) = (quadratic.clone(), Seen::Integrated(Box::new(fitted)));
+            return Ok(View { seen, expansion, quadratic, zero_points_held, regularised });
         }
         let reference = Reference::provisional(imager, values, settings.chi2_target)?;
         let on_target = reference.solution.termination == Termination::Converged;

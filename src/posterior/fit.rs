@@ -240,7 +240,7 @@ fn velocities(
             cycle,
             observed: profile.first_moment(),
             modelled_kms: profile.first_moment_of(depth),
-            orbit_kms: state.vsys_kms + state.orbit.velocity_kms(cycle),
+            orbit_kms: state.vsys_kms + state.motion.velocity_kms(cycle),
         }
     };
     observations.profiles.iter().zip(depths).map(velocity).collect()

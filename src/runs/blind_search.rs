@@ -4,6 +4,8 @@
 //! An optimum or a chain takes a planet for granted and says which one; whether there is one is told by how often stars
 //! without a planet show as much. So their results hold the search beside them, and its verdict heads them.
 
+use super::known_planet::{KnownPlanet, known_planets};
+use crate::data::evidence::EvidenceRecord;
 use crate::data::scene::Scene;
 use crate::planets::periodogram::{
     CircularOrbit, Frequencies, FrequencyError, FrequencySettings, Imitation, RotationPeriods, Row,
@@ -12,7 +14,7 @@ use crate::planets::verdict::{Finding, Remark, Signal, Verdict};
 use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, robustness};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::fit::Explained;
-use crate::posterior::objective::{Parameter, ParameterValues, Prior};
+use crate::posterior::objective::{Elements, Parameter, ParameterValues, Prior, for_blind_search, period_prior};
 use serde::{Deserialize, Serialize};
 
 /// Frequencies closer than this many inverse time bases are the same.
@@ -28,6 +30,10 @@ pub struct BlindSearch {
     /// The star's own periods under this sampling; null where there was no search.
     #[doc(hidden)]
     pub rotation: Option<RotationPeriods>,
+    /// Bayes factors of no, one and two planets; absent where the config has no priors for them.
+    #[doc(hidden)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<EvidenceRecord>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -53,24 +59,29 @@ impl BlindSearch {
             spots: scene.spots(),
             ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), nuisances(&scene.settings.free))
         };
+        let values = for_blind_search(scene.settings.values, &scene.settings.free);
         let anew;
         let found = match before {
             Some(found) => found,
             None => {
-                anew = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ())?;
+                anew = Detection::find(&scene.imager, values, frequencies, &settings, &|_| ())?;
                 &anew
             }
         };
         let explained = Explained::new(&scene.imager, &scene.observations, found.last());
         let misfit: Vec<String> = explained.misfit.into_iter().chain(scene.measured.misfit_text()).collect();
         // of what is no candidate it would say nothing
-        let choices = found.is_candidate().then(|| robustness(&scene.imager, scene.settings.values, &settings, found));
+        let choices = found.is_candidate().then(|| robustness(&scene.imager, values, &settings, found));
         let evidence =
             Evidence { imager: &scene.imager, settings: &settings, robustness: choices.as_ref(), misfit: &misfit };
         let mut remarks = found.remarks(&evidence);
+        let of_the_star: Vec<Remark> =
+            remarks.iter().filter(|remark| !found.of_the_period().contains(remark)).cloned().collect();
         let mut verdict = found.verdict(&remarks);
         let prior = |p: Parameter| scene.settings.free.iter().find(|f| f.parameter == p).map(|f| f.prior);
-        let periods = Periods::of(prior(Parameter::PorbOverProt), &scene.settings.values, found);
+        let [planet, _] = &Elements::PLANETS;
+        let of_period = period_prior(&scene.settings.free, planet, scene.space.clock());
+        let periods = Periods::of(of_period, &scene.settings.values, found);
         if !periods.contain(found.best.porb_over_prot) {
             remarks.retain(|remark| !found.of_the_period().contains(remark));
             remarks.push(Remark::against(
@@ -96,13 +107,38 @@ impl BlindSearch {
             verdict = verdict.with(std::slice::from_ref(&outside));
             remarks.push(outside);
         }
-        Ok(BlindSearch { verdict, rotation: Some(found.blind.rotation.clone()), remarks })
+        let planets = scene.evidence(&found.planet_free.quadratic);
+        let (verdict, mut remarks) =
+            with_known(known_planets(scene, &settings, found, &of_the_star), verdict, remarks, of_the_star);
+        remarks.extend(planets.iter().map(|planets| Remark::note(planets.sentence.clone())));
+        Ok(BlindSearch { verdict, rotation: Some(found.blind.rotation.clone()), remarks, evidence: planets })
     }
 
     fn failed(error: &SearchError) -> Self {
         let verdict = Verdict::not_judged(format!("the blind search failed ({error})"));
-        BlindSearch { verdict, remarks: Vec::new(), rotation: None }
+        BlindSearch { verdict, remarks: Vec::new(), rotation: None, evidence: None }
     }
+}
+
+/// The verdict is that on a planet of known ephemeris where the config looks for one first; what else is found is said
+/// beside it.
+pub fn with_known(
+    known: Vec<KnownPlanet>,
+    verdict: Verdict,
+    mut remarks: Vec<Remark>,
+    of_the_star: Vec<Remark>,
+) -> (Verdict, Vec<Remark>) {
+    let mut head = verdict.clone();
+    for KnownPlanet { is_first, verdict: known } in known {
+        if is_first {
+            remarks = of_the_star.clone();
+            remarks.push(Remark::note(format!("the blind search, beside the known planet: {}", verdict.sentence)));
+            head = known;
+        } else {
+            remarks.push(Remark::note(format!("the planet of known ephemeris: {}", known.sentence)));
+        }
+    }
+    (head, remarks)
 }
 
 /// The periods that a config allows.

@@ -8,13 +8,13 @@ mod conclusions;
 use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::posterior::objective::{
-    CHI2, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, SPOTTEDNESS, definition, in_earths,
+    CHI2, Elements, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, Quoted, SPOTTEDNESS, definition,
+    in_earths,
 };
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
 use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
 use crate::sampling::ensemble::Positions;
-use crate::star::Orbit;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -131,13 +131,16 @@ impl Manifest {
     /// injected.
     pub fn true_quantity(&self, settings: &Settings, name: &str, estimate: f64) -> Option<f64> {
         let truth = self.origin.truth.as_ref()?;
-        let value = |p: Parameter| truth.get(p.name()).copied();
-        let orbit = Orbit {
-            k_kms: value(Parameter::K).filter(|k| *k != 0.0)?,
-            porb_over_prot: value(Parameter::PorbOverProt)?,
-            phi: value(Parameter::Phi)?,
-        };
-        self.orbit_quantities(settings).value(OrbitQuantity::from_name(name)?, &orbit, Some(estimate))
+        let quoted = Quoted::from_name(name)?;
+        let elements = &Elements::PLANETS[quoted.planet];
+        let mut values = settings.values;
+        // an orbit that was simulated is a circle unless its shape is there
+        elements.shape.into_iter().for_each(|p| values[p] = 0.0);
+        for (p, value) in truth.iter().filter_map(|(name, value)| Some((Parameter::from_name(name)?, *value))) {
+            values[p] = value;
+        }
+        truth.get(elements.k.name()).filter(|k| **k != 0.0)?;
+        self.orbit_quantities(settings).value(quoted.quantity, &elements.orbit(&values), Some(estimate))
     }
 
     /// Injected values of the parameters and of what `summary` derives from them, for its table; `None` for observed
@@ -231,8 +234,8 @@ impl Manifest {
 pub fn kinds_and_goals(settings: &Settings) -> (Vec<ParameterKind>, Goals) {
     let kind = |f: &FreeParameter| match (f.parameter, f.prior) {
         (_, Prior::Periodic) => ParameterKind::Periodic,
-        (Parameter::Phi, prior) if prior.bounds().1 - prior.bounds().0 >= 1.0 => ParameterKind::Periodic,
-        (Parameter::K, _) => ParameterKind::Amplitude,
+        (p, prior) if p.is_phase() && prior.bounds().1 - prior.bounds().0 >= 1.0 => ParameterKind::Periodic,
+        (p, _) if p.is_amplitude() => ParameterKind::Amplitude,
         _ => ParameterKind::Linear,
     };
     let goals = Goals { rhat: settings.sampler.rhat, ess: settings.sampler.ess };

@@ -4,8 +4,10 @@
 //!
 //! 1. [`pool`] spreads reconstructions over threads, or over the ranks of a `cluster`.
 //! 2. [`origin`] and [`manifest`] are what a folder was begun with.
-//! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`blind_search`] and
-//!    [`limits`] searches for orbits.
+//! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`maps`] the star there,
+//!    [`simulated`] what it was made with; [`periodogram`], [`blind_search`] and [`limits`] are searches for orbits,
+//!    [`known_planet`] what is said of a planet of known ephemeris, [`plan`] what profiles not yet taken would show.
+//!    [`log_posterior`] is the density of a chain for samplers elsewhere.
 //! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] holds a chain against a
 //!    landscape, [`experiments`] has the rows of the paper.
 //! 5. [`export`] writes a chain for other programs. A new format is a file of it, and a variant of `Format` in
@@ -19,10 +21,16 @@ pub mod comparison;
 pub mod experiments;
 pub mod export;
 pub mod grid_scan;
+pub mod known_planet;
 pub mod limits;
+pub mod log_posterior;
 pub mod manifest;
+pub mod maps;
 pub mod merge;
 pub mod optimum;
 pub mod origin;
+pub mod periodogram;
+pub mod plan;
 pub mod pool;
 pub mod run;
+pub mod simulated;

@@ -1,17 +1,21 @@
 //! What `optimise` found: `optimum.json`, and the same as a table.
 
+use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::io::provenance::Provenance;
 use crate::data::scene::Scene;
 use crate::data::search::{Attempt, Found};
 use crate::numerics::text::listed;
-use crate::posterior::objective::{Estimate, OrbitQuantities, OrbitQuantity, Parameter, definition, in_earths};
+use crate::posterior::objective::{
+    Elements, Estimate, OrbitQuantities, OrbitQuantity, Parameter, Quoted, definition, in_earths,
+};
 use crate::runs::blind_search::BlindSearch;
-use crate::runs::origin::{OptimumRecord, ReferenceRecord, by_name};
+use crate::runs::origin::{OptimumRecord, ReferenceRecord};
 use crate::sampling::log_density::LogDensity as _;
 use crate::sampling::optimise::Optimum;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// Name of the file.
 pub const FILE: &str = "optimum.json";
@@ -101,7 +105,7 @@ impl OptimumFile {
             blind_search: BlindSearch::of(scene, found.detection.as_deref())
                 .map(|search| search.beside(porb_over_prot, prot)),
             derived,
-            truth: scene.truth.map(|values| by_name(&values)),
+            truth: scene.named_truth(),
             derived_truth,
             reference: ReferenceRecord::of(&found.posterior),
             starts: found.attempts.iter().map(StartRecord::of).collect(),
@@ -109,6 +113,14 @@ impl OptimumFile {
             time_span_d: scene.observations.time_span_d(),
             provenance: scene.provenance(),
         }
+    }
+
+    /// Writes `optimum.json` into `folder`, which must exist.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
+        write_json(&folder.join(FILE), self)
     }
 
     /// A table of the parameters and a verdict.
@@ -145,9 +157,8 @@ impl OptimumFile {
 
     /// What is usually quoted of the orbit, and what names mean.
     fn derived_table(&self) -> String {
-        let of = OrbitQuantity::ALL.map(OrbitQuantity::name);
-        let rows: Vec<(&str, &Estimate)> =
-            of.into_iter().filter_map(|name| Some((name, self.derived.get(name)?))).collect();
+        let of = Quoted::all().map(Quoted::name);
+        let rows: Vec<(&str, &Estimate)> = of.filter_map(|name| Some((name, self.derived.get(name)?))).collect();
         let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         let mut text = String::new();
         for (name, Estimate { value, sd }) in &rows {
@@ -174,20 +185,30 @@ fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<String, Estimate>, BTr
     let settings = &scene.settings;
     let quantities = OrbitQuantities::new(&settings.star, settings.mass_msun, scene.observations.time_span_d());
     let free: Vec<Parameter> = scene.space.free().iter().map(|one| one.parameter).collect();
-    let mut values = settings.values;
-    free.iter().zip(&optimum.theta).for_each(|(parameter, value)| values[*parameter] = *value);
     let place = |p: Parameter| free.iter().position(|one| *one == p);
+    let values = scene.space.values_at(&optimum.theta);
     let covariance =
         |p: Parameter, q: Parameter| place(p).zip(place(q)).map_or(0.0, |(i, j)| optimum.written_covariance[(i, j)]);
-    let orbital = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
-    let covariance = orbital.map(|p| orbital.map(|q| covariance(p, q)));
+    let circle = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
+    let covariance = circle.map(|p| circle.map(|q| covariance(p, q)));
+    let is_circle = free.iter().filter(|p| p.is_orbital()).all(|p| circle.contains(p));
     let (mut derived, mut truth) = (BTreeMap::new(), BTreeMap::new());
-    for quantity in quantities.of_free(&free) {
-        let Some(found) = quantities.estimate(quantity, &values.state().orbit, &covariance) else { continue };
-        derived.insert(quantity.name().to_owned(), found);
-        let injected = scene.truth.map(|truth| truth.state().orbit).filter(|orbit| orbit.k_kms != 0.0);
-        let injected = injected.and_then(|orbit| quantities.value(quantity, &orbit, Some(found.value)));
-        truth.extend(injected.map(|value| (quantity.name().to_owned(), value)));
+    for quoted in quantities.of_free(&free) {
+        let orbit = values.motion().first;
+        let found = match is_circle && values.given(Parameter::SqrtECosOmega).is_none() {
+            true => quantities.estimate(quoted.quantity, &orbit.orbit, &covariance),
+            false => {
+                let place = (scene.space.free(), &optimum.theta[..]);
+                quantities.estimate_at(quoted, place, &values, &optimum.written_covariance)
+            }
+        };
+        let Some(found) = found else { continue };
+        derived.insert(quoted.name().to_owned(), found);
+        let elements = &Elements::PLANETS[quoted.planet];
+        let injected = scene.truth.filter(|truth| truth.given(elements.k).is_some_and(|k| k != 0.0));
+        let injected = injected.map(|truth| elements.orbit(&truth));
+        let injected = injected.and_then(|orbit| quantities.value(quoted.quantity, &orbit, Some(found.value)));
+        truth.extend(injected.map(|value| (quoted.name().to_owned(), value)));
     }
     (derived, truth)
 }

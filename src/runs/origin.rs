@@ -197,7 +197,7 @@ impl Origin {
             measured,
             profiles: Some(scene.observations.profiles.len()),
             time_span_d: scene.observations.time_span_d(),
-            truth: scene.truth.map(|values| by_name(&values)),
+            truth: scene.named_truth(),
             reference: ReferenceRecord::of(&found.posterior),
             optimum: OptimumRecord::of(names, &found.optimum),
             rivals: found.rivals().into_iter().map(|rival| OptimumRecord::of(names, rival)).collect(),

@@ -156,10 +156,10 @@ mod tests {
         let mut profile = gaussian(0.0);
         profile.intensity.iter_mut().for_each(|i| *i += 0.25);
         profile.sigma = (0..81).map(|j| if j < 40 { 1e-3 } else { 2e-3 }).collect();
-        let moved = shifted(&profile, STEP, 10.0 * STEP);
+        let moved = shifted(&profile, 10.0 * STEP);
         assert!(moved.intensity[..10].iter().all(|i| (i - 1.25).abs() < 1e-12));
         assert_eq!((moved.sigma[49], moved.sigma[50]), (1e-3, 2e-3));
-        let half = shifted(&profile, STEP, 0.5 * STEP).sigma[40];
+        let half = shifted(&profile, 0.5 * STEP).sigma[40];
         assert!((half - 2.5e-6_f64.sqrt()).abs() < 1e-15, "variances are averaged: {half}");
     }
 }

@@ -13,7 +13,8 @@
 //!    way for a star that differs little.
 //!
 //! Beside that: [`Band`] has the flux of the star, [`observation`] has profiles and what they measure by themselves,
-//! [`injection`] puts an orbit into them, [`planet`] says what is quoted of an orbit.
+//! [`injection`] puts an orbit into them, [`planet`] says what is quoted of an orbit ([`kepler`] has its anomalies),
+//! [`stability`] whether two can last.
 
 mod block;
 pub mod brightness;
@@ -23,6 +24,7 @@ mod deposit;
 mod filling;
 pub mod grid;
 pub mod injection;
+pub mod kepler;
 mod kernel;
 pub mod limb_darkening;
 mod line_profile;
@@ -37,6 +39,7 @@ pub mod response;
 pub mod rotation;
 mod sorting;
 pub mod spots;
+pub mod stability;
 mod stacked;
 mod view;
 mod voigt;
@@ -45,7 +48,7 @@ pub use brightness::{Brightness, BrightnessModel};
 pub use grid::{Quadrature, SurfaceGrid};
 pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;
-pub use orbit::Orbit;
+pub use orbit::{Eccentric, Motion, Orbit, Shape};
 pub use photometry::Band;
 pub use response::Sampling;
 pub use rotation::Rotation;
@@ -140,8 +143,8 @@ pub struct StarState {
     pub vsini_kms: f64,
     /// Systemic velocity (km/s).
     pub vsys_kms: f64,
-    /// Orbit of the planet.
-    pub orbit: Orbit,
+    /// Orbit of the planet, or orbits of both.
+    pub motion: Motion,
     /// What differs from the star's settings.
     pub surface: Surface,
 }

@@ -99,7 +99,7 @@ mod tests {
             inclination: 0.7 + tilt,
             vsini_kms: 40.0 + vsini_kms,
             vsys_kms: 0.3,
-            orbit: Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.4 },
+            motion: Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.4 }.into(),
             surface: Default::default(),
         }
     }

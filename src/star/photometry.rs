@@ -60,7 +60,7 @@ mod tests {
             inclination,
             vsini_kms: 30.0,
             vsys_kms: 5.0,
-            orbit: Orbit { k_kms: 0.3, porb_over_prot: 1.7, phi: 0.2 },
+            motion: Orbit { k_kms: 0.3, porb_over_prot: 1.7, phi: 0.2 }.into(),
             surface: Surface { limb_darkening: Some(0.1), contrast: Some(0.3), ..Surface::default() },
         };
         let band = Band { contrast: None, limb_darkening: Some(limb) };

@@ -82,7 +82,7 @@ impl Part {
             Some(*end)
         }));
         let profiles = sampling.profiles.iter().map(|&(time, first_velocity, bins)| {
-            let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
+            let shift = state.vsys_kms + state.motion.velocity_kms(star.cycle(time));
             (first_velocity - shift - deposit.origin_kms(), bins)
         });
         let convolutions = Convolutions::new(&kernel, grid, profiles);
@@ -340,7 +340,7 @@ mod tests {
             inclination: 0.7,
             vsini_kms: 40.0,
             vsys_kms: 0.3,
-            orbit: Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.4 },
+            motion: Orbit { k_kms: 0.1, porb_over_prot: 1.7, phi: 0.4 }.into(),
             surface: Default::default(),
         };
         let sampling = Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (0.7 * k as f64, -50.0, 57)).collect() };

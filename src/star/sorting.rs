@@ -292,7 +292,7 @@ mod tests {
             inclination: 0.7,
             vsini_kms: 40.0,
             vsys_kms: 0.0,
-            orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 },
+            motion: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 }.into(),
             surface: Default::default(),
         };
         let viewer = Viewer::new(&state, LimbDarkening::Linear(0.7), 1.0);

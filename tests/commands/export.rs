@@ -311,3 +311,53 @@ fn a_run_may_grow_meanwhile() {
         assert_eq!(desk.read("run/chain.jsonl").len(), cut, "the chain is left alone");
     }
 }
+
+/// A search of a small star in `search`.
+fn searched() -> Desk {
+    let desk = Desk::new(two_spots(json!({})));
+    desk.succeed(&["periodogram", CONFIG, "--draws", "1000", "--out", "search"]);
+    desk
+}
+
+#[test]
+fn velocities_are_passed_on_with_their_covariance() {
+    let desk = searched();
+    let said = desk.succeed(&["export", "search", "--format", "rv"]);
+    says(&said, &["written: search/rv/README.txt", "radvel.csv", "rv_likelihood.py"]);
+    let readme = desk.read("search/rv/README.txt");
+    says(&readme, &["as such a package would quote it", "instead of 1", "km/s  pyaneti", "m/s   kima"]);
+    let lines = |name: &str| desk.read(&format!("search/rv/{name}")).lines().map(str::to_owned).collect::<Vec<_>>();
+    let profiles = desk.read("search/rv.csv").lines().count() - 1;
+    let heads = [("radvel.csv", 1), ("juliet.dat", 0), ("kima.txt", 1), ("pyaneti.dat", 1), ("covariance_m2s2.csv", 0)];
+    for (name, head) in heads {
+        assert_eq!(lines(name).len(), profiles + head, "{name}");
+    }
+    let row = desk.read("search/rv.csv").lines().nth(1).unwrap().split(',').map(str::to_owned).collect::<Vec<_>>();
+    let [kms, ms] = [("pyaneti.dat", 1), ("juliet.dat", 0)].map(|(name, k)| {
+        let line = lines(name)[k].clone();
+        line.split(' ').nth(1).unwrap().parse::<f64>().unwrap()
+    });
+    assert_eq!(kms, row[2].parse::<f64>().unwrap());
+    assert!((ms - 1000.0 * kms).abs() < 1e-9 * ms.abs());
+    // nothing is replaced without --force, and nothing but an export with it
+    says(&desk.refusal(&["export", "search", "--format", "rv"]), &["search/rv", "--force"]);
+    desk.succeed(&["export", "search", "--format", "rv", "--force"]);
+    let foreign = desk.refusal(&["export", "search", "--format", "rv", "--out", "search", "--force"]);
+    says(&foreign, &["search", "no earlier export"]);
+    desk.edit("search/covariance.csv", |text| text.lines().skip(1).map(|line| format!("{line}\n")).collect());
+    let short = desk.refusal(&["export", "search", "--format", "rv", "--out", "other"]);
+    says(&short, &["search/covariance.csv", &format!("{} lines instead of {profiles}", profiles - 1)]);
+    says(&desk.refusal(&["export", ".", "--format", "rv"]), &["periodogram.json"]);
+}
+
+#[test]
+#[ignore = "long: .ci/run has it run"]
+fn numpy_reads_the_velocities() {
+    let Some(python) = crate::python::python() else { return };
+    let desk = searched();
+    desk.succeed(&["export", "search", "--format", "rv"]);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/velocities.py");
+    let output = Command::new(&python).arg(script).arg("search/rv").current_dir(desk.path("")).output().unwrap();
+    println!("{}", text(&output.stdout));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}

@@ -27,6 +27,7 @@ mod newcomer;
 mod noise;
 mod orbit_quantities;
 mod periodogram;
+mod plan;
 mod plot;
 mod report;
 mod reproduce;

@@ -42,8 +42,8 @@ fn the_files_are_typed_and_the_figures_are_of_them() {
     let said = desk.succeed(&["plot", "maps"]);
     says(&said, &["maps.svg", "changes.svg", "profiles.svg", "residuals.svg", "rv.svg"]);
     let strip = desk.read("maps/figures/maps.svg");
-    for label in ["−2.00 d", "0.50 d", "10000.00 d", "spot filling factor", "standard deviation of the filling factor"]
-    {
+    let words = ["spot filling factor", "standard deviation of the filling factor"];
+    for label in ["−2.00 d", "0.50 d", "10000.00 d"].into_iter().chain(words) {
         assert!(texts(&strip).contains(&label), "{label}: {:?}", texts(&strip));
     }
     // three maps and three of their errors; nothing above latitude -30 is hidden at 50 degrees

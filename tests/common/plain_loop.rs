@@ -39,7 +39,7 @@ impl<const WINDOW: usize> PlainLoop<WINDOW> {
         for &(time, first_velocity, bins) in &sampling.profiles {
             assert!(bins >= WINDOW, "{bins} bins are fewer than a window of {WINDOW}");
             let first_pair = plain.pairs.len();
-            let shift = state.vsys_kms + state.orbit.velocity_kms(star.cycle(time));
+            let shift = state.vsys_kms + state.motion.velocity_kms(star.cycle(time));
             for pixel in 0..grid.len() {
                 let (mu, velocity) = look(grid, pixel, state, time - star.epoch_d);
                 if mu <= 0.0 {

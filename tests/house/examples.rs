@@ -14,6 +14,7 @@ const ORDER: &[&str] = &[
     "inject",
     "init",
     "import",
+    "plan",
     "schema",
     "completions",
     "man",

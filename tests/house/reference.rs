@@ -51,7 +51,7 @@ impl<'a> Page<'a> {
     /// What a `$ref`, or a choice of something and null or a list of it, refers to.
     fn resolve(&self, part: &'a Value) -> &'a Value {
         if let Some(reference) = part["$ref"].as_str() {
-            return &self.schema["$defs"][reference.rsplit('/').next().unwrap()];
+            return self.resolve(&self.schema["$defs"][reference.rsplit('/').next().unwrap()]);
         }
         let choices: Option<Vec<&Value>> = part["anyOf"]
             .as_array()

@@ -50,12 +50,21 @@ fn demo() -> Value {
     demo
 }
 
-/// A folder as examples expect it: `configs` with the small demo and the schema.
+/// `configs/plan.json` with few pixels and profiles.
+fn planned() -> Value {
+    let mut plan: Value = serde_json::from_slice(&std::fs::read(root().join("configs/plan.json")).unwrap()).unwrap();
+    plan["imaging"]["pixels"] = json!(300);
+    plan["observations"]["simulate"]["schedule"]["per_night"] = json!([1, 2]);
+    plan
+}
+
+/// A folder as examples expect it: `configs` with the small demo, a plan and the schema.
 pub fn desk() -> Desk {
     let desk = Desk::new(json!(null));
     std::fs::create_dir(desk.path("configs")).unwrap();
     desk.write("configs/demo.json", &demo().to_string());
     desk.write("configs/stars.txt", "demo.json\n");
+    desk.write("configs/plan.json", &planned().to_string());
     std::fs::copy(root().join("configs/dimcmc.schema.json"), desk.path("configs/dimcmc.schema.json")).unwrap();
     desk
 }

@@ -41,7 +41,7 @@ fn wide(parameter: Parameter) -> Prior {
         Parameter::Vsys => Prior::Uniform { min: -1.0, max: 1.0 },
         Parameter::LimbDarkening | Parameter::Contrast => Prior::Uniform { min: 0.0, max: 1.0 },
         Parameter::LineSigma | Parameter::EquivalentWidth => Prior::Uniform { min: 1.0, max: 9.0 },
-        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => unreachable!("one map"),
+        other => unreachable!("{other:?}: one map, one planet on a circle"),
     }
 }
 
@@ -124,13 +124,14 @@ fn stellar_parameters_one_sigma_off() {
         Parameter::LineSigma => 0.025,
         Parameter::EquivalentWidth => 0.002,
         Parameter::Contrast => 0.02,
-        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => unreachable!("one map"),
+        other => unreachable!("{other:?}: one map, one planet on a circle"),
     };
     for (s, &p) in STELLAR.iter().enumerate() {
         let i = expansion.profiles() + s;
         println!("{}: {} with all else fixed", p.name(), expansion.information[(i, i)].powf(-0.5));
     }
-    let of_one_map: Vec<Parameter> = Parameter::ALL.into_iter().filter(|p| !p.is_of_field()).collect();
+    let of_one_map: Vec<Parameter> =
+        Parameter::ALL.into_iter().filter(|p| reference.values.given(*p).is_some()).collect();
     for (i, &a) in of_one_map.iter().enumerate() {
         for &b in &of_one_map[i..] {
             for sign in [-1.0, 1.0] {
@@ -176,7 +177,7 @@ fn marginalised_velocities() {
     let imager = imager(&oracle, SurfaceGrid::equal_area(800, Quadrature::Gauss2x2));
     let reference = Reference::provisional(&imager, whole_truth(&oracle), 0.97).unwrap();
     let expansion = Expansion::of(&imager, &reference, &STELLAR);
-    let orbit = |cycle: f64| reference.values.state().orbit.velocity_kms(cycle);
+    let orbit = |cycle: f64| reference.values.state().motion.velocity_kms(cycle);
     let nuisance = |parameter: Parameter, sd: f64| Nuisance { parameter, mean: reference.values[parameter], sd };
     let (fixed, fixed_covariance) = expansion.velocities(&[]).radial_velocities().unwrap();
     // no prior width: nothing changes

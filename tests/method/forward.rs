@@ -11,7 +11,7 @@ fn state() -> StarState {
         inclination: 38.0_f64.to_radians(),
         vsini_kms: 40.0,
         vsys_kms: 0.0,
-        orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.7, phi: 0.5 },
+        motion: Orbit { k_kms: 0.0, porb_over_prot: 1.7, phi: 0.5 }.into(),
         surface: Default::default(),
     }
 }
@@ -111,7 +111,7 @@ fn orbit_and_systemic_velocity_shift_the_profile_as_a_whole() {
     let sampling = sampling(&[0.7]);
     let orbit = Orbit { k_kms: 0.9, porb_over_prot: 1.3, phi: 0.2 };
     let cycle = 0.7 / oracle().star.rotation_period_d;
-    let moved = unspotted(&grid, &StarState { orbit, vsys_kms: 0.4, ..state() }, &sampling, LINEAR);
+    let moved = unspotted(&grid, &StarState { motion: orbit.into(), vsys_kms: 0.4, ..state() }, &sampling, LINEAR);
     let shift = 0.4 + orbit.velocity_kms(cycle);
     let shifted = Sampling { profiles: vec![(0.7, -59.4 - shift, 67)], ..sampling };
     let at_rest = unspotted(&grid, &state(), &shifted, LINEAR);

@@ -156,7 +156,7 @@ fn light_curves_halve_the_error_of_the_lifetime_and_do_not_bias_k() {
             let error = ((2.0 * at(0.0) - at(0.3) - at(-0.3)) / 0.09).max(0.0).sqrt().recip();
             // along the true orbit: its velocities are those of the values
             let quadratic = fitted.expansion(&scene.imager, &basis, &[]).unwrap();
-            let orbit = scene.settings.values.state().orbit;
+            let orbit = scene.settings.values.state().motion.first.orbit;
             let unit =
                 DVector::from_iterator(16, quadratic.cycles.iter().map(|c| orbit.velocity_kms(*c) / orbit.k_kms));
             let information = (quadratic.information * &unit).dot(&unit);

@@ -21,6 +21,7 @@ mod objective;
 mod oracle;
 mod paraboloid;
 mod pixels;
+mod plan;
 mod posterior;
 mod response;
 mod simulate;

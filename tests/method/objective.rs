@@ -63,11 +63,9 @@ const MAPS: [Option<Entropy>; 2] = [None, Some(Entropy::BrightAndDark)];
 /// The start of a space with all parameters off by about one standard deviation each, in varying directions.
 fn nearby(space: &ParameterSpace, i: usize) -> Vec<f64> {
     let sigma = [0.01, 0.06, 0.035, 0.0005, 0.0014, 0.3, 0.015, 0.008];
-    let offset = |parameter: Parameter| {
-        let j = parameter as usize;
-        0.7 * sigma[j] * ((7 * j + 13 * i) as f64).sin()
-    };
-    space.start().iter().zip(space.free()).map(|(x, free)| x + offset(free.parameter)).collect()
+    assert!(space.dimension() <= sigma.len());
+    let offset = |j: usize| 0.7 * sigma[j] * ((7 * j + 13 * i) as f64).sin();
+    space.start().iter().enumerate().map(|(j, x)| x + offset(j)).collect()
 }
 
 #[test]
@@ -362,7 +360,8 @@ fn absurd_parameters_are_refused_not_computed() {
     let posterior = &posteriors(None)[0];
     for (parameter, value) in [(Parameter::K, f64::NAN), (Parameter::K, -0.1), (Parameter::Vsini, 1e9)] {
         let mut theta = posterior.space().start();
-        theta[parameter as usize] = value;
+        let place = posterior.space().free().iter().position(|f| f.parameter == parameter).unwrap();
+        theta[place] = value;
         let evaluation = posterior.evaluate(&theta);
         assert_eq!(
             (evaluation.log_prob, evaluation.model_applications),

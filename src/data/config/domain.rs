@@ -8,7 +8,7 @@ use crate::posterior::objective::{Parameter, Prior};
 /// Where a value of the parameter stands in the config.
 pub(super) fn key(parameter: Parameter) -> String {
     match parameter {
-        Parameter::K | Parameter::PorbOverProt | Parameter::Phi => format!("planet.{}", parameter.name()),
+        _ if parameter.is_orbital() => format!("planet.{}", parameter.name()),
         Parameter::LimbDarkening => "star.limb_darkening.coefficients".into(),
         Parameter::LineSigma => "star.line.sigma_kms".into(),
         Parameter::EquivalentWidth => "star.line.equivalent_width_kms".into(),
@@ -41,14 +41,19 @@ pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> 
 /// Whether a value makes sense at all, whatever the prior.
 pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result<(), Fault> {
     let (fine, allowed) = match parameter {
-        Parameter::K => (value >= 0.0, "0 or more"),
-        Parameter::PorbOverProt | Parameter::OmegaEq => (value > 0.0, "above 0"),
+        Parameter::K | Parameter::K2 => (value >= 0.0, "0 or more"),
+        Parameter::PorbOverProt | Parameter::PorbOverProt2 => (value > 0.0, "above 0"),
+        Parameter::Period | Parameter::Period2 | Parameter::OmegaEq => (value > 0.0, "above 0"),
+        _ if parameter.is_shape() => (value.abs() < 1.0, "above -1 and below 1"),
+        Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => unreachable!("shapes"),
+        Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => unreachable!("shapes"),
+        Parameter::Conjunction | Parameter::Conjunction2 => (true, "finite"),
         Parameter::LineSigma | Parameter::EquivalentWidth => (value > 0.0, "above 0"),
         Parameter::LimbDarkening => ((0.0..=1.0).contains(&value), "from 0 to 1"),
         Parameter::Contrast => ((0.0..1.0).contains(&value), "0 or more and below 1"),
         Parameter::Vsini => (value > 0.0 && value <= most::VSINI_KMS, "above 0 and up to 2000"),
         Parameter::Inclination => (value > 0.0 && value <= 90.0, "above 0 and up to 90"),
-        Parameter::Phi | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
+        Parameter::Phi | Parameter::Phi2 | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
         Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => {
             let (low, high) = marginal::bounds(parameter);
             return match (low..=high).contains(&value) {
@@ -61,9 +66,10 @@ pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result
         return Err(Fault::new(key, format!("{value} must be {allowed}")));
     }
     match parameter {
-        Parameter::K | Parameter::Vsys => check_size(key, value, most::VELOCITY_KMS),
+        Parameter::K | Parameter::K2 | Parameter::Vsys => check_size(key, value, most::VELOCITY_KMS),
         Parameter::LineSigma | Parameter::EquivalentWidth => check_size(key, value, most::VELOCITY_KMS),
-        Parameter::PorbOverProt => check_size(key, value, most::TIME),
+        Parameter::PorbOverProt | Parameter::PorbOverProt2 => check_size(key, value, most::TIME),
+        _ if parameter.is_ephemeris() => check_size(key, value, most::TIME),
         Parameter::OmegaEq | Parameter::DOmega => check_size(key, value, most::OMEGA_RAD_D),
         _ => Ok(()),
     }
@@ -72,10 +78,15 @@ pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result
 /// Widest bounds of a prior.
 fn domain(parameter: Parameter, phi_free: bool) -> (f64, f64) {
     match parameter {
-        Parameter::K if !phi_free => (f64::NEG_INFINITY, f64::INFINITY),
-        Parameter::K | Parameter::PorbOverProt | Parameter::OmegaEq | Parameter::Vsini => (0.0, f64::INFINITY),
+        Parameter::K | Parameter::K2 if !phi_free => (f64::NEG_INFINITY, f64::INFINITY),
+        Parameter::K | Parameter::PorbOverProt | Parameter::Period => (0.0, f64::INFINITY),
+        Parameter::K2 | Parameter::PorbOverProt2 | Parameter::Period2 => (0.0, f64::INFINITY),
+        Parameter::OmegaEq | Parameter::Vsini => (0.0, f64::INFINITY),
+        Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => (-1.0, 1.0),
+        Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => (-1.0, 1.0),
+        Parameter::Conjunction | Parameter::Conjunction2 => (f64::NEG_INFINITY, f64::INFINITY),
         Parameter::LineSigma | Parameter::EquivalentWidth => (0.0, f64::INFINITY),
-        Parameter::Phi | Parameter::LimbDarkening | Parameter::Contrast => (0.0, 1.0),
+        Parameter::Phi | Parameter::Phi2 | Parameter::LimbDarkening | Parameter::Contrast => (0.0, 1.0),
         Parameter::Inclination => (0.0, 90.0),
         Parameter::DOmega | Parameter::Vsys => (f64::NEG_INFINITY, f64::INFINITY),
         Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => marginal::bounds(parameter),
@@ -111,6 +122,14 @@ pub(super) fn resolve_prior(parameter: Parameter, section: &PriorSection, phi_fr
             Ok(Prior::Isotropic { min, max })
         }
         PriorKind::Normal => reader.normal(),
+        PriorKind::UnitDisc => {
+            reader.refuse(&["min", "mean", "sd"])?;
+            let max_eccentricity = section.max.unwrap_or(1.0);
+            match max_eccentricity > 0.0 && max_eccentricity <= 1.0 {
+                true => Ok(Prior::Disc { max_eccentricity }),
+                false => Err(reader.fault("max", format!("{max_eccentricity} must be above 0 and up to 1"))),
+            }
+        }
     }
 }
 
@@ -141,6 +160,7 @@ impl Reader<'_> {
             PriorKind::Normal => "normal",
             PriorKind::Isotropic => "isotropic",
             PriorKind::Periodic => "periodic",
+            PriorKind::UnitDisc => "unit-disc",
         }
     }
 
@@ -149,8 +169,17 @@ impl Reader<'_> {
             (PriorKind::Isotropic, p) if p != Parameter::Inclination => {
                 "an isotropic prior is for inclination_deg only"
             }
-            (PriorKind::Periodic, p) if p != Parameter::Phi => "a periodic prior is for phi only",
-            (PriorKind::Normal | PriorKind::LogUniform, Parameter::Phi) => "phi takes a periodic or a uniform prior",
+            (PriorKind::Periodic, p) if !p.is_phase() => "a periodic prior is for phi only",
+            (PriorKind::Normal | PriorKind::LogUniform, p) if p.is_phase() => "phi takes a periodic or a uniform prior",
+            (PriorKind::UnitDisc, p) if !p.is_shape() => {
+                "a unit-disc prior is for sqrt_e_cos_omega and sqrt_e_sin_omega only"
+            }
+            (kind, p) if p.is_shape() && kind != PriorKind::UnitDisc => {
+                "sqrt_e_cos_omega and sqrt_e_sin_omega take a unit-disc prior"
+            }
+            (PriorKind::LogUniform, Parameter::Conjunction | Parameter::Conjunction2) => {
+                "the time of a conjunction takes a normal or a uniform prior"
+            }
             _ => return Ok(()),
         };
         Err(self.fault("prior", only))
@@ -172,7 +201,7 @@ impl Reader<'_> {
         let (lowest, highest) = domain(self.parameter, self.phi_free);
         if min < lowest {
             let why =
-                if self.parameter == Parameter::K { " while phi is free: -K at phi is K at phi + 0.5" } else { "" };
+                if self.parameter.is_amplitude() { " while phi is free: -K at phi is K at phi + 0.5" } else { "" };
             return Err(self.fault("min", format!("{min} must not be below {lowest}{why}")));
         }
         if max > highest {

@@ -94,7 +94,12 @@ impl Draft {
             schema: self.schema.clone(),
             star: self.star(),
             instrument: Instrument { resolving_power: Some(self.resolving_power) },
-            planet: Planet { k_kms: self.orbit.0, porb_over_prot: self.orbit.1, phi: self.orbit.2 },
+            planet: Planet {
+                k_kms: self.orbit.0,
+                porb_over_prot: self.orbit.1,
+                phi: self.orbit.2,
+                ..Planet::default()
+            },
             observations: ObservationsSection {
                 path: Some(self.observations.clone()),
                 velocity_range_kms: Some(self.velocity_range_kms.into()),

@@ -1,12 +1,12 @@
 //! The fingerprint of a config: what must be the same for a chain to be resumed; and what two configs that belong
 //! together share.
 
-use crate::posterior::objective::Parameter;
+use crate::posterior::objective::{Elements, Parameter};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, the star's
-/// mass, and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
+/// SHA-256 (hex) of the resolved config without what may change on resuming: `$schema`, `grid`, `plan`, the star's
+/// mass (of a star with one planet), and the sampler's `steps`, `rhat` and `ess`. Independent of the order of keys.
 pub(super) fn fingerprint(resolved: &Value) -> String {
     let mut text = String::new();
     canonical(&decisive(resolved), &mut text);
@@ -85,7 +85,10 @@ fn decisive(resolved: &Value) -> Value {
     if let Some(top) = value.as_object_mut() {
         top.remove("$schema");
         top.remove("grid");
-        if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut) {
+        top.remove("plan");
+        // two planets are stable by it or not
+        let one_planet = !has_second_planet(resolved);
+        if let Some(star) = top.get_mut("star").and_then(Value::as_object_mut).filter(|_| one_planet) {
             star.remove("mass_msun");
         }
         if let Some(sampler) = top.get_mut("sampler").and_then(Value::as_object_mut) {
@@ -93,6 +96,12 @@ fn decisive(resolved: &Value) -> Value {
         }
     }
     value
+}
+
+fn has_second_planet(resolved: &Value) -> bool {
+    let [_, second] = &Elements::PLANETS;
+    let given = |section: &str, p: Parameter| resolved[section].get(p.name()).is_some_and(|value| !value.is_null());
+    second.all().into_iter().any(|p| given("planet", p) || given("parameters", p))
 }
 
 /// Compact JSON with sorted keys, whatever the features serde_json was built with.

@@ -19,6 +19,7 @@ mod raw_parts;
 mod resolve;
 mod resolve_grid;
 mod resolve_observations;
+mod resolve_orbits;
 mod resolve_photometry;
 mod resolve_sets;
 mod resolve_simulation;
@@ -36,6 +37,7 @@ pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use jitter::VelocityJitter;
 pub use photometry::SimulatedLight;
+pub use raw_parts::PlanSection;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{
     DataSetSettings, GridSettings, ImagingSettings, LightCurveSettings, LightSource, ObservationSource, Settings,

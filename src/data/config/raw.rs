@@ -6,8 +6,9 @@ use super::EquivalentWidth;
 use super::data_sets::DataSets;
 use super::listed::Listed;
 use super::photometry::PhotometrySection;
-use super::raw_parts::{Grid, PerParameter, PriorSection};
+use super::raw_parts::{Grid, PerParameter, PlanSection, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
+use crate::posterior::objective::Parameter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -27,11 +28,15 @@ pub(super) struct Config {
     /// The planet; without it there is none (K = 0). Where a parameter is free, this is the start.
     #[serde(default)]
     pub planet: Planet,
-    /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its own.
+    /// The line profiles, observed or simulated: either `path` or `simulate`; or a list of data sets, each with its
+    /// own.
     pub observations: DataSets,
     /// Light curves of the star, with objective "marginal-likelihood": one, or a list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photometry: Option<Listed<PhotometrySection>>,
+    /// What is planned beside the observations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<PlanSection>,
     /// The Doppler image.
     #[serde(default)]
     pub imaging: ImagingSettings,
@@ -69,7 +74,7 @@ pub(super) struct Star {
     #[serde(default)]
     pub domega_rad_d: f64,
     /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It
-    /// decides nothing else, and may be added to a run that is there.
+    /// decides nothing else, and may be added to a run that is there; but two planets must be stable by it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass_msun: Option<f64>,
     /// Limb darkening; linear with coefficient 0.65 if not given.
@@ -159,7 +164,11 @@ pub(super) struct Instrument {
     pub resolving_power: Option<f64>,
 }
 
-/// The planet's circular orbit. Where a parameter is free, its value here is the start.
+/// Period over rotation period where none is given.
+pub(super) const DEFAULT_PORB_OVER_PROT: f64 = 2.0;
+
+/// The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a parameter is
+/// free, its value here is the start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Planet {
@@ -170,10 +179,80 @@ pub(super) struct Planet {
     /// Orbital phase (cycles, 0 to 1): the part of an orbit from `star.epoch_d` (rotation cycle 0) to the next maximum
     /// of the star's radial velocity. `phi` = 0 is a maximum at `star.epoch_d`.
     pub phi: f64,
+    /// Orbital period (d), above 0, in place of `porb_over_prot`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_d: Option<f64>,
+    /// Time of an inferior conjunction (planet in front; d, on the time scale of the observations), in place of `phi`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_conjunction_d: Option<f64>,
+    /// Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's orbit; a
+    /// circle if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e_cos_omega: Option<f64>,
+    /// The same with the sine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e_sin_omega: Option<f64>,
+    /// Semi-amplitude of the star's radial velocity by a second planet (km/s), 0 or more; without any key of its there
+    /// is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k2_kms: Option<f64>,
+    /// Orbital period of the second planet over the rotation period, above 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub porb2_over_prot: Option<f64>,
+    /// Orbital period of the second planet (d), in place of `porb2_over_prot`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period2_d: Option<f64>,
+    /// Orbital phase of the second planet (cycles), as `phi`; 0 if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phi2: Option<f64>,
+    /// Time of an inferior conjunction of the second planet (d), in place of `phi2`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_conjunction2_d: Option<f64>,
+    /// Of the second planet's orbit, as `sqrt_e_cos_omega`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e2_cos_omega2: Option<f64>,
+    /// Of the second planet's orbit, as `sqrt_e_sin_omega`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e2_sin_omega2: Option<f64>,
+}
+
+impl Planet {
+    /// A value that may be left out.
+    pub fn given(&self, parameter: Parameter) -> Option<f64> {
+        match parameter {
+            Parameter::Period => self.period_d,
+            Parameter::Conjunction => self.t_conjunction_d,
+            Parameter::SqrtECosOmega => self.sqrt_e_cos_omega,
+            Parameter::SqrtESinOmega => self.sqrt_e_sin_omega,
+            Parameter::K2 => self.k2_kms,
+            Parameter::PorbOverProt2 => self.porb2_over_prot,
+            Parameter::Period2 => self.period2_d,
+            Parameter::Phi2 => self.phi2,
+            Parameter::Conjunction2 => self.t_conjunction2_d,
+            Parameter::SqrtECosOmega2 => self.sqrt_e2_cos_omega2,
+            Parameter::SqrtESinOmega2 => self.sqrt_e2_sin_omega2,
+            _ => None,
+        }
+    }
 }
 
 impl Default for Planet {
     fn default() -> Self {
-        Planet { k_kms: 0.0, porb_over_prot: 2.0, phi: 0.0 }
+        Planet {
+            k_kms: 0.0,
+            porb_over_prot: DEFAULT_PORB_OVER_PROT,
+            phi: 0.0,
+            period_d: None,
+            t_conjunction_d: None,
+            sqrt_e_cos_omega: None,
+            sqrt_e_sin_omega: None,
+            k2_kms: None,
+            porb2_over_prot: None,
+            period2_d: None,
+            phi2: None,
+            t_conjunction2_d: None,
+            sqrt_e2_cos_omega2: None,
+            sqrt_e2_sin_omega2: None,
+        }
     }
 }

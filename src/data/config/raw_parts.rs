@@ -23,10 +23,45 @@ pub(super) struct PerParameter<T> {
     /// Orbital period over the rotation period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub porb_over_prot: Option<T>,
+    /// Orbital period (d), in place of `porb_over_prot`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_d: Option<T>,
     /// Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's radial
     /// velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phi: Option<T>,
+    /// Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in place of `phi`.
+    /// A normal prior is an ephemeris: at the time of the data it must tell the phase to a tenth of an orbit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_conjunction_d: Option<T>,
+    /// Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's orbit; free
+    /// with `sqrt_e_sin_omega`, both with a unit-disc prior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e_cos_omega: Option<T>,
+    /// The same with the sine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e_sin_omega: Option<T>,
+    /// Semi-amplitude of the orbit of a second planet (km/s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k2_kms: Option<T>,
+    /// Orbital period of the second planet over the rotation period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub porb2_over_prot: Option<T>,
+    /// Orbital period of the second planet (d), in place of `porb2_over_prot`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period2_d: Option<T>,
+    /// Orbital phase of the second planet (cycles), as `phi`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phi2: Option<T>,
+    /// Time of one inferior conjunction of the second planet (d), as `t_conjunction_d`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t_conjunction2_d: Option<T>,
+    /// Of the second planet's orbit, as `sqrt_e_cos_omega`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e2_cos_omega2: Option<T>,
+    /// Of the second planet's orbit, as `sqrt_e_sin_omega`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sqrt_e2_sin_omega2: Option<T>,
     /// Angular velocity of the equator (rad/d).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub omega_eq_rad_d: Option<T>,
@@ -73,6 +108,17 @@ impl<T> Default for PerParameter<T> {
             k_kms: None,
             porb_over_prot: None,
             phi: None,
+            period_d: None,
+            t_conjunction_d: None,
+            sqrt_e_cos_omega: None,
+            sqrt_e_sin_omega: None,
+            k2_kms: None,
+            porb2_over_prot: None,
+            period2_d: None,
+            phi2: None,
+            t_conjunction2_d: None,
+            sqrt_e2_cos_omega2: None,
+            sqrt_e2_sin_omega2: None,
             omega_eq_rad_d: None,
             domega_rad_d: None,
             inclination_deg: None,
@@ -96,6 +142,17 @@ impl<T> PerParameter<T> {
             Parameter::K => &mut self.k_kms,
             Parameter::PorbOverProt => &mut self.porb_over_prot,
             Parameter::Phi => &mut self.phi,
+            Parameter::Period => &mut self.period_d,
+            Parameter::Conjunction => &mut self.t_conjunction_d,
+            Parameter::SqrtECosOmega => &mut self.sqrt_e_cos_omega,
+            Parameter::SqrtESinOmega => &mut self.sqrt_e_sin_omega,
+            Parameter::K2 => &mut self.k2_kms,
+            Parameter::PorbOverProt2 => &mut self.porb2_over_prot,
+            Parameter::Period2 => &mut self.period2_d,
+            Parameter::Phi2 => &mut self.phi2,
+            Parameter::Conjunction2 => &mut self.t_conjunction2_d,
+            Parameter::SqrtECosOmega2 => &mut self.sqrt_e2_cos_omega2,
+            Parameter::SqrtESinOmega2 => &mut self.sqrt_e2_sin_omega2,
             Parameter::OmegaEq => &mut self.omega_eq_rad_d,
             Parameter::DOmega => &mut self.domega_rad_d,
             Parameter::Inclination => &mut self.inclination_deg,
@@ -129,7 +186,8 @@ pub(super) struct PriorSection {
     /// Lower bound; needed for uniform and log-uniform (there above 0), optional for normal and isotropic.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
-    /// Upper bound, above the lower one; needed for uniform and log-uniform, optional for normal and isotropic.
+    /// Upper bound, above the lower one; needed for uniform and log-uniform, optional for normal and isotropic. Of a
+    /// unit-disc prior, optional: the largest eccentricity.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
     /// Mean of a normal prior.
@@ -161,6 +219,9 @@ pub(super) enum PriorKind {
     Isotropic,
     /// For `phi`: constant on the circle from 0 to 1.
     Periodic,
+    /// For `sqrt_e_cos_omega` and `sqrt_e_sin_omega` together: constant on the disc in which the eccentricity is below
+    /// `max` (1 if not given), that is, any eccentricity up to there and any argument of periastron alike.
+    UnitDisc,
 }
 
 /// The line profiles of a data set: either `path` (with its options), or `simulate`.
@@ -193,8 +254,8 @@ pub(super) struct ObservationsSection {
     pub weights: Weights,
     /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
     /// beside that of the bins. It should be small against the width of the local line. "fitted": as large as the
-    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the objective
-    /// "marginal-likelihood", and 0 with others.
+    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the
+    /// objective "marginal-likelihood", and 0 with others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity_jitter_kms: Option<VelocityJitter>,
     /// Resolving power of this set's spectrograph, in place of `instrument.resolving_power`.
@@ -225,6 +286,22 @@ pub(super) struct ObservationsSection {
     /// all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulateSection>,
+}
+
+/// Profiles that are planned beside those of `observations`, for the command `plan` alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanSection {
+    /// When they are taken.
+    #[serde(default)]
+    pub schedule: Schedule,
+    /// Time of the first night (d), on the time scale of the observations; the day after the last profile, if not
+    /// given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_d: Option<f64>,
+    /// Signal-to-noise ratio of each bin, above 0; that of the observed profiles, if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snr: Option<f64>,
 }
 
 /// Simulated profiles.

@@ -6,13 +6,15 @@ use super::identity::fingerprint;
 use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
+use super::resolve_orbits::{check_orbits, resolve_orbits, start_of};
 use super::resolve_photometry::resolve_photometry;
 use super::resolve_sets::resolve_sets;
+use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
 use crate::posterior::marginal;
 use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::{FreeParameter, ObjectiveKind, Parameter, ParameterValues, Prior};
+use crate::posterior::objective::{Clock, Elements, FreeParameter, ObjectiveKind, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
 use std::path::Path;
 
@@ -22,12 +24,15 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
     let mut values = values(&mut raw, &star)?;
+    raw.plan.as_ref().map_or(Ok(()), check_plan)?;
     let sets = resolve_sets(&mut raw, &star, &values, path)?;
     let light_curves = resolve_photometry(&raw, path)?;
     let velocity_jitter = resolve_jitter(&mut raw);
     check_imaging(&raw.imaging, velocity_jitter)?;
     resolve_field(&mut raw, &mut values)?;
-    let free = resolve_free(&mut raw, &mut values)?;
+    let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
+    let free = resolve_free(&mut raw, &mut values, clock)?;
+    check_orbits(&free, &values, clock, raw.star.mass_msun)?;
     check_sampler(&raw.sampler, free.len())?;
     if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
         return Err(Fault::new(
@@ -48,6 +53,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         values,
         sets,
         light_curves,
+        plan: raw.plan,
         velocity_jitter,
         imaging: raw.imaging,
         free,
@@ -88,6 +94,7 @@ fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, 
             Parameter::K => planet.k_kms,
             Parameter::PorbOverProt => planet.porb_over_prot,
             Parameter::Phi => planet.phi,
+            _ if parameter.is_orbital() => continue,
             // Filled in by `resolve_star`.
             Parameter::OmegaEq => star.omega_eq_rad_d.unwrap_or(f64::NAN),
             Parameter::DOmega => star.domega_rad_d,
@@ -101,28 +108,32 @@ fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, 
             }
             Parameter::EquivalentWidth => resolved.line.equivalent_width_kms,
             Parameter::Contrast => resolved.contrast,
-            Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => unreachable!("passed over"),
+            _ => unreachable!("passed over"),
         };
         check_value(parameter, values[parameter], &key(parameter))?;
     }
+    resolve_orbits(raw, &mut values, resolved)?;
     Ok(values)
 }
 
 /// Priors of the free parameters, with their defaults filled into `raw`, and their starts checked (and wrapped) in
 /// `values`.
-fn resolve_free(raw: &mut Config, values: &mut ParameterValues) -> Result<Vec<FreeParameter>, Fault> {
-    let phi_free = raw.parameters.phi.is_some();
+fn resolve_free(raw: &mut Config, values: &mut ParameterValues, clock: Clock) -> Result<Vec<FreeParameter>, Fault> {
+    let entries = raw.parameters.entries();
     let mut free = Vec::new();
-    for (parameter, mut section) in raw.parameters.entries() {
+    for (parameter, mut section) in entries.clone() {
+        let phi_free = Elements::of(parameter).is_some_and(|of| entries.iter().any(|(p, _)| *p == of.phi));
         let prior = resolve_prior(parameter, &section, phi_free)?;
-        let start = prior.wrap(values[parameter]);
+        let start = prior.wrap(start_of(parameter, &prior, values, clock));
         if !prior.log_density(start).is_finite() {
             let (min, max) = prior.bounds();
             let problem = format!("{start} is outside its prior, [{min}, {max}] by parameters.{}", parameter.name());
             return Err(Fault::new(key(parameter), problem));
         }
-        values[parameter] = start;
-        if prior != Prior::Periodic {
+        if !parameter.is_ephemeris() {
+            values[parameter] = start;
+        }
+        if !matches!(prior, Prior::Periodic | Prior::Disc { .. }) {
             let (min, max) = prior.bounds();
             section.min = min.is_finite().then_some(min);
             section.max = max.is_finite().then_some(max);
@@ -131,10 +142,9 @@ fn resolve_free(raw: &mut Config, values: &mut ParameterValues) -> Result<Vec<Fr
         free.push(FreeParameter { parameter, prior });
     }
     match without_planet(&free, values) {
-        Some(parameter) => {
-            let name = parameter.name();
-            let problem =
-                format!("{name} has no effect while planet.k_kms is fixed at 0: free k_kms too, or fix {name}");
+        Some((parameter, of)) => {
+            let (name, k) = (parameter.name(), of.k.name());
+            let problem = format!("{name} has no effect while planet.{k} is fixed at 0: free {k} too, or fix {name}");
             Err(Fault::new(format!("parameters.{name}"), problem))
         }
         None => Ok(free),
@@ -142,10 +152,12 @@ fn resolve_free(raw: &mut Config, values: &mut ParameterValues) -> Result<Vec<Fr
 }
 
 /// A free parameter of an orbit of which K is fixed at 0.
-pub(super) fn without_planet(free: &[FreeParameter], values: &ParameterValues) -> Option<Parameter> {
-    let mut parameters = free.iter().map(|f| f.parameter);
-    let no_planet = values[Parameter::K] == 0.0 && free.iter().all(|f| f.parameter != Parameter::K);
-    parameters.find(|parameter| no_planet && parameter.is_orbital())
+pub(super) fn without_planet(
+    free: &[FreeParameter],
+    values: &ParameterValues,
+) -> Option<(Parameter, &'static Elements)> {
+    let no_planet = |of: &Elements| values[of.k] == 0.0 && free.iter().all(|f| f.parameter != of.k);
+    free.iter().find_map(|f| Some((f.parameter, Elements::of(f.parameter).filter(|of| no_planet(of))?)))
 }
 
 /// What is said of the spots has a meaning where they are integrated out, and lies within the bounds of a fit. What is

@@ -31,15 +31,21 @@ pub(super) fn resolve_grid(
     let mut settings = GridSettings { grid: Grid { axes: Vec::new() }, free: Vec::new() };
     for (parameter, (min, max, nodes)) in axes {
         let name = parameter.name().to_string();
-        let axis = Axis { name, min, max, nodes, periodic: parameter == Parameter::Phi };
+        let axis = Axis { name, min, max, nodes, periodic: parameter.is_phase() };
+        if parameter.is_ephemeris() {
+            let problem = "takes no axis: give porb_over_prot or phi one in its place";
+            return Err(Fault::new(format!("grid.axes.{}", parameter.name()), problem));
+        }
         check_axis(parameter, &axis)?;
         let with_prior = free.iter().find(|f| f.parameter == parameter);
         settings.free.push(with_prior.copied().unwrap_or_else(|| along_the_axis(parameter, &axis, values)));
         settings.grid.axes.push(axis);
     }
     match without_planet(&settings.free, values) {
-        Some(parameter) => {
-            let problem = "has no effect while planet.k_kms is fixed at 0: give k_kms an axis or planet.k_kms a value";
+        Some((parameter, of)) => {
+            let k = of.k.name();
+            let problem =
+                format!("has no effect while planet.{k} is fixed at 0: give {k} an axis or planet.{k} a value");
             Err(Fault::new(format!("grid.axes.{}", parameter.name()), problem))
         }
         None => Ok(settings),

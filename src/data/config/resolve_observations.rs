@@ -9,7 +9,7 @@ use super::{Automatic, ObservationSource, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::posterior::noise::ErrorSettings;
 use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::ParameterValues;
+use crate::posterior::objective::{Clock, Elements, ParameterValues};
 use crate::posterior::simulate::Simulation;
 use crate::star::StarSettings;
 use std::path::Path;
@@ -96,7 +96,7 @@ fn simulation(
         .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
     check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
     check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
-    if !(section.zero_point_kms.abs() <= LARGEST_JITTER_KMS) {
+    if section.zero_point_kms.is_nan() || section.zero_point_kms.abs() > LARGEST_JITTER_KMS {
         let problem =
             format!("{} must be from -{LARGEST_JITTER_KMS} to {LARGEST_JITTER_KMS} km/s", section.zero_point_kms);
         return Err(Fault::new(at("zero_point_kms"), problem));
@@ -108,7 +108,11 @@ fn simulation(
     let mut truth = *values;
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
-        truth[parameter] = value;
+    }
+    let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
+    Elements::write(&mut truth, section.truth.entries().into_iter(), clock);
+    if truth.motion().orbits().any(|planet| !(planet.shape.eccentricity() < 1.0 && planet.orbit.porb_over_prot > 0.0)) {
+        return Err(Fault::new(at("truth"), "is no orbit: each planet needs a period, and an eccentricity below 1"));
     }
     Ok(Simulation {
         spots: spots(section, star, &truth, &times_d, set)?,

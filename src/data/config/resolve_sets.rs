@@ -40,7 +40,7 @@ pub(super) fn resolve_sets(
             check_nuisances(priors, ["continuum_offset", "continuum_slope", "equivalent_width"].map(name))?;
         }
         if let ZeroPoint::Known(kms) = section.zero_point_kms
-            && !(kms.abs() <= LARGEST_ZERO_POINT_KMS)
+            && (kms.is_nan() || kms.abs() > LARGEST_ZERO_POINT_KMS)
         {
             let problem = format!("{kms} must be from -{LARGEST_ZERO_POINT_KMS} to {LARGEST_ZERO_POINT_KMS} km/s");
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));

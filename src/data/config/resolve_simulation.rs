@@ -2,7 +2,7 @@
 
 use super::domain::{check_size, most};
 use super::error::Fault;
-use super::raw_parts::SimulateSection;
+use super::raw_parts::{PlanSection, SimulateSection};
 use super::resolve::positive;
 use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::posterior::simulate::{RandomSpots, Schedule};
@@ -22,7 +22,11 @@ pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str)
     let at = |field: &str| at(set, field);
     let cycles = match (&section.cycles, &section.schedule) {
         (Some(cycles), None) => cycles,
-        (None, Some(schedule)) => return scheduled(schedule, star, set),
+        (None, Some(schedule)) => {
+            check_schedule(schedule, &at("schedule"))?;
+            check_size("star.epoch_d", star.epoch_d, most::TIME)?;
+            return scheduled(schedule, &at("schedule"), star.epoch_d);
+        }
         (Some(_), Some(_)) => return Err(Fault::new(at("schedule"), "give either cycles or schedule, not both")),
         (None, None) => return Err(Fault::new(at("cycles"), "missing, give cycles or schedule")),
     };
@@ -38,15 +42,24 @@ pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str)
     Ok(times_d)
 }
 
-fn scheduled(schedule: &Schedule, star: &StarSettings, set: &str) -> Result<Vec<f64>, Fault> {
+/// Whether the schedule at `key` makes sense.
+pub(super) fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
     let Schedule { nights, seasons, season_spacing_d, per_night: [fewest, largest], night_hours, clouds, .. } =
         *schedule;
-    let key = |field: &str| at(set, &format!("schedule.{field}"));
+    let key = |field: &str| format!("{key}.{field}");
     within(&key("nights"), nights as f64, [1.0, 1000.0])?;
     within(&key("seasons"), seasons as f64, [1.0, 100.0])?;
     check_size(&key("season_spacing_d"), season_spacing_d, most::TIME)?;
-    if seasons > 1 && season_spacing_d < nights as f64 {
-        let problem = format!("{season_spacing_d} must be {nights} (the nights of a season) or more");
+    let of_season = schedule.of_season();
+    if let Some(numbers) = &schedule.on_nights {
+        if numbers.is_empty() || numbers.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err(Fault::new(key("on_nights"), "must be rising numbers of nights, one at least"));
+        }
+        within(&key("on_nights"), of_season[of_season.len() - 1] as f64, [0.0, MOST_PROFILES as f64])?;
+    }
+    let length = of_season.last().map_or(0, |last| last + 1);
+    if seasons > 1 && season_spacing_d < length as f64 {
+        let problem = format!("{season_spacing_d} must be {length} (the nights of a season) or more");
         return Err(Fault::new(key("season_spacing_d"), problem));
     }
     for number in [fewest, largest] {
@@ -55,7 +68,7 @@ fn scheduled(schedule: &Schedule, star: &StarSettings, set: &str) -> Result<Vec<
     if fewest > largest {
         return Err(Fault::new(key("per_night"), format!("{fewest} must not be above {largest}")));
     }
-    if nights * seasons * largest > MOST_PROFILES {
+    if of_season.len() * seasons * largest > MOST_PROFILES {
         let problem = format!("{seasons} seasons may have more than {MOST_PROFILES} profiles: take fewer");
         return Err(Fault::new(key("nights"), problem));
     }
@@ -65,12 +78,29 @@ fn scheduled(schedule: &Schedule, star: &StarSettings, set: &str) -> Result<Vec<
     if !(0.0..1.0).contains(&clouds) {
         return Err(Fault::new(key("clouds"), format!("{clouds} must be from 0 and below 1")));
     }
-    check_size("star.epoch_d", star.epoch_d, most::TIME)?;
-    let times_d = schedule.times_d(star.epoch_d);
+    Ok(())
+}
+
+/// Its times (d) from `first_d` on.
+fn scheduled(schedule: &Schedule, key: &str, first_d: f64) -> Result<Vec<f64>, Fault> {
+    let times_d = schedule.times_d(first_d);
     match times_d.is_empty() {
-        true => Err(Fault::new(key("clouds"), format!("{clouds} leaves no night: take less, or another seed"))),
+        true => {
+            let problem = format!("{} leaves no night: take less, or another seed", schedule.clouds);
+            Err(Fault::new(format!("{key}.clouds"), problem))
+        }
         false => Ok(times_d),
     }
+}
+
+/// What is planned, checked.
+pub(super) fn check_plan(plan: &PlanSection) -> Result<(), Fault> {
+    check_schedule(&plan.schedule, "plan.schedule")?;
+    scheduled(&plan.schedule, "plan.schedule", 0.0)?;
+    if let Some(first_d) = plan.first_d {
+        check_size("plan.first_d", first_d, most::TIME)?;
+    }
+    plan.snr.map_or(Ok(()), |snr| positive("plan.snr", snr))
 }
 
 /// The spots, listed ones first.

@@ -2,7 +2,7 @@
 
 use super::data_sets::ZeroPoint;
 use super::spots::Hyperparameter;
-use super::{Automatic, ConfigError, EquivalentWidth, SamplerSettings, SimulatedLight, VelocityJitter};
+use super::{Automatic, ConfigError, EquivalentWidth, PlanSection, SamplerSettings, SimulatedLight, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
@@ -36,6 +36,8 @@ pub struct Settings {
     pub sets: Vec<DataSetSettings>,
     /// The light curves, mostly none.
     pub light_curves: Vec<LightCurveSettings>,
+    /// What is planned beside them.
+    pub plan: Option<PlanSection>,
     /// Scatter of the profiles' velocity zero points.
     pub velocity_jitter: VelocityJitter,
     /// The Doppler image.
@@ -49,7 +51,7 @@ pub struct Settings {
     /// The config with all defaults filled in and paths as given, for the manifest; it is itself a valid config.
     pub resolved: serde_json::Value,
     /// SHA-256 (hex) of the part of `resolved` that decides the posterior and the chain: all but `$schema`, `grid`,
-    /// `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
+    /// `plan`, `star.mass_msun`, and `sampler.steps`, `.rhat` and `.ess`, which may change when a chain is resumed.
     pub sha256: String,
 }
 
@@ -313,8 +315,8 @@ impl Settings {
         Ok(())
     }
 
-    /// The config, of one data set, with other observations in place of its own, those of a list at `path`; cut and errors of observed
-    /// ones stay.
+    /// The config, of one data set, with other observations in place of its own, those of a list at `path`; cut and
+    /// errors of observed ones stay.
     pub fn with_observations(&self, path: &str) -> serde_json::Value {
         let mut config = self.resolved.clone();
         if let Some(top) = config.as_object_mut() {

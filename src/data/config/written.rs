@@ -50,7 +50,16 @@ impl Config {
     /// # Errors
     /// As [`Config::load`], but for reading.
     pub fn from_json(json: &str) -> Result<Self, ConfigError> {
-        Config::checked(json.as_bytes(), NO_FILE.as_ref())
+        Config::from_json_at(json, NO_FILE.as_ref())
+    }
+
+    /// Reads a config that is at hand as JSON, as if it came from the file at `path`: errors name it, and paths in the
+    /// config start from its folder.
+    ///
+    /// # Errors
+    /// As [`Config::load`], but for reading.
+    pub fn from_json_at(json: &str, path: &Path) -> Result<Self, ConfigError> {
+        Config::checked(json.as_bytes(), path)
     }
 
     fn checked(bytes: &[u8], path: &Path) -> Result<Self, ConfigError> {
@@ -89,9 +98,22 @@ impl Config {
         key.split('.').try_fold(&self.json, |place, name| place.get(name))
     }
 
+    /// The file that it was read from, or what errors name in its place.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// As text, laid out for people.
     pub fn to_json(&self) -> String {
         to_text(&self.json)
+    }
+
+    /// With all defaults filled in, as results keep it.
+    ///
+    /// # Errors
+    /// A key that is unknown, missing, or does not make sense.
+    pub fn resolved(&self) -> Result<Value, ConfigError> {
+        Ok(self.settings()?.resolved)
     }
 
     /// Checked, with all defaults.

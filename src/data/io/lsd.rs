@@ -14,7 +14,7 @@ mod times;
 mod writing;
 
 pub use error::LsdError;
-pub use writing::{is_written, write, write_as};
+pub use writing::{is_written, write, write_as, write_numbers};
 
 use crate::star::observation::{Observations, Profile};
 use axis::Axis;

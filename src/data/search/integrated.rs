@@ -3,8 +3,8 @@
 //! expansion becomes the next place to expand it around, as long as ln Z rises and until that place stays.
 
 use super::{
-    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, ROUNDS, SearchError, SearchSettings, Stage,
-    shift, within,
+    Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, SearchError, SearchSettings, Stage, shift,
+    within,
 };
 use crate::field::FieldError;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
@@ -13,10 +13,23 @@ use crate::posterior::detection::{Detection, DetectionSettings, Spots};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::{Basis, Fitted, Forecast, MarginalPosterior, fit};
-use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues};
+use crate::posterior::objective::{Elements, Parameter, ParameterSpace, ParameterValues, for_blind_search};
 use crate::posterior::surrogate::Surrogate;
-use crate::sampling::log_density::LogDensity as _;
+use crate::sampling::log_density::{Evaluation, LogDensity as _};
 use crate::sampling::optimise::climb;
+use crate::star::Shape;
+
+/// A circle is a saddle of the square roots of eccentricities: a climb begins beside it.
+const SMALLEST_E: f64 = 0.01;
+
+/// Share of the largest eccentricity that a climb begins within.
+const SMALL_PART: f64 = 0.8;
+
+/// Places that ln Z is expanded around at most: from an inclination that is far off it takes some.
+const MOST_ROUNDS: usize = 12;
+
+/// Parts of the way to the top of an expansion that are tried.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 
 /// A round that is lower than the one before by this much in log-probability is not followed.
 const DOWN: f64 = 0.1;
@@ -38,7 +51,7 @@ pub(super) fn find(
         None => without_search(imager, space, settings)?,
     };
     let mut highest: Option<Found> = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         at(Stage::Reference);
         let values = space.clone().with_field_of(&field).values_at(&theta);
         let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, jitter_kms) else { break };
@@ -51,13 +64,11 @@ pub(super) fn find(
         let Ok(mut next) = forecast(&posterior).and_then(|forecast| Ok(climb(&forecast, &theta, &|| ())?)) else {
             break;
         };
+        let left_over = shift(space, &theta, &next);
+        (next.theta, next.evaluation) = uphill(&posterior, (&theta, here), &next.theta);
         let moved = shift(space, &theta, &next);
-        let next_theta = next.theta.clone();
-        next.evaluation = posterior.evaluate(&next.theta);
-        if next.evaluation.log_prob < here.log_prob || !next.evaluation.log_prob.is_finite() {
-            (next.theta, next.evaluation) = (theta, here);
-        }
-        theta = next_theta;
+        next.converged &= left_over < REFERENCE_SHIFT || moved > 0.0;
+        theta.clone_from(&next.theta);
         let posterior = Density::Integrated(Box::new(posterior));
         highest = Some(Found { posterior, optimum: next, attempts: Vec::new(), detection: None });
         if moved < REFERENCE_SHIFT {
@@ -72,26 +83,72 @@ pub(super) fn find(
     Ok(found)
 }
 
+/// The first of ever shorter parts of the way from a point to the top of the expansion around it that leads up; the
+/// point itself, where none does. Far from the best star the expansion promises too much.
+fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64]) -> (Vec<f64>, Evaluation) {
+    let space = posterior.space();
+    let (theta, here) = from;
+    let (a, b) = (space.to_sampling(theta), space.to_sampling(to));
+    let at = |share: f64| -> Vec<f64> { a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect() };
+    let tried = SHARES.iter().map(|share| {
+        let there = space.to_physical(&at(*share));
+        let evaluation = posterior.evaluate(&there);
+        (there, evaluation)
+    });
+    let mut higher = tried.filter(|(_, e)| e.log_prob.is_finite() && e.log_prob >= here.log_prob);
+    let found = higher.next();
+    found.unwrap_or_else(|| (theta.to_vec(), here))
+}
+
 /// Where to begin: vector, field and jitter.
 type Start = (Vec<f64>, ParameterValues, f64);
 
 /// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
 fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Option<(Detection, Option<Start>)> {
-    let orbit = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
-    orbit.iter().all(|p| space.free().iter().any(|f| f.parameter == *p)).then_some(())?;
+    let is_free = |p: Parameter| space.free().iter().any(|f| f.parameter == p);
+    let sought = |of: &&Elements| is_free(of.k) && is_free(of.phi) && space.period_prior(of).is_some();
+    let sought: Vec<&Elements> = Elements::PLANETS.iter().filter(sought).collect();
+    let [first, second] = &Elements::PLANETS;
+    let beside = second.all().into_iter().any(is_free);
+    // of a planet of known ephemeris the config knows where it is
+    if !sought.contains(&first) || (beside && !sought.contains(&second)) {
+        return None;
+    }
     let usual = FrequencySettings::default();
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok()?;
     let wanted = DetectionSettings {
         spots: Spots::Integrated(settings.known),
+        eccentric: is_free(first.shape[0]),
+        second_planet: beside,
         ..DetectionSettings::of(settings.chi2_target, nuisances(space.free()))
     };
-    let values = space.values_at(&space.start());
+    let config = space.values_at(&space.start());
+    let values = for_blind_search(config, space.free());
     let found = Detection::find(imager, values, frequencies, &wanted, &|_| ()).ok()?;
     let marginal = &found.last().field()?.marginal;
     let mut values = marginal.values;
-    values[Parameter::K] = found.best.orbit.k_kms;
-    values[Parameter::PorbOverProt] = found.best.porb_over_prot;
-    values[Parameter::Phi] = found.best.orbit.phi;
+    first.all().into_iter().chain(second.all()).for_each(|p| values[p] = config[p]);
+    let both = found.second.as_ref().and_then(|second| second.both).map(|both| both.orbits.to_vec());
+    let mut peaks = both.filter(|_| beside).unwrap_or_else(|| vec![found.best]);
+    for of in sought {
+        let prior = space.period_prior(of)?;
+        let allowed = peaks.iter().position(|peak| prior.contains(peak.porb_over_prot));
+        let peak = peaks.remove(allowed.or((!beside).then_some(0))?);
+        values[of.k] = peak.orbit.k_kms;
+        values[of.ratio] = peak.porb_over_prot;
+        values[of.phi] = peak.orbit.phi;
+    }
+    if let Some(Some(ellipse)) = found.keplerian.first().filter(|_| !beside) {
+        let largest =
+            first.shape.map(|p| space.free().iter().find(|f| f.parameter == p).map(|f| f.prior.bounds().1))[0]?;
+        let e = ellipse.eccentricity.clamp(SMALLEST_E, (SMALL_PART * largest * largest).max(SMALLEST_E));
+        let shape = Shape::new(e, ellipse.omega);
+        values[Parameter::SqrtECosOmega] = shape.sqrt_e_cos_omega;
+        values[Parameter::SqrtESinOmega] = shape.sqrt_e_sin_omega;
+        values[Parameter::K] = ellipse.k_kms;
+        values[Parameter::PorbOverProt] = ellipse.porb_over_prot;
+        values[Parameter::Phi] = (ellipse.maximum_cycle / ellipse.porb_over_prot).rem_euclid(1.0);
+    }
     let mut theta = with_field(space, space.theta_of(&values), &values);
     // phi as its prior has it
     theta = space.to_physical(&space.to_sampling(&theta));
@@ -134,8 +191,10 @@ fn forecast(posterior: &MarginalPosterior) -> Result<Forecast<'_>, SearchError> 
 /// The values at `theta`, without a planet where one is looked for.
 fn without_planet(space: &ParameterSpace, theta: &[f64]) -> ParameterValues {
     let mut values = space.values_at(theta);
-    if space.free().iter().any(|f| f.parameter == Parameter::K) {
-        values[Parameter::K] = 0.0;
+    for of in &Elements::PLANETS {
+        if space.free().iter().any(|f| f.parameter == of.k) {
+            values[of.k] = 0.0;
+        }
     }
     values
 }

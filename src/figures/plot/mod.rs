@@ -1,7 +1,7 @@
 //! Figures of what a folder holds, from its files alone; nothing is computed anew.
 //!
 //! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`,
-//! `optimise`, `grid`, `sample`, `compare` and `reproduce`.
+//! `plan`, `optimise`, `grid`, `sample`, `compare` and `reproduce`.
 
 mod changes;
 mod comparison;
@@ -18,6 +18,7 @@ mod maps;
 mod optimum;
 mod paraboloid;
 mod periodogram;
+mod plan;
 mod profiles;
 mod projection;
 mod star_map;
@@ -88,10 +89,11 @@ const ANY: [f64; 2] = [-1e12, 1e12];
 type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 
 /// The files by which a folder is known, with what draws it.
-const KINDS: [(&str, Draw); 9] = [
+const KINDS: [(&str, Draw); 10] = [
     (MAP, star_map_figures),
     (io::periodogram::FILE, |folder, _| periodogram::figures(folder)),
     (runs::limits::JSON, |folder, _| limits::figures(folder)),
+    (runs::plan::JSON, |folder, _| plan::figures(folder)),
     (manifest::FILE, |folder, _| chain_figures(folder)),
     (grid_scan::HEADER, landscape::figures),
     (runs::optimum::FILE, |folder, _| optimum::figures(folder)),

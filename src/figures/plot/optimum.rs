@@ -38,7 +38,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     }
     let truth = |i: usize| {
         let truth = *file.truth.as_ref()?.get(&file.names[i])?;
-        let periodic = Parameter::from_name(&file.names[i]) == Some(Parameter::Phi);
+        let periodic = Parameter::from_name(&file.names[i]).is_some_and(Parameter::is_phase);
         Some(if periodic { nearest_turn(truth, best[i]) } else { truth })
     };
     let title = |i: usize| Title::value(&file.names[i], best[i], [sd[i]; 2], decimals(sd[i]));

@@ -183,8 +183,11 @@ fn one(figure: &mut Figure, panel: &Panel, line: &Line, down: f64) {
     let sigma = line.sigma.iter().sum::<f64>() / line.sigma.len().max(1) as f64;
     let half = 0.5 * (panel.place(last, 0.0)[1] - panel.place(last, 2.0 * sigma)[1]);
     figure.polyline("sigma", &[[bar, middle - half], [bar, middle + half]], Stroke::new(BLACK, 1.0));
-    let data_set = line.data_set.map_or_else(String::new, |s| format!(" ({s})"));
-    let text = format!("{turns:.0} + {:.3}{data_set}", line.phase());
+    // beside the number of a data set there is room for two digits
+    let text = match line.data_set {
+        None => format!("{turns:.0} + {:.3}", line.phase()),
+        Some(set) => format!("{turns:.0} + {:.2} ({set})", line.phase()),
+    };
     figure.text(&text, [bar + 3.0, middle + 2.3], TINY, Align::Left, 0.0);
 }
 

@@ -8,7 +8,7 @@ use crate::figures::drawing::colour::{BLACK, BLUE, GREY, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Axis, COLUMN_MM, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
 use crate::runs::origin;
-use crate::star::Orbit;
+use crate::star::{Eccentric, Motion, Orbit};
 use std::path::Path;
 
 /// The table of velocities that `map` and `periodogram` write.
@@ -30,7 +30,7 @@ struct Series<'a> {
 struct Curves<'a> {
     cycle: &'a [f64],
     panels: Vec<(&'a str, Vec<Series<'a>>)>,
-    orbit: Orbit,
+    motion: Motion,
     vsys_kms: f64,
     /// What the orbit is called.
     orbit_is: &'static str,
@@ -57,7 +57,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
             ("RV − spots (km/s)", vec![errors(clean, "")]),
             ("residual (km/s)", vec![errors(filtered.to_vec(), "")]),
         ],
-        orbit: state.orbit,
+        motion: state.motion,
         vsys_kms: state.vsys_kms,
         orbit_is: "assumed orbit",
         orbital: 1,
@@ -93,7 +93,7 @@ pub(super) fn of_changing_map(folder: &Path) -> Result<Figure, PlotError> {
             ("RV − spots (km/s)", vec![errors(rv, rv_sigma.clone(), "")]),
             ("residual (km/s)", vec![errors(residual, rv_sigma, "")]),
         ],
-        orbit: state.orbit,
+        motion: state.motion,
         vsys_kms: state.vsys_kms,
         orbit_is: "assumed orbit",
         orbital: 1,
@@ -127,7 +127,7 @@ pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<
             ("RV (km/s)", vec![series("observed", "", "first_moment_kms", "first_moment_sigma_kms", POINT)?]),
             ("RV − spots (km/s)", vec![series("observed", "", "rv_kms", "rv_sigma_kms", POINT)?]),
         ],
-        orbit,
+        motion: orbit.into(),
         vsys_kms: offset_kms,
         orbit_is: "best orbit",
         orbital: 1,
@@ -148,7 +148,8 @@ const ORBIT: Stroke = Stroke::new(BLUE, 1.0);
 
 impl Curves<'_> {
     fn draw(&self) -> Figure {
-        let folds = self.orbit.k_kms > 0.0 && self.orbit.porb_over_prot > 0.0;
+        let Orbit { k_kms, porb_over_prot, .. } = self.motion.first.orbit;
+        let folds = k_kms > 0.0 && porb_over_prot > 0.0;
         let rows = self.panels.len() as f64;
         let mut figure = Figure::new("rv", if folds { PAGE_MM } else { COLUMN_MM }, 24.0 + 26.0 * rows);
         let mut legend = legend(&self.panels[0].1);
@@ -167,7 +168,7 @@ impl Curves<'_> {
                     let steps = 600;
                     let curve: Vec<[f64; 2]> = (0..=steps)
                         .map(|i| span[0] + (span[1] - span[0]) * f64::from(i) / f64::from(steps))
-                        .map(|cycle| [cycle, self.vsys_kms + self.orbit.velocity_kms(cycle)])
+                        .map(|cycle| [cycle, self.vsys_kms + self.motion.velocity_kms(cycle)])
                         .collect();
                     panel.line(&mut figure, "orbit", &curve, ORBIT);
                 }
@@ -196,16 +197,19 @@ impl Curves<'_> {
         let (label, series) = &self.panels[self.orbital];
         let y = Axis::linear(label, range(series, self.vsys_kms));
         let panel = Panel { frame, x: Axis::linear("orbital phase (0: maximal RV)", [0.0, 1.0]), y };
-        let phase = |cycle: &f64| (cycle / self.orbit.porb_over_prot - self.orbit.phi).rem_euclid(1.0);
-        let curve: Vec<[f64; 2]> = (0..=200)
-            .map(|i| f64::from(i) / 200.0)
-            .map(|t| [t, self.vsys_kms + self.orbit.k_kms * (std::f64::consts::TAU * t).cos()])
-            .collect();
+        let Motion { first, second } = self.motion;
+        let Orbit { k_kms, porb_over_prot, phi } = first.orbit;
+        let phase = |cycle: &f64| (cycle / porb_over_prot - phi).rem_euclid(1.0);
+        // counted from the largest velocity
+        let alone = Eccentric { orbit: Orbit { porb_over_prot: 1.0, phi: 0.0, ..first.orbit }, ..first };
+        let curve: Vec<[f64; 2]> =
+            (0..=200).map(|i| f64::from(i) / 200.0).map(|t| [t, self.vsys_kms + alone.velocity_kms(t)]).collect();
         panel.line(figure, "orbit", &curve, ORBIT);
         let phases: Vec<f64> = self.cycle.iter().map(phase).collect();
-        series.iter().for_each(|one| one.draw(figure, &panel, &phases));
+        let others = |cycle: &f64| second.map_or(0.0, |second| second.velocity_kms(*cycle));
+        let others: Vec<f64> = self.cycle.iter().map(others).collect();
+        series.iter().for_each(|one| one.less(&others).draw(figure, &panel, &phases));
         panel.frame(figure, Sides::BOTH);
-        let Orbit { k_kms, porb_over_prot, .. } = self.orbit;
         let mut legend = Legend::default();
         let text = format!("*K* = {k_kms:.3} km/s, *P*_{{orb}} = {porb_over_prot:.3} *P*_{{rot}}");
         legend.add(Key::Line(ORBIT), &text);
@@ -237,7 +241,12 @@ fn legend(series: &[Series]) -> Legend {
     legend
 }
 
-impl Series<'_> {
+impl<'a> Series<'a> {
+    fn less(&self, y_kms: &[f64]) -> Series<'a> {
+        let y = self.y.iter().zip(y_kms).map(|(y, less)| y - less).collect();
+        Series { y, sigma: self.sigma.clone(), ..*self }
+    }
+
     fn draw(&self, figure: &mut Figure, panel: &Panel, x: &[f64]) {
         for ((x, y), sigma) in x.iter().zip(&self.y).zip(&self.sigma) {
             panel.bar(figure, "error-bar", [[*x, y - sigma], [*x, y + sigma]], 0.0, Stroke::new(GREY, 0.6));

@@ -1,6 +1,6 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, NOTHING, Table, Tone, changing, injection, is_empty, run, verdicts};
+use super::{Chapter, NOTHING, Table, Tone, changing, injection, is_empty, planned, run, verdicts};
 use crate::data::io::map::{FIT, FitFile, MAP, MapKind};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::periodogram::{self, PeakRecord, PeriodogramFile};
@@ -8,11 +8,11 @@ use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::planets::verdict::probability;
-use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterValues, definition};
+use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
 use crate::runs::optimum::{self, OptimumFile};
-use crate::runs::{limits, manifest, origin};
+use crate::runs::{limits, manifest, origin, plan};
 use crate::sampling::landscape::Axis;
 use crate::sampling::log_density::Status;
 use std::collections::BTreeMap;
@@ -35,6 +35,7 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError
         optimum::FILE => best(&origin::read(folder, file)?),
         comparison::FILE => compared(&origin::read(folder, file)?),
         limits::JSON => injection::limits(&origin::read(folder, file)?),
+        plan::JSON => planned::chapter(&origin::read(folder, file)?),
         truth::FILE => match origin::read(folder, file)? {
             TruthFile::Injected(truth) => injection::injection(&truth),
             TruthFile::Simulated(truth) => simulation(&truth),
@@ -241,7 +242,7 @@ fn best(file: &OptimumFile) -> Chapter {
     };
     let mut rows: Vec<Vec<String>> = file.names.iter().map(of).collect();
     let mut notes: Vec<String> = file.names.iter().filter_map(|name| note(name)).collect();
-    for name in OrbitQuantity::ALL.map(OrbitQuantity::name) {
+    for name in Quoted::all().map(Quoted::name).filter(|name| !file.names.iter().any(|free| free == name)) {
         if let Some(Estimate { value, sd }) = file.derived.get(name) {
             rows.push(row(name, Some(*value), Some(*sd), file.derived_truth.get(name).copied()));
             notes.extend(note(name));

@@ -7,6 +7,7 @@ mod chapters;
 mod citation;
 mod html;
 mod injection;
+mod planned;
 mod run;
 mod subject;
 mod verdicts;

@@ -6,11 +6,11 @@
 //! is singular.
 
 use super::frequencies::Frequencies;
-use super::kepler::{mean_anomaly, true_anomaly};
 use super::orbits::{SIGMA_OF_UNKNOWN_PHASE, mid_cycle};
 use super::peaks::{Peak, parameters, steps};
 use super::refine::{Maximum, Model};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::star::kepler::{mean_anomaly, true_anomaly};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use std::f64::consts::{PI, TAU};
 

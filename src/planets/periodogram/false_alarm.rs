@@ -3,8 +3,8 @@
 //! The number of peaks above z of a sine fit is Poisson with mean `tau(z) = W sqrt(z) exp(-z)`, hence `FAP = 1 -
 //! exp(-tau)` (Baluev 2008, MNRAS 385, 1279, eq. 6, for two linear parameters and known variances). W comes from the
 //! upper tail of the draws by maximum likelihood, those below the tail counting as such. Where a jitter of unknown size
-//! stands beside the orbit high peaks are more frequent, as in the F-test: z is taken times a rate, which is found along
-//! with W.
+//! stands beside the orbit high peaks are more frequent, as in the F-test: z is taken times a rate, which is found
+//! along with W.
 
 use super::draws::maxima;
 use super::jitter::Jitters;

@@ -9,7 +9,6 @@ pub mod eccentric;
 pub mod false_alarm;
 pub mod frequencies;
 mod jitter;
-pub mod kepler;
 pub mod limits;
 pub mod offset;
 pub mod orbits;
@@ -17,7 +16,7 @@ pub mod peaks;
 mod refine;
 pub mod rotation;
 #[cfg(test)]
-mod sample;
+pub mod sample;
 pub mod two_planets;
 pub mod window;
 

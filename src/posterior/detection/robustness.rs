@@ -94,7 +94,7 @@ pub fn robustness(
             orbit: view.ok().as_ref().and_then(orbit),
         }
     };
-    let mut nights = nights(&times_d);
+    let mut nights = nights(&times_d, NIGHT_GAP_D);
     nights.retain(|night| times_d.len() - night.len() >= FEWEST);
     if nights.len() < 2 {
         nights.clear();
@@ -107,11 +107,11 @@ pub fn robustness(
     Robustness { all, targets, nights: nights.par_iter().map(without).collect() }
 }
 
-/// Profiles night by night, in order of time.
-fn nights(times_d: &[f64]) -> Vec<Vec<usize>> {
+/// Profiles night by night, in order of time; nights are more than `gap_d` apart.
+pub fn nights(times_d: &[f64], gap_d: f64) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..times_d.len()).collect();
     order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
-    order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= NIGHT_GAP_D).map(<[usize]>::to_vec).collect()
+    order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= gap_d).map(<[usize]>::to_vec).collect()
 }
 
 impl Robustness {
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn nights_end_with_gaps() {
-        let found = nights(&[5.01, 3.2, 3.0, 5.2, 3.45, 9.0]);
+        let found = nights(&[5.01, 3.2, 3.0, 5.2, 3.45, 9.0], NIGHT_GAP_D);
         assert_eq!(found, vec![vec![2, 1, 4], vec![0, 3], vec![5]]);
     }
 

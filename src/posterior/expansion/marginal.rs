@@ -36,10 +36,10 @@ impl Expansion {
         let columns = self.columns(nuisances);
         let (sd, offset) = self.priors(nuisances);
         let weight = sd.map(|sd| sd.powi(-2));
-        // at orbital velocities 0, all else as in the centre
-        let orbit = self.values.state().orbit;
+        // at orbital velocities 0, all else as in the centre, a second planet too
+        let orbit = self.values.motion().first;
         let mut back = DVector::zeros(all);
-        back.iter_mut().zip(orbit.velocities_kms(&self.cycles)).for_each(|(v, orbit)| *v = orbit);
+        back.iter_mut().zip(&self.cycles).for_each(|(v, cycle)| *v = orbit.velocity_kms(*cycle));
         let gradient = &self.gradient + &self.information * &back;
         // the answer of the nuisances to a change of velocities: eta = (N' I N + P)^-1 (N' (g - I v) + P offset)
         let mut keep = DMatrix::zeros(n, all);

@@ -162,6 +162,6 @@ impl Expansion {
 /// Velocities of the profiles at these rotation cycles, and stellar parameters.
 pub fn coordinates(values: &ParameterValues, cycles: &[f64], stellar: &[Parameter]) -> DVector<f64> {
     let state = values.state();
-    let velocities = state.orbit.velocities_kms(cycles).map(|orbit| state.vsys_kms + orbit);
+    let velocities = state.motion.velocities_kms(cycles).map(|orbit| state.vsys_kms + orbit);
     DVector::from_vec(velocities.chain(stellar.iter().map(|&p| p.to_sampling(values[p]))).collect())
 }

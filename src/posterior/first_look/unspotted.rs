@@ -160,7 +160,7 @@ impl Model {
             inclination: FRAC_PI_2,
             vsini_kms: shape.vsini_kms,
             vsys_kms: shape.centre_kms,
-            orbit: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 },
+            motion: Orbit { k_kms: 0.0, porb_over_prot: 1.0, phi: 0.0 }.into(),
             surface: Default::default(),
         };
         let mut star = self.star.clone();

@@ -230,7 +230,7 @@ pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &F
             cycle,
             observed: profile.first_moment(),
             modelled_kms: profile.first_moment_of(depth),
-            orbit_kms: state.vsys_kms + state.orbit.velocity_kms(cycle),
+            orbit_kms: state.vsys_kms + state.motion.velocity_kms(cycle),
         }
     };
     Explained {
@@ -382,7 +382,7 @@ fn velocities(
             cycle,
             observed: profile.first_moment(),
             modelled_kms: profile.first_moment_of(depth),
-            orbit_kms: state.vsys_kms + state.orbit.velocity_kms(cycle),
+            orbit_kms: state.vsys_kms + state.motion.velocity_kms(cycle),
             rv_kms,
             rv_sigma_kms: variance.sqrt(),
         }

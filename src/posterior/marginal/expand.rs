@@ -1,6 +1,6 @@
 //! ln Z to second order in the velocities of the profiles and in the star's own parameters.
 
-use super::{Basis, Marginal, zero_points};
+use super::{Basis, Design, Marginal, zero_points};
 use crate::field::{FieldError, Quadratic};
 use crate::posterior::expansion::{Expansion, VELOCITY_STEP_KMS, coordinates, stellar_step};
 use crate::posterior::imaging::{Imager, ZeroPointPrior};
@@ -97,21 +97,34 @@ impl Marginal {
         basis: &Basis,
         stellar: &[Parameter],
     ) -> Vec<DMatrix<f64>> {
-        let brightness = self.brightness(basis);
+        self.design.slopes(imager, &self.values, &self.brightness(basis), stellar)
+    }
+}
+
+impl Design {
+    /// How the depths of each profile change with its velocity and with the star's parameters (bins, 1 + parameters)
+    /// at `values`, for maps of this `brightness` (pixels, profiles).
+    pub(super) fn slopes(
+        &self,
+        imager: &Imager,
+        values: &ParameterValues,
+        brightness: &DMatrix<f64>,
+        stellar: &[Parameter],
+    ) -> Vec<DMatrix<f64>> {
         let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
         let derivative = |parameter: Option<Parameter>| {
-            let h = parameter.map_or(VELOCITY_STEP_KMS, |p| stellar_step(p, &self.values, time_base_d));
+            let h = parameter.map_or(VELOCITY_STEP_KMS, |p| stellar_step(p, values, time_base_d));
             let at = |h: f64| {
-                let mut values = self.values;
+                let mut values = *values;
                 values[parameter.unwrap_or(Parameter::Vsys)] += h;
-                self.response(imager, parameter, &values).depths_of_each(&brightness)
+                self.displaced(imager, parameter, &values).depths_of_each(brightness)
             };
             let (above, below) = (at(h), at(-h));
             above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * h)).collect::<Vec<f64>>()
         };
         let all: Vec<Option<Parameter>> = std::iter::once(None).chain(stellar.iter().map(|p| Some(*p))).collect();
         let columns: Vec<Vec<f64>> = all.into_par_iter().map(derivative).collect();
-        let response = self.design.response();
+        let response = self.response();
         let of_profile = |k: usize| {
             let bins = response.bins(k);
             DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][bins.start + j])
@@ -119,9 +132,9 @@ impl Marginal {
         (0..response.profiles()).map(of_profile).collect()
     }
 
-    fn response(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
+    fn displaced(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
         match moved {
-            None => imager.with_velocities(self.design.response(), &values.state()),
+            None => imager.with_velocities(self.response(), &values.state()),
             Some(_) => imager.response(&values.state()),
         }
     }
@@ -129,7 +142,7 @@ impl Marginal {
 
 /// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of the profiles, which
 /// are the first epochs, and the parameters, which are those of all epochs.
-fn summed(of_all: &Quadratic, epochs: usize, profiles: usize, stellar: usize) -> Quadratic {
+pub(super) fn summed(of_all: &Quadratic, epochs: usize, profiles: usize, stellar: usize) -> Quadratic {
     let mut sums = DMatrix::zeros(epochs * (1 + stellar), profiles + stellar);
     for k in 0..epochs {
         if k < profiles {

@@ -13,6 +13,7 @@
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
 //! 7. [`zero_points`]: the velocity zero points of data sets, before anything else.
 //! 8. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 9. [`Planned`]: what profiles that are not yet taken will say of velocities.
 
 pub mod change;
 mod condense;
@@ -22,6 +23,7 @@ mod fit;
 mod forecast;
 mod light;
 mod maps;
+mod planned;
 mod posterior;
 pub mod zero_points;
 
@@ -31,6 +33,7 @@ pub use fit::{Fitted, Known, NoFit, bounds, fit, usual_value};
 pub use forecast::Forecast;
 pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
+pub use planned::Planned;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};

@@ -82,7 +82,7 @@ fn the_line_is_the_mean_of_all_profiles_where_they_are() {
     let observations = observations();
     let rows = templates_of(&observations.profiles[1], &observations);
     let [first, second] = [0, 1].map(|k| &observations.profiles[k]);
-    let both = 1.0 - 0.5 * (second.intensity[3] + first.intensity_at(-11.3, 2.0));
+    let both = 1.0 - 0.5 * (second.intensity[3] + first.intensity_at(-11.3));
     assert!((rows[3][2] - both).abs() < 1e-12);
     // beyond the end of the first
     assert!((rows[19][2] - (1.0 - second.intensity[19])).abs() < 1e-12);

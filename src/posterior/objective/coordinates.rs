@@ -1,11 +1,14 @@
 //! Free parameters, their joint prior, and the sampling coordinates that samplers and optimisers move in.
 //!
-//! Where K and phi are both free they become `(K cos, K sin)` of the orbital phase at mid-time (`docs/method.md`
-//! section 5): K near 0 and the wrap of phi are then no special case, and phi no longer hangs on the period.
+//! Where K and phi of a planet are both free they become `(K cos, K sin)` of the mean longitude at mid-time
+//! (`docs/method.md` section 5): K near 0 and the wrap of phi are then no special case, and phi no longer hangs on the
+//! period, nor on the eccentricity. Eccentricity is `sqrt(e) cos(omega), sqrt(e) sin(omega)` as it is.
 
+use super::elements::{Clock, Elements};
 use super::parameters::{Parameter, ParameterValues};
 use super::prior::Prior;
-use std::f64::consts::TAU;
+use crate::star::stability::{self, Unstable};
+use std::f64::consts::{PI, TAU};
 
 /// A free parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,9 +30,38 @@ pub struct ParameterSpace {
     /// Rotation cycle in the middle of the time base, and its length.
     mid_cycle: f64,
     time_base_cycles: f64,
-    rotation_period_d: f64,
-    /// Positions of K and phi among the free parameters, if both are.
-    polar: Option<(usize, usize)>,
+    /// What ephemerides are counted with.
+    clock: Clock,
+    /// Mass of the star (solar masses), where it is known: two planets must be stable.
+    mass_msun: Option<f64>,
+    /// Planets of which K and phi are free.
+    polar: Vec<Polar>,
+    /// Planets of which the eccentricity is free: positions of its two parameters, and the largest eccentricity.
+    discs: Vec<(usize, usize, f64)>,
+}
+
+/// Positions of K and phi among the free parameters.
+#[derive(Clone, Copy, Debug)]
+struct Polar {
+    k: usize,
+    phi: usize,
+    of: &'static Elements,
+}
+
+/// The prior of a planet's period over the rotation period among free parameters.
+pub fn period_prior(free: &[FreeParameter], of: &Elements, clock: Clock) -> Option<Prior> {
+    let prior = |p: Parameter| free.iter().find(|f| f.parameter == p).map(|f| f.prior);
+    prior(of.ratio).or_else(|| Some(prior(of.period)?.in_units_of(clock.rotation_period_d)))
+}
+
+/// Values for a blind search: circles, and none of a second planet that is looked for as well.
+pub fn for_blind_search(mut values: ParameterValues, free: &[FreeParameter]) -> ParameterValues {
+    let [first, second] = &Elements::PLANETS;
+    first.shape.into_iter().for_each(|p| values[p] = f64::NAN);
+    if free.iter().any(|f| second.all().contains(&f.parameter)) {
+        second.all().into_iter().for_each(|p| values[p] = f64::NAN);
+    }
+    values
 }
 
 /// Smallest K (km/s) at which the Jacobian of the polar coordinates is told apart from that at K = 0.
@@ -46,9 +78,55 @@ impl ParameterSpace {
     ) -> Self {
         free.sort_by_key(|f| f.parameter);
         let position = |p: Parameter| free.iter().position(|f| f.parameter == p);
-        let polar = position(Parameter::K).zip(position(Parameter::Phi));
+        let polar = |of: &'static Elements| position(of.k).zip(position(of.phi)).map(|(k, phi)| Polar { k, phi, of });
+        let disc = |of: &'static Elements| {
+            let (i, j) = position(of.shape[0]).zip(position(of.shape[1]))?;
+            match free[i].prior {
+                Prior::Disc { max_eccentricity } => Some((i, j, max_eccentricity)),
+                _ => None,
+            }
+        };
         let names = free.iter().map(|f| f.parameter.name().to_string()).collect();
-        ParameterSpace { polar, names, free, values, mid_cycle, time_base_cycles, rotation_period_d }
+        ParameterSpace {
+            polar: Elements::PLANETS.iter().filter_map(polar).collect(),
+            discs: Elements::PLANETS.iter().filter_map(disc).collect(),
+            clock: Clock { rotation_period_d, epoch_d: 0.0 },
+            mass_msun: None,
+            names,
+            free,
+            values,
+            mid_cycle,
+            time_base_cycles,
+        }
+    }
+
+    /// The same with the time of rotation cycle 0 (d), from which conjunctions are counted, and the mass of the star
+    /// (solar masses), by which two planets are stable or not.
+    pub fn of_star(mut self, epoch_d: f64, mass_msun: Option<f64>) -> Self {
+        self.clock.epoch_d = epoch_d;
+        self.mass_msun = mass_msun;
+        self
+    }
+
+    /// What ephemerides are counted with.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// The prior of a planet's period over the rotation period, whichever way the period is free; `None` where it is
+    /// fixed.
+    pub fn period_prior(&self, of: &Elements) -> Option<Prior> {
+        period_prior(&self.free, of, self.clock)
+    }
+
+    /// Whether two planets can last beside each other; a single one always does.
+    ///
+    /// # Errors
+    /// [`Unstable`].
+    pub fn check_stability(&self, values: &ParameterValues) -> Result<(), Unstable> {
+        let motion = values.motion();
+        let Some(second) = motion.second else { return Ok(()) };
+        stability::check(&motion.first, &second, self.clock.rotation_period_d, self.mass_msun)
     }
 
     /// The same with the field of `values` where it is fixed.
@@ -77,15 +155,18 @@ impl ParameterSpace {
     /// Values of all parameters at `theta`.
     pub fn values_at(&self, theta: &[f64]) -> ParameterValues {
         let mut values = self.values;
-        for (f, &x) in self.free.iter().zip(theta) {
-            values[f.parameter] = x;
-        }
+        Elements::write(&mut values, self.free.iter().map(|f| f.parameter).zip(theta.iter().copied()), self.clock);
         values
     }
 
     /// The free ones among `values`.
     pub fn theta_of(&self, values: &ParameterValues) -> Vec<f64> {
-        self.free.iter().map(|f| values[f.parameter]).collect()
+        let one = |f: &FreeParameter| match Elements::of(f.parameter) {
+            Some(of) if of.period == f.parameter => of.period_d(values, self.clock),
+            Some(of) if of.conjunction == f.parameter => of.conjunction_d(values, self.clock, f.prior.centre()),
+            _ => values[f.parameter],
+        };
+        self.free.iter().map(one).collect()
     }
 
     /// Where a search starts: the free parameters as given.
@@ -93,14 +174,45 @@ impl ParameterSpace {
         self.theta_of(&self.values)
     }
 
-    /// Logarithm of the prior density at `theta`; minus infinity outside.
+    /// Logarithm of the prior density at `theta`; minus infinity outside, and where two planets would not last.
     pub fn log_prior(&self, theta: &[f64]) -> f64 {
-        self.free.iter().zip(theta).map(|(f, &x)| f.prior.log_density(x)).sum()
+        let own = |(f, &x): (&FreeParameter, &f64)| match f.prior {
+            Prior::Disc { .. } => 0.0,
+            prior => prior.log_density(x),
+        };
+        let mut sum: f64 = self.free.iter().zip(theta).map(own).sum();
+        for &(i, j, largest) in &self.discs {
+            let e = theta[i].powi(2) + theta[j].powi(2);
+            sum += if e <= largest && e < 1.0 { -(PI * largest).ln() } else { f64::NEG_INFINITY };
+        }
+        if sum > f64::NEG_INFINITY && self.has_two_planets() && self.check_stability(&self.values_at(theta)).is_err() {
+            return f64::NEG_INFINITY;
+        }
+        sum
+    }
+
+    fn has_two_planets(&self) -> bool {
+        let [_, second] = &Elements::PLANETS;
+        self.values.given(second.k).is_some()
     }
 
     /// A draw from the prior.
     pub fn sample_prior(&self, rng: &mut impl rand::Rng) -> Vec<f64> {
-        self.free.iter().map(|f| f.prior.sample(rng)).collect()
+        const TRIES: usize = 1000;
+        let mut draw = || -> Vec<f64> {
+            let mut theta: Vec<f64> = self.free.iter().map(|f| f.prior.sample(rng)).collect();
+            for &(i, j, largest) in &self.discs {
+                let (radius, angle) = ((largest * rng.random::<f64>()).sqrt(), TAU * rng.random::<f64>());
+                (theta[i], theta[j]) = (radius * angle.cos(), radius * angle.sin());
+            }
+            theta
+        };
+        let first = draw();
+        if !self.has_two_planets() {
+            return first;
+        }
+        let allowed = |theta: &Vec<f64>| self.log_prior(theta).is_finite();
+        std::iter::once(first.clone()).chain((0..TRIES).map(|_| draw())).find(allowed).unwrap_or(first)
     }
 
     /// Which free parameters are periodic (phase of the orbit).
@@ -108,19 +220,18 @@ impl ParameterSpace {
         self.free.iter().map(|f| f.prior == Prior::Periodic).collect()
     }
 
-    /// Orbital phase angle at mid-time, but for phi.
-    fn mid_angle(&self, theta: &[f64]) -> f64 {
-        let period = self.free.iter().position(|f| f.parameter == Parameter::PorbOverProt);
-        let period = period.map_or(self.values[Parameter::PorbOverProt], |i| theta[i]);
-        TAU * self.mid_cycle / period
+    /// Mean longitude at mid-time (rad), but for phi, of a planet whose period and shape are in `theta`.
+    fn mid_angle(&self, of: &Elements, theta: &[f64]) -> f64 {
+        let values = self.values_at(theta);
+        TAU * self.mid_cycle / values[of.ratio] + TAU * of.shape(&values).longitude(0.0)
     }
 
     /// Internal coordinates of `theta`.
     pub fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
         let own = |(f, x): (&FreeParameter, &f64)| f.parameter.to_sampling(*x);
         let mut x: Vec<f64> = self.free.iter().zip(theta).map(own).collect();
-        if let Some((k, phi)) = self.polar {
-            let (sin, cos) = (self.mid_angle(theta) - TAU * theta[phi]).sin_cos();
+        for &Polar { k, phi, of } in &self.polar {
+            let (sin, cos) = (self.mid_angle(of, theta) - TAU * theta[phi]).sin_cos();
             (x[k], x[phi]) = (theta[k] * cos, theta[k] * sin);
         }
         x
@@ -129,10 +240,10 @@ impl ParameterSpace {
     /// Written coordinates of `internal`, periodic ones wrapped.
     pub fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
         let mut theta = internal.to_vec();
-        if let Some((k, phi)) = self.polar {
+        for &Polar { k, phi, of } in &self.polar {
             let (x, y) = (internal[k], internal[phi]);
             theta[k] = x.hypot(y);
-            theta[phi] = (self.mid_angle(internal) - y.atan2(x)) / TAU;
+            theta[phi] = (self.mid_angle(of, internal) - y.atan2(x)) / TAU;
             // phi has period 1 whatever its prior: bring it to where that one may contain it
             let (lowest, _) = self.free[phi].prior.bounds();
             theta[phi] -= (theta[phi] - lowest.max(-1e6)).floor();
@@ -146,7 +257,7 @@ impl ParameterSpace {
     /// ln |d(written) / d(internal)| at `theta`: `d(K, phi) = dx dy / (2 pi K)`, and logarithms of the field.
     pub fn log_jacobian(&self, theta: &[f64]) -> f64 {
         let own: f64 = self.free.iter().zip(theta).map(|(f, x)| f.parameter.log_jacobian(*x)).sum();
-        own + self.polar.map_or(0.0, |(k, _)| -(TAU * theta[k].max(SMALLEST_K_KMS)).ln())
+        self.polar.iter().fold(own, |sum, polar| sum - (TAU * theta[polar.k].max(SMALLEST_K_KMS)).ln())
     }
 
     /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what
@@ -154,15 +265,21 @@ impl ParameterSpace {
     pub fn scales(&self) -> Vec<f64> {
         // a change of angular velocity that turns the star by this angle (rad) in half the time base
         let turn = 0.01;
-        let omega = turn / (0.5 * self.time_base_cycles.max(0.1) * self.rotation_period_d);
+        let omega = turn / (0.5 * self.time_base_cycles.max(0.1) * self.clock.rotation_period_d);
+        let ratio = |of: Parameter| {
+            let period = self.values[of];
+            0.02 * period * period / (0.5 * self.time_base_cycles).max(0.1)
+        };
         let scale = |f: &FreeParameter| match f.parameter {
-            Parameter::K | Parameter::Vsys => 0.02,
-            Parameter::Phi if self.polar.is_some() => 0.02,
-            Parameter::Phi => 0.02,
-            Parameter::PorbOverProt => {
-                let period = self.values[Parameter::PorbOverProt];
-                0.02 * period * period / (0.5 * self.time_base_cycles).max(0.1)
-            }
+            Parameter::K | Parameter::K2 | Parameter::Vsys => 0.02,
+            Parameter::Phi | Parameter::Phi2 => 0.02,
+            Parameter::PorbOverProt | Parameter::PorbOverProt2 => ratio(f.parameter),
+            Parameter::Period => self.clock.rotation_period_d * ratio(Parameter::PorbOverProt),
+            Parameter::Period2 => self.clock.rotation_period_d * ratio(Parameter::PorbOverProt2),
+            Parameter::Conjunction => 0.02 * self.clock.rotation_period_d * self.values[Parameter::PorbOverProt],
+            Parameter::Conjunction2 => 0.02 * self.clock.rotation_period_d * self.values[Parameter::PorbOverProt2],
+            Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => 0.05,
+            Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => 0.05,
             Parameter::OmegaEq => omega,
             Parameter::DOmega => 3.0 * omega,
             Parameter::Inclination => 0.5,
@@ -211,7 +328,7 @@ mod tests {
                 assert!((a - b).abs() < 1e-9, "{theta:?} {back:?}");
             }
             // x is the velocity at mid-time
-            let velocity = space.values_at(&theta).state().orbit.velocity_kms(1.47);
+            let velocity = space.values_at(&theta).state().motion.velocity_kms(1.47);
             assert!((space.to_sampling(&theta)[0] - velocity).abs() < 1e-12);
         }
     }
@@ -232,5 +349,92 @@ mod tests {
         };
         let m = nalgebra::Matrix3::from_columns(&[column(0), column(1), column(2)].map(nalgebra::Vector3::from));
         assert!((m.determinant().abs().ln() + space.log_jacobian(&theta)).abs() < 1e-6);
+    }
+
+    /// Two ellipses: there and back, with the determinant of the change by differences.
+    #[test]
+    fn ellipses_and_second_planets_have_coordinates_of_their_own() {
+        use Parameter::{K, K2, Phi, Phi2, PorbOverProt, PorbOverProt2, SqrtECosOmega, SqrtESinOmega};
+        let uniform = |parameter, min, max| FreeParameter { parameter, prior: Prior::Uniform { min, max } };
+        let other = |parameter, prior| FreeParameter { parameter, prior };
+        let disc = Prior::Disc { max_eccentricity: 0.5 };
+        let free = vec![
+            uniform(K, 0.0, 0.3),
+            uniform(PorbOverProt, 0.5, 1.0),
+            other(Phi, Prior::Periodic),
+            other(SqrtECosOmega, disc),
+            other(SqrtESinOmega, disc),
+            uniform(K2, 0.0, 0.3),
+            uniform(PorbOverProt2, 3.0, 4.0),
+            other(Phi2, Prior::Periodic),
+        ];
+        let mut values = ParameterValues::of_eight([0.1, 0.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]);
+        (values[K2], values[PorbOverProt2], values[Phi2]) = (0.1, 3.5, 0.5);
+        let space = ParameterSpace::new(free, values, 1.47, 2.94, 3.0);
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        for _ in 0..20 {
+            let theta = space.sample_prior(&mut rng);
+            assert!(theta[3].powi(2) + theta[4].powi(2) <= 0.5 && space.log_prior(&theta).is_finite());
+            let back = space.to_physical(&space.to_sampling(&theta));
+            assert!(theta.iter().zip(&back).all(|(a, b)| (a - b).abs() < 1e-8), "{theta:?} {back:?}");
+            let h = 1e-6;
+            let column = |i: usize| {
+                let shifted = |h: f64| {
+                    let mut t = theta.clone();
+                    t[i] += h;
+                    nalgebra::DVector::from_vec(space.to_sampling(&t))
+                };
+                (shifted(h) - shifted(-h)) / (2.0 * h)
+            };
+            let columns: Vec<_> = (0..8).map(column).collect();
+            let determinant = nalgebra::DMatrix::from_columns(&columns).determinant();
+            assert!((determinant.abs().ln() + space.log_jacobian(&theta)).abs() < 1e-4, "{theta:?}");
+        }
+        // crossing orbits are outside of the prior
+        let mut crossing = space.start();
+        (crossing[1], crossing[6]) = (1.0, 3.0);
+        (crossing[3], crossing[4]) = (0.5f64.sqrt() - 1e-9, 0.0);
+        assert!(space.log_prior(&crossing).is_finite());
+        crossing[6] = 1.5;
+        assert_eq!(space.log_prior(&crossing), f64::NEG_INFINITY);
+    }
+
+    /// An ephemeris in days is the same orbit with the same density, but for units.
+    #[test]
+    fn an_ephemeris_gives_the_posterior_of_what_it_stands_for() {
+        use Parameter::{Conjunction, K, Period, Phi, PorbOverProt};
+        let values = ParameterValues::of_eight([0.1, 1.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]);
+        let of = |free: Vec<(Parameter, Prior)>| {
+            let free = free.into_iter().map(|(parameter, prior)| FreeParameter { parameter, prior }).collect();
+            ParameterSpace::new(free, values, 1.47, 2.94, 3.0).of_star(100.0, None)
+        };
+        let k = (K, Prior::Uniform { min: 0.0, max: 0.3 });
+        let ratio = Prior::Normal { mean: 1.7, sd: 0.01, min: 0.0, max: 4.0 };
+        let internal = of(vec![k, (PorbOverProt, ratio), (Phi, Prior::Periodic)]);
+        let days = Prior::Normal { mean: 5.1, sd: 0.03, min: 0.0, max: 12.0 };
+        let named = of(vec![k, (Period, days), (Phi, Prior::Periodic)]);
+        for period in [1.69, 1.7, 1.72] {
+            let (a, b) = ([0.1, period, 0.4], [0.1, 3.0 * period, 0.4]);
+            let (one, other) = (named.values_at(&b), internal.values_at(&a));
+            assert!((one[PorbOverProt] - other[PorbOverProt]).abs() < 1e-15 && one[Phi] == other[Phi]);
+            assert!((named.log_prior(&b) - internal.log_prior(&a) + 3f64.ln()).abs() < 1e-9);
+            assert!((named.log_jacobian(&b) - internal.log_jacobian(&a)).abs() < 1e-12);
+            let (x, y) = (named.to_sampling(&b), internal.to_sampling(&a));
+            assert!((x[0] - y[0]).abs() < 1e-14 && (x[2] - y[2]).abs() < 1e-14);
+        }
+        // a conjunction that may be anywhere in one orbit is a phase that may be anything
+        let phase = of(vec![k, (Phi, Prior::Periodic)]);
+        let conjunction = of(vec![k, (Conjunction, Prior::Uniform { min: 150.0, max: 155.1 })]);
+        let density = |space: &ParameterSpace, theta: &[f64]| space.log_prior(theta);
+        for phi in [0.0, 0.2, 0.77] {
+            let mut values = values;
+            values[Phi] = phi;
+            let theta = conjunction.theta_of(&values);
+            assert!((150.0..=155.1).contains(&theta[1]), "{theta:?}");
+            let back = conjunction.values_at(&theta)[Phi];
+            assert!(((back - phi + 0.5).rem_euclid(1.0) - 0.5).abs() < 1e-12);
+            let difference = density(&phase, &[0.1, phi]) - density(&conjunction, &theta);
+            assert!((difference - 5.1f64.ln()).abs() < 1e-9);
+        }
     }
 }

@@ -2,6 +2,7 @@
 //! 3).
 
 pub mod coordinates;
+pub mod elements;
 pub mod kind;
 mod likelihood;
 pub mod orbital;
@@ -9,16 +10,20 @@ pub mod parameters;
 pub mod posterior;
 mod prediction;
 pub mod prior;
+mod quantile;
+mod quoted;
 pub mod reference;
 pub mod target;
 pub mod tradeoff;
 mod warm_start;
 
-pub use coordinates::{FreeParameter, ParameterSpace};
+pub use coordinates::{FreeParameter, ParameterSpace, for_blind_search, period_prior};
+pub use elements::{Clock, Elements};
 pub use kind::{ObjectiveKind, UnresolvedSpots};
 pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
 pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 pub use parameters::{Parameter, ParameterValues};
 pub use posterior::{CHI2, Posterior, SPOTTEDNESS, is_physical};
 pub use prior::Prior;
+pub use quoted::Quoted;
 pub use reference::{Reference, ReferenceError};

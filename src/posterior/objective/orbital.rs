@@ -1,18 +1,18 @@
-//! What is usually quoted of an orbit, from the parameters sampled: period in days, time of the largest radial velocity
-//! and of inferior conjunction, minimum mass; for single orbits with their errors, and for each draw of a chain.
+//! What is usually quoted of an orbit: period in days, time of the largest radial velocity and of inferior conjunction,
+//! minimum mass, eccentricity; for single orbits, of circles with their errors. For each draw of a chain see `quoted`.
 //!
-//! Formulas are in `star::planet`, statistics of draws in `chain::derived`.
+//! Formulas are in `star::planet`.
 
-use super::{FreeParameter, Parameter, ParameterValues};
+use super::Parameter;
+use super::elements::{Clock, to_conjunction};
+use super::quoted::Quoted;
 use crate::numerics::units::EARTHS_PER_JUPITER;
-use crate::sampling::chain::derived::{Derived, Formula, Rule};
-use crate::star::planet::{MAXIMUM_TO_CONJUNCTION, maximum_phase, minimum_mass};
-use crate::star::{Orbit, StarSettings};
+use crate::star::planet::{maximum_phase, minimum_mass};
+use crate::star::{Eccentric, Orbit, StarSettings};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// Standard deviation of a phase of which nothing is known (cycles).
-const UNKNOWN_PHASE: f64 = 0.288_675_134_594_812_9;
+pub(super) const UNKNOWN_PHASE: f64 = 0.288_675_134_594_812_9;
 
 /// Minimum masses below this (Jupiter masses) are also given in masses of the Earth.
 const SMALL_MJUP: f64 = 0.1;
@@ -20,6 +20,9 @@ const SMALL_MJUP: f64 = 0.1;
 /// What phi is, in a line.
 pub const PHI: &str = "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity; 0: a \
 maximum at star.epoch_d";
+
+/// What a conjunction is whose time is a parameter.
+const NAMED_CONJUNCTION: &str = "time (d) of the inferior conjunction (planet in front) that its prior is on";
 
 /// A quantity of an orbit. The order is that of tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,10 +35,14 @@ pub enum OrbitQuantity {
     Conjunction,
     /// Minimum mass of the planet (Jupiter masses).
     MinimumMass,
+    /// Eccentricity.
+    Eccentricity,
+    /// Argument of periastron of the star's orbit (degrees).
+    Omega,
 }
 
 impl OrbitQuantity {
-    /// All of them, in order.
+    /// Those of a circle, in order.
     pub const ALL: [OrbitQuantity; 4] =
         [OrbitQuantity::Period, OrbitQuantity::Maximum, OrbitQuantity::Conjunction, OrbitQuantity::MinimumMass];
 
@@ -46,17 +53,24 @@ impl OrbitQuantity {
             OrbitQuantity::Maximum => "t_max_rv_d",
             OrbitQuantity::Conjunction => "t_conjunction_d",
             OrbitQuantity::MinimumMass => "msini_mjup",
+            OrbitQuantity::Eccentricity => "eccentricity",
+            OrbitQuantity::Omega => "omega_deg",
         }
     }
 
-    /// The quantity of that name.
-    pub fn from_name(name: &str) -> Option<OrbitQuantity> {
-        OrbitQuantity::ALL.into_iter().find(|one| one.name() == name)
+    /// Whether it is the time of something that comes back with every orbit.
+    pub fn is_event(self) -> bool {
+        matches!(self, OrbitQuantity::Maximum | OrbitQuantity::Conjunction)
     }
 
     /// Unit of its values.
     pub fn unit(self) -> &'static str {
-        if self == OrbitQuantity::MinimumMass { "Mjup" } else { "d" }
+        match self {
+            OrbitQuantity::MinimumMass => "Mjup",
+            OrbitQuantity::Eccentricity => "1",
+            OrbitQuantity::Omega => "deg",
+            OrbitQuantity::Period | OrbitQuantity::Maximum | OrbitQuantity::Conjunction => "d",
+        }
     }
 
     /// Its symbol, in LaTeX without dollars.
@@ -66,13 +80,16 @@ impl OrbitQuantity {
             OrbitQuantity::Maximum => r"T_\mathrm{max\,RV}",
             OrbitQuantity::Conjunction => r"T_\mathrm{conj}",
             OrbitQuantity::MinimumMass => r"M \sin i",
+            OrbitQuantity::Eccentricity => "e",
+            OrbitQuantity::Omega => r"\omega",
         }
     }
 
     /// What it is, in a line; `None` where the name says it.
     pub fn definition(self) -> Option<&'static str> {
         Some(match self {
-            OrbitQuantity::Period => return None,
+            OrbitQuantity::Period | OrbitQuantity::Eccentricity => return None,
+            OrbitQuantity::Omega => "argument of periastron of the star's orbit (degrees)",
             OrbitQuantity::Maximum => {
                 "time (d) of the largest (receding) radial velocity nearest to the middle of the data"
             }
@@ -117,16 +134,23 @@ impl OrbitQuantities {
         self.time_span_d.map(|[first, last]| 0.5 * (first + last))
     }
 
-    fn period_d(&self, orbit: &Orbit) -> f64 {
+    /// What ephemerides are counted with.
+    pub fn clock(&self) -> Clock {
+        Clock { rotation_period_d: self.rotation_period_d, epoch_d: self.epoch_d }
+    }
+
+    /// Period (d) of an orbit.
+    pub fn period_d(&self, orbit: &Orbit) -> f64 {
         self.rotation_period_d * orbit.porb_over_prot
     }
 
     /// Phase of an event, counted like phi; `None` for what is no event.
-    fn phase(quantity: OrbitQuantity, orbit: &Orbit) -> Option<f64> {
+    fn phase(quantity: OrbitQuantity, orbit: &Eccentric) -> Option<f64> {
+        let maximum = maximum_phase(&orbit.orbit);
         match quantity {
-            OrbitQuantity::Maximum => Some(maximum_phase(orbit)),
-            OrbitQuantity::Conjunction => Some(maximum_phase(orbit) + MAXIMUM_TO_CONJUNCTION),
-            OrbitQuantity::Period | OrbitQuantity::MinimumMass => None,
+            OrbitQuantity::Maximum => Some(maximum),
+            OrbitQuantity::Conjunction => Some(maximum + to_conjunction(&orbit.shape)),
+            _ => None,
         }
     }
 
@@ -139,22 +163,27 @@ impl OrbitQuantities {
 
     /// The value for one orbit; an event nearest to `near`, or else to the middle of the data. `None` where it cannot
     /// be had.
-    pub fn value(&self, quantity: OrbitQuantity, orbit: &Orbit, near: Option<f64>) -> Option<f64> {
-        let period = self.period_d(orbit);
+    pub fn value(&self, quantity: OrbitQuantity, orbit: &Eccentric, near: Option<f64>) -> Option<f64> {
+        let period = self.period_d(&orbit.orbit);
         let value = match quantity {
             OrbitQuantity::Period => Some(period),
-            OrbitQuantity::MinimumMass => Some(minimum_mass(orbit.k_kms, period, self.mass_msun?).mjup),
+            OrbitQuantity::MinimumMass => {
+                let round = (1.0 - orbit.shape.eccentricity().powi(2)).sqrt();
+                Some(minimum_mass(orbit.orbit.k_kms * round, period, self.mass_msun?).mjup)
+            }
+            OrbitQuantity::Eccentricity => Some(orbit.shape.eccentricity()),
+            OrbitQuantity::Omega => Some(orbit.shape.omega().to_degrees().rem_euclid(360.0)),
             event => Self::phase(event, orbit)
                 .zip(near.or(self.middle_d()))
-                .map(|(phase, near)| self.time(phase, orbit, near)),
+                .map(|(phase, near)| self.time(phase, &orbit.orbit, near)),
         };
         value.filter(|value| value.is_finite())
     }
 
-    /// The value with its error to first order, for errors of K, period over rotation period and phi of that
-    /// covariance. The error of an event is at most that of one of which nothing but the period is known.
+    /// The value for a circle with its error to first order, for errors of K, period over rotation period and phi of
+    /// that covariance. The error of an event is at most that of one of which nothing but the period is known.
     pub fn estimate(&self, quantity: OrbitQuantity, orbit: &Orbit, covariance: &[[f64; 3]; 3]) -> Option<Estimate> {
-        let value = self.value(quantity, orbit, None)?;
+        let value = self.value(quantity, &(*orbit).into(), None)?;
         let (prot, period) = (self.rotation_period_d, self.period_d(orbit));
         let slope = match quantity {
             OrbitQuantity::Period => [0.0, prot, 0.0],
@@ -165,74 +194,24 @@ impl OrbitQuantities {
                 let mass = minimum_mass(orbit.k_kms, period, self.mass_msun?);
                 [mass.by_k, prot * mass.by_period, 0.0]
             }
+            OrbitQuantity::Eccentricity | OrbitQuantity::Omega => return None,
         };
         let variance: f64 = (0..3).flat_map(|i| (0..3).map(move |j| slope[i] * covariance[i][j] * slope[j])).sum();
-        let most = if Self::phase(quantity, orbit).is_some() { UNKNOWN_PHASE * period } else { f64::INFINITY };
+        let most = if quantity.is_event() { UNKNOWN_PHASE * period } else { f64::INFINITY };
         Some(Estimate { value, sd: variance.max(0.0).sqrt().min(most) })
-    }
-
-    /// Those that follow from free parameters, in order.
-    pub fn of_free(&self, free: &[Parameter]) -> Vec<OrbitQuantity> {
-        let is_free = |wanted: &[Parameter]| wanted.iter().any(|one| free.contains(one));
-        let follows = |quantity: &OrbitQuantity| match quantity {
-            OrbitQuantity::Period => is_free(&[Parameter::PorbOverProt]),
-            OrbitQuantity::MinimumMass => self.mass_msun.is_some() && is_free(&[Parameter::K, Parameter::PorbOverProt]),
-            _ => self.time_span_d.is_some() && is_free(&[Parameter::PorbOverProt, Parameter::Phi]),
-        };
-        OrbitQuantity::ALL.into_iter().filter(follows).collect()
-    }
-
-    /// Those that follow from free parameters, for draws of these; the others stay at `values`.
-    pub fn of_draws(&self, free: &[FreeParameter], values: &ParameterValues) -> Vec<Derived> {
-        let parameters: Vec<Parameter> = free.iter().map(|one| one.parameter).collect();
-        let of = self.of_free(&parameters);
-        let fixed = *values;
-        let orbit: Formula<Orbit> = Arc::new(move |theta: &[f64]| {
-            let mut values = fixed;
-            parameters.iter().zip(theta).for_each(|(parameter, value)| values[*parameter] = *value);
-            values.state().orbit
-        });
-        let derived = |quantity: OrbitQuantity| {
-            let rule = self.rule(quantity, orbit.clone())?;
-            Some(Derived {
-                name: quantity.name().to_owned(),
-                definition: quantity.definition().map(str::to_owned),
-                rule,
-            })
-        };
-        of.into_iter().filter_map(derived).collect()
-    }
-
-    fn rule(&self, quantity: OrbitQuantity, orbit: Formula<Orbit>) -> Option<Rule> {
-        let star = *self;
-        Some(match quantity {
-            OrbitQuantity::Period => Rule::Value(Arc::new(move |theta| star.period_d(&orbit(theta)))),
-            OrbitQuantity::MinimumMass => {
-                let mass_msun = star.mass_msun?;
-                let mass = move |theta: &[f64]| {
-                    let orbit = orbit(theta);
-                    minimum_mass(orbit.k_kms, star.period_d(&orbit), mass_msun).mjup
-                };
-                Rule::Amplitude(Parameter::K.name().to_owned(), Arc::new(mass))
-            }
-            OrbitQuantity::Maximum | OrbitQuantity::Conjunction => {
-                let near = star.middle_d()?;
-                let time_and_period = move |theta: &[f64]| {
-                    let orbit = orbit(theta);
-                    let time = Self::phase(quantity, &orbit).map(|phase| star.time(phase, &orbit, near));
-                    [time.unwrap_or(near), star.period_d(&orbit)]
-                };
-                Rule::Event { near, time_and_period: Arc::new(time_and_period) }
-            }
-        })
     }
 }
 
 /// What a parameter or quantity of an orbit is, in a line, where its name does not say it.
 pub fn definition(name: &str) -> Option<&'static str> {
-    match OrbitQuantity::from_name(name) {
-        Some(quantity) => quantity.definition(),
-        None => (name == Parameter::Phi.name()).then_some(PHI),
+    match (Parameter::from_name(name), Quoted::from_name(name)) {
+        (Some(Parameter::Phi | Parameter::Phi2), _) => Some(PHI),
+        (Some(Parameter::Conjunction | Parameter::Conjunction2), _) => Some(NAMED_CONJUNCTION),
+        (Some(parameter), _) if parameter.is_shape() => {
+            Some("of eccentricity e and argument of periastron omega of the star's orbit")
+        }
+        (Some(_), _) => None,
+        (None, quoted) => quoted.and_then(|quoted| quoted.quantity.definition()),
     }
 }
 
@@ -258,7 +237,7 @@ mod tests {
         for (k, p, phi) in [(0.1, 1.7, 0.3), (0.4, 0.31, 0.99), (-0.1, 2.4, 0.6), (0.2, 30.0, 0.1)] {
             let orbit = Orbit { k_kms: k, porb_over_prot: p, phi };
             let velocity = |t: f64| orbit.velocity_kms((t - STAR.epoch_d) / STAR.rotation_period_d);
-            let at = |quantity| STAR.value(quantity, &orbit, None).unwrap();
+            let at = |quantity| STAR.value(quantity, &orbit.into(), None).unwrap();
             let (period, maximum) = (at(OrbitQuantity::Period), at(OrbitQuantity::Maximum));
             assert_eq!(period, 3.0 * p);
             assert!((velocity(maximum) / k.abs() - 1.0).abs() < 1e-9, "{maximum}");
@@ -268,7 +247,7 @@ mod tests {
             for time in [maximum, conjunction] {
                 assert!((time - 2_459_320.0).abs() <= 0.5 * period + 1e-9, "{time}");
             }
-            assert_eq!(STAR.value(OrbitQuantity::Maximum, &orbit, Some(maximum + 3.0 * period)), {
+            assert_eq!(STAR.value(OrbitQuantity::Maximum, &orbit.into(), Some(maximum + 3.0 * period)), {
                 Some(STAR.time(maximum_phase(&orbit), &orbit, maximum + 3.0 * period))
             });
         }
@@ -290,7 +269,7 @@ mod tests {
                     porb_over_prot: orbit.porb_over_prot + sign * dp,
                     phi: orbit.phi + sign * dphi,
                 };
-                let at = |sign: f64| STAR.value(quantity, &moved(sign), None).unwrap();
+                let at = |sign: f64| STAR.value(quantity, &moved(sign).into(), None).unwrap();
                 0.5 * (at(1.0) - at(-1.0))
             };
             // the two directions of the covariance, and K
@@ -306,17 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_follows_from_what_is_fixed() {
-        use Parameter::{K, Phi, PorbOverProt, Vsini};
-        let names = |star: OrbitQuantities, free: &[Parameter]| -> Vec<&str> {
-            star.of_free(free).into_iter().map(OrbitQuantity::name).collect()
-        };
-        assert_eq!(names(STAR, &[K, PorbOverProt, Phi]), ["period_d", "t_max_rv_d", "t_conjunction_d", "msini_mjup"]);
-        assert_eq!(names(STAR, &[K, Vsini]), ["msini_mjup"]);
-        assert_eq!(names(STAR, &[Phi]), ["t_max_rv_d", "t_conjunction_d"]);
-        let bare = OrbitQuantities { mass_msun: None, time_span_d: None, ..STAR };
-        assert_eq!(names(bare, &[K, PorbOverProt, Phi]), ["period_d"]);
-        assert!(names(STAR, &[Vsini]).is_empty());
+    fn small_masses_are_told_in_earths() {
         assert_eq!(in_earths(0.01).unwrap(), "0.0100 Jupiter masses are 3.18 of the Earth");
         assert_eq!(in_earths(0.2), None);
     }

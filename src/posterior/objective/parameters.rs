@@ -1,6 +1,7 @@
 //! The parameters that may be sampled: their names, units, and values at one point of parameter space.
 
-use crate::star::{Orbit, Rotation, StarState, Surface};
+use super::elements::Elements;
+use crate::star::{Motion, Rotation, StarState, Surface};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -12,8 +13,30 @@ pub enum Parameter {
     K,
     /// Orbital period over rotation period.
     PorbOverProt,
+    /// Orbital period (d), in place of that ratio.
+    Period,
     /// Orbital phase (cycles).
     Phi,
+    /// Time of an inferior conjunction (d), in place of the phase.
+    Conjunction,
+    /// Square root of the eccentricity times the cosine of the argument of periastron.
+    SqrtECosOmega,
+    /// The same with the sine.
+    SqrtESinOmega,
+    /// Semi-amplitude of a second planet's orbit (km/s).
+    K2,
+    /// Its orbital period over rotation period.
+    PorbOverProt2,
+    /// Its orbital period (d), in place of that ratio.
+    Period2,
+    /// Its orbital phase (cycles).
+    Phi2,
+    /// Time of one of its inferior conjunctions (d), in place of the phase.
+    Conjunction2,
+    /// Of its orbit, the square root of the eccentricity times the cosine of the argument of periastron.
+    SqrtECosOmega2,
+    /// The same with the sine.
+    SqrtESinOmega2,
     /// Angular velocity of the equator (rad/d).
     OmegaEq,
     /// Equator-to-pole shear (rad/d).
@@ -42,10 +65,21 @@ pub enum Parameter {
 
 impl Parameter {
     /// All of them, in order.
-    pub const ALL: [Parameter; 15] = [
+    pub const ALL: [Parameter; 26] = [
         Parameter::K,
         Parameter::PorbOverProt,
+        Parameter::Period,
         Parameter::Phi,
+        Parameter::Conjunction,
+        Parameter::SqrtECosOmega,
+        Parameter::SqrtESinOmega,
+        Parameter::K2,
+        Parameter::PorbOverProt2,
+        Parameter::Period2,
+        Parameter::Phi2,
+        Parameter::Conjunction2,
+        Parameter::SqrtECosOmega2,
+        Parameter::SqrtESinOmega2,
         Parameter::OmegaEq,
         Parameter::DOmega,
         Parameter::Inclination,
@@ -68,7 +102,18 @@ impl Parameter {
         match self {
             Parameter::K => "k_kms",
             Parameter::PorbOverProt => "porb_over_prot",
+            Parameter::Period => "period_d",
             Parameter::Phi => "phi",
+            Parameter::Conjunction => "t_conjunction_d",
+            Parameter::SqrtECosOmega => "sqrt_e_cos_omega",
+            Parameter::SqrtESinOmega => "sqrt_e_sin_omega",
+            Parameter::K2 => "k2_kms",
+            Parameter::PorbOverProt2 => "porb2_over_prot",
+            Parameter::Period2 => "period2_d",
+            Parameter::Phi2 => "phi2",
+            Parameter::Conjunction2 => "t_conjunction2_d",
+            Parameter::SqrtECosOmega2 => "sqrt_e2_cos_omega2",
+            Parameter::SqrtESinOmega2 => "sqrt_e2_sin_omega2",
             Parameter::OmegaEq => "omega_eq_rad_d",
             Parameter::DOmega => "domega_rad_d",
             Parameter::Inclination => "inclination_deg",
@@ -87,12 +132,15 @@ impl Parameter {
     /// Unit of its values; `1` for a ratio.
     pub fn unit(self) -> &'static str {
         match self {
-            Parameter::K | Parameter::Vsini | Parameter::Vsys => "km/s",
+            Parameter::K | Parameter::K2 | Parameter::Vsini | Parameter::Vsys => "km/s",
             Parameter::LineSigma | Parameter::EquivalentWidth => "km/s",
             Parameter::PorbOverProt | Parameter::LimbDarkening | Parameter::Contrast => "1",
             Parameter::SpotAmplitude | Parameter::SpotSlope => "1",
+            Parameter::PorbOverProt2 | Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => "1",
+            Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => "1",
             Parameter::SpotLifetime => "d",
-            Parameter::Phi => "cycles",
+            Parameter::Period | Parameter::Conjunction | Parameter::Period2 | Parameter::Conjunction2 => "d",
+            Parameter::Phi | Parameter::Phi2 => "cycles",
             Parameter::OmegaEq | Parameter::DOmega => "rad/d",
             Parameter::Inclination => "deg",
         }
@@ -103,7 +151,18 @@ impl Parameter {
         match self {
             Parameter::K => "K",
             Parameter::PorbOverProt => r"P_\mathrm{orb}/P_\mathrm{rot}",
+            Parameter::Period => r"P_\mathrm{orb}",
             Parameter::Phi => r"\phi",
+            Parameter::Conjunction => r"T_\mathrm{conj}",
+            Parameter::SqrtECosOmega => r"\sqrt{e} \cos \omega",
+            Parameter::SqrtESinOmega => r"\sqrt{e} \sin \omega",
+            Parameter::K2 => "K_2",
+            Parameter::PorbOverProt2 => r"P_{\mathrm{orb},2}/P_\mathrm{rot}",
+            Parameter::Period2 => r"P_{\mathrm{orb},2}",
+            Parameter::Phi2 => r"\phi_2",
+            Parameter::Conjunction2 => r"T_{\mathrm{conj},2}",
+            Parameter::SqrtECosOmega2 => r"\sqrt{e_2} \cos \omega_2",
+            Parameter::SqrtESinOmega2 => r"\sqrt{e_2} \sin \omega_2",
             Parameter::OmegaEq => r"\Omega_\mathrm{eq}",
             Parameter::DOmega => r"\mathrm{d}\Omega",
             Parameter::Inclination => "i",
@@ -119,9 +178,31 @@ impl Parameter {
         }
     }
 
-    /// Whether it belongs to the planet's orbit.
+    /// Whether it belongs to a planet's orbit.
     pub fn is_orbital(self) -> bool {
-        matches!(self, Parameter::K | Parameter::PorbOverProt | Parameter::Phi)
+        Elements::of(self).is_some()
+    }
+
+    /// Whether it is a phase of an orbit, which has period 1.
+    pub fn is_phase(self) -> bool {
+        matches!(self, Parameter::Phi | Parameter::Phi2)
+    }
+
+    /// Whether it is one of the two that say how eccentric an orbit is, and where its periastron.
+    pub fn is_shape(self) -> bool {
+        Elements::of(self).is_some_and(|of| of.shape.contains(&self))
+    }
+
+    /// Whether it is a semi-amplitude.
+    pub fn is_amplitude(self) -> bool {
+        matches!(self, Parameter::K | Parameter::K2)
+    }
+
+    /// Whether it stands in place of another parameter, in other units: it is free in its name alone, and
+    /// [`ParameterValues`] hold the other.
+    pub fn is_ephemeris(self) -> bool {
+        use Parameter::{Conjunction, Conjunction2, Period, Period2};
+        matches!(self, Period | Conjunction | Period2 | Conjunction2)
     }
 
     /// Whether it stands in place of one of the star's settings.
@@ -136,7 +217,8 @@ impl Parameter {
 
     /// Whether values of all parameters may do without it.
     pub fn is_optional(self) -> bool {
-        self.is_surface() || self.is_of_field()
+        let is_usual = matches!(self, Parameter::K | Parameter::PorbOverProt | Parameter::Phi);
+        self.is_surface() || self.is_of_field() || (self.is_orbital() && !is_usual)
     }
 
     /// Whether samplers move in its logarithm.
@@ -173,7 +255,9 @@ impl Parameter {
 
 /// Values of all parameters in the units of their names, free or not; index by [`Parameter`]. Those of the surface are
 /// NaN where they are not given: they are those of the star's settings then. Those of the field are NaN where no maps
-/// are integrated over, the lifetime where spots live for ever.
+/// are integrated over, the lifetime where spots live for ever. Those of a second planet are NaN where there is none,
+/// and those of eccentricity where the orbit is a circle. Periods in days and conjunctions are always NaN: what they
+/// stand for is there.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterValues(pub [f64; Parameter::ALL.len()]);
 
@@ -198,11 +282,14 @@ impl PartialEq for ParameterValues {
 }
 
 impl ParameterValues {
-    /// Of the eight parameters of orbit, rotation and systemic velocity; the surface is that of the star's settings.
+    /// Of the eight parameters of a circular orbit, rotation and systemic velocity; the surface is that of the star's
+    /// settings.
     pub fn of_eight(eight: [f64; 8]) -> Self {
-        let mut values = [f64::NAN; Parameter::ALL.len()];
-        values[..8].copy_from_slice(&eight);
-        ParameterValues(values)
+        use Parameter::{DOmega, Inclination, K, OmegaEq, Phi, PorbOverProt, Vsini, Vsys};
+        let mut values = ParameterValues([f64::NAN; Parameter::ALL.len()]);
+        let names = [K, PorbOverProt, Phi, OmegaEq, DOmega, Inclination, Vsini, Vsys];
+        names.into_iter().zip(eight).for_each(|(p, value)| values[p] = value);
+        values
     }
 
     /// The value, if it is given.
@@ -215,6 +302,12 @@ impl ParameterValues {
         self.given(p) == other.given(p)
     }
 
+    /// The orbits.
+    pub fn motion(&self) -> Motion {
+        let [first, second] = &Elements::PLANETS;
+        Motion { first: first.orbit(self), second: self.given(second.k).map(|_| second.orbit(self)) }
+    }
+
     /// The physical state of star and planet they stand for.
     pub fn state(&self) -> StarState {
         StarState {
@@ -222,11 +315,7 @@ impl ParameterValues {
             inclination: self[Parameter::Inclination].to_radians(),
             vsini_kms: self[Parameter::Vsini],
             vsys_kms: self[Parameter::Vsys],
-            orbit: Orbit {
-                k_kms: self[Parameter::K],
-                porb_over_prot: self[Parameter::PorbOverProt],
-                phi: self[Parameter::Phi],
-            },
+            motion: self.motion(),
             surface: Surface {
                 limb_darkening: self.given(Parameter::LimbDarkening),
                 line_sigma_kms: self.given(Parameter::LineSigma),

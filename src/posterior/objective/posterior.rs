@@ -317,7 +317,7 @@ pub fn is_physical(imager: &Imager, values: &ParameterValues, theta: &[f64]) -> 
         && fastest.is_finite()
         && fastest <= LARGEST_VSINI_KMS
         && values[Parameter::Vsini] > 0.0
-        && values[Parameter::PorbOverProt] > 0.0
+        && state.motion.orbits().all(|planet| planet.orbit.porb_over_prot > 0.0 && planet.shape.eccentricity() < 1.0)
 }
 
 impl LogDensity for Posterior {

@@ -4,6 +4,7 @@
 
 use rand::Rng;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
 
 /// The prior of one free parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +42,12 @@ pub enum Prior {
         /// Upper bound (degrees).
         max: f64,
     },
+    /// Of one of the two coordinates of a point in a disc around 0, which may be anywhere in it alike. The density of
+    /// both is not the product: [`super::ParameterSpace`] has it.
+    Disc {
+        /// Square of the disc's radius: the largest eccentricity.
+        max_eccentricity: f64,
+    },
     /// Constant density on the circle `[0, 1)`; any real number stands for its fractional part.
     Periodic,
 }
@@ -53,7 +60,16 @@ impl Prior {
             | Prior::LogUniform { min, max }
             | Prior::Normal { min, max, .. }
             | Prior::Isotropic { min, max } => (min, max),
+            Prior::Disc { max_eccentricity } => (-max_eccentricity.sqrt(), max_eccentricity.sqrt()),
             Prior::Periodic => (0.0, 1.0),
+        }
+    }
+
+    /// Where it is densest, or the middle of its bounds.
+    pub fn centre(&self) -> f64 {
+        match *self {
+            Prior::Normal { mean, min, max, .. } => mean.clamp(min, max),
+            _ => 0.5 * (self.bounds().0 + self.bounds().1),
         }
     }
 
@@ -89,6 +105,9 @@ impl Prior {
                 let (a, b) = (min.to_radians(), max.to_radians());
                 x.to_radians().sin().ln() + 1f64.to_radians().ln() - (a.cos() - b.cos()).ln()
             }
+            Prior::Disc { max_eccentricity } => {
+                (max_eccentricity - x * x).max(0.0).sqrt().ln() - (0.5 * PI * max_eccentricity).ln()
+            }
             Prior::Periodic => 0.0,
         }
     }
@@ -113,6 +132,18 @@ impl Prior {
         (mean, variance.sqrt())
     }
 
+    /// The same prior of `x / unit`.
+    pub fn in_units_of(&self, unit: f64) -> Self {
+        match *self {
+            Prior::Uniform { min, max } => Prior::Uniform { min: min / unit, max: max / unit },
+            Prior::LogUniform { min, max } => Prior::LogUniform { min: min / unit, max: max / unit },
+            Prior::Normal { mean, sd, min, max } => {
+                Prior::Normal { mean: mean / unit, sd: sd / unit, min: min / unit, max: max / unit }
+            }
+            Prior::Isotropic { .. } | Prior::Disc { .. } | Prior::Periodic => *self,
+        }
+    }
+
     /// A random draw, always within the bounds.
     pub fn sample(&self, rng: &mut impl Rng) -> f64 {
         let (lower, upper) = self.bounds();
@@ -125,6 +156,10 @@ impl Prior {
             Prior::Isotropic { min, max } => {
                 let (a, b) = (min.to_radians().cos(), max.to_radians().cos());
                 (a + rng.random::<f64>() * (b - a)).acos().to_degrees()
+            }
+            Prior::Disc { max_eccentricity } => {
+                let (radius, angle) = ((max_eccentricity * rng.random::<f64>()).sqrt(), TAU * rng.random::<f64>());
+                radius * angle.cos()
             }
             Prior::Periodic => return rng.random::<f64>(),
         };
@@ -184,7 +219,6 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
-    use std::f64::consts::TAU;
 
     fn examples() -> Vec<Prior> {
         vec![
@@ -195,6 +229,7 @@ mod tests {
             Prior::Normal { mean: -2.0, sd: 0.1, min: 0.0, max: f64::INFINITY },
             Prior::Isotropic { min: 0.0, max: 90.0 },
             Prior::Isotropic { min: 20.0, max: 55.0 },
+            Prior::Disc { max_eccentricity: 0.6 },
             Prior::Periodic,
         ]
     }

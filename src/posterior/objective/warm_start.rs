@@ -45,7 +45,7 @@ pub fn place(imager: &Imager, space: &ParameterSpace, theta: &[f64]) -> Vec<f64>
     let state = space.values_at(theta).state();
     let cycles = imager.cycles();
     let unit = VELOCITY_KMS * (cycles.len() as f64).sqrt();
-    let mut place: Vec<f64> = state.orbit.velocities_kms(&cycles).map(|v| (v + state.vsys_kms) / unit).collect();
+    let mut place: Vec<f64> = state.motion.velocities_kms(&cycles).map(|v| (v + state.vsys_kms) / unit).collect();
     let stellar = space.free().iter().zip(theta).zip(space.scales()).filter(|((f, _), _)| !f.parameter.only_shifts());
     place.extend(stellar.map(|((_, x), scale)| x / scale));
     place

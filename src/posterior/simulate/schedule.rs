@@ -16,6 +16,9 @@ const STREAM: u64 = 3;
 pub struct Schedule {
     /// Nights of a season, one a day, 1 to 1000.
     pub nights: usize,
+    /// Which nights of a season, by their numbers from 0 on and rising, in place of one a day: `[0, 1, 7, 8]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on_nights: Option<Vec<usize>>,
     /// Seasons, 1 to 100.
     pub seasons: usize,
     /// Days from the first night of a season to that of the next.
@@ -34,6 +37,7 @@ impl Default for Schedule {
     fn default() -> Self {
         Schedule {
             nights: 15,
+            on_nights: None,
             seasons: 1,
             season_spacing_d: 365.0,
             per_night: [2, 4],
@@ -45,11 +49,17 @@ impl Default for Schedule {
 }
 
 impl Schedule {
+    /// Numbers of the nights of a season.
+    pub fn of_season(&self) -> Vec<usize> {
+        self.on_nights.clone().unwrap_or_else(|| (0..self.nights).collect())
+    }
+
     /// The times (d) from the first night on, in order and to a second. None where clouds take all nights.
     pub fn times_d(&self, first_d: f64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(STREAM);
-        let nights = (0..self.seasons).flat_map(|season| (0..self.nights).map(move |night| (season, night)));
+        let of_season = self.of_season();
+        let nights = (0..self.seasons).flat_map(|season| of_season.iter().map(move |night| (season, *night)));
         let mut times = Vec::new();
         for (season, night) in nights {
             let begin_d = first_d + season as f64 * self.season_spacing_d + night as f64;

@@ -1,14 +1,15 @@
-//! The quadratic at one period: a Gaussian in all other coordinates.
+//! The quadratic at one period (or two, with the shapes of the orbits): a Gaussian in all other coordinates.
 //!
 //! With `x = T y + o` the coordinates of the expansion, y the linear ones (K cos, K sin, systemic velocity, stellar
-//! parameters) and T's first two columns the cosine and sine of the orbit's angle: `ln L = c + b y - y A y / 2`.
+//! parameters) and T's first columns the velocities of unit orbits (`planet`): of a circle the cosine and sine of its
+//! angle. Then `ln L = c + b y - y A y / 2`.
 
+use super::planet::{Nonlinear, Planet};
 use crate::posterior::expansion::Expansion;
-use crate::posterior::objective::{Parameter, ParameterSpace, Prior};
+use crate::posterior::objective::{Elements, Parameter, ParameterSpace, Prior};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::{Rng, RngCore};
 use rand_distr::{ChiSquared, StandardNormal};
-use std::f64::consts::TAU;
 
 /// Degrees of freedom of the distribution that the linear coordinates are drawn from.
 const DEGREES: f64 = 8.0;
@@ -22,13 +23,13 @@ pub(super) struct LinearModel {
     /// Gradient of ln L and ln L itself at `y = 0`.
     gradient: DVector<f64>,
     constant: f64,
-    /// Columns of T but for the orbit's two, and the information times these.
+    /// Columns of T but for those of orbits, and the information times these.
     columns: DMatrix<f64>,
     informed: DMatrix<f64>,
-    /// Positions of the linear coordinates in a vector of internal ones: K cos, K sin, then those of `columns`.
-    linear: Vec<usize>,
-    /// Position of the period, or its value where it is fixed.
-    period: Result<usize, f64>,
+    /// The planets, whose columns come first, in this order.
+    planets: Vec<Planet>,
+    /// Positions of the other linear coordinates in a vector of internal ones: those of `columns`.
+    others: Vec<usize>,
     dimension: usize,
     correction: Option<Correction>,
     /// Precision and pull of the normal priors of linear coordinates.
@@ -58,49 +59,60 @@ pub(super) struct Conditional {
 }
 
 impl LinearModel {
-    /// Of an expansion whose stellar coordinates are those that `space` leaves free.
-    pub fn new(expansion: &Expansion, space: &ParameterSpace, mid_cycle: f64) -> Self {
+    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where no planet's
+    /// velocities are linear in some of its free parameters.
+    pub fn new(expansion: &Expansion, space: &ParameterSpace, mid_cycle: f64) -> Option<Self> {
         let (n, all) = (expansion.profiles(), expansion.centre.len());
-        let position = |p: Parameter| space.free().iter().position(|f| f.parameter == p);
+        let is_free = |of: &Elements| space.free().iter().any(|f| of.all().contains(&f.parameter));
+        let free = Elements::PLANETS.iter().filter(|of| is_free(of));
+        let planets: Vec<Planet> = free.map(|of| Planet::new(space, of, mid_cycle)).collect::<Option<_>>()?;
+        if planets.is_empty() {
+            return None;
+        }
         let fixed = space.values_at(&space.start());
-        let polar = [Parameter::K, Parameter::Phi].map(|p| position(p).expect("K and phi are free"));
-        let others: Vec<usize> = (0..space.dimension())
-            .filter(|i| !polar.contains(i) && space.free()[*i].parameter != Parameter::PorbOverProt)
-            .collect();
+        let of_planets: Vec<usize> = planets.iter().flat_map(Planet::positions).collect();
+        let others: Vec<usize> = (0..space.dimension()).filter(|i| !of_planets.contains(i)).collect();
         let mut columns = DMatrix::zeros(all, others.len());
         let mut offset = -&expansion.centre;
         for (mut column, &i) in columns.column_iter_mut().zip(&others) {
             column.copy_from(&expansion.direction(space.free()[i].parameter));
         }
-        if position(Parameter::Vsys).is_none() {
+        if !space.free().iter().any(|f| f.parameter == Parameter::Vsys) {
             offset.rows_mut(0, n).add_scalar_mut(fixed[Parameter::Vsys]);
         }
-        let linear: Vec<usize> = polar.into_iter().chain(others).collect();
-        let normal = |&i: &usize| match space.free()[i].prior {
-            Prior::Normal { mean, sd, .. } if !polar.contains(&i) => {
-                // in the coordinate that is sampled, to first order
-                let p = space.free()[i].parameter;
-                let sd = sd * (-p.log_jacobian(mean)).exp();
-                (sd.powi(-2), p.to_sampling(mean) * sd.powi(-2))
-            }
-            _ => (0.0, 0.0),
+        for of in Elements::PLANETS.iter().filter(|of| !is_free(of) && fixed.given(of.k).is_some_and(|k| k != 0.0)) {
+            let planet = of.orbit(&fixed);
+            offset.iter_mut().zip(&expansion.cycles).for_each(|(v, cycle)| *v += planet.velocity_kms(*cycle));
+        }
+        let normal = |i: Option<usize>| match i.map(|i| space.free()[i]) {
+            Some(f) => match f.prior {
+                Prior::Normal { mean, sd, .. } => {
+                    // in the coordinate that is sampled, to first order
+                    let p = f.parameter;
+                    let sd = sd * (-p.log_jacobian(mean)).exp();
+                    (sd.powi(-2), p.to_sampling(mean) * sd.powi(-2))
+                }
+                _ => (0.0, 0.0),
+            },
+            None => (0.0, 0.0),
         };
-        let normals: Vec<(f64, f64)> = linear.iter().map(normal).collect();
+        let of_orbits = planets.iter().flat_map(|planet| vec![planet.ray(); planet.columns()]);
+        let normals: Vec<(f64, f64)> = of_orbits.chain(others.iter().copied().map(Some)).map(normal).collect();
         let pushed = &expansion.information * &offset;
-        LinearModel {
+        Some(LinearModel {
             cycles: expansion.cycles.iter().map(|e| e - mid_cycle).collect(),
             gradient: &expansion.gradient - &pushed,
             constant: expansion.log_likelihood + expansion.gradient.dot(&offset) - 0.5 * offset.dot(&pushed),
             informed: &expansion.information * &columns,
             information: expansion.information.clone(),
             columns,
-            period: position(Parameter::PorbOverProt).ok_or(fixed[Parameter::PorbOverProt]),
             dimension: space.dimension(),
             correction: None,
-            prior_precision: DVector::from_iterator(linear.len(), normals.iter().map(|n| n.0)),
-            prior_pull: DVector::from_iterator(linear.len(), normals.iter().map(|n| n.1)),
-            linear,
-        }
+            prior_precision: DVector::from_iterator(normals.len(), normals.iter().map(|n| n.0)),
+            prior_pull: DVector::from_iterator(normals.len(), normals.iter().map(|n| n.1)),
+            planets,
+            others,
+        })
     }
 
     /// With a correction to ln L in place of the one that there is.
@@ -110,51 +122,64 @@ impl LinearModel {
 
     /// Number of linear coordinates.
     pub fn linear_count(&self) -> usize {
-        self.linear.len()
+        self.orbit_count() + self.others.len()
     }
 
-    /// The fixed period, if it is.
-    pub fn fixed_period(&self) -> Option<f64> {
-        self.period.err()
+    fn orbit_count(&self) -> usize {
+        self.planets.iter().map(Planet::columns).sum()
     }
 
-    pub fn period_of(&self, position: &[f64]) -> f64 {
-        self.period.map_or_else(|fixed| fixed, |i| position[i])
+    /// The planets.
+    pub fn planets(&self) -> &[Planet] {
+        &self.planets
     }
 
-    pub fn linear_of(&self, position: &[f64]) -> DVector<f64> {
-        DVector::from_iterator(self.linear.len(), self.linear.iter().map(|&i| position[i]))
+    /// The first column of a planet.
+    pub fn column_of(&self, planet: usize) -> usize {
+        self.planets[..planet].iter().map(Planet::columns).sum()
     }
 
-    /// Internal coordinates of a period and linear ones.
-    pub fn position(&self, period: f64, linear: &DVector<f64>) -> Vec<f64> {
+    /// What of a position is not linear, planet by planet, and what is.
+    pub fn split(&self, position: &[f64]) -> (Vec<Nonlinear>, DVector<f64>) {
+        let (nonlinear, linear): (Vec<_>, Vec<_>) = self.planets.iter().map(|planet| planet.split(position)).unzip();
+        let linear = linear.into_iter().flatten().chain(self.others.iter().map(|&i| position[i]));
+        (nonlinear, DVector::from_vec(linear.collect()))
+    }
+
+    /// Internal coordinates of both.
+    pub fn position(&self, nonlinear: &[Nonlinear], linear: &DVector<f64>) -> Vec<f64> {
         let mut position = vec![0.0; self.dimension];
-        if let Ok(i) = self.period {
-            position[i] = period;
+        let mut first = 0;
+        for (planet, at) in self.planets.iter().zip(nonlinear) {
+            planet.write(at, &linear.as_slice()[first..first + planet.columns()], &mut position);
+            first += planet.columns();
         }
-        self.linear.iter().zip(linear.iter()).for_each(|(&i, x)| position[i] = *x);
+        self.others.iter().zip(linear.iter().skip(first)).for_each(|(&i, x)| position[i] = *x);
         position
     }
 
-    /// The quadratic at `period`, drawn from as if ln L were divided by `temperature`; `None` where it has no maximum.
-    pub fn at(&self, period: f64, temperature: f64) -> Option<Conditional> {
-        let (all, count) = (self.gradient.len(), self.linear.len());
-        let mut orbit = DMatrix::zeros(all, 2);
-        for (k, cycle) in self.cycles.iter().enumerate() {
-            // K cos(angle + angle at mid-time)
-            let (sin, cos) = (TAU * cycle / period).sin_cos();
-            (orbit[(k, 0)], orbit[(k, 1)]) = (cos, -sin);
+    /// The quadratic at these periods and shapes, drawn from as if ln L were divided by `temperature`; `None` where it
+    /// has no maximum.
+    pub fn at(&self, nonlinear: &[Nonlinear], temperature: f64) -> Option<Conditional> {
+        let (all, count, orbits) = (self.gradient.len(), self.linear_count(), self.orbit_count());
+        let mut orbit = DMatrix::zeros(all, orbits);
+        let mut first = 0;
+        for (planet, at) in self.planets.iter().zip(nonlinear) {
+            planet.fill(at, &self.cycles, &mut orbit, first);
+            first += planet.columns();
         }
         let informed_orbit = &self.information * &orbit;
         let mut information = DMatrix::zeros(count, count);
-        information.view_mut((0, 0), (2, 2)).copy_from(&orbit.tr_mul(&informed_orbit));
+        information.view_mut((0, 0), (orbits, orbits)).copy_from(&orbit.tr_mul(&informed_orbit));
         let across = orbit.tr_mul(&self.informed);
-        information.view_mut((0, 2), (2, count - 2)).copy_from(&across);
-        information.view_mut((2, 0), (count - 2, 2)).copy_from(&across.transpose());
-        information.view_mut((2, 2), (count - 2, count - 2)).copy_from(&self.columns.tr_mul(&self.informed));
+        information.view_mut((0, orbits), (orbits, count - orbits)).copy_from(&across);
+        information.view_mut((orbits, 0), (count - orbits, orbits)).copy_from(&across.transpose());
+        information
+            .view_mut((orbits, orbits), (count - orbits, count - orbits))
+            .copy_from(&self.columns.tr_mul(&self.informed));
         let mut gradient = DVector::zeros(count);
-        gradient.rows_mut(0, 2).copy_from(&orbit.tr_mul(&self.gradient));
-        gradient.rows_mut(2, count - 2).copy_from(&self.columns.tr_mul(&self.gradient));
+        gradient.rows_mut(0, orbits).copy_from(&orbit.tr_mul(&self.gradient));
+        gradient.rows_mut(orbits, count - orbits).copy_from(&self.columns.tr_mul(&self.gradient));
         let mut constant = self.constant;
         if let Some(Correction { centre, constant: at_centre, gradient: slope, information: bend }) = &self.correction {
             let bent = bend * centre;
@@ -182,9 +207,11 @@ impl Conditional {
         self.mode.clone()
     }
 
-    /// Standard error of K cos and K sin, all else known.
-    pub fn amplitude_error(&self) -> f64 {
-        (2.0 / (self.information[(0, 0)] + self.information[(1, 1)])).sqrt()
+    /// K at the mode, or its standard error if that is larger, all else known, of a planet whose columns begin at
+    /// `first`.
+    pub fn amplitude(&self, first: usize) -> f64 {
+        let error = (2.0 / (self.information[(first, first)] + self.information[(first + 1, first + 1)])).sqrt();
+        self.mode[first].hypot(self.mode[first + 1]).max(error)
     }
 
     /// ln of the determinant of its information.

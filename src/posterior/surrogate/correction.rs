@@ -63,8 +63,8 @@ impl Surrogate {
             .iter()
             .filter(|(.., log_prob)| *log_prob > highest - REACH)
             .filter_map(|(position, theta, log_prob)| {
-                let linear = self.model.linear_of(position);
-                let model = self.model.at(self.model.period_of(position), 1.0)?.log_likelihood(&linear);
+                let (nonlinear, linear) = self.model.split(position);
+                let model = self.model.at(&nonlinear, 1.0)?.log_likelihood(&linear);
                 let beyond = log_prob - self.space.log_prior(theta) - model;
                 beyond.is_finite().then_some((linear, beyond))
             })

@@ -1,8 +1,8 @@
 //! The surrogate's distribution of the period: a table, uniform in frequency within a cell.
 
 use super::TAIL;
-use super::conditional::LinearModel;
-use crate::posterior::objective::{Parameter, ParameterSpace};
+use super::conditional::Conditional;
+use crate::posterior::objective::Prior;
 use rand::{Rng, RngCore};
 
 /// Cells over the inverse of the time base: a peak is some fraction of it wide.
@@ -30,28 +30,43 @@ pub(super) struct PeriodTable {
     fixed: Option<f64>,
 }
 
+/// What a table is made for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scale {
+    /// Number of parameters.
+    pub dimension: usize,
+    /// Length of the data.
+    pub time_base_cycles: f64,
+    /// What differences of ln L are divided by.
+    pub temperature: f64,
+}
+
 impl PeriodTable {
-    /// Over the prior of the period; with the highest ln L of all. `None` where the quadratic has no maximum.
+    /// Over the prior of a period, or its fixed value; with the highest ln L of all. `at` is the quadratic at a period,
+    /// in which the planet's columns begin at `first`. `None` where the quadratic has no maximum.
     pub fn new(
-        model: &LinearModel,
-        space: &ParameterSpace,
-        time_base_cycles: f64,
-        temperature: f64,
+        at: &dyn Fn(f64, f64) -> Option<Conditional>,
+        first: usize,
+        prior: Result<Prior, f64>,
+        scale: Scale,
     ) -> Option<(Self, f64)> {
-        if let Some(period) = model.fixed_period() {
-            let conditional = model.at(period, 1.0)?;
-            let best = conditional.log_likelihood(&conditional.mode());
-            let table = PeriodTable {
-                lowest: 1.0 / period,
-                width: 0.0,
-                probability: vec![1.0],
-                cumulative: vec![1.0],
-                heights: vec![best],
-                fixed: Some(period),
-            };
-            return Some((table, best));
-        }
-        let prior = space.free().iter().find(|f| f.parameter == Parameter::PorbOverProt)?.prior;
+        let Scale { dimension, time_base_cycles, temperature } = scale;
+        let prior = match prior {
+            Ok(prior) => prior,
+            Err(period) => {
+                let conditional = at(period, 1.0)?;
+                let best = conditional.log_likelihood(&conditional.mode());
+                let table = PeriodTable {
+                    lowest: 1.0 / period,
+                    width: 0.0,
+                    probability: vec![1.0],
+                    cumulative: vec![1.0],
+                    heights: vec![best],
+                    fixed: Some(period),
+                };
+                return Some((table, best));
+            }
+        };
         let (mean, sd) = prior.mean_and_sd();
         let (least, most) = prior.bounds();
         // an unbounded prior is followed as far as it matters, and periods are positive
@@ -63,18 +78,17 @@ impl PeriodTable {
         let cells = cells.clamp(50, MOST_CELLS);
         let width = (highest - lowest) / cells as f64;
         let period = |i: usize| 1.0 / (lowest + (i as f64 + 0.5) * width);
-        let at = |i: usize| {
-            let conditional = model.at(period(i), temperature)?;
-            let mode = conditional.mode();
+        let cell = |i: usize| {
+            let conditional = at(period(i), temperature)?;
             // the density 1/K of K cos and K sin, blurred where K is no larger than its error
-            let k = mode[0].hypot(mode[1]).max(conditional.amplitude_error());
+            let k = conditional.amplitude(first);
             let volume = -0.5 * conditional.log_determinant() - k.ln();
             let prior = prior.log_density(period(i)) + 2.0 * period(i).ln();
-            Some((conditional.log_likelihood(&mode), volume + prior))
+            Some((conditional.log_likelihood(&conditional.mode()), volume + prior))
         };
-        let cells: Vec<(f64, f64)> = (0..cells).map(at).collect::<Option<_>>()?;
+        let cells: Vec<(f64, f64)> = (0..cells).map(cell).collect::<Option<_>>()?;
         let best = cells.iter().map(|c| c.0).fold(f64::NEG_INFINITY, f64::max);
-        let degrees = TAIL + space.dimension() as f64;
+        let degrees = TAIL + dimension as f64;
         let log_weight = |(height, volume): &(f64, f64)| {
             let below = (best - height) / temperature;
             volume - 0.5 * degrees * (2.0 * below / TAIL).ln_1p()
@@ -121,6 +135,11 @@ impl PeriodTable {
 
     fn log_cell(&self, cell: usize, period: f64) -> f64 {
         (self.probability[cell] / self.width).ln() - 2.0 * period.ln()
+    }
+
+    /// The period of the highest ln L, and that.
+    pub fn highest(&self) -> (f64, f64) {
+        self.peaks()[0]
     }
 
     /// Periods at which ln L is higher than in both neighbouring cells, with its value there, highest first.

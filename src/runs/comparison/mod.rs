@@ -152,7 +152,8 @@ impl Comparison {
         if imaging.objective != pair.grid_objective {
             let (chain, landscape) = (imaging.objective.name(), pair.grid_objective.name());
             comparison.notes.push(format!(
-                "the chain is by the objective {chain}, the landscape by {landscape}: differences are those of the methods"
+                "the chain is by the objective {chain}, the landscape by {landscape}: differences are those of the \
+                methods"
             ));
         }
         Ok(comparison)
@@ -172,7 +173,7 @@ fn parameter(
     let chain = Interval { value: one.median, ci68: one.ci68 };
     let origin = &pair.manifest.origin;
     let truth = origin.truth.as_ref().and_then(|truth| truth.get(name).copied());
-    let periodic = Parameter::from_name(name) == Some(Parameter::Phi);
+    let periodic = Parameter::from_name(name).is_some_and(Parameter::is_phase);
     let Some(k) = pair.axis(name) else {
         let fixed_at = pair.header.origin.reference.parameters().get(name).copied();
         return Compared {

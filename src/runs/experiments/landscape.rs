@@ -32,7 +32,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         min,
         max,
         nodes,
-        periodic: Parameter::from_name(name) == Some(Parameter::Phi),
+        periodic: Parameter::from_name(name).is_some_and(Parameter::is_phase),
     };
     (laboratory.report)("R3: landscape in three dimensions");
     let whole = Grid { axes: AXES.iter().map(|a| axis(a, along)).collect() };

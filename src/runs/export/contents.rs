@@ -4,7 +4,7 @@
 
 use super::ExportError;
 use crate::data::io::journal;
-use crate::posterior::objective::{FreeParameter, OrbitQuantity, Prior};
+use crate::posterior::objective::{FreeParameter, Prior, Quoted};
 use crate::runs::manifest::{Manifest, kinds_and_goals};
 use crate::runs::run::CHAIN;
 use crate::sampling::chain::{Chain, Settled, Summary, statistics::unwrap_around};
@@ -104,9 +104,9 @@ impl Contents {
         };
         let parameters = settings.free.iter().zip(&kinds).map(quantity).collect();
         let derived = |settled: Settled| {
-            let quantity = OrbitQuantity::from_name(&settled.quantity.name)?;
+            let quantity = Quoted::from_name(&settled.quantity.name)?;
             let injected = manifest.true_quantity(&settings, quantity.name(), settled.summary.median);
-            Some(DerivedQuantity { settled, latex: quantity.latex(), unit: quantity.unit(), injected })
+            Some(DerivedQuantity { settled, latex: quantity.latex(), unit: quantity.quantity.unit(), injected })
         };
         let derived = settled.into_iter().filter_map(derived).collect();
         let origin = manifest.origin;

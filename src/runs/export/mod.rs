@@ -1,4 +1,5 @@
-//! A chain for other programs: one format a file, all from the same [`Contents`].
+//! A chain for other programs: one format a file, all from the same [`Contents`]; and the velocities of a search for
+//! RV packages ([`velocities`]).
 //!
 //! | format | for | warm-up | ensembles and walkers |
 //! |---|---|---|---|
@@ -18,10 +19,12 @@ mod draws;
 pub mod emcee;
 pub mod getdist;
 mod place;
+pub mod velocities;
 pub mod zarr;
 
 pub use contents::{Contents, DerivedQuantity, Quantity};
 
+use crate::data::io::FileError;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::JournalError;
 use crate::runs::origin::OriginError;
@@ -57,7 +60,7 @@ impl Format {
 /// Why a run is not exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// There is no run, or it cannot be read.
+    /// There is no run or search, or it cannot be read.
     #[error(transparent)]
     Origin(#[from] OriginError),
     /// Its chain cannot be read.
@@ -77,6 +80,9 @@ pub enum ExportError {
         /// The chain.
         path: PathBuf,
     },
+    /// A table of the search is missing or wrong.
+    #[error(transparent)]
+    Table(#[from] FileError),
     /// The export cannot go there.
     #[error("{}: {problem}", path.display())]
     Place {
@@ -106,6 +112,14 @@ pub fn write(contents: &Contents, format: Format, out: &Path, replace: bool) -> 
         Format::Csv => csv::write(contents, out)?,
     }
     Ok(targets(format, contents.chain.shape().ensembles, out))
+}
+
+/// Writes the chain of the run in the folder `run`, as [`write`] does.
+///
+/// # Errors
+/// [`ExportError`].
+pub fn export(run: &Path, format: Format, out: &Path, replace: bool) -> Result<Vec<PathBuf>, ExportError> {
+    write(&Contents::read(run)?, format, out, replace)
 }
 
 /// Whether the chain can be exported so, and the export may go to `out`.

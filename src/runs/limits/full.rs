@@ -7,7 +7,7 @@ use crate::data::scene::{Scene, SceneError};
 use crate::planets::periodogram::Search;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::posterior::detection::View;
-use crate::posterior::objective::Parameter;
+use crate::posterior::objective::{Parameter, for_blind_search};
 use crate::star::Orbit;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -124,7 +124,7 @@ impl WholeWay {
         Ok(move |orbit: &Orbit| {
             let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();
             let star = scene.injected(&whole, &orbits).ok()?;
-            let mut values = star.settings.values;
+            let mut values = for_blind_search(star.settings.values, &star.settings.free);
             values[Parameter::K] = 0.0;
             let view = View::new(&star.imager, values, &settings.detection, None).ok()?;
             let search = Search::new(&view.quadratic, &settings.frequencies, settings.detection.search).ok()?;

@@ -8,7 +8,7 @@ use super::Manifest;
 use crate::data::config::Settings;
 use crate::planets::periodogram::RotationPeriods;
 use crate::planets::verdict::{Finding, Remark, Verdict};
-use crate::posterior::objective::{FreeParameter, OrbitQuantity, Parameter, Prior};
+use crate::posterior::objective::{Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
 use crate::sampling::chain::modes::period_modes;
 use crate::sampling::chain::statistics::quantile;
 use crate::sampling::chain::{Chain, ParameterSummary, PeriodMode, Summary};
@@ -42,7 +42,8 @@ impl Manifest {
     pub(super) fn conclude(&self, settings: &Settings, chain: &Chain, summary: &mut Summary) {
         summary.period_modes = self.period_modes(settings, chain, summary.discarded_steps);
         for f in &settings.free {
-            let few = f.parameter == Parameter::PorbOverProt && self.is_in_few_modes(summary);
+            let is_period = matches!(f.parameter, Parameter::PorbOverProt | Parameter::Period);
+            let few = is_period && self.is_in_few_modes(summary);
             if let Some(one) = summary.parameters.get_mut(f.parameter.name()) {
                 one.unconstrained = !few && is_as_wide(one, f);
             }
@@ -66,12 +67,13 @@ impl Manifest {
     fn period_modes(&self, settings: &Settings, chain: &Chain, discarded: usize) -> Vec<PeriodMode> {
         let place = |p: Parameter| self.names.iter().position(|name| name == p.name());
         let rotation = self.blind_search.as_ref().and_then(|search| search.rotation.as_ref());
-        let (Some(period), Some(k), Some(rotation)) = (place(Parameter::PorbOverProt), place(Parameter::K), rotation)
-        else {
+        let ratio = place(Parameter::PorbOverProt).map(|i| (i, 1.0));
+        let period = ratio.or(place(Parameter::Period).map(|i| (i, settings.star.rotation_period_d)));
+        let (Some((period, unit)), Some(k), Some(rotation)) = (period, place(Parameter::K), rotation) else {
             return Vec::new();
         };
         let draws = |i: usize| chain.series(i, discarded).into_iter().flatten().flatten();
-        let draws: Vec<(f64, f64)> = draws(period).zip(draws(k)).collect();
+        let draws: Vec<(f64, f64)> = draws(period).map(|period| period / unit).zip(draws(k)).collect();
         let mut modes = period_modes(&draws, rotation.time_base_cycles);
         for mode in &mut modes {
             if is_broad(mode, rotation) {
@@ -120,8 +122,9 @@ impl Manifest {
             let text = "the chain has not converged: its intervals are not to be quoted";
             remarks.push(Remark::against("the chain has not converged", text));
         }
-        let period = settings.free.iter().find(|f| f.parameter == Parameter::PorbOverProt);
-        if let Some(shortest) = period.map(|f| f.prior.bounds().0).filter(|shortest| *shortest > 1.0) {
+        let clock = self.orbit_quantities(settings).clock();
+        let period = period_prior(&settings.free, &Elements::PLANETS[0], clock);
+        if let Some(shortest) = period.map(|prior| prior.bounds().0).filter(|shortest| *shortest > 1.0) {
             remarks.push(Remark::note(format!(
                 "the prior of the period begins at {shortest:.4} Prot, above the rotation period: signals of the \
                 spots at Prot and \
@@ -166,7 +169,7 @@ fn is_as_wide(one: &ParameterSummary, f: &FreeParameter) -> bool {
     };
     match f.prior {
         // how much there is of an amplitude is said by its limit
-        _ if f.parameter == Parameter::K => false,
+        _ if f.parameter.is_amplitude() => false,
         Prior::Periodic => width(one.hdi68) > UNCONSTRAINED * 0.68,
         prior => width(one.ci68) > UNCONSTRAINED * width(interval68(&prior)),
     }

@@ -7,6 +7,7 @@ use crate::data::io::journal::JournalError;
 use crate::data::search::SearchError;
 use crate::runs::origin::OriginError;
 use crate::runs::pool::UnresolvedSpotsError;
+use crate::sampling::chain::ChainError;
 use crate::sampling::ensemble::EnsembleError;
 use std::path::PathBuf;
 
@@ -55,7 +56,15 @@ pub enum RunError {
         /// Why.
         source: std::io::Error,
     },
+    /// The chain on disk says nothing.
+    #[error("{}: {source}", path.display())]
+    Analysis {
+        /// The chain.
+        path: PathBuf,
+        /// Why.
+        source: ChainError,
+    },
     /// The chain refused a step: a fault of the program.
     #[error(transparent)]
-    Chain(#[from] crate::sampling::chain::ChainError),
+    Chain(#[from] ChainError),
 }

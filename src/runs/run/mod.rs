@@ -1,13 +1,18 @@
 //! A sampling run: search, start, chain, in memory or on disk; begun afresh or resumed to the same bytes.
 //!
-//! `start` is where the walkers begin.
+//! `start` is where the walkers begin, `pace` how far they have come, `conclusion` what is said in the end.
 
+mod conclusion;
 mod error;
+mod pace;
 mod start;
 
+pub use conclusion::Conclusion;
 pub use error::RunError;
+pub use pace::{Meter, Pace};
 
 use crate::data::config::Settings;
+use crate::data::io::effort::Effort;
 use crate::data::io::journal::{self, Journal, JournalError};
 use crate::data::io::lines;
 use crate::data::scene::Scene;
@@ -93,6 +98,15 @@ impl Run {
         self.go(&Pool::default(), |_, _| ())
     }
 
+    /// Adds this session to `effort.json` in the run's `folder`; `afresh` where the run began in it.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    #[doc(hidden)]
+    pub fn note_effort(folder: &Path, afresh: bool, seconds: f64, threads: usize) -> Result<(), RunError> {
+        Ok(Effort::add(folder, afresh, seconds, threads)?)
+    }
+
     /// What the chain says of each parameter, whether it has converged, and the verdict on a planet.
     ///
     /// # Errors
@@ -110,6 +124,11 @@ impl Run {
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
         let (summary, _) = manifest.summarise(&manifest.settings(folder)?, &chain)?;
         Ok((chain, summary))
+    }
+
+    /// Whether `folder` holds nothing but a run that ended before its first step: another one may replace it.
+    pub fn is_false_start(folder: &Path) -> bool {
+        is_false_start(folder, true)
     }
 
     /// Begins a run at what a search `found`: draws the start and evaluates it.

@@ -35,6 +35,16 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError>
     save(&folder.join(LIST), &list)
 }
 
+/// The same for profiles of whatever origin that were at hand as numbers.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
+    let label = |k: usize| Label { file: format!("profile {k}"), vrad_kms: 0.0 };
+    let labels: Vec<Label> = (0..observations.profiles.len()).map(label).collect();
+    write_as(folder, observations, &labels, "from arrays")
+}
+
 /// The same for what became of observed profiles, one of the `labels` each: VRAD stays in the list and in the velocity
 /// axis, and a comment names the file that a profile comes from. `what` says in its title what became of it.
 ///

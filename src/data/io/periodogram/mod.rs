@@ -14,6 +14,7 @@ pub use record::{AliasRecord, FieldRecord, OrbitRecord, PeakRecord, PeriodogramF
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::provenance::Provenance;
+use crate::data::evidence::EvidenceRecord;
 use crate::planets::periodogram::Search;
 use crate::planets::periodogram::orbits::scan;
 use crate::planets::verdict::{Remark, Verdict};
@@ -35,6 +36,8 @@ pub struct PeriodogramResult<'a> {
     pub verdict: &'a Verdict,
     /// What has to be known beside the verdict.
     pub remarks: &'a [Remark],
+    /// Bayes factors, where the config has priors for them.
+    pub evidence: Option<&'a EvidenceRecord>,
     /// Whether that depends on a choice.
     pub robustness: &'a Robustness,
     /// How it was asked for.

@@ -50,7 +50,7 @@ impl QuantitiesRecord {
     /// Value and error of a quantity that is in it.
     pub fn of(&self, quantity: OrbitQuantity) -> Option<(f64, Option<f64>)> {
         let (value, sigma) = match quantity {
-            OrbitQuantity::Period => return None,
+            OrbitQuantity::Period | OrbitQuantity::Eccentricity | OrbitQuantity::Omega => return None,
             OrbitQuantity::Maximum => (self.t_max_rv_d, self.sigma_t_max_rv_d),
             OrbitQuantity::Conjunction => (self.t_conjunction_d, self.sigma_t_conjunction_d),
             OrbitQuantity::MinimumMass => (self.msini_mjup, self.sigma_msini_mjup),
@@ -95,7 +95,7 @@ impl PeriodogramResult<'_> {
 
     /// The injected value of a quantity of the best orbit, an event's nearest to the one found.
     pub(super) fn true_quantity(&self, quantity: OrbitQuantity, found: f64) -> Option<f64> {
-        let injected = self.truth.map(|truth| truth.state().orbit).filter(|orbit| orbit.k_kms != 0.0)?;
+        let injected = self.truth.map(|truth| truth.motion().first).filter(|planet| planet.orbit.k_kms != 0.0)?;
         self.orbit_quantities().value(quantity, &injected, Some(found))
     }
 

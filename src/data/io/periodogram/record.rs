@@ -5,6 +5,7 @@ use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::quantities::QuantitiesRecord;
 use super::robustness::RobustnessRecord;
+use crate::data::evidence::EvidenceRecord;
 use crate::numerics::json::number_or_null;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
@@ -51,6 +52,9 @@ pub struct PeriodogramFile {
     pub co_rotation: CoRotationRecord,
     /// Whether the best orbit hangs on a choice.
     pub robustness: RobustnessRecord,
+    /// Bayes factors of no, one and two planets, where the config has priors for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<EvidenceRecord>,
     /// What has to be known beside the verdict.
     pub warnings: Vec<String>,
     /// Config, data and program.
@@ -295,6 +299,7 @@ impl PeriodogramResult<'_> {
                 statement: found.co_rotation(),
             },
             robustness: self.robustness_record(),
+            evidence: self.evidence.cloned(),
             warnings: self.remarks.iter().map(|remark| remark.text.clone()).collect(),
             provenance: self.provenance.clone(),
         }

@@ -22,6 +22,9 @@ impl PeriodogramResult<'_> {
             text += &FieldRecord::of(field).line();
         }
         text += &format!("{}\n", chance(&false_alarm(&found.blind)));
+        if let Some(evidence) = self.evidence {
+            text += &format!("evidence: {}\n", evidence.sentence);
+        }
         text += &peaks(&self.peaks(&found.blind));
         for orbit in found.keplerian.iter().take(1).flatten() {
             let orbit = self.keplerian(orbit);

@@ -1,0 +1,147 @@
+"""Stellar parameters of simulated stars that change: best values and errors by integrated maps and by one map.
+
+    python3 examples/calibration_stellar.py --simulator target/release/dimcmc --program target/release/dimcmc
+    python3 examples/calibration_stellar.py --table
+
+Stars of random geometry as in calibration_changing.py (inclination 20 to 75 degrees, vsini 15 to 70 km/s, lifetimes of
+7 d to for ever), with a planet. Orbit, rotation, shear, inclination, vsini and the field are free; the search begins at
+values that are off: inclination by up to 15 degrees, vsini by up to 1 km/s, the rate of rotation by up to 0.3 %.
+`dimcmc optimise` gives best values with errors by the curvature. A line a star and objective goes to
+results/calibration/stellar.csv; the script can be stopped, and goes on. The second command writes
+results/calibration-stellar.md. Needs numpy.
+"""
+
+import argparse
+import csv
+import json
+import math
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+
+import calibration_changing
+
+OBJECTIVES = ("marginal-likelihood", "spottedness")
+FREE = ("inclination_deg", "vsini_kms", "omega_eq_rad_d", "domega_rad_d", "k_kms", "porb_over_prot", "phi")
+COLUMNS = ["seed", "objective", "lifetime_d", "well_defined", "log_prob", "seconds", "error"]
+COLUMNS += [f"{prefix}{name}" for name in FREE for prefix in ("true_", "best_", "sd_")]
+
+
+def config(truth, folder, objective, seed):
+    """The simulated star's config with all of FREE free, beginning beside the truth."""
+    random = np.random.default_rng(seed)
+    found = json.loads((folder / "config.json").read_text())
+    star = found["star"]
+    omega = 2 * math.pi / star["rotation_period_d"]
+    vsini = star["vsini_kms"] + random.uniform(-1, 1)
+    star["inclination_deg"] = float(np.clip(star["inclination_deg"] + random.uniform(-15, 15), 10, 85))
+    star["vsini_kms"], star["domega_rad_d"] = vsini, 0.0
+    star["omega_eq_rad_d"] = omega * (1 + random.uniform(-3e-3, 3e-3))
+    uniform = lambda low, high: {"prior": "uniform", "min": low, "max": high}
+    found["parameters"] |= {
+        "inclination_deg": {"prior": "isotropic", "min": 3, "max": 89},
+        "vsini_kms": uniform(vsini - 5, vsini + 5),
+        "omega_eq_rad_d": uniform(0.97 * omega, 1.03 * omega),
+        "domega_rad_d": uniform(-0.2, 0.2),
+    }
+    found["planet"] = {"k_kms": 0.1, "porb_over_prot": truth["porb_over_prot"], "phi": truth["phi"]}
+    found["observations"]["velocity_jitter_kms"] = 0.0
+    found["imaging"] = found.get("imaging", {}) | {"objective": objective}
+    return found
+
+
+def one(number, objective, args):
+    row, options = calibration_changing.star("geometry", number, 1)
+    folder = args.work / f"geometry-{row['seed']}"
+    if not (folder / "config.json").exists():
+        calibration_changing.simulate(args.simulator, options, folder)
+    truth = {"inclination_deg": options["inclination"], "vsini_kms": options["vsini"], "domega_rad_d": 0.0}
+    truth |= {"omega_eq_rad_d": 2 * math.pi / options["prot"], "k_kms": options["k"]}
+    truth |= {"porb_over_prot": options["porb-over-prot"], "phi": options["phi"]}
+    line = {"seed": row["seed"], "objective": objective, "lifetime_d": row["lifetime_d"]}
+    line |= {f"true_{name}": truth[name] for name in FREE}
+    path, out = folder / f"stellar-{objective}.json", folder / f"stellar-{objective}"
+    path.write_text(json.dumps(config(truth, folder, objective, row["seed"])))
+    began = time.monotonic()
+    done = subprocess.run([args.program, "optimise", path, "--out", out, "--force"], capture_output=True, text=True)
+    line["seconds"] = round(time.monotonic() - began, 1)
+    if done.returncode:
+        return line | {"error": done.stderr.strip().splitlines()[-1][:200]}
+    found = json.loads((out / "optimum.json").read_text())
+    line |= {"well_defined": found["well_defined"], "log_prob": found["log_prob"]}
+    for name in FREE:
+        line[f"best_{name}"], line[f"sd_{name}"] = found["parameters"][name], found["sd"][name]
+    return line
+
+
+def run(args):
+    args.work.mkdir(parents=True, exist_ok=True)
+    done = {(row["seed"], row["objective"]) for row in read(args.csv)}
+    for number in range(args.stars):
+        for objective in OBJECTIVES:
+            seed = calibration_changing.star("geometry", number, 1)[0]["seed"]
+            if (str(seed), objective) not in done:
+                append(args.csv, one(number, objective, args))
+
+
+def read(path):
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def append(path, line):
+    fresh = not path.exists()
+    with path.open("a", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        if fresh:
+            writer.writeheader()
+        writer.writerow(line)
+
+
+def share(inside):
+    n = len(inside)
+    p = sum(inside) / n
+    return f"{100 * p:.0f} +- {100 * math.sqrt(max(p * (1 - p), 0.25 / n) / n):.0f}"
+
+
+def table(args):
+    """Shares of true values within 1 and 2 standard errors, of all stars whose search ended."""
+    lines = ["| parameter | objective | stars | within 1 sd (68 %) | within 2 sd (95 %) | median sd | median error |"]
+    lines.append("| --- | --- | --- | --- | --- | --- | --- |")
+    rows = read(args.csv)
+    for name in FREE[:4]:
+        for objective in OBJECTIVES:
+            of = [row for row in rows if row["objective"] == objective and not row["error"]]
+            if not of:
+                continue
+            number = lambda prefix: np.array([float(row[prefix + name]) for row in of])
+            off, sd = np.abs(number("best_") - number("true_")), number("sd_")
+            cells = [name, objective, str(len(of)), share(off < sd), share(off < 2 * sd)]
+            lines.append("| " + " | ".join(cells + [f"{np.median(sd):.3g}", f"{np.median(off):.3g}"]) + " |")
+    failed = [f"- {row['seed']}, {row['objective']}: {row['error']}" for row in rows if row["error"]]
+    fresh = "# Stellar parameters of stars that change\n\n<!-- table -->\n"
+    text = args.out.read_text() if args.out.exists() else fresh
+    head = text[: text.index("<!-- table -->")]
+    args.out.write_text(head + "\n".join(["<!-- table -->", "", *lines, "", *failed]).rstrip() + "\n")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--simulator", help="dimcmc, or a script (calibration_changing.py)")
+    parser.add_argument("--program", help="dimcmc")
+    parser.add_argument("--stars", type=int, default=40)
+    parser.add_argument("--work", type=Path, default=Path("target/calibration-changing"), help="folder of the stars")
+    parser.add_argument("--csv", type=Path, default=Path("results/calibration/stellar.csv"))
+    parser.add_argument("--out", type=Path, default=Path("results/calibration-stellar.md"))
+    parser.add_argument("--table", action="store_true", help="write the table of the lines so far")
+    args = parser.parse_args()
+    if args.table:
+        table(args)
+    elif args.simulator and args.program:
+        run(args)
+    else:
+        parser.error("--simulator and --program, or --table")

@@ -1,0 +1,54 @@
+"""Orbits of planets around spotted stars, the spots marginalised out.
+
+A config says which star, which profiles and which parameters are free; the functions are those of the command line:
+
+>>> import dimcmc
+>>> config = dimcmc.Config("configs/demo.json")            # doctest: +SKIP
+>>> run = dimcmc.sample(config)                            # doctest: +SKIP
+>>> print(run)                                             # doctest: +SKIP
+
+==================  =========================================================
+`Config`            star, observations, image, free parameters, sampler
+`Observations`      line profiles as arrays
+`plan`              which planets would profiles show that are not yet taken?
+`simulate`          profiles of a star with spots and a planet
+`map`               the spots, and whether the model fits
+`periodogram`       is there a planet, at which period?
+`optimise`          the best parameters and their error bars
+`sample`            the posterior; a `Run`, also of the command line
+`LogPosterior`      the same density for emcee, zeus, dynesty, nautilus
+==================  =========================================================
+
+Velocities are in km/s, times and periods in days, angles in degrees, as their names say.
+"""
+
+from ._config import Config, Section
+from ._core import __version__
+from ._functions import map, optimise, periodogram, plan, sample, simulate
+from ._observations import Observations
+from ._posterior import LogPosterior
+from ._results import Figure, Maps, Optimum, Periodogram, Plan, Record, Result, Simulation
+from ._run import Run
+
+__all__ = [
+    "Config",
+    "Figure",
+    "LogPosterior",
+    "Maps",
+    "Observations",
+    "Optimum",
+    "Periodogram",
+    "Plan",
+    "Record",
+    "Result",
+    "Run",
+    "Section",
+    "Simulation",
+    "__version__",
+    "map",
+    "optimise",
+    "periodogram",
+    "plan",
+    "sample",
+    "simulate",
+]

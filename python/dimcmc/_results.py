@@ -1,0 +1,318 @@
+"""What calls give back: the files that the command line would have written, and what is in them."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import html
+import json
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from ._observations import Observations
+
+__all__ = ["Figure", "Maps", "Optimum", "Periodogram", "Plan", "Record", "Result", "Simulation"]
+
+_R = TypeVar("_R", bound="Result")
+
+
+class Record(dict[str, Any]):
+    """A dict of results, whose keys are attributes, too.
+
+    >>> Record(k_kms=0.1).k_kms
+    0.1
+    """
+
+    def __getattr__(self, key: str) -> Any:
+        try:
+            return self[key]
+        except KeyError:
+            raise AttributeError(key) from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self]
+
+
+class Figure:
+    """A figure, as SVG and PNG. A notebook shows it.
+
+    Attributes
+    ----------
+    name : str
+        What it is called, as in ``result.figures``.
+    caption : str
+        What it shows, in a sentence or two.
+    svg : str
+        For papers and slides.
+    png : bytes
+        With as many pixels to the inch as were asked for.
+    """
+
+    def __init__(self, name: str, caption: str, svg: str, png: bytes) -> None:
+        self.name, self.caption, self.svg, self.png = name, caption, svg, png
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the figure into a file.
+
+        Parameters
+        ----------
+        path : str or path
+            A name that ends in ``.svg`` or ``.png``; a file that is there is replaced.
+        """
+        path = Path(path)
+        if path.suffix == ".svg":
+            path.write_text(self.svg, encoding="utf-8")
+        elif path.suffix == ".png":
+            path.write_bytes(self.png)
+        else:
+            raise ValueError(f"{path}: a figure is saved as .svg or .png")
+
+    def __repr__(self) -> str:
+        return f"Figure({self.name!r}: {self.caption})"
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def _img(self) -> str:
+        data = base64.b64encode(self.png).decode("ascii")
+        return f'<img src="data:image/png;base64,{data}" alt="{html.escape(self.caption, quote=True)}">'
+
+
+class Scratch:
+    """A folder that goes when the object goes."""
+
+    def __init__(self) -> None:
+        self.folder = Path(tempfile.mkdtemp(prefix="dimcmc-"))
+        self._finalizer = weakref.finalize(self, shutil.rmtree, self.folder, True)
+
+    def keep(self) -> None:
+        """Leave the folder where it is."""
+        self._finalizer.detach()
+
+
+class Result:
+    """A folder of results, kept where it was asked for, or as long as the object lives.
+
+    Attributes
+    ----------
+    folder : pathlib.Path
+        Where the files are.
+    """
+
+    #: The file by which such a folder is known.
+    _FILE = ""
+
+    folder: Path
+
+    def __init__(self, folder: Path, text: str, scratch: Scratch | None = None) -> None:
+        self.folder = folder
+        self._text = text
+        self._scratch = scratch
+
+    @property
+    def figures(self) -> list[str]:
+        """Names of the figures that `figure` draws."""
+        return _core.figure_names(os.fspath(self.folder))
+
+    def figure(self, name: str | None = None, *, dpi: float = 150.0) -> Figure:
+        """Draw a figure.
+
+        Parameters
+        ----------
+        name : str, optional
+            One of `figures`; by default the first.
+        dpi : float
+            Pixels of the PNG to the inch.
+
+        Returns
+        -------
+        Figure
+        """
+        return Figure(*_core.figure(os.fspath(self.folder), name, dpi))
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Copy all files into another folder, for the command line and others.
+
+        Parameters
+        ----------
+        folder : str or path
+            Made if need be; must be empty.
+        """
+        folder = Path(folder)
+        if folder.is_dir() and any(folder.iterdir()):
+            raise FileExistsError(f"{folder}: the folder is not empty; give another one")
+        shutil.copytree(self.folder, folder, dirs_exist_ok=True)
+
+    def _json(self, name: str) -> Record:
+        text = (self.folder / name).read_text(encoding="utf-8")
+        content: Record = json.loads(text, object_hook=Record)
+        return content
+
+    def _table(self, name: str) -> dict[str, NDArray[np.float64]]:
+        """The columns of a table, by name."""
+        with open(self.folder / name, encoding="utf-8", newline="") as file:
+            names = next(csv.reader(file))
+            rows = np.loadtxt(file, delimiter=",", ndmin=2)
+        return {name: rows[:, k].copy() for k, name in enumerate(names)}
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        return f"<dimcmc.{type(self).__name__} in {self.folder}>\n{self._text}"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(self._text)}</pre>{self.figure(dpi=100.0)._img()}"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        files = {
+            path.relative_to(self.folder).as_posix(): path.read_bytes()
+            for path in sorted(self.folder.rglob("*"))
+            if path.is_file()
+        }
+        return _restored, (type(self), files, self._text)
+
+
+def _restored(kind: type[_R], files: Mapping[str, bytes], text: str) -> _R:
+    """A result with its files in a folder that goes when it goes."""
+    scratch = Scratch()
+    for name, content in files.items():
+        path = scratch.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return kind(scratch.folder, text, scratch)
+
+
+class Simulation(Result):
+    """Profiles of a spotted star with a planet, from `simulate`; of several data sets each in a folder of its name."""
+
+    @property
+    def observations(self) -> Observations:
+        """The profiles, for ``observations=`` of other calls; there is one data set."""
+        if len(self._sets) > 1:
+            raise ValueError(f"{len(self._sets)} data sets: see `sets`, or the folders in {self.folder}")
+        return self._sets[0]
+
+    @property
+    def sets(self) -> list[Observations]:
+        """The profiles of each data set."""
+        return list(self._sets)
+
+    @property
+    def truth(self) -> Record:
+        """What they were made with: parameters, spots, noise (`truth.json`); there is one data set."""
+        return self._json("truth.json")
+
+    _sets: list[Observations]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        make, arguments = super().__reduce__()
+        return make, arguments, {"_sets": self._sets}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._sets = state["_sets"]
+
+
+class Maps(Result):
+    """The star reconstructed, from `map`."""
+
+    @property
+    def summary(self) -> Record:
+        """How good the fit is, and what warns of it (`fit.json`)."""
+        return self._json("fit.json")
+
+    @property
+    def map(self) -> Record:
+        """The map on its pixels, or the maps of a star that may change (`map.json`)."""
+        return self._json("map.json")
+
+    @property
+    def profiles(self) -> dict[str, NDArray[np.float64]]:
+        """Observed and model profiles, a number for each bin: the columns of `profiles.csv`."""
+        return self._table("profiles.csv")
+
+    @property
+    def velocities(self) -> dict[str, NDArray[np.float64]]:
+        """Radial velocities (km/s) with and without the spots: the columns of `rv.csv`."""
+        return self._table("rv.csv")
+
+
+class Periodogram(Result):
+    """A blind search for a planet, from `periodogram`."""
+
+    @property
+    def summary(self) -> Record:
+        """Best orbit, peaks, false alarms, remarks (`periodogram.json`)."""
+        return self._json("periodogram.json")
+
+    @property
+    def verdict(self) -> str:
+        """What is said of the best orbit, in one sentence."""
+        return str(self.summary.verdict.sentence)
+
+    @property
+    def velocities(self) -> dict[str, NDArray[np.float64]]:
+        """Radial velocities (km/s) free of spots: the columns of `rv.csv`."""
+        return self._table("rv.csv")
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of ``velocities["rv_kms"]`` (km^2/s^2), shape (profiles, profiles)."""
+        return np.loadtxt(self.folder / "covariance.csv", delimiter=",", ndmin=2)
+
+    @property
+    def periods(self) -> dict[str, NDArray[np.float64]]:
+        """The periodogram, a number for each trial period: the columns of `periodogram.csv`."""
+        return self._table("periodogram.csv")
+
+
+class Plan(Result):
+    """Which planets schedules would show, from `plan`."""
+
+    @property
+    def summary(self) -> Record:
+        """Each schedule, as it grows, and the best of them (`plan.json`)."""
+        return self._json("plan.json")
+
+    @property
+    def periods(self) -> dict[str, NDArray[np.float64]]:
+        """Error of K and K detected (km/s) at every period, for each schedule: the columns of `plan.csv`."""
+        return self._table("plan.csv")
+
+
+class Optimum(Result):
+    """The best parameters and their error bars, from `optimise`."""
+
+    @property
+    def summary(self) -> Record:
+        """All that the search found (`optimum.json`)."""
+        return self._json("optimum.json")
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the free parameters."""
+        return list(self.summary.names)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The best value of each parameter, in the unit of its name."""
+        return dict(self.summary.parameters)
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """The standard deviation of each, by the curvature."""
+        return dict(self.summary.sd)
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Their covariance, in the order of `names`."""
+        return np.array(self.summary.covariance, dtype=np.float64)

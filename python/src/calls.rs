@@ -1,0 +1,195 @@
+//! Calls that write the files of a command into a folder, and say in text what that command prints.
+
+use crate::fault::Fault;
+use crate::job::{Job, attend, soon};
+use crate::scene::{Arrays, ConfigText, NewArrays, Source, arrays};
+use dimcmc::{
+    Failure, Figure, Forecast, Format, FrequencySettings, Maps, OptimumFile, Periodogram, PeriodogramOptions,
+    PlanSettings, Scene, Simulated,
+};
+use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// How a call is carried out: number of threads, and who is told how far it is.
+#[derive(FromPyObject)]
+pub struct Manner(pub Option<usize>, pub Option<Py<PyAny>>);
+
+/// Computes with a scene, and makes the folder for what it writes.
+fn with_scene(
+    py: Python,
+    source: Source,
+    out: PathBuf,
+    Manner(threads, progress): Manner,
+    work: impl FnOnce(&Job, &Scene, &Path) -> Result<String, Fault> + Send + 'static,
+) -> PyResult<String> {
+    attend(py, threads, progress, move |job| {
+        job.say("profiles");
+        let scene = source.scene(None)?;
+        work(job, &scene, &out)
+    })
+}
+
+/// A folder that is to be written into, made if need be, unless Ctrl-C was pressed.
+fn create(job: &Job, folder: &Path) -> Result<(), Fault> {
+    job.begin_to_write();
+    std::fs::create_dir_all(folder).map_err(|e| Fault::Failed(format!("{}: {e}", folder.display())))
+}
+
+/// Labels and texts, a line each, labels padded.
+fn text(lines: &[(&str, String)]) -> String {
+    let width = lines.iter().map(|(label, _)| label.len()).max().unwrap_or(0);
+    let lines: Vec<String> = lines.iter().map(|(label, text)| format!("{label:width$}  {text}")).collect();
+    lines.join("\n")
+}
+
+/// `dimcmc simulate`: the text, and the profiles of each data set.
+#[pyfunction]
+pub fn simulate(py: Python, config: ConfigText, out: PathBuf, manner: Manner) -> PyResult<(String, Vec<NewArrays>)> {
+    let simulated = attend(py, manner.0, manner.1, move |job| {
+        job.say("simulating");
+        let simulated = Simulated::of(&config.config()?)?;
+        create(job, &out)?;
+        simulated.write(&out)?;
+        Ok(simulated)
+    })?;
+    let sets = simulated.sets().iter().map(|set| arrays(py, &set.observations));
+    Ok((text(&simulated.lines()), sets.collect::<PyResult<_>>()?))
+}
+
+/// `dimcmc map`.
+#[pyfunction]
+pub fn map(
+    py: Python,
+    config: ConfigText,
+    observations: Option<Arrays>,
+    times_d: Option<Vec<f64>>,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    with_scene(py, Source::new(config, observations)?, out, manner, move |job, scene, out| {
+        let maps = Maps::of(scene, times_d.as_deref(), &|what| job.say(what)).map_err(Failure::maps)?;
+        create(job, out)?;
+        maps.write(out)?;
+        Ok(text(&maps.lines()))
+    })
+}
+
+/// Options of `periodogram`: shortest and longest period, oversampling; eccentric, second planet, fixed; draws, seed.
+type Options = (Option<f64>, Option<f64>, Option<f64>, bool, bool, bool, usize, u64);
+
+/// `dimcmc periodogram`.
+#[pyfunction]
+pub fn periodogram(
+    py: Python,
+    config: ConfigText,
+    observations: Option<Arrays>,
+    options: Options,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    let (min_period_d, max_period_d, oversampling, eccentric, second_planet, fixed, draws, seed) = options;
+    let options =
+        PeriodogramOptions { min_period_d, max_period_d, oversampling, eccentric, second_planet, fixed, draws, seed };
+    with_scene(py, Source::new(config, observations)?, out, manner, move |job, scene, out| {
+        let found = Periodogram::of(scene, &options, &|what| job.say(what)).map_err(Failure::periodogram)?;
+        create(job, out)?;
+        found.write(out)?;
+        Ok(found.table().trim_end().to_owned())
+    })
+}
+
+/// Options of `plan`: shortest and longest period, fixed; maps, draws, seed.
+type PlanOptions = (Option<f64>, Option<f64>, bool, usize, usize, u64);
+
+/// `dimcmc plan`.
+#[pyfunction]
+pub fn plan(
+    py: Python,
+    configs: Vec<ConfigText>,
+    nights: Vec<usize>,
+    options: PlanOptions,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    let (min_period_d, max_period_d, fixed, maps, draws, seed) = options;
+    let periods = FrequencySettings { min_period_d, max_period_d, oversampling: None };
+    let settings = PlanSettings { maps, draws, seed, fixed };
+    attend(py, manner.0, manner.1, move |job| {
+        job.say("reading");
+        let configs = configs.iter().map(ConfigText::config).collect::<Result<Vec<_>, _>>()?;
+        let forecast = Forecast::of(&configs, &nights, periods, &settings, &|what| job.say(what));
+        let forecast = forecast.map_err(Failure::plan)?;
+        create(job, &out)?;
+        forecast.write(&out).map_err(Fault::from)?;
+        Ok(forecast.table().trim_end().to_owned())
+    })
+}
+
+/// `dimcmc optimise`.
+#[pyfunction]
+pub fn optimise(
+    py: Python,
+    config: ConfigText,
+    observations: Option<Arrays>,
+    out: PathBuf,
+    manner: Manner,
+) -> PyResult<String> {
+    with_scene(py, Source::new(config, observations)?, out, manner, |job, scene, out| {
+        scene.require_free()?;
+        let found = scene.optimise_with(&|progress| job.search(progress));
+        let found = found.map_err(|e| Failure::search(scene.path(), e))?;
+        job.say("blind search");
+        let file = OptimumFile::new(scene, &found);
+        create(job, out)?;
+        file.write(out)?;
+        Ok(file.table().trim_end().to_owned())
+    })
+}
+
+/// `dimcmc export`: the files written.
+#[pyfunction]
+pub fn export(py: Python, run: PathBuf, format: &str, out: Option<PathBuf>, replace: bool) -> PyResult<Vec<PathBuf>> {
+    let format = match format {
+        "zarr" => Format::Zarr,
+        "emcee" => Format::Emcee,
+        "getdist" => Format::Getdist,
+        "csv" => Format::Csv,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "format: must be \"zarr\", \"emcee\", \"getdist\" or \"csv\", not {other:?}"
+            )));
+        }
+    };
+    let out = out.unwrap_or_else(|| format.place(&run));
+    Ok(soon(py, || dimcmc::export(&run, format, &out, replace).map_err(Fault::from))??)
+}
+
+fn drawn(py: Python, folder: &Path) -> PyResult<Vec<Figure>> {
+    Ok(soon(py, || dimcmc::figures(folder, None).map_err(Fault::from))??)
+}
+
+/// Names of the figures of what a folder holds.
+#[pyfunction]
+pub fn figure_names(py: Python, folder: PathBuf) -> PyResult<Vec<String>> {
+    Ok(drawn(py, &folder)?.into_iter().map(|figure| figure.name).collect())
+}
+
+/// One of them, by default the first: name, caption, SVG and PNG.
+#[pyfunction]
+pub fn figure(
+    py: Python,
+    folder: PathBuf,
+    name: Option<String>,
+    dpi: f64,
+) -> PyResult<(String, String, String, Vec<u8>)> {
+    let figures = drawn(py, &folder)?;
+    let wanted = |figure: &&Figure| name.as_ref().is_none_or(|name| *name == figure.name);
+    let Some(figure) = figures.iter().find(wanted) else {
+        let names: Vec<&str> = figures.iter().map(|figure| figure.name.as_str()).collect();
+        let name = name.unwrap_or_default();
+        return Err(PyKeyError::new_err(format!("no figure {name}: there are {}", names.join(", "))));
+    };
+    let (svg, png) = py.detach(|| (figure.svg(), figure.png(dpi)));
+    Ok((figure.name.clone(), figure.caption.clone(), svg, png))
+}

@@ -1,0 +1,388 @@
+//! How much more likely the profiles are with planets than without: Bayes factors of no, one and two planets, on
+//! circles and on ellipses, and the false inclusion probability over periods (`docs/method.md` section 4).
+//!
+//! `ln Z` of a model is that of the velocity quadratic, `ln L(V) - ln L(0)`, integrated over the priors of its orbits;
+//! of no planet it is 0. At each period K and the phase are integrated numerically along rays through K = 0, on which
+//! the quadratic is a parabola: so any prior of K will do. One circle is a sum over all periods. Eccentricity and
+//! periastron of one ellipse, and the first of two circles, are importance samples of draws from what the circle says,
+//! with the scatter of independent repetitions; the second of two circles is integrated like a single one.
+//!
+//! The false inclusion probability of an interval of frequencies (Hara et al. 2022, A&A 663, A14) is the posterior
+//! probability that no planet has its frequency there, none and one planet taken for equally likely before the data.
+
+use super::periodogram::orbits::{Trial, mid_cycle, scan};
+use super::periodogram::two_planets::without;
+use super::velocities::VelocityQuadratic;
+use crate::star::kepler::true_anomaly;
+use nalgebra::{DMatrix, Matrix2, Vector2};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// ln of a prior's density, between bounds; the density is normalised there.
+pub struct Density<'a> {
+    /// ln of the density.
+    pub ln: &'a (dyn Fn(f64) -> f64 + Sync),
+    /// Bounds.
+    pub bounds: [f64; 2],
+}
+
+/// What is known of a planet before the data. Phases are uniform.
+pub struct PlanetPrior<'a> {
+    /// Of K (km/s), 0 or more.
+    pub k: Density<'a>,
+    /// Of the period over the rotation period, above 0.
+    pub period: Density<'a>,
+    /// Largest eccentricity: e is uniform up to there.
+    pub largest_e: f64,
+}
+
+/// ln of a Bayes factor over no planet, with the scatter of independent repetitions; exact where that is null.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LnBayes {
+    /// ln of the ratio of marginal likelihoods.
+    pub ln_bayes: f64,
+    /// Standard error by the scatter of the repetitions; null where there is no random number in it.
+    pub sd: Option<f64>,
+}
+
+/// An interval of frequencies, one over the time base wide.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Inclusion {
+    /// Its middle, as a period over the rotation period.
+    pub porb_over_prot: f64,
+    /// Posterior probability that no planet is in it.
+    pub false_inclusion_probability: f64,
+}
+
+/// The evidence for planets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Of one planet on a circle.
+    pub circle: LnBayes,
+    /// Of one planet on an ellipse.
+    pub ellipse: LnBayes,
+    /// Of two planets on circles.
+    pub two_circles: LnBayes,
+    /// The intervals of least false inclusion probability that do not overlap, from low to high.
+    pub inclusion: Vec<Inclusion>,
+}
+
+/// Frequencies to each inverse time base: a peak of 50 in ln L is a tenth of one wide.
+const OVERSAMPLING: f64 = 60.0;
+
+/// Most frequencies.
+const MOST_FREQUENCIES: usize = 40_000;
+
+/// Draws of a repetition, and repetitions.
+const DRAWS: usize = 4000;
+const REPETITIONS: usize = 8;
+
+/// Share of the draws of periods that are spread over the prior.
+const EVEN: f64 = 0.1;
+
+/// Intervals of least false inclusion probability that are told.
+const TOLD: usize = 5;
+
+/// Marginal likelihoods of the models, over that of no planet. `None` where the quadratic does not bound an orbit.
+pub fn evidence(quadratic: &VelocityQuadratic, priors: [&PlanetPrior; 2], seed: u64) -> Option<Evidence> {
+    let one = Periodogram::new(quadratic, priors[0])?;
+    let ellipse = repeated(seed, |rng| ellipse(quadratic, priors[0], &one, rng));
+    // the second where the first is at its best
+    let best = one.best();
+    let beside = without(quadratic, one.frequency(best)).and_then(|rest| Periodogram::new(&rest, priors[1]));
+    let other = Periodogram::new(quadratic, priors[1])?;
+    let best = other.best();
+    let before = without(quadratic, other.frequency(best)).and_then(|rest| Periodogram::new(&rest, priors[0]));
+    let pairs = [(Some(&one), beside.as_ref()), (before.as_ref(), Some(&other))];
+    let pairs: Vec<[&Periodogram; 2]> = pairs.into_iter().filter_map(|(a, b)| Some([a?, b?])).collect();
+    let two_circles = repeated(seed.wrapping_add(1), |rng| two_circles(quadratic, priors, &pairs, rng));
+    let circle = LnBayes { ln_bayes: one.ln_z, sd: None };
+    Some(Evidence { circle, ellipse, two_circles, inclusion: one.inclusion() })
+}
+
+/// The mean of independent estimates of a marginal likelihood, given as logarithms.
+fn repeated(seed: u64, estimate: impl Fn(&mut ChaCha8Rng) -> f64 + Sync) -> LnBayes {
+    let one = |k: usize| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(k as u64);
+        estimate(&mut rng)
+    };
+    let all: Vec<f64> = (0..REPETITIONS).into_par_iter().map(one).collect();
+    let ln_bayes = ln_sum(&all) - (REPETITIONS as f64).ln();
+    let relative: Vec<f64> = all.iter().map(|x| (x - ln_bayes).exp()).collect();
+    let variance = relative.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / (REPETITIONS - 1) as f64;
+    LnBayes { ln_bayes, sd: Some((variance / REPETITIONS as f64).sqrt()) }
+}
+
+fn ln_sum(terms: &[f64]) -> f64 {
+    let highest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if highest == f64::NEG_INFINITY {
+        return highest;
+    }
+    highest + terms.iter().map(|x| (x - highest).exp()).sum::<f64>().ln()
+}
+
+/// Marginal likelihoods at the frequencies of a prior.
+struct Periodogram {
+    lowest: f64,
+    width: f64,
+    /// ln Z at each frequency, prior of the frequency included.
+    ln_cells: Vec<f64>,
+    /// Probabilities of drawing from each, and of all up to it.
+    drawn: Vec<f64>,
+    cumulative: Vec<f64>,
+    ln_z: f64,
+    time_base: f64,
+}
+
+impl Periodogram {
+    fn new(quadratic: &VelocityQuadratic, prior: &PlanetPrior) -> Option<Self> {
+        let [shortest, longest] = prior.period.bounds;
+        let (lowest, highest) = (1.0 / longest, 1.0 / shortest);
+        let first = quadratic.cycles.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = quadratic.cycles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let time_base = (last - first).max(1e-3);
+        let count = (OVERSAMPLING * time_base * (highest - lowest)).ceil().clamp(50.0, MOST_FREQUENCIES as f64);
+        let width = (highest - lowest) / count;
+        let frequencies: Vec<f64> = (0..count as usize).map(|i| lowest + (i as f64 + 0.5) * width).collect();
+        let cell = |trial: &Trial| {
+            let period = 1.0 / trial.frequency;
+            let prior_of_frequency = (prior.period.ln)(period) + 2.0 * period.ln() + width.ln();
+            trial.orbit.map(|_| ln_over_k_and_phase(&trial.information, &trial.gradient, &prior.k) + prior_of_frequency)
+        };
+        let trials = scan(quadratic, &frequencies);
+        let cells: Vec<Option<f64>> = trials.par_iter().map(cell).collect();
+        let ln_cells: Vec<f64> = cells.into_iter().map(|cell| cell.unwrap_or(f64::NEG_INFINITY)).collect();
+        let ln_z = ln_sum(&ln_cells);
+        if !ln_z.is_finite() {
+            return None;
+        }
+        let even = EVEN / ln_cells.len() as f64;
+        let drawn: Vec<f64> = ln_cells.iter().map(|x| (1.0 - EVEN) * (x - ln_z).exp() + even).collect();
+        let mut sum = 0.0;
+        let cumulative = drawn.iter().map(|p| {
+            sum += p;
+            sum
+        });
+        let cumulative = cumulative.collect();
+        Some(Periodogram { lowest, width, ln_cells, drawn, cumulative, ln_z, time_base })
+    }
+
+    fn frequency(&self, cell: usize) -> f64 {
+        self.lowest + (cell as f64 + 0.5) * self.width
+    }
+
+    fn best(&self) -> usize {
+        (0..self.ln_cells.len()).max_by(|a, b| self.ln_cells[*a].total_cmp(&self.ln_cells[*b])).unwrap_or(0)
+    }
+
+    /// A frequency.
+    fn draw(&self, rng: &mut ChaCha8Rng) -> f64 {
+        let target = rng.random::<f64>() * self.cumulative[self.cumulative.len() - 1];
+        let cell = self.cumulative.partition_point(|&c| c <= target).min(self.drawn.len() - 1);
+        self.lowest + (cell as f64 + rng.random::<f64>()) * self.width
+    }
+
+    /// Density with which it is drawn.
+    fn density(&self, frequency: f64) -> f64 {
+        let cell = ((frequency - self.lowest) / self.width).floor();
+        let inside = cell >= 0.0 && cell < self.drawn.len() as f64;
+        if inside { self.drawn[cell as usize] / self.width } else { 0.0 }
+    }
+
+    /// The intervals that hold most of the posterior of one planet.
+    fn inclusion(&self) -> Vec<Inclusion> {
+        let half = ((0.5 / self.time_base / self.width).round() as usize).max(1);
+        // none and one planet alike before the data
+        let one = 1.0 / (1.0 + (-self.ln_z).exp());
+        let posterior: Vec<f64> = self.ln_cells.iter().map(|x| one * (x - self.ln_z).exp()).collect();
+        let mut before = vec![0.0];
+        posterior.iter().for_each(|p| before.push(before[before.len() - 1] + p));
+        let within = |cell: usize| {
+            let (from, to) = (cell.saturating_sub(half), (cell + half + 1).min(posterior.len()));
+            before[to] - before[from]
+        };
+        let mut cells: Vec<usize> = (0..posterior.len()).collect();
+        cells.sort_by(|a, b| within(*b).total_cmp(&within(*a)));
+        let mut told: Vec<usize> = Vec::new();
+        for cell in cells {
+            // of all intervals that hold a peak that in whose middle it is
+            let around = cell.saturating_sub(half)..(cell + half + 1).min(posterior.len());
+            let cell = around.max_by(|a, b| posterior[*a].total_cmp(&posterior[*b])).unwrap_or(cell);
+            if told.len() < TOLD && told.iter().all(|other| other.abs_diff(cell) > 2 * half) {
+                told.push(cell);
+            }
+        }
+        told.into_iter()
+            .map(|cell| Inclusion {
+                porb_over_prot: 1.0 / self.frequency(cell),
+                false_inclusion_probability: (1.0 - within(cell)).max(0.0),
+            })
+            .collect()
+    }
+}
+
+/// Directions of a half turn and nodes along a ray: enough for parabolas, whose width each ray knows.
+const NODES: usize = 40;
+
+/// Standard errors of K that a ray is followed for, beyond its highest point.
+const REACH: f64 = 8.0;
+
+/// ln of the integral of `exp(b x - x A x / 2)` over the prior of K and a uniform phase, x = K (cos, sin).
+fn ln_over_k_and_phase(a: &Matrix2<f64>, b: &Vector2<f64>, prior: &Density) -> f64 {
+    // a phase is known to sigma / K
+    let sharpness = a.try_inverse().map_or(0.0, |inverse| b.dot(&(inverse * b)).max(0.0).sqrt());
+    let rays = (12.0 * sharpness).clamp(48.0, 4000.0) as usize;
+    let ray = |i: usize| {
+        let (sin, cos) = (TAU * i as f64 / rays as f64).sin_cos();
+        let direction = Vector2::new(cos, sin);
+        ln_along_ray(direction.dot(&(a * direction)), b.dot(&direction), prior)
+    };
+    let all: Vec<f64> = (0..rays).map(ray).collect();
+    ln_sum(&all) - (rays as f64).ln()
+}
+
+/// ln of the integral of `exp(g K - a K^2 / 2)` over the prior of K, by Gauss-Legendre panels where it matters.
+fn ln_along_ray(a: f64, g: f64, prior: &Density) -> f64 {
+    const ABSCISSA: f64 = 0.577_350_269_189_625_8;
+    let [low, high] = prior.bounds;
+    let (top, sigma) = (g / a, a.sqrt().recip());
+    let peak = top.clamp(low, high);
+    // where the parabola has fallen by so much below its highest point within the bounds
+    let reach = (REACH * REACH * sigma * sigma + (peak - top).powi(2)).sqrt();
+    let (from, to) = (low.max(top - reach), high.min(top + reach));
+    if to.is_nan() || to <= from {
+        return f64::NEG_INFINITY;
+    }
+    let half = 0.5 * (to - from) / NODES as f64;
+    let highest = g * peak - 0.5 * a * peak * peak;
+    let at = |k: f64| (g * k - 0.5 * a * k * k - highest + (prior.ln)(k)).exp();
+    let sum: f64 = (0..NODES)
+        .map(|i| {
+            let middle = from + (2 * i + 1) as f64 * half;
+            at(middle - ABSCISSA * half) + at(middle + ABSCISSA * half)
+        })
+        .sum();
+    highest + (half * sum).ln()
+}
+
+/// `X' I X` and `X' g` of columns.
+fn projected(quadratic: &VelocityQuadratic, x: &DMatrix<f64>) -> (DMatrix<f64>, nalgebra::DVector<f64>) {
+    let a = x.tr_mul(&(&quadratic.information * x));
+    (0.5 * (&a + a.transpose()), x.tr_mul(&quadratic.gradient))
+}
+
+/// An estimate of ln Z of one ellipse.
+fn ellipse(quadratic: &VelocityQuadratic, prior: &PlanetPrior, circle: &Periodogram, rng: &mut ChaCha8Rng) -> f64 {
+    let mid = mid_cycle(&quadratic.cycles);
+    let weight = |_: usize| {
+        let frequency = circle.draw(rng);
+        // uniform in e and in the mean anomaly at mid-time, as the prior; nearly circular ones more often
+        let root: f64 = rng.random();
+        let (e, anomaly) = (prior.largest_e * root * root, TAU * rng.random::<f64>());
+        let ln_e = (2.0 * root.max(f64::MIN_POSITIVE)).ln();
+        let row = |cycle: &f64| {
+            let (cos, sin) = true_anomaly(TAU * frequency * (cycle - mid) + anomaly, e.min(1.0 - 1e-9));
+            [cos + e, -sin]
+        };
+        let rows: Vec<f64> = quadratic.cycles.iter().flat_map(row).collect();
+        let (a, b) = projected(quadratic, &DMatrix::from_row_slice(quadratic.len(), 2, &rows));
+        let (a, b) = (Matrix2::from_iterator(a.iter().copied()), Vector2::new(b[0], b[1]));
+        let ln_prior = (prior.period.ln)(1.0 / frequency) - 2.0 * frequency.ln();
+        ln_prior - circle.density(frequency).ln() + ln_e + ln_over_k_and_phase(&a, &b, &prior.k)
+    };
+    let all: Vec<f64> = (0..DRAWS).map(weight).collect();
+    ln_sum(&all) - (DRAWS as f64).ln()
+}
+
+/// An estimate of ln Z of two circles; frequencies are drawn from the `pairs` alike.
+fn two_circles(
+    quadratic: &VelocityQuadratic,
+    priors: [&PlanetPrior; 2],
+    pairs: &[[&Periodogram; 2]],
+    rng: &mut ChaCha8Rng,
+) -> f64 {
+    let mid = mid_cycle(&quadratic.cycles);
+    if pairs.is_empty() {
+        return f64::NEG_INFINITY;
+    }
+    let weight = |i: usize| {
+        let pair = pairs[i % pairs.len()];
+        let frequencies = pair.map(|one| one.draw(rng));
+        let row = |cycle: &f64| {
+            let [one, other] = frequencies.map(|f| (TAU * f * (cycle - mid)).sin_cos());
+            [one.1, one.0, other.1, other.0]
+        };
+        let rows: Vec<f64> = quadratic.cycles.iter().flat_map(row).collect();
+        let (a, b) = projected(quadratic, &DMatrix::from_row_slice(quadratic.len(), 4, &rows));
+        let block = |r: usize, c: usize| a.fixed_view::<2, 2>(r, c).into_owned();
+        let (own, across, other) = (block(0, 0), block(0, 2), block(2, 2));
+        let (b1, b2) = (Vector2::new(b[0], b[1]), Vector2::new(b[2], b[3]));
+        // the first orbit with the second left free
+        let Some(inverse) = other.try_inverse() else { return f64::NEG_INFINITY };
+        let alone = own - across * inverse * across.transpose();
+        let Some(factor) = alone.cholesky() else { return f64::NEG_INFINITY };
+        let mode = factor.solve(&(b1 - across * inverse * b2));
+        let first = FirstOrbit::new(mode, factor.l(), priors[0].k.bounds[1]);
+        let x = first.draw(rng);
+        let k = x.norm();
+        let ln_prior_k = (priors[0].k.ln)(k) - (TAU * k).ln();
+        if !ln_prior_k.is_finite() {
+            return f64::NEG_INFINITY;
+        }
+        let ln_first = b1.dot(&x) - 0.5 * x.dot(&(own * x));
+        let ln_second = ln_over_k_and_phase(&other, &(b2 - across.transpose() * x), &priors[1].k);
+        let density = pairs.iter().map(|pair| pair[0].density(frequencies[0]) * pair[1].density(frequencies[1]));
+        let density: f64 = density.sum::<f64>() / pairs.len() as f64;
+        let ln_periods: f64 =
+            (0..2).map(|j| (priors[j].period.ln)(1.0 / frequencies[j]) - 2.0 * frequencies[j].ln()).sum();
+        ln_prior_k + ln_first + ln_second + ln_periods - density.ln() - first.density(&x).ln()
+    };
+    let all: Vec<f64> = (0..DRAWS).map(weight).collect();
+    ln_sum(&all) - (DRAWS as f64).ln()
+}
+
+/// What (a, b) of the first of two orbits are drawn from: a Gaussian somewhat wider than its own, or any phase and K up
+/// to beyond it alike, which is as dense at K = 0 as the prior.
+struct FirstOrbit {
+    mode: Vector2<f64>,
+    /// Lower factor of the information.
+    lower: Matrix2<f64>,
+    largest_k: f64,
+}
+
+/// Factor on the standard errors of that Gaussian.
+const WIDER: f64 = 1.3;
+
+impl FirstOrbit {
+    fn new(mode: Vector2<f64>, lower: Matrix2<f64>, bound: f64) -> Self {
+        let sigma = lower.diagonal().map(|l| 1.0 / l).norm();
+        FirstOrbit { mode, lower, largest_k: (mode.norm() + 5.0 * sigma).min(bound) }
+    }
+
+    fn draw(&self, rng: &mut ChaCha8Rng) -> Vector2<f64> {
+        if rng.random::<bool>() {
+            let normal = Vector2::new(rng.sample(StandardNormal), rng.sample(StandardNormal));
+            let step = self.lower.tr_solve_lower_triangular(&normal).unwrap_or_else(Vector2::zeros);
+            return self.mode + step * WIDER;
+        }
+        let k = self.largest_k * rng.random::<f64>();
+        let (sin, cos) = (TAU * rng.random::<f64>()).sin_cos();
+        Vector2::new(k * cos, k * sin)
+    }
+
+    fn density(&self, x: &Vector2<f64>) -> f64 {
+        let scaled = self.lower.transpose() * (x - self.mode) / WIDER;
+        let gaussian = self.lower.determinant() / (TAU * WIDER * WIDER) * (-0.5 * scaled.norm_squared()).exp();
+        let k = x.norm();
+        let even = if k <= self.largest_k { 1.0 / (TAU * k * self.largest_k) } else { 0.0 };
+        0.5 * (gaussian + even)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,159 @@
+//! Which parameters belong to which planet, and the one place where an ephemeris in days becomes what is computed with.
+//!
+//! A period in days stands for `Porb/Prot`, `P / rotation_period`; the time of an inferior conjunction for phi:
+//! `phi = (T - epoch) / P - (lambda_c - lambda_max)`, the mean longitudes (cycles) of conjunction and largest velocity,
+//! a quarter of a cycle apart on a circle.
+
+use super::parameters::{Parameter, ParameterValues};
+use crate::star::{Eccentric, Orbit, Shape};
+use std::f64::consts::FRAC_PI_2;
+
+/// The parameters of one planet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Elements {
+    /// Semi-amplitude.
+    pub k: Parameter,
+    /// Period over rotation period.
+    pub ratio: Parameter,
+    /// Period (d) in its place.
+    pub period: Parameter,
+    /// Phase.
+    pub phi: Parameter,
+    /// Time of an inferior conjunction (d) in its place.
+    pub conjunction: Parameter,
+    /// Eccentricity and argument of periastron.
+    pub shape: [Parameter; 2],
+}
+
+/// What days are counted with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clock {
+    /// Rotation period (d).
+    pub rotation_period_d: f64,
+    /// Time of rotation cycle 0 (d).
+    pub epoch_d: f64,
+}
+
+impl Elements {
+    /// Of the planet and of a second one.
+    pub const PLANETS: [Elements; 2] = [
+        Elements {
+            k: Parameter::K,
+            ratio: Parameter::PorbOverProt,
+            period: Parameter::Period,
+            phi: Parameter::Phi,
+            conjunction: Parameter::Conjunction,
+            shape: [Parameter::SqrtECosOmega, Parameter::SqrtESinOmega],
+        },
+        Elements {
+            k: Parameter::K2,
+            ratio: Parameter::PorbOverProt2,
+            period: Parameter::Period2,
+            phi: Parameter::Phi2,
+            conjunction: Parameter::Conjunction2,
+            shape: [Parameter::SqrtECosOmega2, Parameter::SqrtESinOmega2],
+        },
+    ];
+
+    /// Writes values of free parameters into `values`. An ephemeris becomes what it stands for here.
+    pub fn write(values: &mut ParameterValues, given: impl Iterator<Item = (Parameter, f64)> + Clone, clock: Clock) {
+        given.clone().filter(|(p, _)| !p.is_ephemeris()).for_each(|(p, x)| values[p] = x);
+        for (p, x) in given.filter(|(p, _)| p.is_ephemeris()) {
+            // in the order of all parameters the period comes before the conjunction
+            match Elements::of(p) {
+                Some(of) if of.period == p => of.set_period(values, x, clock),
+                Some(of) => of.set_conjunction(values, x, clock),
+                None => unreachable!("ephemerides belong to planets"),
+            }
+        }
+    }
+
+    /// Those of the planet that a parameter belongs to.
+    pub fn of(parameter: Parameter) -> Option<&'static Elements> {
+        Elements::PLANETS.iter().find(|elements| elements.all().contains(&parameter))
+    }
+
+    /// All of them, in the order of [`Parameter::ALL`].
+    pub fn all(&self) -> [Parameter; 7] {
+        let Elements { k, ratio, period, phi, conjunction, shape: [cos, sin] } = *self;
+        [k, ratio, period, phi, conjunction, cos, sin]
+    }
+
+    /// Eccentricity and argument of periastron.
+    pub fn shape(&self, values: &ParameterValues) -> Shape {
+        let [sqrt_e_cos_omega, sqrt_e_sin_omega] = self.shape.map(|p| values.given(p).unwrap_or(0.0));
+        Shape { sqrt_e_cos_omega, sqrt_e_sin_omega }
+    }
+
+    /// The orbit.
+    pub fn orbit(&self, values: &ParameterValues) -> Eccentric {
+        let (k_kms, porb_over_prot, phi) = (values[self.k], values[self.ratio], values[self.phi]);
+        Eccentric { orbit: Orbit { k_kms, porb_over_prot, phi }, shape: self.shape(values) }
+    }
+
+    /// Writes a period in days into `values`.
+    pub fn set_period(&self, values: &mut ParameterValues, period_d: f64, clock: Clock) {
+        values[self.ratio] = period_d / clock.rotation_period_d;
+    }
+
+    /// Writes the time of a conjunction into `values`, whose period and shape are there.
+    pub fn set_conjunction(&self, values: &mut ParameterValues, time_d: f64, clock: Clock) {
+        let cycles = (time_d - clock.epoch_d) / self.period_d(values, clock);
+        values[self.phi] = (cycles - to_conjunction(&self.shape(values))).rem_euclid(1.0);
+    }
+
+    /// The period in days.
+    pub fn period_d(&self, values: &ParameterValues, clock: Clock) -> f64 {
+        values[self.ratio] * clock.rotation_period_d
+    }
+
+    /// The conjunction (d) nearest to `near`.
+    pub fn conjunction_d(&self, values: &ParameterValues, clock: Clock, near: f64) -> f64 {
+        let period = self.period_d(values, clock);
+        let phase = values[self.phi] + to_conjunction(&self.shape(values));
+        let turns = ((near - clock.epoch_d) / period - phase).round();
+        clock.epoch_d + period * (turns + phase)
+    }
+}
+
+/// From the largest radial velocity to the inferior conjunction (orbital cycles).
+pub fn to_conjunction(shape: &Shape) -> f64 {
+    shape.longitude(FRAC_PI_2) - shape.longitude(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CLOCK: Clock = Clock { rotation_period_d: 3.0, epoch_d: 2_459_000.25 };
+
+    #[test]
+    fn an_ephemeris_leads_to_the_orbit_and_back() {
+        for elements in &Elements::PLANETS {
+            for (e, omega) in [(0.0, 0.0), (0.2, 1.0), (0.7, -2.0)] {
+                let mut values = ParameterValues::of_eight([0.1, 1.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]);
+                let shape = Shape::new(e, omega);
+                values[elements.k] = 0.1;
+                values[elements.shape[0]] = shape.sqrt_e_cos_omega;
+                values[elements.shape[1]] = shape.sqrt_e_sin_omega;
+                elements.set_period(&mut values, 4.93, CLOCK);
+                elements.set_conjunction(&mut values, 2_459_321.125, CLOCK);
+                assert!((elements.period_d(&values, CLOCK) - 4.93).abs() < 1e-12);
+                let back = elements.conjunction_d(&values, CLOCK, 2_459_322.0);
+                assert!((back - 2_459_321.125).abs() < 1e-8, "{back}");
+                // there the velocity falls through that of the centre of mass
+                let orbit = elements.orbit(&values);
+                let velocity = |t: f64| orbit.velocity_kms((t - CLOCK.epoch_d) / 3.0);
+                assert!((velocity(back) - 0.1 * e * omega.cos()).abs() < 1e-8);
+                assert!(velocity(back + 0.01) < velocity(back - 0.01));
+            }
+        }
+    }
+
+    #[test]
+    fn every_parameter_of_an_orbit_belongs_to_one_planet() {
+        let orbital: Vec<Parameter> = Parameter::ALL.into_iter().filter(|p| p.is_orbital()).collect();
+        let listed: Vec<Parameter> = Elements::PLANETS.iter().flat_map(Elements::all).collect();
+        assert_eq!(orbital, listed);
+    }
+}

@@ -1,0 +1,174 @@
+//! The activity-free velocities of a blind search for RV packages: a folder with a table for each of them, the full
+//! covariance, a likelihood of it in Python, and what is lost without it.
+//!
+//! Most packages take velocities for independent. Those of a spotted star are not: what spots are taken for one night
+//! they are the next night, and all profiles share the systemic velocity.
+
+mod loss;
+
+use super::ExportError;
+use super::place::{begins_with, check_folder, check_name, create_parent};
+use crate::data::io::FileError;
+use crate::data::io::atomic::{self, WriteError};
+use crate::data::io::csv::Columns;
+use crate::data::io::periodogram::{FILE, PeriodogramFile};
+use crate::runs::origin;
+use loss::Loss;
+use nalgebra::{DMatrix, DVector};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Metres in a kilometre.
+const M: f64 = 1000.0;
+
+/// What stands for the instrument in tables that name one.
+const INSTRUMENT: &str = "dimcmc";
+
+const README: &str = "README.txt";
+const COVARIANCE: &str = "covariance_m2s2.csv";
+const LIKELIHOOD: &str = "rv_likelihood.py";
+
+/// The beginning of [`README`].
+const TITLE: &str = "Radial velocities free of spots, by dimcmc";
+
+/// The velocities of a search.
+struct Velocities {
+    times_d: Vec<f64>,
+    /// km/s.
+    kms: DVector<f64>,
+    /// km^2/s^2.
+    covariance: DMatrix<f64>,
+}
+
+/// Writes the velocities of the search in `folder` to the folder `out`; an earlier export there is replaced if
+/// `replace`. Returns the files.
+///
+/// # Errors
+/// [`ExportError`]: no search there, files that are wrong, a folder that cannot be written.
+pub fn write(folder: &Path, out: &Path, replace: bool) -> Result<Vec<PathBuf>, ExportError> {
+    let search: PeriodogramFile = origin::read(folder, FILE)?;
+    let velocities = Velocities::read(folder)?;
+    check_name(out)?;
+    check_folder(out, replace, &|folder| begins_with(&folder.join(README), TITLE.as_bytes()))?;
+    create_parent(out)?;
+    std::fs::create_dir_all(out).map_err(|source| WriteError { path: out.into(), source })?;
+    let loss = Loss::new(&velocities.times_d, &velocities.covariance, search.best.period_d);
+    let files = [
+        (README, readme(&search, &velocities, loss.as_ref())),
+        ("radvel.csv", velocities.table("time,mnvel,errvel,tel\n", ",", M, true)),
+        ("juliet.dat", velocities.table("", " ", M, true)),
+        ("kima.txt", velocities.table("time vrad svrad\n", " ", M, false)),
+        ("pyaneti.dat", velocities.table("# time rv err telescope\n", " ", 1.0, true)),
+        (COVARIANCE, velocities.covariance_m2s2()),
+        (LIKELIHOOD, include_str!("rv_likelihood.py").to_owned()),
+    ];
+    let mut written = Vec::new();
+    for (name, text) in files {
+        let file = out.join(name);
+        atomic::write(&file, text.as_bytes())?;
+        written.push(file);
+    }
+    Ok(written)
+}
+
+impl Velocities {
+    fn read(folder: &Path) -> Result<Self, ExportError> {
+        let path = folder.join("rv.csv");
+        let table = Columns::read(&path)?;
+        let (times_d, kms) = (table.column("time_d")?.to_vec(), table.column("rv_kms")?.to_vec());
+        let covariance = matrix(&folder.join("covariance.csv"), times_d.len())?;
+        if !kms.iter().chain(covariance.as_slice()).all(|x| x.is_finite()) {
+            let problem = "the profiles do not bound all velocities: there is nothing to pass on";
+            return Err(FileError::of(&path, problem).into());
+        }
+        Ok(Velocities { times_d, kms: DVector::from_vec(kms), covariance })
+    }
+
+    /// Time, velocity and error in units of the km/s over `unit`, and perhaps the instrument.
+    fn table(&self, head: &str, between: &str, unit: f64, instrument: bool) -> String {
+        let mut text = head.to_owned();
+        for (k, time_d) in self.times_d.iter().enumerate() {
+            let (velocity, error) = (self.kms[k] * unit, self.covariance[(k, k)].sqrt() * unit);
+            let _ = write!(text, "{time_d}{between}{velocity}{between}{error}");
+            if instrument {
+                let _ = write!(text, "{between}{INSTRUMENT}");
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    fn covariance_m2s2(&self) -> String {
+        let row = |k: usize| {
+            let numbers: Vec<String> = self.covariance.row(k).iter().map(|c| (c * M * M).to_string()).collect();
+            numbers.join(",") + "\n"
+        };
+        (0..self.times_d.len()).map(row).collect()
+    }
+
+    /// chi2 of no planet, by the full covariance (if it has an inverse) and by its diagonal alone.
+    fn chi2(&self) -> [Option<f64>; 2] {
+        let full = self.covariance.clone().cholesky().map(|factor| self.kms.dot(&factor.solve(&self.kms)));
+        let alone = self.kms.iter().zip(self.covariance.diagonal().iter()).map(|(v, c)| v * v / c).sum();
+        [full, Some(alone)]
+    }
+}
+
+/// `n` lines of `n` numbers, without a head.
+fn matrix(path: &Path, n: usize) -> Result<DMatrix<f64>, FileError> {
+    let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.into(), source })?;
+    let mut numbers = Vec::with_capacity(n * n);
+    for (k, line) in text.lines().enumerate() {
+        let wrong = |problem: String| FileError::Line { path: path.into(), line: k + 1, problem };
+        let before = numbers.len();
+        for cell in line.split(',') {
+            let number: f64 = cell.trim().parse().map_err(|_| wrong(format!("{cell:?} is not a number")))?;
+            numbers.push(number);
+        }
+        if numbers.len() - before != n {
+            return Err(wrong(format!("{} numbers instead of {n}, one for each velocity", numbers.len() - before)));
+        }
+    }
+    match numbers.len() == n * n {
+        true => Ok(DMatrix::from_row_slice(n, n, &numbers)),
+        false => Err(FileError::of(path, format!("{} lines instead of {n}, one for each velocity", numbers.len() / n))),
+    }
+}
+
+fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>) -> String {
+    let mut text = format!(
+        "{TITLE} {}\n\n\
+        {} velocities and their covariance, spots marginalised out. Times are days, as in the list of profiles.\n\
+        Velocities count from the systemic velocity of the config.\n\n\
+        radvel.csv           m/s   radvel: time, mnvel, errvel, tel\n\
+        juliet.dat           m/s   juliet: time, velocity, error, instrument; no head\n\
+        kima.txt             m/s   kima: time, velocity, error; RVData('kima.txt', skip=1)\n\
+        pyaneti.dat          km/s  pyaneti: time, velocity, error, telescope\n\
+        {COVARIANCE}  m2/s2 the full covariance, in the order of the tables; no head\n\
+        {LIKELIHOOD}           it as a likelihood of radvel, and as the noise of tinygp\n\n",
+        search.provenance.version,
+        velocities.times_d.len()
+    );
+    text += "What is lost without the covariance\n\n\
+        Errors in the tables are the square roots of its diagonal. Velocities of a spotted star are not independent,\n\
+        and a package that takes them for independent is wrong by this much:\n\n";
+    if let Some(loss) = loss {
+        let Loss { quoted, achieved, reduced_chi2 } = *loss;
+        let _ = writeln!(
+            text,
+            "sigma_K at {:.4} d (circular orbit, constant velocity free), over that with the full covariance:\n  \
+            as such a package would quote it: {quoted:.2}\n  as it would truly be: {achieved:.2}\n\
+            reduced chi2 of the best orbit that it would find on average: {reduced_chi2:.3} instead of 1",
+            search.best.period_d
+        );
+    }
+    if let [Some(full), Some(alone)] = velocities.chi2() {
+        let _ = writeln!(
+            text,
+            "chi2 of these {} velocities without a planet: {full:.1}, by the diagonal alone {alone:.1}",
+            velocities.times_d.len()
+        );
+    }
+    text += "\nA jitter that is fitted beside does not mend this: it is independent from night to night as well.\n";
+    text
+}

@@ -1,0 +1,335 @@
+//! The files of a plan: `plan.csv`, a line for each schedule and period, and `plan.json`; and what is printed.
+
+use super::{Campaign, Expected, Outlook, PlanSettings, SpotsSource};
+use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::csv::Table;
+use crate::data::io::provenance::Provenance;
+use crate::numerics::text::{aligned, escaped};
+use crate::planets::verdict::CANDIDATE_FAP;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Names of the files.
+pub const CSV: &str = "plan.csv";
+/// See [`CSV`].
+pub const JSON: &str = "plan.json";
+
+/// Periods (d) of the table, those within the search.
+const ROUND_D: [f64; 14] = [0.3, 0.5, 0.7, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 100.0];
+
+/// Those of which sentences speak.
+const SPOKEN_D: [f64; 6] = [0.5, 2.0, 5.0, 10.0, 20.0, 50.0];
+
+/// The content of `plan.json`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PlanFile {
+    /// False-alarm probability of a detection.
+    pub false_alarm_probability: f64,
+    /// Shortest and longest period that is searched (d).
+    pub range_d: [f64; 2],
+    /// How it was reckoned.
+    pub settings: PlanSettings,
+    /// The schedules, as asked for.
+    pub schedules: Vec<ScheduleRecord>,
+    /// Number of the best of them, from 1: that with the lowest `k95_kms`.
+    pub best: usize,
+    /// Config of the first, times and program.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+}
+
+/// A schedule.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ScheduleRecord {
+    /// What it is called.
+    pub name: String,
+    /// Profiles that had been taken before.
+    pub taken: usize,
+    /// First and last time (d), of all profiles.
+    pub span_d: [f64; 2],
+    /// Rotation period of the star (d).
+    pub rotation_period_d: f64,
+    /// Signal-to-noise ratio of a planned bin.
+    pub snr: f64,
+    /// The spots that are integrated out.
+    pub spots: SpotsRecord,
+    /// Delta ln L of a detection, after all nights.
+    pub level: f64,
+    /// After more and more nights, all at last.
+    pub after: Vec<AfterRecord>,
+    /// After all nights, at some round periods.
+    pub periods: Vec<ExpectedRecord>,
+    /// Strong peaks of the window function, from high to low: orbits of frequency f are hard to tell from those of f
+    /// plus or minus one of these.
+    pub window: Vec<WindowRecord>,
+}
+
+/// The spots that are integrated out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpotsRecord {
+    /// Where they are from.
+    pub source: SpotsSource,
+    /// Standard deviation of the filling factor.
+    pub spot_amplitude: f64,
+    /// Slope of the spectrum.
+    pub spot_slope: f64,
+    /// Lifetime (d); null for spots that do not change.
+    pub spot_lifetime_d: Option<f64>,
+    /// Scatter of the velocity zero points (km/s).
+    pub velocity_jitter_kms: f64,
+}
+
+/// What there is after some nights: medians over all periods compared, up to the longest time base.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AfterRecord {
+    /// Planned nights.
+    pub nights: usize,
+    /// Profiles, those taken before among them.
+    pub profiles: usize,
+    /// Standard error of K (km/s); null where most periods are not bounded.
+    pub sigma_k_kms: Option<f64>,
+    /// K detected with a probability of 50 % (km/s).
+    pub k50_kms: Option<f64>,
+    /// The same of 95 %.
+    pub k95_kms: Option<f64>,
+}
+
+/// What is expected at one period.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExpectedRecord {
+    /// The period (d).
+    pub period_d: f64,
+    /// The same over the rotation period.
+    pub porb_over_prot: f64,
+    /// Standard error of K (km/s); null where no orbit is bounded.
+    pub sigma_k_kms: Option<f64>,
+    /// K detected with a probability of 50 % (km/s).
+    pub k50_kms: Option<f64>,
+    /// The same of 95 %.
+    pub k95_kms: Option<f64>,
+    /// Which period of the star it is not told from, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imitated: Option<String>,
+}
+
+/// A peak of the window function.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WindowRecord {
+    /// Frequency (1/d).
+    pub frequency_per_d: f64,
+    /// Height, 1 at most.
+    pub height: f64,
+}
+
+/// A campaign with what it comes to, the last of them after all nights.
+pub type Looked<'a> = (&'a Campaign, &'a [Outlook]);
+
+impl PlanFile {
+    /// Of campaigns, one at least, each with its outlooks; periods (d) at which they are compared.
+    pub fn new(campaigns: &[Looked], range_d: [f64; 2], compared_d: &[f64], settings: &PlanSettings) -> Self {
+        let schedules: Vec<ScheduleRecord> =
+            campaigns.iter().map(|looked| ScheduleRecord::new(*looked, range_d, compared_d)).collect();
+        let k95 = |k: &usize| schedules[*k].whole().and_then(|whole| whole.k95_kms).unwrap_or(f64::INFINITY);
+        let best = (0..schedules.len()).min_by(|a, b| k95(a).total_cmp(&k95(b))).unwrap_or(0) + 1;
+        PlanFile {
+            false_alarm_probability: CANDIDATE_FAP,
+            range_d,
+            settings: *settings,
+            schedules,
+            best,
+            provenance: campaigns[0].0.provenance.clone(),
+        }
+    }
+
+    /// Writes both files into `folder`, which must exist.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, campaigns: &[Looked], folder: &Path) -> Result<(), WriteError> {
+        let columns = ["schedule", "period_d", "porb_over_prot", "sigma_k_kms", "k50_kms", "k95_kms"];
+        let mut table = Table::new(&columns);
+        for (k, (campaign, outlooks)) in campaigns.iter().enumerate() {
+            let Some(whole) = outlooks.last() else { continue };
+            for Expected { porb_over_prot, sigma_k_kms, k50_kms, k95_kms } in whole.everywhere() {
+                let period_d = campaign.imager.star.rotation_period_d * porb_over_prot;
+                let numbers = [sigma_k_kms, k50_kms, k95_kms].map(|number| number.unwrap_or(f64::NAN));
+                table.row(&[&[(k + 1) as f64, period_d, porb_over_prot][..], &numbers].concat());
+            }
+        }
+        write(&folder.join(CSV), &table.into_bytes())?;
+        write_json(&folder.join(JSON), self)
+    }
+
+    /// The best schedule.
+    pub fn best(&self) -> &ScheduleRecord {
+        &self.schedules[self.best - 1]
+    }
+
+    /// What is printed.
+    pub fn table(&self) -> String {
+        let several = self.schedules.len() > 1;
+        let mut text = if several { self.comparison() } else { String::new() };
+        let best = self.best();
+        if several {
+            text += &format!("best: {}\n\n", escaped(&best.name));
+        }
+        text += &best.table();
+        text += "\n";
+        for sentence in best.sentences(self.false_alarm_probability) {
+            text += &format!("{sentence}\n");
+        }
+        text
+    }
+
+    fn comparison(&self) -> String {
+        let head = ["schedule", "nights", "profiles", "time base (d)", "sigma_K", "K 50 %", "K 95 %"];
+        let row = |schedule: &ScheduleRecord| {
+            let whole = schedule.whole();
+            let count = |number: fn(&AfterRecord) -> usize| whole.map_or_else(|| "-".into(), |w| number(w).to_string());
+            let k = |number: fn(&AfterRecord) -> Option<f64>| shown(whole.and_then(number));
+            vec![
+                escaped(&schedule.name).into_owned(),
+                count(|w| w.nights),
+                count(|w| w.profiles),
+                format!("{:.1}", schedule.span_d[1] - schedule.span_d[0]),
+                k(|w| w.sigma_k_kms),
+                k(|w| w.k50_kms),
+                k(|w| w.k95_kms),
+            ]
+        };
+        let rows = std::iter::once(head.map(str::to_owned).to_vec()).chain(self.schedules.iter().map(row));
+        aligned(&rows.collect::<Vec<_>>()) + "sigma_K and K (km/s): medians over all periods\n"
+    }
+}
+
+impl ScheduleRecord {
+    fn new((campaign, outlooks): Looked, range_d: [f64; 2], compared_d: &[f64]) -> Self {
+        let prot = campaign.imager.star.rotation_period_d;
+        let compared: Vec<f64> = compared_d.iter().map(|period_d| prot / period_d).collect();
+        let after = |outlook: &Outlook| {
+            let Expected { sigma_k_kms, k50_kms, k95_kms, .. } = outlook.typical(&compared);
+            AfterRecord { nights: outlook.nights, profiles: outlook.profiles, sigma_k_kms, k50_kms, k95_kms }
+        };
+        let whole = outlooks.last();
+        let round: Vec<f64> = ROUND_D.into_iter().filter(|d| (range_d[0]..=range_d[1]).contains(d)).collect();
+        let periods = whole.map_or_else(Vec::new, |whole| {
+            let expected = whole.at(&round.iter().map(|d| prot / d).collect::<Vec<_>>());
+            expected.iter().map(|expected| ExpectedRecord::new(expected, prot, whole)).collect()
+        });
+        let mut window: Vec<WindowRecord> = whole.map_or_else(Vec::new, |whole| {
+            let record = |peak: &crate::planets::periodogram::window::WindowPeak| WindowRecord {
+                frequency_per_d: peak.frequency / prot,
+                height: peak.height,
+            };
+            whole.window.iter().map(record).collect()
+        });
+        window.sort_by(|a, b| b.height.total_cmp(&a.height));
+        let spectrum = campaign.assumed.field.spectrum;
+        ScheduleRecord {
+            name: campaign.name.clone(),
+            taken: campaign.before(),
+            span_d: campaign.span_d(),
+            rotation_period_d: prot,
+            snr: 1.0 / campaign.sigma,
+            spots: SpotsRecord {
+                source: campaign.source,
+                spot_amplitude: spectrum.amplitude,
+                spot_slope: spectrum.slope,
+                spot_lifetime_d: campaign.assumed.field.kernel.lifetime.days(),
+                velocity_jitter_kms: campaign.assumed.jitter_kms,
+            },
+            level: whole.map_or(f64::NAN, |whole| whole.level),
+            after: outlooks.iter().map(after).collect(),
+            periods,
+            window,
+        }
+    }
+
+    /// After all nights.
+    pub fn whole(&self) -> Option<&AfterRecord> {
+        self.after.last()
+    }
+
+    /// Spots, and what there is after more and more nights and at some periods.
+    fn table(&self) -> String {
+        let SpotsRecord { source, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms } = self.spots;
+        let lives = spot_lifetime_d.map_or("that do not change".into(), |d| format!("that live {d:.1} d"));
+        let mut text = format!(
+            "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); velocity jitter \
+            {velocity_jitter_kms} km/s; S/N {:.0}\n\n",
+            source.words(),
+            self.snr
+        );
+        let head = ["nights", "profiles", "sigma_K", "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
+        let row = |after: &AfterRecord| {
+            let counts = [after.nights, after.profiles].map(|n| n.to_string());
+            counts.into_iter().chain([after.sigma_k_kms, after.k50_kms, after.k95_kms].map(shown)).collect()
+        };
+        text += &aligned(&std::iter::once(head).chain(self.after.iter().map(row)).collect::<Vec<_>>());
+        text += "medians over all periods (km/s)\n\n";
+        let head = ["period_d", "sigma_K", "K 50 %", "K 95 %"].map(str::to_owned).to_vec();
+        let row = |at: &ExpectedRecord| {
+            let numbers = [at.sigma_k_kms, at.k50_kms, at.k95_kms].map(shown);
+            std::iter::once(format!("{}", at.period_d)).chain(numbers).collect()
+        };
+        text + &aligned(&std::iter::once(head).chain(self.periods.iter().map(row)).collect::<Vec<_>>())
+    }
+
+    /// It in plain words.
+    pub fn sentences(&self, false_alarm_probability: f64) -> Vec<String> {
+        let mut sentences = Vec::new();
+        for at in self.periods.iter().filter(|at| SPOKEN_D.contains(&at.period_d)) {
+            if let (Some(k50), Some(k95)) = (at.k50_kms, at.k95_kms) {
+                sentences.push(format!(
+                    "A planet of K = {} km/s and {} d would be detected with 95 % probability, one of {} km/s with 50 \
+                    %.",
+                    two_digits(k95),
+                    at.period_d,
+                    two_digits(k50)
+                ));
+            }
+        }
+        let hard: Vec<String> = self
+            .periods
+            .iter()
+            .filter_map(|at| at.imitated.as_ref().map(|words| format!("{} d ({words})", at.period_d)))
+            .collect();
+        if !hard.is_empty() {
+            sentences.push(format!("Spots may imitate orbits of {}.", hard.join(", ")));
+        }
+        if !self.window.is_empty() {
+            let peak = |peak: &WindowRecord| format!("{:.3}/d ({:.2})", peak.frequency_per_d, peak.height);
+            let peaks: Vec<String> = self.window.iter().take(4).map(peak).collect();
+            sentences.push(format!(
+                "Orbits are hard to tell from those whose frequency differs by {}: window function in brackets.",
+                peaks.join(", ")
+            ));
+        }
+        if !sentences.is_empty() {
+            let percent = 100.0 * false_alarm_probability;
+            sentences.push(format!("Detected: false alarms below {percent} % in a search of all periods."));
+        }
+        sentences
+    }
+}
+
+impl ExpectedRecord {
+    fn new(expected: &Expected, rotation_period_d: f64, outlook: &Outlook) -> Self {
+        let Expected { porb_over_prot, sigma_k_kms, k50_kms, k95_kms } = *expected;
+        let imitation = outlook.rotation.imitated(porb_over_prot, None).filter(|imitation| imitation.is_likely());
+        // 10.000000000000002 d is what division makes of 10 d
+        let period_d = (1e9 * rotation_period_d * porb_over_prot).round() / 1e9;
+        let imitated = imitation.map(|imitation| imitation.words(rotation_period_d));
+        ExpectedRecord { period_d, porb_over_prot, sigma_k_kms, k50_kms, k95_kms, imitated }
+    }
+}
+
+fn shown(k: Option<f64>) -> String {
+    k.map_or_else(|| "-".to_owned(), |k| format!("{k:.4}"))
+}
+
+/// To two digits.
+fn two_digits(x: f64) -> String {
+    let decimals = (1.0 - x.abs().max(1e-9).log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{x:.decimals$}")
+}

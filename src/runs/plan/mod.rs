@@ -1,0 +1,118 @@
+//! What profiles that are not yet taken will say of planets.
+//!
+//! In: configs, each a star with a schedule ([`Campaign`]): `observations.simulate` of a star that is not yet observed,
+//! or observed profiles with a `plan`. Out: for each the error of K, and the K that is detected, at every period, after
+//! every few nights ([`Outlook`]); and which of the schedules is best ([`PlanFile`]). The order:
+//! 1. Maps are drawn from the field of spots, given the profiles that there are, and the profiles made linear at them.
+//! 2. The information that these hold of the orbit's velocities, spots integrated out (`posterior::marginal`).
+//! 3. Errors, false alarms and limits follow from it as for observed profiles (`planets::periodogram`). Of what differs
+//!    from map to map the median is taken.
+
+mod campaign;
+mod file;
+mod forecast;
+mod outlook;
+
+pub use campaign::{Campaign, CampaignError, SpotsSource};
+pub use file::{AfterRecord, CSV, ExpectedRecord, JSON, PlanFile, ScheduleRecord, SpotsRecord, WindowRecord};
+pub use forecast::{Forecast, ForecastError};
+pub use outlook::{Expected, Outlook};
+
+use crate::field::FieldError;
+use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
+use crate::posterior::expansion::nuisances;
+use crate::posterior::marginal::Planned;
+use serde::{Deserialize, Serialize};
+
+/// Periods over which schedules are compared, even in their logarithm.
+const COMPARED: usize = 60;
+
+/// How often the growing campaign is looked at.
+const LOOKS: usize = 6;
+
+/// How a plan is reckoned.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanSettings {
+    /// Maps that are drawn; 0 for a star without spots in place of them.
+    pub maps: usize,
+    /// Stars without a planet of which false alarms are taken.
+    pub draws: usize,
+    /// Seed of both.
+    pub seed: u64,
+    /// Whether systemic velocity and stellar parameters are those of the config, rather than integrated out.
+    pub fixed: bool,
+}
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The field cannot be integrated out.
+    #[error("{name}: {source}")]
+    Field {
+        /// The schedule.
+        name: String,
+        /// What is wrong.
+        source: FieldError,
+    },
+    /// Periods that make no sense, or too few profiles.
+    #[error(transparent)]
+    Frequencies(#[from] FrequencyError),
+}
+
+/// Shortest and longest period (d) at which all of the campaigns are looked at.
+///
+/// # Errors
+/// [`FrequencyError`].
+pub fn range_d(campaigns: &[Campaign], wanted: FrequencySettings) -> Result<[f64; 2], FrequencyError> {
+    let mut range = [0.0_f64; 2];
+    for campaign in campaigns {
+        let (low, high) = campaign.frequencies(&campaign.all(), wanted)?.range();
+        let prot = campaign.imager.star.rotation_period_d;
+        range = [range[0].max(prot / high), range[1].max(prot / low)];
+    }
+    Ok(range)
+}
+
+/// What a campaign comes to, searched from the shortest to the longest period of `range_d`.
+///
+/// # Errors
+/// [`PlanError`].
+pub fn outlook(campaign: &Campaign, range_d: [f64; 2], settings: &PlanSettings) -> Result<Vec<Outlook>, PlanError> {
+    let field = |source| PlanError::Field { name: campaign.name.clone(), source };
+    let nuisances = if settings.fixed { Vec::new() } else { nuisances(&campaign.settings.free) };
+    let values = campaign.settings.values;
+    let planned = Planned::new(&campaign.imager, values, campaign.assumed, &nuisances, campaign.taken.as_deref());
+    let wanted =
+        FrequencySettings { min_period_d: Some(range_d[0]), max_period_d: Some(range_d[1]), oversampling: None };
+    let looks: Vec<(usize, Vec<usize>, Frequencies)> = campaign
+        .looks(LOOKS)
+        .into_iter()
+        .filter_map(|(nights, part)| {
+            // too few times for an orbit
+            let frequencies = campaign.frequencies(&part, wanted).ok()?;
+            Some((nights, part, frequencies))
+        })
+        .collect();
+    let parts: Vec<Vec<usize>> = looks.iter().map(|(_, part, _)| part.clone()).collect();
+    let mut quadratics: Vec<Vec<_>> = vec![Vec::new(); parts.len()];
+    for k in 0..settings.maps.max(1) {
+        let maps = match settings.maps {
+            0 => planned.mean_maps(),
+            _ => planned.drawn_maps(settings.seed.wrapping_add(k as u64)).map_err(field)?,
+        };
+        for (all, one) in quadratics.iter_mut().zip(planned.velocities(&maps, &parts).map_err(field)?) {
+            all.push(one);
+        }
+    }
+    let outlook = |((nights, part, frequencies), quadratics): ((usize, Vec<usize>, Frequencies), Vec<_>)| {
+        Outlook::new(nights, part.len(), quadratics, frequencies, settings)
+    };
+    Ok(looks.into_iter().zip(quadratics).map(outlook).collect())
+}
+
+/// The periods (d) at which schedules are compared.
+pub fn compared_d(campaigns: &[Campaign], range_d: [f64; 2]) -> Vec<f64> {
+    let longest = campaigns.iter().map(Campaign::time_base_d).fold(0.0, f64::max);
+    let [low, high] = [range_d[0], range_d[1].min(longest.max(range_d[0] * 1.1))];
+    crate::runs::limits::even_in_logarithm(low, high, COMPARED)
+}

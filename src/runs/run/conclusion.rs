@@ -1,0 +1,74 @@
+//! What is said of a run once it has ended, or meanwhile: its summary, and the text that goes with it.
+
+use super::{CHAIN, RunError, SUMMARY};
+use crate::data::io::atomic::write_json;
+use crate::data::io::journal;
+use crate::runs::manifest::{Manifest, kinds_and_goals};
+use crate::sampling::chain::statistics::unwrap_around;
+use crate::sampling::chain::{Chain, ParameterKind, Settled, Summary, table};
+use std::path::Path;
+
+/// Summary and text.
+#[derive(Clone, Debug)]
+pub struct Conclusion {
+    /// What `summary.json` holds.
+    pub summary: Summary,
+    /// The verdict, the table of the parameters, and notes: what `dimcmc analyse` prints.
+    pub text: String,
+    kinds: Vec<ParameterKind>,
+    settled: Vec<Settled>,
+}
+
+impl Conclusion {
+    /// Reads the run in `folder`, whether or not it is finished; also its chain.
+    ///
+    /// # Errors
+    /// No run there, or one that is broken.
+    pub fn read(folder: &Path) -> Result<(Self, Chain), RunError> {
+        let manifest = Manifest::read(folder)?;
+        let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
+        Ok((Conclusion::of(folder, &manifest, &chain)?, chain))
+    }
+
+    /// Of a chain in `folder`, which errors name.
+    ///
+    /// # Errors
+    /// A config that this version does not understand, a chain without a step.
+    #[doc(hidden)]
+    pub fn of(folder: &Path, manifest: &Manifest, chain: &Chain) -> Result<Self, RunError> {
+        let settings = manifest.settings(folder)?;
+        let (kinds, _) = kinds_and_goals(&settings);
+        let (summary, settled) = manifest
+            .summarise(&settings, chain)
+            .map_err(|source| RunError::Analysis { path: folder.join(CHAIN), source })?;
+        let mut text = table(&summary, manifest.truth(&settings, &summary).as_ref()).trim_end().to_owned();
+        let notes = summary.remarks.iter().cloned().chain(manifest.warnings()).chain(manifest.co_rotation(&summary));
+        notes.for_each(|note| text += &format!("\nnote: {note}"));
+        Ok(Conclusion { summary, text, kinds, settled })
+    }
+
+    /// The draws of every parameter and of every quantity that follows from them, by name: those of `chain`, whose
+    /// conclusion this is, in its order and without the steps left out. Phases are unwrapped around their mode.
+    pub fn draws(&self, chain: &Chain) -> Vec<(String, Vec<f64>)> {
+        let kept = || chain.records().iter().skip(self.summary.discarded_steps * chain.shape().size());
+        let parameter = |(k, name): (usize, &String)| {
+            let mut values: Vec<f64> = kept().map(|record| record.theta[k]).collect();
+            if self.kinds[k] == ParameterKind::Periodic {
+                unwrap_around(&mut values, self.summary.parameters[name].mode);
+            }
+            (name.clone(), values)
+        };
+        let derived = |settled: &Settled| {
+            (settled.quantity.name.clone(), kept().map(|record| settled.value(&record.theta)).collect())
+        };
+        chain.names().iter().enumerate().map(parameter).chain(self.settled.iter().map(derived)).collect()
+    }
+
+    /// Writes `summary.json` into `folder`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), RunError> {
+        Ok(write_json(&folder.join(SUMMARY), &self.summary)?)
+    }
+}

@@ -1,0 +1,141 @@
+//! `dimcmc plan` as users run it: what is written, drawn and reported, that more nights show smaller planets, that a
+//! forecast is what a search of the simulated profiles achieves, and refusals.
+
+use crate::desk::{Desk, says, star};
+use serde_json::{Value, json};
+
+/// A small star with known spots, observed for some nights.
+fn config(nights: usize) -> Value {
+    json!({
+        "star": star(),
+        "observations": { "simulate": {
+            "random_spots": { "number": 10, "lifetime_d": 15, "seed": 2 },
+            "schedule": { "nights": nights, "per_night": [2, 2], "night_hours": 7.0, "seed": 3 },
+            "velocity_kms": { "min": -30, "max": 30, "step": 3.0 }, "snr": 500, "pixels": 1000
+        } },
+        "imaging": {
+            "pixels": 300, "objective": "marginal-likelihood",
+            "spot_amplitude": 0.2, "spot_slope": 0.9, "spot_lifetime_d": 12
+        },
+        "parameters": { "vsys_kms": { "prior": "uniform", "min": -1, "max": 1 } }
+    })
+}
+
+const QUICK: [&str; 4] = ["--draws", "1000", "--maps", "3"];
+
+fn plan(desk: &Desk, options: &[&str]) -> String {
+    desk.succeed(&[&["plan", "config.json"], &QUICK[..], options].concat())
+}
+
+/// Columns of a table by name, row by row.
+fn column(table: &str, name: &str) -> Vec<f64> {
+    let mut lines = table.lines();
+    let k = lines.next().unwrap().split(',').position(|one| one == name).unwrap();
+    lines.map(|line| line.split(',').nth(k).unwrap().parse().unwrap()).collect()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value}"))
+}
+
+#[test]
+fn more_nights_show_smaller_planets_and_the_best_schedule_is_said() {
+    let desk = Desk::new(config(10));
+    let said = plan(&desk, &["--nights", "6,12", "--out", "a"]);
+    says(
+        &said,
+        &["best: config, 12 nights", "K 95 %", "would be detected with 95 % probability", "written: a: plan.csv"],
+    );
+    let file = desk.json("a/plan.json");
+    assert_eq!(file["best"], 2);
+    let [few, many] = [0, 1].map(|k| &file["schedules"][k]);
+    // one night of two profiles is no orbit
+    assert_eq!((few["after"].as_array().unwrap().len(), many["after"].as_array().unwrap().len()), (5, 6));
+    let last = |of: &Value| of["after"].as_array().unwrap().last().unwrap().clone();
+    assert_eq!((last(few)["profiles"].as_u64(), last(many)["profiles"].as_u64()), (Some(12), Some(24)));
+    for key in ["sigma_k_kms", "k50_kms", "k95_kms"] {
+        assert!(number(&last(many)[key]) < number(&last(few)[key]), "{key}");
+    }
+    for at in many["periods"].as_array().unwrap() {
+        let [sigma, k50, k95] = ["sigma_k_kms", "k50_kms", "k95_kms"].map(|key| number(&at[key]));
+        assert!(sigma < k50 && k50 < k95, "{at}");
+    }
+    // the same bytes again, whatever the number of threads
+    plan(&desk, &["--nights", "6,12", "--out", "b", "--threads", "1"]);
+    for name in ["plan.csv", "plan.json"] {
+        assert!(desk.read(&format!("a/{name}")) == desk.read(&format!("b/{name}")), "{name}");
+    }
+    desk.succeed(&["plot", "a"]);
+    let svg = desk.read("a/figures/plan.svg");
+    assert!(svg.contains("config, 12 nights") && !svg.contains("NaN"), "a figure for a proposal");
+    desk.succeed(&["report", "a"]);
+    says(&desk.read("a/report.html"), &["The best schedule: config, 12 nights.", "would be detected with 95 %"]);
+}
+
+/// The search makes the profiles linear at the maps that fit them, the plan at maps that might be there.
+#[test]
+fn a_forecast_is_what_a_search_achieves() {
+    let desk = Desk::new(config(10));
+    plan(&desk, &["--out", "plan"]);
+    desk.succeed(&["periodogram", "config.json", "--draws", "1000", "--out", "search"]);
+    let [plan, search] = ["plan/plan.csv", "search/periodogram.csv"].map(|name| desk.read(name));
+    let [forecast, achieved] = [&plan, &search].map(|table| column(table, "period_d"));
+    assert_eq!(forecast.len(), achieved.len());
+    assert!(forecast.iter().zip(&achieved).all(|(a, b)| (a - b).abs() < 1e-9), "the same periods");
+    let ratios = column(&plan, "sigma_k_kms").into_iter().zip(column(&search, "sigma_k_kms")).map(|(a, b)| b / a);
+    let ratio = median(ratios.collect());
+    assert!((ratio - 1.0).abs() < 0.12, "{ratio}");
+    let ratios = column(&plan, "k95_kms").into_iter().zip(column(&search, "k_limit95_kms")).map(|(a, b)| b / a);
+    let ratio = median(ratios.collect());
+    assert!((ratio - 1.0).abs() < 0.15, "{ratio}");
+}
+
+/// What there is before the next nights is what a search of the profiles says; then it falls.
+#[test]
+fn the_next_nights_add_to_what_has_been_observed() {
+    let mut config = config(6);
+    config["plan"] = json!({ "schedule": { "nights": 6, "per_night": [2, 2] }, "snr": 500 });
+    let desk = Desk::new(config);
+    let said = plan(&desk, &["--out", "a", "--min-period-d", "1", "--max-period-d", "8"]);
+    says(&said, &["fitted to the profiles there are"]);
+    let file = desk.json("a/plan.json");
+    let schedule = &file["schedules"][0];
+    assert_eq!(schedule["taken"], 12);
+    let after: Vec<(u64, f64)> = schedule["after"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|after| (after["nights"].as_u64().unwrap(), number(&after["sigma_k_kms"])))
+        .collect();
+    assert_eq!(after.iter().map(|(nights, _)| *nights).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
+    assert!(after.windows(2).all(|pair| pair[1].1 < pair[0].1), "{after:?}");
+    let span = schedule["span_d"].as_array().unwrap();
+    assert!(number(&span[1]) > 11.0 && number(&span[1]) < 13.0, "from the day after the last profile on: {span:?}");
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let desk = Desk::new(config(6));
+    let refused = |options: &[&str], parts: &[&str]| {
+        says(&desk.refusal(&[&["plan", "config.json", "--out", "a"], options].concat()), parts);
+    };
+    refused(&["--nights", "0"], &["--nights", "1 to 1000"]);
+    refused(&["--min-period-d", "-1"], &["--min-period-d"]);
+    refused(&["--nights", "1"], &["config.json", "three different times"]);
+    let faulty = |pointer: &str, value: Value, parts: &[&str]| {
+        desk.set(pointer, value);
+        says(&desk.refusal(&["plan", "config.json", "--out", "a"]), parts);
+    };
+    let path = json!({ "path": "observations.txt" });
+    faulty("/observations", path, &["config.json: plan: missing", "when is the star to be observed next?"]);
+    faulty("/plan", json!({ "snr": 0 }), &["config.json: plan.snr", "0"]);
+    faulty("/plan", json!({ "schedule": { "on_nights": [3, 2] } }), &["plan.schedule.on_nights", "rising"]);
+    let listed = json!({ "on_nights": [0, 1, 5], "per_night": [2, 2] });
+    desk.set("/observations/simulate/schedule", listed);
+    says(&desk.refusal(&["plan", "config.json", "--nights", "4", "--out", "a"]), &["--nights 4", "lists 3 nights"]);
+}
