@@ -78,8 +78,8 @@ impl<'a> Maps<'a> {
         FILES.into_iter().chain(has_light.then_some(LIGHT_CURVES)).collect()
     }
 
-    /// Writes `map.json`, `profiles.csv`, `rv.csv` and `fit.json` into `folder`, which must exist; where there are light
-    /// curves `lightcurve.csv`, too.
+    /// Writes `map.json`, `profiles.csv`, `rv.csv` and `fit.json` into `folder`, which must exist; where there are
+    /// light curves `lightcurve.csv`, too.
     ///
     /// # Errors
     /// A file that cannot be written.

@@ -1,6 +1,6 @@
 //! Several data sets in one config: two spectrographs in two seasons, a transit left out.
 
-use super::desk::{Desk, says};
+use super::desk::{Desk, dimcmc, says, text};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -59,7 +59,9 @@ fn two_spectrographs_from_files_to_a_chain() {
     assert!(rv.starts_with("time_d") && rv.lines().next().unwrap().ends_with(",data_set"));
     assert_eq!(rv.lines().skip(1).filter(|line| line.ends_with(",2")).count(), 7);
     desk.succeed(&["plot", "map"]);
-    desk.succeed(&["sample", "star.json", "--out", "run"]);
+    let sampled = dimcmc(&["sample", "star.json", "--out", "run"], &desk.path(""));
+    assert_eq!(sampled.status.code(), Some(0), "{}", text(&sampled.stderr));
+    says(&text(&sampled.stderr), &["blue: 1 of 7 left out"]);
     desk.succeed(&["report", "run"]);
     says(&desk.read("run/report.html"), &["blue: 6 profiles", "red: 7 profiles"]);
 }

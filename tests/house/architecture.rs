@@ -18,6 +18,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
         "posterior",
         &[
             "nuisances",
+            "photometry",
             "first_look",
             "imaging",
             "objective",
