@@ -73,7 +73,7 @@ def test_long_calls_stop_and_leave_nothing(name: str, tmp_path: Path) -> None:
 
 
 def test_a_batch_stops(log_posterior: dimcmc.LogPosterior) -> None:
-    theta = np.tile(log_posterior.optimum, (10_000_000, 1))
+    theta = np.tile(log_posterior.optimum, (200_000, 1))
     main = os.getpid()
     watch = subprocess.Popen(["sh", "-c", f"sleep 0.5; kill -INT {main}"])
     began = time.monotonic()
