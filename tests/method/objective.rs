@@ -220,7 +220,8 @@ fn log_probability_falls_monotonically_far_beyond_the_reach_of_the_target() {
         for (parameter, offsets) in &walks {
             let at = |offset: &f64| {
                 let mut theta = posterior.space().start();
-                theta[*parameter as usize] += offset;
+                let place = posterior.space().free().iter().position(|f| f.parameter == *parameter).unwrap();
+                theta[place] += offset;
                 posterior.evaluate(&theta)
             };
             let values: Vec<f64> = offsets.iter().map(|offset| at(offset).log_prob).collect();
