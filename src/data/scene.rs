@@ -3,7 +3,9 @@
 
 mod imaging;
 mod light_curves;
+mod measuring;
 mod reading;
+mod truth;
 
 use crate::data::config::{
     Automatic, Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
@@ -14,30 +16,27 @@ use crate::data::evidence::EvidenceRecord;
 use crate::data::io::FileError;
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
-use crate::data::io::truth::Truth;
 use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::posterior::detection::Spots;
 use crate::posterior::fit::{ChangingFit, Fit, NoField};
 use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::Known;
-use crate::posterior::noise::{self, ErrorSettings, MeasuredErrors, NoiseError};
+use crate::posterior::noise::{ErrorSettings, MeasuredErrors};
 use crate::posterior::objective::{
-    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
+    FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
 };
 use crate::posterior::photometry::Flux;
-use crate::posterior::simulate::Simulation;
-use crate::posterior::zero_points::{JitterError, MeasuredJitter, ZeroPoints};
+use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
-use crate::star::{BrightnessModel, Orbit, Quadrature, Spot, SurfaceGrid};
 use imaging::hold_zero_points;
+use measuring::{measured_errors, zero_points};
 use reading::Part;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
 
 pub use imaging::imager;
-use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 /// What stands for the list of profiles in the config of profiles that are in no file.
 const IN_MEMORY: &str = "profiles in memory";
@@ -394,88 +393,10 @@ impl Scene {
         space(free, &self.settings, &self.imager)
     }
 
-    /// The true spot map on the pixels of the image, if the observations are simulated; of a star that changes, in the
-    /// middle of the data.
-    #[doc(hidden)]
-    pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
-        self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
-    }
-
-    /// What the image should hold on its pixels, if the observations are simulated; of a star that changes, in the
-    /// middle of the data.
-    #[doc(hidden)]
-    pub fn true_map(&self) -> Option<Vec<f64>> {
-        self.true_map_at(self.simulation()?.mid_time_d())
-    }
-
-    /// The same at a time (d).
-    #[doc(hidden)]
-    pub fn true_map_at(&self, time_d: f64) -> Option<Vec<f64>> {
-        let (simulation, grid) = (self.simulation()?, &self.imager.grid);
-        Some(match self.settings.imaging.brightness {
-            BrightnessModel::Spots => simulation.spot_filling_at(grid, time_d),
-            BrightnessModel::BrightAndDark => {
-                simulation.brightness_at(grid, simulation.contrast(&self.imager.star), time_d)
-            }
-        })
-    }
-
-    fn simulation(&self) -> Option<&Simulation> {
-        match &self.settings.sets[0].source {
-            ObservationSource::Simulate(simulation) => Some(simulation),
-            ObservationSource::Files { .. } => None,
-        }
-    }
-
-    /// What the scene's `simulation` was made with.
-    #[doc(hidden)]
-    pub fn truth_of(&self, simulation: &Simulation) -> Truth {
-        let grid = SurfaceGrid::equal_area(simulation.pixels, Quadrature::Gauss2x2);
-        let coverage = match simulation.is_changing() {
-            true => simulation.coverage(&grid),
-            false => Vec::new(),
-        };
-        let spottedness = match coverage.len() {
-            0 => simulation.spot_filling(&grid).iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
-            profiles => coverage.iter().sum::<f64>() / profiles as f64,
-        };
-        let state = simulation.truth.state();
-        let velocity = |time: &f64| state.vsys_kms + state.motion.velocity_kms(self.imager.star.cycle(*time));
-        Truth {
-            parameters: simulation.truth,
-            spots: simulation.spots.iter().map(Spot::written).collect(),
-            faculae: self.settings.faculae_as_written(),
-            contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
-            continuum: simulation.nuisances(),
-            zero_points_kms: simulation.zero_points_kms(),
-            zero_point_kms: Some(simulation.zero_point_kms).filter(|kms| *kms != 0.0),
-            correlated_bins: Some(simulation.correlated_bins).filter(|bins| *bins != 1.0),
-            spottedness,
-            coverage,
-            snr: simulation.snr,
-            sigma: simulation.sigma(),
-            seed: simulation.seed,
-            pixels: grid.len(),
-            orbit_kms: simulation.times_d.iter().map(velocity).collect(),
-            times_d: simulation.times_d.clone(),
-            provenance: self.provenance(),
-        }
-    }
-
     /// Bayes factors of planets under the priors of the config, from the star's quadratic without a planet.
     #[doc(hidden)]
     pub fn evidence(&self, quadratic: &VelocityQuadratic) -> Option<EvidenceRecord> {
         EvidenceRecord::of(&self.settings.free, self.space.clock(), self.settings.sampler.seed, quadratic)
-    }
-
-    /// The simulated values by name, ephemerides among them where the config names them.
-    #[doc(hidden)]
-    pub fn named_truth(&self) -> Option<BTreeMap<String, f64>> {
-        let truth = self.truth?;
-        let own = Parameter::ALL.into_iter().filter_map(|p| Some((p, truth.given(p)?)));
-        let named = self.space.free().iter().map(|f| f.parameter).zip(self.space.theta_of(&truth));
-        let named = named.filter(|(p, value)| p.is_ephemeris() && value.is_finite());
-        Some(own.chain(named).map(|(p, value)| (p.name().to_owned(), value)).collect())
     }
 
     /// What results say of where they came from.
@@ -489,73 +410,6 @@ impl Scene {
             measured: self.measured.clone(),
         }
     }
-}
-
-/// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
-/// target chi2 is per datum, independent or not.
-fn zero_points(
-    settings: &Settings,
-    imager: &Imager,
-    chi2_target: f64,
-) -> Result<(Option<ZeroPoints>, Option<MeasuredJitter>), ConfigError> {
-    let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
-    let (sd_kms, measured) = match settings.velocity_jitter {
-        VelocityJitter::Known(0.0) => return Ok((None, None)),
-        // it is counted with the field
-        _ if settings.imaging.objective == ObjectiveKind::MarginalLikelihood => return Ok((None, None)),
-        VelocityJitter::Known(sd_kms) => (sd_kms, None),
-        VelocityJitter::Fitted => {
-            let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;
-            (measured.value_kms, Some(measured))
-        }
-    };
-    let zero_points = ZeroPoints::new(imager, settings.values, chi2_target, sd_kms).map_err(|e| fault(e.into()))?;
-    Ok((Some(zero_points), measured))
-}
-
-/// Errors and velocity zero points are settled in turn that many times at most, until errors move by less than this
-/// part.
-const SETTLED: (usize, f64) = (3, 0.03);
-
-/// The errors that the observations of a `set`, `cut` as they are used, and the `whole` profiles ask for.
-fn measured_errors(
-    settings: &Settings,
-    set: &DataSetSettings,
-    wanted: ErrorSettings,
-    whole: &Observations,
-    cut: &Observations,
-) -> Result<MeasuredErrors, ConfigError> {
-    let fault = |e: NoiseError| settings.fault(&e.key().replacen("observations", &set.key, 1), &e.to_string());
-    let scaled = |measured: &MeasuredErrors| {
-        let mut observations = cut.clone();
-        measured.apply(&mut observations);
-        observations
-    };
-    let continuum = noise::by_continuum(whole, &set.star, &settings.values, wanted).map_err(fault)?;
-    // what a map leaves over is no noise where stars may change
-    if !wanted.measured || settings.imaging.objective == ObjectiveKind::MarginalLikelihood {
-        return Ok(continuum);
-    }
-    let before = scaled(&continuum);
-    let chi2_target = settings.imaging.chi2_target.value() / continuum.correlated_bins;
-    let mut measured = continuum.clone();
-    for _ in 0..SETTLED.0 {
-        // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
-        let (zero_points, _) = zero_points(settings, &imager(settings, &[scaled(&measured)])?, chi2_target)?;
-        let with_factor = |factor: f64| {
-            let mut observations = before.clone();
-            observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
-            let imager = imager(settings, &[observations])?;
-            Ok(zero_points.iter().fold(imager, |imager, zero_points| zero_points.counted_in(imager)))
-        };
-        let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);
-        measured.count_residuals(settings.values, with_factor)?.map_err(fault)?;
-        let moved = (measured.sigma_scale.unwrap_or(1.0) / then).ln().abs();
-        if settings.velocity_jitter != VelocityJitter::Fitted || moved < SETTLED.1 {
-            break;
-        }
-    }
-    Ok(measured)
 }
 
 fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {

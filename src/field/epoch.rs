@@ -56,8 +56,8 @@ impl Epoch {
     }
 
     /// With noise of its own on each number of which there are slopes, of these standard deviations (columns): more
-    /// nuisances. A velocity jitter is this, with slopes `D'`; that of [`super::Quadratic::jittered`] leaves the most
-    /// probable field as it is without.
+    /// nuisances. A velocity jitter is this, with slopes `D'`; one that is integrated out of the quadratic alone leaves
+    /// the most probable field as it is without.
     #[must_use]
     pub fn jittered(mut self, sd: &[f64]) -> Self {
         assert_eq!(sd.len(), self.slopes.ncols(), "standard deviations of all numbers of an epoch");

@@ -21,13 +21,12 @@ impl Quadratic {
     }
 
     /// The same where numbers x of a Gaussian of this `mean` and standard deviations `sd` are added, `v + columns x`,
-    /// and integrated out. `None` where the information is not finite.
+    /// and integrated out. `None` where the information is not finite. A jitter of each number is columns of their own.
     pub fn integrated(&self, columns: &DMatrix<f64>, mean: &DVector<f64>, sd: &DVector<f64>) -> Option<Self> {
         let shift = columns * mean;
         let pulled_by = &self.information * &shift;
         let ln_evidence = self.ln_evidence + self.gradient.dot(&shift) - 0.5 * shift.dot(&pulled_by);
         let gradient = &self.gradient - pulled_by;
-        // as for a jitter, its columns in the place of the diagonal matrix s
         let mut scaled = columns.clone();
         scaled.column_iter_mut().zip(sd.iter()).for_each(|(mut column, sd)| column *= *sd);
         let across = scaled.tr_mul(&self.information);
@@ -39,27 +38,6 @@ impl Quadratic {
             ln_evidence: ln_evidence + 0.5 * pulled.dot(&answer) - 0.5 * factor.ln_determinant(),
             gradient: gradient - across.tr_mul(&answer),
             information: &self.information - across.tr_mul(&factor.solve(&across)),
-        })
-    }
-
-    /// The same where each number has noise of its own beside what is asked of it, of standard deviation `sd`:
-    /// integrated out, as if `D' sd` had been nuisances of the epochs. `None` where the information is not finite.
-    pub fn jittered(&self, sd: &[f64]) -> Option<Self> {
-        let n = self.gradient.len();
-        assert_eq!(sd.len(), n, "standard deviations of all numbers");
-        // with s the diagonal matrix of sd, A = 1 + s I s
-        let mut scaled = self.information.clone();
-        scaled.row_iter_mut().zip(sd).for_each(|(mut row, sd)| row *= *sd);
-        let mut a = scaled.clone();
-        a.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
-        a += DMatrix::identity(n, n);
-        let factor = a.cholesky()?;
-        let pulled = DVector::from_fn(n, |k, _| sd[k] * self.gradient[k]);
-        let answer = factor.solve(&pulled);
-        Some(Quadratic {
-            ln_evidence: self.ln_evidence + 0.5 * pulled.dot(&answer) - 0.5 * factor.ln_determinant(),
-            gradient: &self.gradient - scaled.tr_mul(&answer),
-            information: &self.information - scaled.tr_mul(&factor.solve(&scaled)),
         })
     }
 }

@@ -11,7 +11,7 @@ use crate::planets::periodogram::{
     CircularOrbit, Frequencies, FrequencyError, FrequencySettings, Imitation, RotationPeriods, Row,
 };
 use crate::planets::verdict::{Finding, Remark, Signal, Verdict};
-use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, robustness};
+use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, Robustness, robustness};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::fit::Explained;
 use crate::posterior::objective::{Elements, Parameter, ParameterValues, Prior, for_blind_search, period_prior};
@@ -68,15 +68,9 @@ impl BlindSearch {
                 &anew
             }
         };
-        let explained = Explained::new(&scene.imager, &scene.observations, found.last());
-        let misfit: Vec<String> = explained.misfit.into_iter().chain(scene.measured.misfit_text()).collect();
         // of what is no candidate it would say nothing
         let choices = found.is_candidate().then(|| robustness(&scene.imager, values, &settings, found));
-        let evidence =
-            Evidence { imager: &scene.imager, settings: &settings, robustness: choices.as_ref(), misfit: &misfit };
-        let mut remarks = found.remarks(&evidence);
-        let of_the_star: Vec<Remark> =
-            remarks.iter().filter(|remark| !found.of_the_period().contains(remark)).cloned().collect();
+        let Judged { mut remarks, of_the_star, .. } = Judged::of(scene, &settings, found, choices.as_ref());
         let mut verdict = found.verdict(&remarks);
         let prior = |p: Parameter| scene.settings.free.iter().find(|f| f.parameter == p).map(|f| f.prior);
         let [planet, _] = &Elements::PLANETS;
@@ -117,6 +111,29 @@ impl BlindSearch {
     fn failed(error: &SearchError) -> Self {
         let verdict = Verdict::not_judged(format!("the blind search failed ({error})"));
         BlindSearch { verdict, remarks: Vec::new(), rotation: None, evidence: None }
+    }
+}
+
+/// What is to be said of a search beside its numbers.
+pub(super) struct Judged {
+    /// The profiles as the spots beside the best orbit explain them.
+    pub at_best: Explained,
+    /// All of it.
+    pub remarks: Vec<Remark>,
+    /// What does not concern the best period.
+    pub of_the_star: Vec<Remark>,
+}
+
+impl Judged {
+    /// Of what was found in `scene`, and whether it depends on `choices`, where these were tried.
+    pub fn of(scene: &Scene, settings: &DetectionSettings, found: &Detection, choices: Option<&Robustness>) -> Self {
+        let imager = &scene.imager;
+        let at_best = Explained::new(imager, &scene.observations, found.last());
+        let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
+        let remarks = found.remarks(&Evidence { imager, settings, robustness: choices, misfit: &misfit });
+        let of_the_period = found.of_the_period();
+        let of_the_star = remarks.iter().filter(|remark| !of_the_period.contains(remark)).cloned().collect();
+        Judged { at_best, remarks, of_the_star }
     }
 }
 

@@ -7,13 +7,11 @@ use crate::data::io::provenance::Provenance;
 use crate::data::scene::Scene;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
 use crate::planets::verdict::{Remark, Verdict};
-use crate::posterior::detection::{
-    Detection, DetectionError, DetectionSettings, Evidence, Robustness, Stage, View, robustness,
-};
+use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Robustness, Stage, robustness};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::fit::Explained;
 use crate::posterior::objective::for_blind_search;
-use crate::runs::blind_search::with_known;
+use crate::runs::blind_search::{Judged, with_known};
 use crate::runs::known_planet::known_planets;
 use std::path::{Path, PathBuf};
 
@@ -127,13 +125,8 @@ impl<'a> Periodogram<'a> {
         let detection = Detection::find(imager, values, frequencies, &settings, &at).map_err(failed)?;
         report("other targets, without each night");
         let choices = robustness(imager, values, &settings, &detection);
-        let explained = |view: &View| Explained::new(imager, &scene.observations, view);
-        let (planet_free, at_best) = (explained(&detection.planet_free), explained(detection.last()));
-        let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
-        let evidence = Evidence { imager, settings: &settings, robustness: Some(&choices), misfit: &misfit };
-        let remarks = detection.remarks(&evidence);
-        let of_the_star: Vec<Remark> =
-            remarks.iter().filter(|remark| !detection.of_the_period().contains(remark)).cloned().collect();
+        let planet_free = Explained::new(imager, &scene.observations, &detection.planet_free);
+        let Judged { at_best, remarks, of_the_star } = Judged::of(scene, &settings, &detection, Some(&choices));
         let known = known_planets(scene, &settings, &detection, &of_the_star);
         let (verdict, remarks) = with_known(known, detection.verdict(&remarks), remarks, of_the_star);
         Ok(Periodogram {

@@ -1,7 +1,8 @@
 //! One data set of a config: its profiles read or simulated, those of excluded times left out, errors as they are
 //! asked for.
 
-use super::{SceneError, fingerprint, measured_errors};
+use super::measuring::measured_errors;
+use super::{SceneError, fingerprint};
 use crate::data::config::{ConfigError, DataSetSettings, ObservationSource, Settings};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::posterior::noise::{ErrorSettings, MeasuredErrors};

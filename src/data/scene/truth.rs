@@ -1,0 +1,89 @@
+//! What simulated observations were made with: maps and parameters to hold results against.
+
+use super::Scene;
+use crate::data::config::ObservationSource;
+use crate::data::io::truth::Truth;
+use crate::posterior::objective::Parameter;
+use crate::posterior::simulate::Simulation;
+use crate::star::{BrightnessModel, Quadrature, Spot, SurfaceGrid};
+use std::collections::BTreeMap;
+
+impl Scene {
+    /// The true spot map on the pixels of the image, if the observations are simulated; of a star that changes, in the
+    /// middle of the data.
+    #[doc(hidden)]
+    pub fn true_spot_filling(&self) -> Option<Vec<f64>> {
+        self.simulation().map(|simulation| simulation.spot_filling(&self.imager.grid))
+    }
+
+    /// What the image should hold on its pixels, if the observations are simulated; of a star that changes, in the
+    /// middle of the data.
+    #[doc(hidden)]
+    pub fn true_map(&self) -> Option<Vec<f64>> {
+        self.true_map_at(self.simulation()?.mid_time_d())
+    }
+
+    /// The same at a time (d).
+    #[doc(hidden)]
+    pub fn true_map_at(&self, time_d: f64) -> Option<Vec<f64>> {
+        let (simulation, grid) = (self.simulation()?, &self.imager.grid);
+        Some(match self.settings.imaging.brightness {
+            BrightnessModel::Spots => simulation.spot_filling_at(grid, time_d),
+            BrightnessModel::BrightAndDark => {
+                simulation.brightness_at(grid, simulation.contrast(&self.imager.star), time_d)
+            }
+        })
+    }
+
+    fn simulation(&self) -> Option<&Simulation> {
+        match &self.settings.sets[0].source {
+            ObservationSource::Simulate(simulation) => Some(simulation),
+            ObservationSource::Files { .. } => None,
+        }
+    }
+
+    /// What the scene's `simulation` was made with.
+    #[doc(hidden)]
+    pub fn truth_of(&self, simulation: &Simulation) -> Truth {
+        let grid = SurfaceGrid::equal_area(simulation.pixels, Quadrature::Gauss2x2);
+        let coverage = match simulation.is_changing() {
+            true => simulation.coverage(&grid),
+            false => Vec::new(),
+        };
+        let spottedness = match coverage.len() {
+            0 => simulation.spot_filling(&grid).iter().zip(&grid.area).map(|(s, a)| s * a).sum(),
+            profiles => coverage.iter().sum::<f64>() / profiles as f64,
+        };
+        let state = simulation.truth.state();
+        let velocity = |time: &f64| state.vsys_kms + state.motion.velocity_kms(self.imager.star.cycle(*time));
+        Truth {
+            parameters: simulation.truth,
+            spots: simulation.spots.iter().map(Spot::written).collect(),
+            faculae: self.settings.faculae_as_written(),
+            contrast: (!simulation.faculae.is_empty()).then(|| simulation.contrast(&self.imager.star)),
+            continuum: simulation.nuisances(),
+            zero_points_kms: simulation.zero_points_kms(),
+            zero_point_kms: Some(simulation.zero_point_kms).filter(|kms| *kms != 0.0),
+            correlated_bins: Some(simulation.correlated_bins).filter(|bins| *bins != 1.0),
+            spottedness,
+            coverage,
+            snr: simulation.snr,
+            sigma: simulation.sigma(),
+            seed: simulation.seed,
+            pixels: grid.len(),
+            orbit_kms: simulation.times_d.iter().map(velocity).collect(),
+            times_d: simulation.times_d.clone(),
+            provenance: self.provenance(),
+        }
+    }
+
+    /// The simulated values by name, ephemerides among them where the config names them.
+    #[doc(hidden)]
+    pub fn named_truth(&self) -> Option<BTreeMap<String, f64>> {
+        let truth = self.truth?;
+        let own = Parameter::ALL.into_iter().filter_map(|p| Some((p, truth.given(p)?)));
+        let named = self.space.free().iter().map(|f| f.parameter).zip(self.space.theta_of(&truth));
+        let named = named.filter(|(p, value)| p.is_ephemeris() && value.is_finite());
+        Some(own.chain(named).map(|(p, value)| (p.name().to_owned(), value)).collect())
+    }
+}
