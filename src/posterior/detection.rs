@@ -255,6 +255,14 @@ impl View {
         }
     }
 
+    /// A search with the periods at which these spots imitate orbits.
+    fn imitated_by(&self, search: Search) -> Search {
+        match &self.seen {
+            Seen::OneMap(_) => search,
+            Seen::Integrated(_) => search.without_multiples(),
+        }
+    }
+
     /// The map of maximum entropy, where there is one.
     pub fn image(&self) -> Option<&Image> {
         match &self.seen {
@@ -297,10 +305,7 @@ impl Detection {
         report(Stage::Search);
         let jitters = planet_free.jitters(imager, settings)?;
         let blind = Search::with_jitter(&jitters, &frequencies, settings.search)?;
-        let blind = match settings.spots {
-            Spots::OneMap(_) => blind,
-            Spots::Integrated(_) => blind.without_multiples(),
-        };
+        let blind = planet_free.imitated_by(blind);
         let best = match jitters.is_none() {
             true => blind.best().orbit.delta_ln_l,
             false => highest(&planet_free.quadratic, &frequencies),
@@ -412,7 +417,7 @@ impl Detection {
     fn second_planet(&self, settings: SearchSettings) -> Result<Option<SecondPlanet>, Unbounded> {
         let quadratic = &self.last().quadratic;
         let Some(rest) = without(quadratic, 1.0 / self.best.porb_over_prot) else { return Ok(None) };
-        let search = Search::new(&rest, &self.frequencies, settings)?;
+        let search = self.last().imitated_by(Search::new(&rest, &self.frequencies, settings)?);
         let both = both(quadratic, &self.frequencies, &self.best, search.best());
         Ok(Some(SecondPlanet { search, both }))
     }

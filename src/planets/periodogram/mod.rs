@@ -137,7 +137,7 @@ impl Search {
     /// The same where spots imitate no orbits of several rotations.
     #[must_use]
     pub fn without_multiples(mut self) -> Self {
-        self.rotation.multiples = 1;
+        self.rotation = self.rotation.without_multiples();
         for peak in &mut self.peaks {
             peak.imitation = self.rotation.imitated(peak.porb_over_prot, peak.sigma_porb_over_prot);
         }

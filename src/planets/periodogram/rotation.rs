@@ -91,6 +91,12 @@ impl RotationPeriods {
         RotationPeriods { window: all, time_base_cycles, multiples: usual_multiples() }
     }
 
+    /// The same where spots may change: of several rotations none is looked at.
+    #[must_use]
+    pub fn without_multiples(self) -> Self {
+        RotationPeriods { multiples: 1, ..self }
+    }
+
     /// The star's period that `porb_over_prot`, known to `sigma`, is not told from, if there is one: itself rather than
     /// an alias, and fractions rather than multiples.
     pub fn imitated(&self, porb_over_prot: f64, sigma: Option<f64>) -> Option<Imitation> {
@@ -140,7 +146,7 @@ mod tests {
     fn without_multiples_two_rotations_are_a_period_like_others() {
         let cycles: Vec<f64> = (0..50).map(|k| 0.6 * f64::from(k)).collect();
         let all = RotationPeriods::new(&cycles, 3.0, &[], 29.4);
-        let own = RotationPeriods { multiples: 1, ..all.clone() };
+        let own = all.clone().without_multiples();
         assert!(all.imitated(2.0, Some(0.01)).is_some() && own.imitated(2.0, Some(0.01)).is_none());
         assert_eq!(all.imitated(1.0, Some(0.01)), own.imitated(1.0, Some(0.01)));
     }

@@ -58,7 +58,8 @@ impl Outlook {
         let level = false_alarm.level(CANDIDATE_FAP);
         let window = window_peaks(&mean.cycles, &frequencies);
         let Frequencies { rotation_period_d, time_base_cycles, .. } = frequencies;
-        let rotation = RotationPeriods::new(&mean.cycles, rotation_period_d, &window, time_base_cycles);
+        let rotation =
+            RotationPeriods::new(&mean.cycles, rotation_period_d, &window, time_base_cycles).without_multiples();
         Outlook { nights, profiles, frequencies, level, window, rotation, quadratics }
     }
 
