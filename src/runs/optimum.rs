@@ -6,7 +6,7 @@ use crate::data::scene::Scene;
 use crate::data::search::{Attempt, Found};
 use crate::numerics::text::listed;
 use crate::posterior::objective::{
-    Elements, Estimate, OrbitQuantities, OrbitQuantity, Parameter, Quoted, definition, in_earths,
+    Elements, Estimate, OrbitQuantities, OrbitQuantity, Parameter, Quoted, definition, in_earths, quoted_definition,
 };
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{OptimumRecord, ReferenceRecord};
@@ -168,9 +168,11 @@ impl OptimumFile {
             }
             text.push('\n');
         }
-        let names = self.names.iter().map(String::as_str).chain(rows.iter().map(|(name, _)| *name));
-        for (name, meaning) in names.filter_map(|name| Some((name, definition(name)?))) {
-            let _ = writeln!(text, "{name}: {meaning}");
+        let sampled = self.names.iter().map(|name| (name.as_str(), definition(name)));
+        for (name, meaning) in sampled.chain(rows.iter().map(|(name, _)| (*name, quoted_definition(name)))) {
+            if let Some(meaning) = meaning {
+                let _ = writeln!(text, "{name}: {meaning}");
+            }
         }
         let mass = self.derived.get(OrbitQuantity::MinimumMass.name());
         if let Some(earths) = mass.and_then(|mass| in_earths(mass.value)) {

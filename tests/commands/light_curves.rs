@@ -99,7 +99,7 @@ fn what_is_no_light_curve_is_refused_by_key_file_or_line() {
         says(&desk.refusal(&["map", "star.json", "--out", "map"]), parts);
     };
     table("time,flux\n1,2\n", &["tess.csv", "no column sigma", "time, flux, sigma"]);
-    table("time,flux,sigma\n1,-2,0.1\n", &["tess.csv:2", "flux"]);
+    table("time,flux,sigma\n1,-2,0.1\n", &["tess.csv:2", "flux: -2 must be above 0"]);
     table("time,flux,sigma\n1,2,0.1\n2,2,0\n", &["tess.csv:3", "sigma"]);
     table("time,flux,sigma\n1,nan,0.1\n", &["tess.csv:2", "flux"]);
     table("time,flux,sigma\nnoon,2,0.1\n", &["tess.csv:2", "noon"]);

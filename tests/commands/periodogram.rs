@@ -39,6 +39,7 @@ fn the_planet_of_the_demo_is_found() {
         &table,
         &["at Porb = Prot", "a: rv.csv, covariance.csv, periodogram.csv, periodogram_2.csv, periodogram.json"],
     );
+    says(&table, &["t_conjunction_d: ", "(planet in front) nearest to the middle of the data"]);
 
     let found = desk.json("a/periodogram.json");
     let best = &found["best"];

@@ -75,7 +75,10 @@ impl Columns {
             Some(k) => Err(FileError::Line {
                 path: self.path.clone(),
                 line: self.lines[k],
-                problem: format!("{name}: {} must be from {low:e} to {high:e}", column[k]),
+                problem: match low > 0.0 && column[k] <= 0.0 {
+                    true => format!("{name}: {} must be above 0", column[k]),
+                    false => format!("{name}: {} must be from {low:e} to {high:e}", column[k]),
+                },
             }),
         }
     }

@@ -28,7 +28,7 @@ pub fn read(path: &Path) -> Result<Vec<Flux>, FileError> {
     }
     let [time, flux, sigma] = COLUMNS;
     let times_d = table.column_within(time, [-LARGEST[0], LARGEST[0]])?;
-    let positive = [LARGEST[1].recip(), LARGEST[1]];
+    let positive = [f64::MIN_POSITIVE, LARGEST[1]];
     let (fluxes, sigmas) = (table.column_within(flux, positive)?, table.column_within(sigma, positive)?);
     let all = times_d.iter().zip(fluxes).zip(sigmas);
     let mut measured: Vec<Flux> =

@@ -8,7 +8,9 @@ use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::planets::verdict::probability;
-use crate::posterior::objective::{Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition};
+use crate::posterior::objective::{
+    Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition, quoted_definition,
+};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
 use crate::runs::optimum::{self, OptimumFile};
@@ -143,10 +145,10 @@ fn search(file: &PeriodogramFile) -> Chapter {
     let period = row("", best.period_d, best.sigma_period_d, None);
     orbit.insert(1, [vec!["*P*_{orb} (d)".into()], period[1..].to_vec()].concat());
     let told = OrbitQuantity::ALL.into_iter().filter_map(|quantity| Some((quantity, best.quantities.of(quantity)?)));
-    let mut notes: Vec<String> = note("phi").into_iter().collect();
+    let mut notes: Vec<String> = note("phi", definition("phi")).into_iter().collect();
     for (quantity, (value, sigma)) in told {
         orbit.push(row(quantity.name(), value, sigma, file.derived_truth.get(quantity.name()).copied()));
-        notes.extend(note(quantity.name()));
+        notes.extend(note(quantity.name(), quantity.definition()));
     }
     notes.push(file.co_rotation.statement.clone());
     let peak = |peak: &PeakRecord| {
@@ -175,8 +177,8 @@ fn search(file: &PeriodogramFile) -> Chapter {
 }
 
 /// What a name means, where it has to be said.
-fn note(name: &str) -> Option<String> {
-    Some(format!("{}: {}.", symbol(name).0, definition(name)?))
+fn note(name: &str, meaning: Option<&str>) -> Option<String> {
+    Some(format!("{}: {}.", symbol(name).0, meaning?))
 }
 
 fn landscape(header: &Header, file: Option<&ParaboloidFile>) -> Chapter {
@@ -241,11 +243,11 @@ fn best(file: &OptimumFile) -> Chapter {
         row(name, get(&file.optimum.parameters), get(&file.optimum.sd), file.truth.as_ref().and_then(get))
     };
     let mut rows: Vec<Vec<String>> = file.names.iter().map(of).collect();
-    let mut notes: Vec<String> = file.names.iter().filter_map(|name| note(name)).collect();
+    let mut notes: Vec<String> = file.names.iter().filter_map(|name| note(name, definition(name))).collect();
     for name in Quoted::all().map(Quoted::name).filter(|name| !file.names.iter().any(|free| free == name)) {
         if let Some(Estimate { value, sd }) = file.derived.get(name) {
             rows.push(row(name, Some(*value), Some(*sd), file.derived_truth.get(name).copied()));
-            notes.extend(note(name));
+            notes.extend(note(name, quoted_definition(name)));
         }
     }
     let sentence = match (file.well_defined, file.converged) {

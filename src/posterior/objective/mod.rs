@@ -21,7 +21,7 @@ pub use coordinates::{FreeParameter, ParameterSpace, for_blind_search, period_pr
 pub use elements::{Clock, Elements};
 pub use kind::{ObjectiveKind, UnresolvedSpots};
 pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
-pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
+pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths, quoted_definition};
 pub use parameters::{Parameter, ParameterValues};
 pub use posterior::{CHI2, Posterior, SPOTTEDNESS, is_physical};
 pub use prior::Prior;

@@ -202,17 +202,21 @@ impl OrbitQuantities {
     }
 }
 
-/// What a parameter or quantity of an orbit is, in a line, where its name does not say it.
-pub fn definition(name: &str) -> Option<&'static str> {
-    match (Parameter::from_name(name), Quoted::from_name(name)) {
-        (Some(Parameter::Phi | Parameter::Phi2), _) => Some(PHI),
-        (Some(Parameter::Conjunction | Parameter::Conjunction2), _) => Some(NAMED_CONJUNCTION),
-        (Some(parameter), _) if parameter.is_shape() => {
+/// What a parameter of an orbit is, in a line, where its name does not say it.
+pub fn definition(parameter: &str) -> Option<&'static str> {
+    match Parameter::from_name(parameter)? {
+        Parameter::Phi | Parameter::Phi2 => Some(PHI),
+        Parameter::Conjunction | Parameter::Conjunction2 => Some(NAMED_CONJUNCTION),
+        parameter if parameter.is_shape() => {
             Some("of eccentricity e and argument of periastron omega of the star's orbit")
         }
-        (Some(_), _) => None,
-        (None, quoted) => quoted.and_then(|quoted| quoted.quantity.definition()),
+        _ => None,
     }
+}
+
+/// The same of a quantity that follows from the parameters.
+pub fn quoted_definition(quantity: &str) -> Option<&'static str> {
+    Quoted::from_name(quantity)?.quantity.definition()
 }
 
 /// A small mass (Jupiter masses) in words, in masses of the Earth; `None` for a larger one.

@@ -113,8 +113,9 @@ impl PeriodogramResult<'_> {
     pub(super) fn meanings(&self, found: &QuantitiesRecord) -> String {
         let given = OrbitQuantity::ALL.into_iter().filter(|quantity| found.of(*quantity).is_some());
         let mut text = String::new();
-        for name in ["phi"].into_iter().chain(given.map(OrbitQuantity::name)) {
-            if let Some(meaning) = definition(name) {
+        let meanings = given.map(|quantity| (quantity.name(), quantity.definition()));
+        for (name, meaning) in [("phi", definition("phi"))].into_iter().chain(meanings) {
+            if let Some(meaning) = meaning {
                 let _ = writeln!(text, "{name}: {meaning}");
             }
         }
