@@ -14,8 +14,8 @@
 //! 3. [`settle()`] finds the most probable coefficients, from zeros once and from those of a reference afterwards, and
 //!    gives the [`Evidence`] there. For data that are linear, [`Evidence::new`] does.
 //! 4. [`Evidence::quadratic`]: ln Z, and its gradient and information in the velocities; numbers that are not asked
-//!    for, a jitter for example, go by [`Quadratic::integrated`]. [`Evidence::with`]: the same for another orbit, design
-//!    unchanged, by new misfits and slopes.
+//!    for, a jitter for example, go by [`Quadratic::integrated`]. [`Evidence::with`]: the same for another orbit,
+//!    design unchanged, by new misfits and slopes.
 //! 5. [`Evidence::derivatives`]: of ln Z, with respect to the hyperparameters.
 //! 6. [`Evidence::coefficients_at`], [`Evidence::means`] and [`Evidence::standard_deviations`]: the field after the
 //!    data, at any time. [`Field::drawn`] and [`Evidence::drawn`]: fields drawn before and after the data.
