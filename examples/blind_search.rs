@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         detection: &detection,
         verdict: &detection.verdict(&remarks),
         remarks: &remarks,
-        evidence: None,
+        evidence: scene.evidence(&detection.planet_free.quadratic).as_ref(),
         robustness: &choices,
         settings: &settings,
         planet_free: &explained(&detection.planet_free),

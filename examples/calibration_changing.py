@@ -50,7 +50,7 @@ COLUMNS = (
     "median_sigma_k_kms amplitude slope fitted_lifetime_d jitter_kms at_bounds "
     "along_kms sigma_along_kms across_kms sigma_across_kms chi2_orbit k_there_kms sigma_k_there_kms phi_there "
     "sigma_phi_there seconds static_false_alarm static_finding static_k_kms static_sigma_k_kms static_porb_over_prot "
-    "static_seconds season_d simulator chi2_rv "
+    "static_seconds season_d simulator ln_bayes_circle ln_bayes_ellipse ln_bayes_two_circles chi2_rv "
     "chi2_below_0.3 chi2_to_0.45 chi2_half chi2_to_0.85 chi2_rotation chi2_to_2 chi2_to_4 chi2_to_8 error"
 ).split()
 
@@ -195,6 +195,9 @@ def searched(row, folder, args, static):
     row["amplitude"], row["slope"] = field["spot_amplitude"], field["spot_slope"]
     row["fitted_lifetime_d"], row["jitter_kms"] = field["spot_lifetime_d"], field["velocity_jitter_kms"]
     row["at_bounds"] = " ".join(field["at_bounds"])
+    for planets, factor in found["evidence"].items():
+        if "ln_bayes" in factor:
+            row[f"ln_bayes_{planets}"] = factor["ln_bayes"]
     scan = np.genfromtxt(folder / "changing" / "periodogram.csv", delimiter=",", names=True)
     row["median_sigma_k_kms"] = calibration_table.median_sigma(scan["porb_over_prot"], scan["sigma_k_kms"])
     period_d = row["true_porb_over_prot"] * row["rotation_period_d"]
@@ -233,7 +236,7 @@ def run(args):
         whole = args.csv.read_text()
         args.csv.write_text(whole[: whole.rfind("\n") + 1])
     done = {(row["kind"], row["seed"]) for row in calibration_table.read(args.csv)}
-    for number, planet, kind in itertools.product(range(args.stars), (0, 1), KINDS):
+    for number, planet, kind in itertools.product(range(args.first, args.stars), (0, 1), KINDS):
         able = [program for program in args.simulator if kind != "shear" or is_own(program)]
         if able and (kind, str(star(kind, number, planet)[0]["seed"])) not in done:
             simulator = able[number % len(able)]
@@ -245,6 +248,7 @@ if __name__ == "__main__":
     parser.add_argument("--simulator", action="append", help=SIMULATOR)
     parser.add_argument("--search", help="dimcmc, or the example blind_search")
     parser.add_argument("--stars", type=int, default=25, help="of each kind, without and with a planet each")
+    parser.add_argument("--first", type=int, default=0, help="number of the first star, for a share of the work")
     parser.add_argument("--static", type=int, default=6, help="how many of these are searched by spottedness as well")
     parser.add_argument("--work", type=Path, default=Path("target/calibration-changing"), help="folder of the stars")
     parser.add_argument("--csv", type=Path, default=Path("results/calibration/changing.csv"))
