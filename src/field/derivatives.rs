@@ -3,7 +3,6 @@
 
 use super::Evidence;
 use super::dense;
-use super::evidence::in_time;
 use nalgebra::DMatrix;
 
 /// Derivatives of ln Z with respect to the hyperparameters, model and residuals held as they are linearised.
@@ -20,28 +19,34 @@ pub struct Derivatives {
 }
 
 impl Evidence {
-    /// Derivatives of ln Z with respect to the hyperparameters: as much work again as ln Z.
+    /// Derivatives of ln Z with respect to the hyperparameters, with dense matrices of all numbers: twice the work of
+    /// ln Z again.
+    ///
+    /// # Panics
+    /// Where C is positive definite in time, but not as a dense matrix.
     pub fn derivatives(&self) -> Derivatives {
+        let (numbers, kernel) = (&self.numbers, &self.field.kernel);
+        let spatial = numbers.spatial();
+        let factor = numbers.dense(spatial.clone(), kernel).expect("the covariance had a factor before");
         // 1/2 (a a^T - C^-1), of which the lower triangle is used twice
-        let mut pull = -self.factor.inverse();
+        let mut pull = -factor.inverse();
         pull.ger(1.0, &self.dual, &self.dual, 1.0);
         pull.fill_upper_triangle(0.0, 1);
-        pull.iter_mut().step_by(self.rows.nrows() + 1).for_each(|x| *x *= 0.5);
-        let kernel = &self.field.kernel;
+        pull.iter_mut().step_by(numbers.rows.nrows() + 1).for_each(|x| *x *= 0.5);
         let along = |spatial: &DMatrix<f64>, k: &dyn Fn(f64) -> f64| {
             let mut change = spatial.clone();
-            in_time(&mut change, &self.parts, &self.times_d, k);
+            numbers.in_time(&mut change, k);
             pull.dot(&change)
         };
         let by_slope = self.field.spectrum.log_variances_by_slope(&self.degrees);
-        let mut weighted = self.rows.clone();
+        let mut weighted = numbers.rows.clone();
         weighted.column_iter_mut().zip(by_slope).for_each(|(mut column, weight)| column *= weight);
-        let by_slope = dense::product_with_transpose(&weighted, &self.rows);
+        let by_slope = dense::product_with_transpose(&weighted, &numbers.rows);
         Derivatives {
-            ln_amplitude: 2.0 * along(&self.spatial, &|delay| kernel.at(delay)),
+            ln_amplitude: 2.0 * along(&spatial, &|delay| kernel.at(delay)),
             slope: along(&by_slope, &|delay| kernel.at(delay)),
-            ln_lifetime: along(&self.spatial, &|delay| kernel.by_log_lifetime(delay)),
-            persistent: along(&self.spatial, &|delay| kernel.by_persistent(delay)),
+            ln_lifetime: along(&spatial, &|delay| kernel.by_log_lifetime(delay)),
+            persistent: along(&spatial, &|delay| kernel.by_persistent(delay)),
         }
     }
 }

@@ -40,7 +40,7 @@ impl Evidence {
         times_d: &[f64],
         rng: &mut impl Rng,
     ) -> Result<DMatrix<f64>, FieldError> {
-        let all: Vec<f64> = self.times_d.iter().chain(times_d).copied().collect();
+        let all: Vec<f64> = self.numbers.times_d.iter().chain(times_d).copied().collect();
         let before = self.field.drawn(&self.degrees, &all, rng);
         let simulated = |(k, epoch): (usize, &Epoch)| {
             let mut normal = |n: usize| DVector::from_fn(n, |_, _| rng.sample::<f64, _>(StandardNormal));

@@ -5,16 +5,12 @@
 //! gradient and information of numbers that change the model by D' are `D'^T C^-1 r` and `D'^T C^-1 D'`. All of it in
 //! units of the noise and compressed, where N is 1, but for what epochs have in common, which adds `B B^T` over all.
 //!
-//! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers a profile (`benches/field.rs`:
-//! 0.06 s for 40 profiles, 0.3 s for 100, 4.4 s for 300). Seasons that are 13 lifetimes apart, with k below 1e-8, are
-//! apart: ln Z is the sum of theirs. Within one season a Kalman filter takes time in proportion to the number of
-//! profiles, if its states are value and rate along the 300 to 500 directions of the coefficients that all profiles
-//! together see, not of all coefficients. In a trial it took 0.75, 0.6 and 0.4 of the time of this for 100, 200 and 300
-//! profiles, the search for the directions left out.
+//! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers a profile, or in proportion to n'
+//! by a filter in time (`covariance`; `benches/field.rs`: 0.07 s for 50 profiles, 0.3 for 100, 1.4 for 200, 4.3 for
+//! 400, which take 13 s as a dense matrix).
 
 use super::compress::{Compressed, Compression, Told};
-use super::dense::{self, Factor};
-use super::epoch::in_common;
+use super::covariance::{Covariance, Numbers};
 use super::{Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -26,14 +22,9 @@ pub struct Evidence {
     pub(super) degrees: Vec<usize>,
     /// Prior standard deviation of each coefficient (H).
     pub(super) sd: Vec<f64>,
-    /// Times (d) of the epochs, and where the numbers of each stand.
-    pub(super) times_d: Vec<f64>,
-    pub(super) parts: Vec<Range<usize>>,
-    /// J S^(1/2) in units of the noise (n', H).
-    pub(super) rows: DMatrix<f64>,
-    /// J S J^T (n', n'), lower triangle.
-    pub(super) spatial: DMatrix<f64>,
-    pub(super) factor: Factor,
+    /// The data, compressed.
+    pub(super) numbers: Numbers,
+    pub(super) covariance: Covariance,
     /// C^-1 r.
     pub(super) dual: DVector<f64>,
     epochs: Vec<Compressed>,
@@ -68,21 +59,12 @@ impl Evidence {
         let (compressed, rows): (Vec<_>, Vec<_>) = compressed.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let (rows, common): (Vec<_>, Vec<_>) = rows.into_iter().map(|[rows, common]| (rows, common)).unzip();
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
-        let parts = parts(&rows);
-        let rows = stacked(&rows, &parts, sd.len());
-        let spatial = dense::gram(&rows);
-        let mut covariance = spatial.clone();
-        in_time(&mut covariance, &parts, &times_d, |delay| field.kernel.at(delay));
-        covariance.iter_mut().step_by(rows.nrows() + 1).for_each(|variance| *variance += 1.0);
-        let numbers = in_common(epochs);
-        if numbers > 0 {
-            covariance += dense::gram(&stacked(&common, &parts, numbers));
-        }
-        let factor = Factor::new(covariance).ok_or(FieldError::NotPositive)?;
+        let numbers = Numbers::new(times_d, &rows, &common, sd.len());
+        let covariance = Covariance::new(&numbers, &field.kernel).ok_or(FieldError::NotPositive)?;
         let told = compressed.iter().zip(epochs).map(|(to, epoch)| to.tell(&epoch.misfit, &epoch.slopes)).collect();
-        let (quadratic, dual) = quadratic(&factor, &parts, &compressed, told);
+        let (quadratic, dual) = quadratic(&covariance, &numbers.parts, &compressed, told);
         let (degrees, epochs) = (degrees.to_vec(), compressed);
-        Ok(Evidence { field, degrees, sd, times_d, parts, rows, spatial, factor, dual, epochs, quadratic })
+        Ok(Evidence { field, degrees, sd, numbers, covariance, dual, epochs, quadratic })
     }
 
     /// The field that is assumed.
@@ -92,7 +74,7 @@ impl Evidence {
 
     /// Numbers that the data of all epochs were compressed to.
     pub fn compressed_len(&self) -> usize {
-        self.rows.nrows()
+        self.numbers.rows.nrows()
     }
 
     /// ln Z, all constants included.
@@ -120,13 +102,13 @@ impl Evidence {
             let sound = finite(misfit.as_slice()) && finite(slopes.as_slice());
             sound.then(|| to.tell(misfit, slopes)).ok_or(FieldError::NotFinite { epoch: k })
         });
-        Ok(quadratic(&self.factor, &self.parts, &self.epochs, told.collect::<Result<_, _>>()?).0)
+        Ok(quadratic(&self.covariance, &self.numbers.parts, &self.epochs, told.collect::<Result<_, _>>()?).0)
     }
 }
 
 /// ln Z, gradient and information of misfits and slopes as told by `epochs`; and `C^-1 r`.
 fn quadratic(
-    factor: &Factor,
+    covariance: &Covariance,
     parts: &[Range<usize>],
     epochs: &[Compressed],
     told: Vec<Told>,
@@ -140,11 +122,11 @@ fn quadratic(
         columns.view_mut((part.start, 1 + k * per_epoch), (part.len(), per_epoch)).copy_from(&of.slopes);
     }
     let starts = parts.iter().flat_map(|part| std::iter::repeat_n(part.start, per_epoch));
-    factor.forward_from(&mut columns, &std::iter::once(0).chain(starts).collect::<Vec<_>>());
+    covariance.forward_from(&mut columns, &std::iter::once(0).chain(starts).collect::<Vec<_>>());
     let (residual, slopes) = (columns.column(0), columns.columns_range(1..));
     let mut gradient = slopes.tr_mul(&residual);
     let mut information = slopes.transpose() * slopes;
-    let mut ln_evidence = -0.5 * (residual.norm_squared() + factor.ln_determinant());
+    let mut ln_evidence = -0.5 * (residual.norm_squared() + covariance.ln_determinant());
     for (k, (of, epoch)) in told.iter().zip(epochs).enumerate() {
         ln_evidence += epoch.constant - 0.5 * of.chi2;
         let mut part = gradient.rows_mut(k * per_epoch, per_epoch);
@@ -153,37 +135,6 @@ fn quadratic(
         block += &of.information;
     }
     let mut dual = residual.clone_owned().reshape_generic(nalgebra::Dyn(residual.len()), nalgebra::Dyn(1));
-    factor.backward(&mut dual);
+    covariance.backward(&mut dual);
     (Quadratic { ln_evidence, gradient, information }, dual.column(0).into_owned())
-}
-
-/// Where the numbers of each epoch stand.
-fn parts(rows: &[DMatrix<f64>]) -> Vec<Range<usize>> {
-    let mut end = 0;
-    let part = |rows: &DMatrix<f64>| {
-        end += rows.nrows();
-        end - rows.nrows()..end
-    };
-    rows.iter().map(part).collect()
-}
-
-/// Rows of all epochs, zeros for one without columns.
-fn stacked(of_epochs: &[DMatrix<f64>], parts: &[Range<usize>], columns: usize) -> DMatrix<f64> {
-    let mut rows = DMatrix::zeros(parts.last().map_or(0, |part| part.end), columns);
-    for (of_epoch, part) in of_epochs.iter().zip(parts) {
-        if of_epoch.ncols() > 0 {
-            rows.rows_range_mut(part.clone()).copy_from(of_epoch);
-        }
-    }
-    rows
-}
-
-/// Multiplies the blocks of the lower triangle of a matrix over all epochs by a function of their delay.
-pub(super) fn in_time(matrix: &mut DMatrix<f64>, parts: &[Range<usize>], times_d: &[f64], k: impl Fn(f64) -> f64) {
-    for (column, later) in parts.iter().zip(times_d) {
-        for (row, earlier) in parts.iter().zip(times_d).filter(|(row, _)| row.start >= column.start) {
-            let mut block = matrix.view_range_mut(row.clone(), column.clone());
-            block *= k(later - earlier);
-        }
-    }
 }

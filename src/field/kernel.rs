@@ -66,7 +66,7 @@ impl Kernel {
     }
 
     /// `sqrt(3) |delay| / lifetime`; `None` for a static field.
-    fn scaled(&self, delay_d: f64) -> Option<f64> {
+    pub(super) fn scaled(&self, delay_d: f64) -> Option<f64> {
         match self.lifetime {
             Lifetime::Static => None,
             Lifetime::Days(days) => Some(3.0_f64.sqrt() * delay_d.abs() / days),

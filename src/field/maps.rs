@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 impl Evidence {
     /// Most probable coefficients (H, epochs) at the times of the epochs.
     pub fn coefficients(&self) -> DMatrix<f64> {
-        self.coefficients_at(&self.times_d)
+        self.coefficients_at(&self.numbers.times_d)
     }
 
     /// Most probable coefficients (H, times) at any times (d).
@@ -25,17 +25,17 @@ impl Evidence {
     pub fn standard_deviations(&self, harmonics: &DMatrix<f64>, times_d: &[f64]) -> DMatrix<f64> {
         let mut scaled = harmonics.clone();
         scale_rows(&mut scaled, &self.sd);
-        let seen = &self.rows * &scaled;
+        let seen = &self.numbers.rows * &scaled;
         let before: Vec<f64> = scaled.column_iter().map(|point| point.norm_squared()).collect();
-        let correlations = correlations(&self.field, &self.times_d, times_d);
+        let correlations = correlations(&self.field, &self.numbers.times_d, times_d);
         let mut after = DMatrix::zeros(harmonics.ncols(), times_d.len());
         for (correlations, mut after) in correlations.column_iter().zip(after.column_iter_mut()) {
             let mut known = seen.clone();
-            for (part, correlation) in self.parts.iter().zip(&correlations) {
+            for (part, correlation) in self.numbers.parts.iter().zip(&correlations) {
                 let mut rows = known.rows_range_mut(part.clone());
                 rows *= *correlation;
             }
-            self.factor.forward(&mut known);
+            self.covariance.forward(&mut known);
             for ((after, before), known) in after.iter_mut().zip(&before).zip(known.column_iter()) {
                 // rounding may take more than there was
                 *after = (before - known.norm_squared()).max(0.0).sqrt();
@@ -49,26 +49,26 @@ impl Evidence {
     /// `(1 - K J^T C^-1 J) (K' pulled - c)`, K' of that field, all else of this evidence. With all of one model that is
     /// the step of Gauss-Newton; and it vanishes at the most probable coefficients of the other, `c = K' pulled`.
     pub(super) fn step(&self, field: &Field, coefficients: &DMatrix<f64>, pulled: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut gradient = pulled * correlations(field, &self.times_d, &self.times_d);
+        let mut gradient = pulled * correlations(field, &self.numbers.times_d, &self.numbers.times_d);
         scale_rows(&mut gradient, &field.spectrum.variances(&self.degrees));
         gradient -= coefficients;
         let mut scaled = gradient.clone();
         scale_rows(&mut scaled, &self.sd.iter().map(|sd| if *sd > 0.0 { sd.recip() } else { 0.0 }).collect::<Vec<_>>());
-        let mut seen = DVector::zeros(self.rows.nrows());
-        for (part, scaled) in self.parts.iter().zip(scaled.column_iter()) {
-            seen.rows_range_mut(part.clone()).gemv(1.0, &self.rows.rows_range(part.clone()), &scaled, 0.0);
+        let mut seen = DVector::zeros(self.numbers.rows.nrows());
+        for (part, scaled) in self.numbers.parts.iter().zip(scaled.column_iter()) {
+            seen.rows_range_mut(part.clone()).gemv(1.0, &self.numbers.rows.rows_range(part.clone()), &scaled, 0.0);
         }
-        gradient - self.spread(&self.factor.solve(&seen), &self.times_d)
+        gradient - self.spread(&self.covariance.solve(&seen), &self.numbers.times_d)
     }
 
     /// `K J^T N^(-1/2) x`, coefficients (H, times) at any times (d), of numbers x as compressed.
     fn spread(&self, x: &DVector<f64>, times_d: &[f64]) -> DMatrix<f64> {
-        let mut pulls = DMatrix::zeros(self.sd.len(), self.times_d.len());
-        for (part, mut pull) in self.parts.iter().zip(pulls.column_iter_mut()) {
-            pull.gemv_tr(1.0, &self.rows.rows_range(part.clone()), &x.rows_range(part.clone()), 0.0);
+        let mut pulls = DMatrix::zeros(self.sd.len(), self.numbers.times_d.len());
+        for (part, mut pull) in self.numbers.parts.iter().zip(pulls.column_iter_mut()) {
+            pull.gemv_tr(1.0, &self.numbers.rows.rows_range(part.clone()), &x.rows_range(part.clone()), 0.0);
         }
         scale_rows(&mut pulls, &self.sd);
-        pulls * correlations(&self.field, &self.times_d, times_d)
+        pulls * correlations(&self.field, &self.numbers.times_d, times_d)
     }
 }
 

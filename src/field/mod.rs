@@ -20,15 +20,17 @@
 //! 6. [`Evidence::coefficients_at`], [`Evidence::means`] and [`Evidence::standard_deviations`]: the field after the
 //!    data, at any time. [`Field::drawn`] and [`Evidence::drawn`]: fields drawn before and after the data.
 //!
-//! Inside, `compress` finds the few numbers of an epoch that say something of the field, and `dense` has the products
-//! and the Cholesky factor in which nearly all of the time goes.
+//! Inside, `compress` finds the few numbers of an epoch that say something of the field. `covariance` is that of all
+//! numbers, factored: `dense`, or by a Kalman `filter` for many profiles. Nearly all of the time goes there.
 
 mod compress;
+mod covariance;
 mod dense;
 mod derivatives;
 mod draws;
 mod epoch;
 mod evidence;
+mod filter;
 mod harmonics;
 mod kernel;
 mod maps;

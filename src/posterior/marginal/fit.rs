@@ -217,17 +217,19 @@ pub fn fit(
         })?,
         None => {
             let rough = basis.roughly();
-            let start = |of_field: &Vec<Assumed>| {
-                let mut found: Vec<Result<Marginal, FieldError>> = Vec::new();
-                for assumed in of_field {
+            // of many profiles each is hundreds of megabytes: only the best so far is kept
+            let higher = |best, next| higher(best, next, &known);
+            let start = |of_field: Vec<Assumed>| {
+                of_field.into_iter().fold(None, |best: Option<Found>, assumed| {
                     // with a jitter from the maps without one
-                    let before = found.last().and_then(|before| before.as_ref().ok());
-                    found.push(Marginal::new(imager, &rough, Arc::clone(&design), values, *assumed, before));
-                }
-                found
+                    let before = best.as_ref().and_then(|before| before.as_ref().ok());
+                    let next = Marginal::new(imager, &rough, Arc::clone(&design), values, assumed, before);
+                    Some(higher(best, next))
+                })
             };
-            let tried = starts(&known).par_iter().with_max_len(1).flat_map_iter(start).collect();
-            let best = highest(tried, &known)?;
+            let tried = starts(&known).into_par_iter().with_max_len(1).filter_map(start);
+            let best = tried.reduce_with(|best, next| higher(Some(best), next));
+            let best = best.expect("a start at least")?;
             at(best.assumed, Some(&best))?
         }
     };
@@ -260,20 +262,16 @@ fn starts(known: &Known) -> Vec<Vec<Assumed>> {
     lifetimes.iter().map(assumed).collect()
 }
 
-/// The one with the highest ln Z, or the last error.
-fn highest(tried: Vec<Result<Marginal, FieldError>>, known: &Known) -> Result<Marginal, FieldError> {
-    let mut best: Option<Result<Marginal, FieldError>> = None;
-    for next in tried {
-        let is_better = match (&next, &best) {
-            (Ok(next), Some(Ok(best))) => known.height(next) > known.height(best),
-            (Err(_), Some(Ok(_))) => false,
-            _ => true,
-        };
-        if is_better {
-            best = Some(next);
-        }
+/// The profiles with one of the fields that a fit may start from.
+type Found = Result<Marginal, FieldError>;
+
+/// The one with the higher ln Z, the first of equals; or the last error.
+fn higher(best: Option<Found>, next: Found, known: &Known) -> Found {
+    match (best, next) {
+        (Some(Ok(best)), Ok(next)) if known.height(&next) > known.height(&best) => Ok(next),
+        (Some(Ok(best)), _) => Ok(best),
+        (_, next) => next,
     }
-    best.expect("a start at least")
 }
 
 /// The fit with a jitter in place of one without, or the other way round, where that is better.

@@ -1,0 +1,134 @@
+//! The covariance `C = J K J^T + 1` of the numbers of all epochs, and what they have in common, factored: dense for as
+//! many numbers as it is faster for, by a filter in time beyond. Both are the same Cholesky factor.
+
+use super::Kernel;
+use super::dense::{self, Factor};
+use super::filter::Filter;
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+/// Numbers of all epochs beyond which a filter is faster (`benches/field.rs`).
+const FILTER_BEYOND: usize = 5000;
+
+/// Numbers of all epochs, in units of their noise.
+#[derive(Clone, Debug)]
+pub struct Numbers {
+    /// Times (d) of the epochs, and where the numbers of each stand.
+    pub times_d: Vec<f64>,
+    pub parts: Vec<Range<usize>>,
+    /// J S^(1/2) (n, H).
+    pub rows: DMatrix<f64>,
+    /// What epochs have in common (n, numbers).
+    pub common: DMatrix<f64>,
+}
+
+impl Numbers {
+    /// Of epochs at these times, and their parts of both matrices.
+    pub fn new(times_d: Vec<f64>, rows: &[DMatrix<f64>], common: &[DMatrix<f64>], coefficients: usize) -> Self {
+        let mut end = 0;
+        let part = |rows: &DMatrix<f64>| {
+            end += rows.nrows();
+            end - rows.nrows()..end
+        };
+        let parts: Vec<Range<usize>> = rows.iter().map(part).collect();
+        let numbers = common.iter().map(DMatrix::ncols).max().unwrap_or(0);
+        let (rows, common) = (stacked(rows, &parts, coefficients), stacked(common, &parts, numbers));
+        Numbers { times_d, parts, rows, common }
+    }
+
+    /// J S J^T (n, n), lower triangle.
+    pub fn spatial(&self) -> DMatrix<f64> {
+        dense::gram(&self.rows)
+    }
+
+    /// Multiplies the blocks of the lower triangle of a matrix (n, n) by a function of their delay.
+    pub fn in_time(&self, matrix: &mut DMatrix<f64>, k: impl Fn(f64) -> f64) {
+        let epochs = || self.parts.iter().zip(&self.times_d);
+        for (column, later) in epochs() {
+            for (row, earlier) in epochs().filter(|(row, _)| row.start >= column.start) {
+                let mut block = matrix.view_range_mut(row.clone(), column.clone());
+                block *= k(later - earlier);
+            }
+        }
+    }
+
+    /// The dense factor, given [`Numbers::spatial`]; `None` where the covariance is not positive definite or not
+    /// finite.
+    pub fn dense(&self, spatial: DMatrix<f64>, kernel: &Kernel) -> Option<Factor> {
+        let mut covariance = spatial;
+        self.in_time(&mut covariance, |delay| kernel.at(delay));
+        covariance.iter_mut().step_by(self.rows.nrows() + 1).for_each(|variance| *variance += 1.0);
+        if self.common.ncols() > 0 {
+            covariance += dense::gram(&self.common);
+        }
+        Factor::new(covariance)
+    }
+}
+
+/// Rows of all epochs, zeros for one without columns.
+fn stacked(of_epochs: &[DMatrix<f64>], parts: &[Range<usize>], columns: usize) -> DMatrix<f64> {
+    let mut rows = DMatrix::zeros(parts.last().map_or(0, |part| part.end), columns);
+    for (of_epoch, part) in of_epochs.iter().zip(parts) {
+        if of_epoch.ncols() > 0 {
+            rows.rows_range_mut(part.clone()).copy_from(of_epoch);
+        }
+    }
+    rows
+}
+
+/// Cholesky factor `L L^T` of the covariance.
+#[derive(Clone, Debug)]
+pub enum Covariance {
+    /// Of few numbers.
+    Dense(Factor),
+    /// Of many.
+    InTime(Filter),
+}
+
+impl Covariance {
+    /// `None` where it is not positive definite or not finite.
+    pub fn new(numbers: &Numbers, kernel: &Kernel) -> Option<Self> {
+        match numbers.rows.nrows() > FILTER_BEYOND {
+            true => Filter::new(numbers, kernel).map(Covariance::InTime),
+            false => numbers.dense(numbers.spatial(), kernel).map(Covariance::Dense),
+        }
+    }
+
+    /// Logarithm of its determinant.
+    pub fn ln_determinant(&self) -> f64 {
+        match self {
+            Covariance::Dense(factor) => factor.ln_determinant(),
+            Covariance::InTime(filter) => filter.ln_determinant(),
+        }
+    }
+
+    /// `L^-1 B` in place of B (n, columns), where each column of B is known to be zero in its rows before `starts`,
+    /// which are in ascending order.
+    pub fn forward_from(&self, b: &mut DMatrix<f64>, starts: &[usize]) {
+        match self {
+            Covariance::Dense(factor) => factor.forward_from(b, starts),
+            Covariance::InTime(filter) => filter.forward_from(b, starts),
+        }
+    }
+
+    /// `L^-1 B` in place of B (n, columns).
+    pub fn forward(&self, b: &mut DMatrix<f64>) {
+        self.forward_from(b, &vec![0; b.ncols()]);
+    }
+
+    /// `L^-T B` in place of B (n, columns).
+    pub fn backward(&self, b: &mut DMatrix<f64>) {
+        match self {
+            Covariance::Dense(factor) => factor.backward(b),
+            Covariance::InTime(filter) => filter.backward(b),
+        }
+    }
+
+    /// `C^-1 x`.
+    pub fn solve(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut column = DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+        self.forward(&mut column);
+        self.backward(&mut column);
+        column.column(0).into_owned()
+    }
+}

@@ -1,0 +1,326 @@
+//! The Cholesky factor of the covariance of all epochs by a Kalman filter: time in proportion to their number
+//! (`docs/method.md` section 9).
+//!
+//! Matern 3/2 is a state space of two numbers, value v and rate w (over `sqrt(3) / lifetime`), which are independent of
+//! each other and of unit variance at any one time; `a = sqrt(3) delay / lifetime` later they are
+//! `e^-a [(1 + a) v + a w]` and `e^-a [(1 - a) w - a v]`, and independent noise (Hartikainen & Sarkka 2010). What
+//! never changes is a number of its own, and so is each number that epochs have in common. Innovations over their
+//! standard deviations are `L^-1` times the data, for the L with `L L^T = C`, epochs in the order of time.
+//!
+//! States are those of the few directions of the coefficients that all profiles together see: all coefficients in
+//! units of their standard deviations have the same correlation in time, so that any orthonormal directions have.
+
+use super::Kernel;
+use super::compress::with_directions;
+use super::covariance::Numbers;
+use super::dense;
+use nalgebra::{DMatrix, DMatrixView};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::ops::Range;
+
+/// Largest variance, over that of the noise, of all numbers of all epochs together along directions that are left out.
+const LEFT_OUT: f64 = 1e-3;
+
+/// Directions that are looked for at once.
+const AT_ONCE: usize = 64;
+
+/// The factor L, an epoch at a time.
+#[derive(Clone, Debug)]
+pub struct Filter {
+    /// In the order of time.
+    steps: Vec<Step>,
+    /// Numbers of a state: rates, which no profile sees; then values, numbers that never change, numbers in common.
+    states: usize,
+    /// How many rates there are.
+    rates: usize,
+}
+
+/// An epoch.
+#[derive(Clone, Debug)]
+struct Step {
+    /// Where its numbers stand.
+    part: Range<usize>,
+    /// Time since the epoch before, in units of the lifetime: a.
+    passed: f64,
+    /// What it sees of a state but its rates (numbers, states - rates).
+    seen: DMatrix<f64>,
+    /// What a whitened innovation changes of a state (states, numbers).
+    gain: DMatrix<f64>,
+    /// L of the innovation's covariance, and its inverse.
+    lower: DMatrix<f64>,
+    inverse: DMatrix<f64>,
+}
+
+/// Values and rates from one epoch to the next: factors of value and rate in either, and the covariance of the noise.
+struct Passage {
+    value: [f64; 2],
+    rate: [f64; 2],
+    noise: [f64; 3],
+}
+
+impl Passage {
+    fn after(a: f64) -> Self {
+        let e = (-a).exp();
+        let (value, rate) = ([e * (1.0 + a), e * a], [-e * a, e * (1.0 - a)]);
+        let dot = |x: [f64; 2], y: [f64; 2]| x[0] * y[0] + x[1] * y[1];
+        Passage { value, rate, noise: [1.0 - dot(value, value), -dot(value, rate), 1.0 - dot(rate, rate)] }
+    }
+
+    /// States (states, columns) an epoch later.
+    fn forward(&self, states: &mut DMatrix<f64>, rates: usize) {
+        self.mixed(states, rates, [self.value[0], self.value[1], self.rate[0], self.rate[1]]);
+    }
+
+    /// The transpose of that.
+    fn backward(&self, states: &mut DMatrix<f64>, rates: usize) {
+        self.mixed(states, rates, [self.value[0], self.rate[0], self.value[1], self.rate[1]]);
+    }
+
+    fn mixed(&self, states: &mut DMatrix<f64>, rates: usize, [vv, vw, wv, ww]: [f64; 4]) {
+        if rates == 0 {
+            return;
+        }
+        let rows = states.nrows();
+        for column in states.as_mut_slice().chunks_exact_mut(rows) {
+            let (w, v) = column.split_at_mut(rates);
+            for (v, w) in v.iter_mut().zip(w) {
+                (*v, *w) = (vv * *v + vw * *w, wv * *v + ww * *w);
+            }
+        }
+    }
+
+    /// The covariance (states, states) an epoch later.
+    fn covariance(&self, covariance: &mut DMatrix<f64>, rates: usize) {
+        self.forward(covariance, rates);
+        let [value, across, rate] = self.noise;
+        for i in 0..rates {
+            let (mut w, mut v) = covariance.columns_range_pair_mut(i, rates + i);
+            for (v, w) in v.iter_mut().zip(w.iter_mut()) {
+                (*v, *w) = (self.value[0] * *v + self.value[1] * *w, self.rate[0] * *v + self.rate[1] * *w);
+            }
+            w[i] += rate;
+            w[rates + i] += across;
+            v[i] += across;
+            v[rates + i] += value;
+        }
+    }
+}
+
+impl Filter {
+    /// `None` where the covariance is not positive definite or not finite.
+    pub fn new(Numbers { times_d, parts, rows, common }: &Numbers, kernel: &Kernel) -> Option<Self> {
+        let directions = seen_directions(rows)?;
+        let seen = rows * &directions;
+        let (changes, stays) = (!kernel.is_static(), kernel.is_static() || kernel.persistent > 0.0);
+        let share = if kernel.is_static() { 1.0 } else { kernel.persistent };
+        let rates = if changes { directions.ncols() } else { 0 };
+        let mut blocks = Vec::new();
+        if changes {
+            blocks.push(&seen * (1.0 - share).sqrt());
+        }
+        if stays {
+            blocks.push(&seen * share.sqrt());
+        }
+        blocks.push(common.clone());
+        let width: usize = blocks.iter().map(DMatrix::ncols).sum();
+        let states = rates + width;
+        let mut order: Vec<usize> = (0..parts.len()).collect();
+        order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
+        let mut covariance = DMatrix::<f64>::identity(states, states);
+        let mut steps = Vec::with_capacity(order.len());
+        let mut before = None;
+        for k in order {
+            let part = parts[k].clone();
+            let passed = before.map_or(0.0, |before| kernel.scaled(times_d[k] - before).unwrap_or(0.0));
+            before = Some(times_d[k]);
+            if passed > 0.0 {
+                Passage::after(passed).covariance(&mut covariance, rates);
+            }
+            let mut seen = DMatrix::zeros(part.len(), width);
+            let mut from = 0;
+            for block in &blocks {
+                seen.columns_mut(from, block.ncols()).copy_from(&block.rows_range(part.clone()));
+                from += block.ncols();
+            }
+            let along = covariance.columns_range(rates..) * seen.transpose();
+            let mut innovation = &seen * along.rows_range(rates..);
+            innovation.iter_mut().step_by(part.len() + 1).for_each(|variance| *variance += 1.0);
+            let lower = innovation.cholesky()?.unpack();
+            let inverse = lower.solve_lower_triangular(&DMatrix::identity(part.len(), part.len()))?;
+            let gain = along * inverse.transpose();
+            covariance.gemm(-1.0, &gain, &gain.transpose(), 1.0);
+            if !lower.diagonal().iter().all(|x| x.is_finite()) {
+                return None;
+            }
+            steps.push(Step { part, passed, seen, gain, lower, inverse });
+        }
+        Some(Filter { steps, states, rates })
+    }
+
+    /// Logarithm of the determinant of the covariance.
+    pub fn ln_determinant(&self) -> f64 {
+        self.steps.iter().map(|step| 2.0 * step.lower.diagonal().iter().map(|x| x.ln()).sum::<f64>()).sum()
+    }
+
+    /// `L^-1 B` in place of B (n, columns), where each column of B is known to be zero in its rows before `starts`,
+    /// which are in ascending order.
+    pub fn forward_from(&self, b: &mut DMatrix<f64>, starts: &[usize]) {
+        // the first epoch in the order of time in which a column is not zero
+        let first = |start: &usize| self.steps.iter().position(|step| step.part.end > *start).unwrap_or(0);
+        let first: Vec<usize> = starts.iter().map(first).collect();
+        let mut states = DMatrix::zeros(self.states, b.ncols());
+        for (number, step) in self.steps.iter().enumerate() {
+            let columns = first.partition_point(|first| *first <= number);
+            let mut active = states.columns_mut(0, columns).into_owned();
+            if step.passed > 0.0 {
+                Passage::after(step.passed).forward(&mut active, self.rates);
+            }
+            let mut rows = b.view_mut((step.part.start, 0), (step.part.len(), columns));
+            rows.gemm(-1.0, &step.seen, &active.rows_range(self.rates..), 1.0);
+            let whitened = &step.inverse * rows.clone_owned();
+            rows.copy_from(&whitened);
+            active.gemm(1.0, &step.gain, &whitened, 1.0);
+            states.columns_mut(0, columns).copy_from(&active);
+        }
+    }
+
+    /// `L^-T B` in place of B (n, columns).
+    pub fn backward(&self, b: &mut DMatrix<f64>) {
+        let mut states = DMatrix::zeros(self.states, b.ncols());
+        for step in self.steps.iter().rev() {
+            let mut rows = b.rows_range_mut(step.part.clone());
+            rows.gemm_tr(1.0, &step.gain, &states, 1.0);
+            let whitened = step.inverse.tr_mul(&rows);
+            rows.copy_from(&whitened);
+            states.rows_range_mut(self.rates..).gemm_tr(-1.0, &step.seen, &whitened, 1.0);
+            if step.passed > 0.0 {
+                Passage::after(step.passed).backward(&mut states, self.rates);
+            }
+        }
+    }
+}
+
+/// Orthonormal directions (H, few) that hold all of `rows` (n, H) but what may be lost: blocks of random ones, turned
+/// towards the largest by two products with `rows^T rows` (Halko, Martinsson & Tropp 2011). `None` where that is not
+/// finite.
+fn seen_directions(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let mut products = dense::gram(&rows.transpose());
+    products.fill_upper_triangle_with_lower_triangle();
+    let all = products.trace();
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let coefficients = rows.ncols();
+    let mut directions = DMatrix::zeros(coefficients, 0);
+    let mut held = 0.0;
+    while all - held > LEFT_OUT && directions.ncols() < coefficients {
+        let many = AT_ONCE.min(coefficients - directions.ncols());
+        let mut block = DMatrix::from_fn(coefficients, many, |_, _| rng.sample::<f64, _>(StandardNormal));
+        for _ in 0..2 {
+            block = &products * block;
+            block = apart(&directions.as_view(), block)?;
+        }
+        if block.ncols() == 0 {
+            break;
+        }
+        held += block.dot(&(&products * &block));
+        directions = joined(directions, &block);
+    }
+    all.is_finite().then_some(directions)
+}
+
+/// Orthonormal columns of what `block` has beside `directions`; `None` where it is not finite.
+fn apart(directions: &DMatrixView<f64>, mut block: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    // twice, for the first time leaves rounding errors of the size of the block
+    for _ in 0..2 {
+        let along = directions.transpose() * &block;
+        block -= directions * along;
+        block = with_directions(DMatrix::zeros(block.nrows(), 0), &block);
+    }
+    block.iter().all(|x| x.is_finite()).then_some(block)
+}
+
+fn joined(directions: DMatrix<f64>, more: &DMatrix<f64>) -> DMatrix<f64> {
+    let before = directions.ncols();
+    let mut all = directions.resize_horizontally(before + more.ncols(), 0.0);
+    all.columns_mut(before, more.ncols()).copy_from(more);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Lifetime;
+    use super::super::dense::Factor;
+    use super::*;
+
+    /// Numbers that look random, (n, m).
+    fn some(n: usize, m: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(n, m, |i, j| ((i * 7919 + j * 104_729 + i * j * 31) % 1009) as f64 / 1009.0 - 0.5)
+    }
+
+    /// Epochs that are not in the order of time, two of them at the same time, of 3 to 5 numbers; of 100 coefficients
+    /// they see some 20 more and more faintly.
+    fn numbers() -> Numbers {
+        let times_d = vec![0.0, 2.5, 1.0, 9.0, 30.0, 2.5, 31.0, 30.5];
+        let of = |k: usize| {
+            let fading = DMatrix::from_diagonal(&nalgebra::DVector::from_fn(20, |i, _| 100.0 * 0.5f64.powi(i as i32)));
+            some(3 + k % 3, 20 + k).columns(k, 20) * fading * some(20, 100)
+        };
+        let rows: Vec<_> = (0..times_d.len()).map(of).collect();
+        let common: Vec<_> = rows.iter().map(|rows| some(rows.nrows(), 2)).collect();
+        Numbers::new(times_d, &rows, &common, 100)
+    }
+
+    fn dense_and_filter(kernel: &Kernel) -> (Factor, Filter, usize) {
+        let numbers = numbers();
+        let n = numbers.rows.nrows();
+        (numbers.dense(numbers.spatial(), kernel).unwrap(), Filter::new(&numbers, kernel).unwrap(), n)
+    }
+
+    #[test]
+    fn it_does_what_dense_algebra_does() {
+        let changing = |persistent| Kernel { lifetime: Lifetime::Days(6.0), persistent };
+        for kernel in [changing(0.0), changing(0.3), Kernel::of(Lifetime::Static), Kernel::of(Lifetime::Days(1e7))] {
+            let (dense, filter, n) = dense_and_filter(&kernel);
+            let (known, got) = (dense.ln_determinant(), filter.ln_determinant());
+            assert!((got - known).abs() < 1e-5, "{kernel:?}: {got}, not {known}");
+            // a column that begins at each number, as slopes of later and later epochs do
+            let starts: Vec<usize> = (0..n).collect();
+            let late = some(n, n).lower_triangle();
+            let whitened = |factor: &dyn Fn(&mut DMatrix<f64>)| {
+                let mut b = late.clone();
+                factor(&mut b);
+                b
+            };
+            let known = whitened(&|b| dense.forward_from(b, &starts));
+            let got = whitened(&|b| filter.forward_from(b, &starts));
+            // rows stand in another order of elimination, squares do not depend on it
+            let (known, got) = (known.tr_mul(&known), got.tr_mul(&got));
+            assert!((&got - &known).amax() < 1e-6 * known.amax(), "{kernel:?}");
+            let mut b = late.clone();
+            filter.forward_from(&mut b, &starts);
+            filter.backward(&mut b);
+            let mut plain = late.clone();
+            dense.forward_from(&mut plain, &starts);
+            dense.backward(&mut plain);
+            assert!((&b - &plain).amax() < 1e-6 * plain.amax(), "{kernel:?}");
+        }
+    }
+
+    #[test]
+    fn of_what_epochs_see_little_is_left_out() {
+        let numbers = numbers();
+        let directions = seen_directions(&numbers.rows).unwrap();
+        let orthonormal = directions.tr_mul(&directions) - DMatrix::identity(directions.ncols(), directions.ncols());
+        assert!(orthonormal.amax() < 1e-12);
+        let left = &numbers.rows - &numbers.rows * &directions * directions.transpose();
+        assert!(left.norm_squared() <= LEFT_OUT && directions.ncols() <= AT_ONCE, "{}", directions.ncols());
+    }
+
+    #[test]
+    fn what_is_not_finite_has_no_factor() {
+        let mut numbers = numbers();
+        numbers.rows[(7, 3)] = f64::NAN;
+        assert!(Filter::new(&numbers, &Kernel::of(Lifetime::Days(6.0))).is_none());
+    }
+}
