@@ -67,6 +67,7 @@ def config(name, options):
     found, simulated = calibration_changing.own(options)
     keys = ("photosphere_k", "spot_k", "wavelength_nm")
     found["star"] |= dict(zip(keys, STARS[name]["spots"]))
+    found["parameters"]["porb_over_prot"]["max"] = 40.0
     simulated["schedule"] = STARS[name]["schedule"] | {"seed": 1}
     return found, simulated
 
