@@ -15,7 +15,6 @@ import argparse
 import json
 import math
 import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
@@ -96,20 +95,20 @@ def one(kind, number, args):
     (folder / "simulate.json").write_text(json.dumps(simulation))
     (folder / "star.json").write_text(json.dumps(inference | {"observations": from_files(simulation["observations"])}))
     line = {"kind": kind, "seed": seed} | {f"{name}_true": value for name, value in truth.items()}
-    began = time.monotonic()
+    commands = (["simulate", "simulate.json", "--out", "."], ["sample", "star.json", "--out", "run"])
     try:
-        for command in (["simulate", "simulate.json", "--out", "."], ["sample", "star.json", "--out", "run"]):
+        for command in commands if not (folder / "run" / "summary.json").exists() else ():
             subprocess.run([args.program, *command, "--force"], cwd=folder, check=True, capture_output=True, text=True)
     except subprocess.CalledProcessError as failure:
         return line | {"error": failure.stderr.strip().splitlines()[-1]}
-    line["seconds"] = time.monotonic() - began
     return line | results(folder / "run")
 
 
 def results(run):
     found = json.loads((run / "summary.json").read_text())
-    measured = found["measured"]["sets"]
+    measured = json.loads((run / "manifest.json").read_text())["measured"]["sets"]
     line = {key: found[key] for key in ("converged", "steps", "evaluations")}
+    line["seconds"] = json.loads((run / "effort.json").read_text())["seconds"]
     line |= {"finding": found["verdict"]["finding"], "false_alarm": found["verdict"]["false_alarm_probability"]}
     line["profiles"] = sum(each["profiles"] for each in measured)
     line["ess"] = min(each["ess"] for each in found["parameters"].values())
