@@ -56,10 +56,10 @@ class LogPosterior:
     >>> sampler = emcee.EnsembleSampler(32, 3, log_posterior, vectorize=True)    # doctest: +SKIP
     >>> sampler.run_mcmc(start, 1000)                                            # doctest: +SKIP
 
-    dynesty:
+    dynesty, from bounds around its live points as soon as may be, for evaluations far from the optimum are slow:
 
-    >>> nested = dynesty.NestedSampler(log_posterior.log_likelihood, log_posterior.prior_transform, 3)
-    ... # doctest: +SKIP
+    >>> density = log_posterior.log_likelihood, log_posterior.prior_transform, 3  # doctest: +SKIP
+    >>> nested = dynesty.NestedSampler(*density, first_update={"min_eff": 90})   # doctest: +SKIP
     """
 
     def __init__(
