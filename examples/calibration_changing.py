@@ -229,13 +229,8 @@ def one(kind, number, planet, simulator, args):
 
 def run(args):
     """Stars until there are enough, those that are in the table left out."""
-    args.csv.parent.mkdir(parents=True, exist_ok=True)
     args.work.mkdir(parents=True, exist_ok=True)
-    if args.csv.exists():
-        # a line that was being written when it was stopped
-        whole = args.csv.read_text()
-        args.csv.write_text(whole[: whole.rfind("\n") + 1])
-    done = {(row["kind"], row["seed"]) for row in calibration_table.read(args.csv)}
+    done = {(row["kind"], row["seed"]) for row in calibration_table.resumed(args.csv)}
     for number, planet, kind in itertools.product(range(args.first, args.stars), (0, 1), KINDS):
         able = [program for program in args.simulator if kind != "shear" or is_own(program)]
         if able and (kind, str(star(kind, number, planet)[0]["seed"])) not in done:

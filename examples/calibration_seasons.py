@@ -130,9 +130,8 @@ def results(run):
 
 
 def run(args):
-    args.csv.parent.mkdir(parents=True, exist_ok=True)
     args.work.mkdir(parents=True, exist_ok=True)
-    done = {row["seed"] for row in calibration_table.read(args.csv)}
+    done = {row["seed"] for row in calibration_table.resumed(args.csv)}
     for number in range(args.stars):
         for kind in KINDS:
             if str(star(kind, number)[0]) not in done:
@@ -179,9 +178,7 @@ def table(args):
                 lines.append([name, len(have), *shares, f"{np.median(widths):.2g}"])
         text += calibration_table.table("parameter; stars; inside 68 %; inside 95 %; median error".split("; "), lines)
     text += "".join(f"- {row['kind']}, {row['seed']:.0f}: {row['error']}\n" for row in failed)
-    mark = "<!-- tables -->\n"
-    note = args.out.read_text() if args.out.exists() else "# Two seasons, two spectrographs\n\n"
-    args.out.write_text(f"{note.partition(mark)[0]}{mark}\n{text.rstrip()}\n")
+    calibration_table.under_the_head(args.out, "Two seasons, two spectrographs", text)
 
 
 if __name__ == "__main__":

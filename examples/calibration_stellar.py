@@ -12,7 +12,6 @@ results/calibration-stellar.md. Needs numpy.
 """
 
 import argparse
-import csv
 import json
 import math
 import subprocess
@@ -22,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import calibration_changing
+import calibration_table
 
 OBJECTIVES = ("marginal-likelihood", "spottedness")
 FREE = ("inclination_deg", "vsini_kms", "omega_eq_rad_d", "domega_rad_d", "k_kms", "porb_over_prot", "phi")
@@ -78,41 +78,19 @@ def one(number, objective, args):
 
 def run(args):
     args.work.mkdir(parents=True, exist_ok=True)
-    done = {(row["seed"], row["objective"]) for row in read(args.csv)}
+    done = {(row["seed"], row["objective"]) for row in calibration_table.resumed(args.csv)}
     for number in range(args.stars):
         for objective in OBJECTIVES:
             seed = calibration_changing.star("geometry", number, 1)[0]["seed"]
             if (str(seed), objective) not in done:
-                append(args.csv, one(number, objective, args))
-
-
-def read(path):
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def append(path, line):
-    fresh = not path.exists()
-    with path.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        if fresh:
-            writer.writeheader()
-        writer.writerow(line)
-
-
-def share(inside):
-    n = len(inside)
-    p = sum(inside) / n
-    return f"{100 * p:.0f} +- {100 * math.sqrt(max(p * (1 - p), 0.25 / n) / n):.0f}"
+                calibration_table.append(args.csv, COLUMNS, one(number, objective, args))
 
 
 def table(args):
     """Shares of true values within 1 and 2 standard errors, of all stars whose search ended."""
     lines = ["| parameter | objective | stars | within 1 sd (68 %) | within 2 sd (95 %) | median sd | median error |"]
     lines.append("| --- | --- | --- | --- | --- | --- | --- |")
-    rows = read(args.csv)
+    rows = calibration_table.read(args.csv)
     for name in FREE[:4]:
         for objective in OBJECTIVES:
             of = [row for row in rows if row["objective"] == objective and not row["error"]]
@@ -120,13 +98,11 @@ def table(args):
                 continue
             number = lambda prefix: np.array([float(row[prefix + name]) for row in of])
             off, sd = np.abs(number("best_") - number("true_")), number("sd_")
-            cells = [name, objective, str(len(of)), share(off < sd), share(off < 2 * sd)]
+            cells = [name, objective, str(len(of)), *(calibration_table.share(off < n * sd) for n in (1, 2))]
             lines.append("| " + " | ".join(cells + [f"{np.median(sd):.3g}", f"{np.median(off):.3g}"]) + " |")
     failed = [f"- {row['seed']}, {row['objective']}: {row['error']}" for row in rows if row["error"]]
-    fresh = "# Stellar parameters of stars that change\n\n<!-- table -->\n"
-    text = args.out.read_text() if args.out.exists() else fresh
-    head = text[: text.index("<!-- table -->")]
-    args.out.write_text(head + "\n".join(["<!-- table -->", "", *lines, "", *failed]).rstrip() + "\n")
+    text = "\n".join([*lines, "", *failed])
+    calibration_table.under_the_head(args.out, "Stellar parameters of stars that change", text)
 
 
 if __name__ == "__main__":

@@ -30,6 +30,15 @@ def read(path):
         return list(csv.DictReader(file))
 
 
+def resumed(path):
+    """The lines of a table that is to be continued, without one that was being written when it was stopped."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.exists():
+        whole = path.read_text()
+        path.write_text(whole[: whole.rfind("\n") + 1])
+    return read(path)
+
+
 def append(path, columns, line):
     """One line more, with names above the first."""
     new = not path.exists() or not path.stat().st_size
@@ -38,6 +47,13 @@ def append(path, columns, line):
         if new:
             writer.writeheader()
         writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in line.items()})
+
+
+def under_the_head(out, title, text):
+    """Puts tables under the hand-written head of a note, or below its title where there is none yet."""
+    mark = "<!-- tables -->\n"
+    note = out.read_text() if out.exists() else f"# {title}\n\n"
+    out.write_text(f"{note.partition(mark)[0]}{mark}\n{text.rstrip()}\n")
 
 
 def median_sigma(porb_over_prot, sigma_k_kms):

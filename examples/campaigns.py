@@ -139,17 +139,12 @@ def plan(name, lifetime, args):
 
 def run(args):
     """Forecasts, then stars until there are enough, those that are in the table left out."""
-    args.csv.parent.mkdir(parents=True, exist_ok=True)
     args.work.mkdir(parents=True, exist_ok=True)
-    if args.csv.exists():
-        # a line that was being written when it was stopped
-        whole = args.csv.read_text()
-        args.csv.write_text(whole[: whole.rfind("\n") + 1])
-    planned = {(row["kind"], row["lifetime_d"]) for row in calibration_table.read(args.plan)}
+    planned = {(row["kind"], row["lifetime_d"]) for row in calibration_table.resumed(args.plan)}
     for lifetime, name in itertools.product(LIFETIMES_D, STARS):
         if (name, str(lifetime)) not in planned:
             calibration_table.append(args.plan, PLAN_COLUMNS, plan(name, lifetime, args))
-    done = {row["seed"] for row in calibration_table.read(args.csv)}
+    done = {row["seed"] for row in calibration_table.resumed(args.csv)}
     for number, planet, lifetime, name in itertools.product(range(args.stars), (0, 1), LIFETIMES_D, STARS):
         if str(star(name, lifetime, number, planet)[0]["seed"]) not in done:
             calibration_table.append(args.csv, COLUMNS, one(name, lifetime, number, planet, args))
@@ -277,9 +272,7 @@ def write(args):
     }
     text += "".join(f"### {title}\n\n{body}" for title, body in sections.items())
     text += "".join(f"- {row['kind']}, {row['seed']:.0f}: {row['error']}\n" for row in failed)
-    mark = "<!-- tables -->\n"
-    note = args.out.read_text() if args.out.exists() else "# Published campaigns, simulated\n\n"
-    args.out.write_text(f"{note.partition(mark)[0]}{mark}\n{text.rstrip()}\n")
+    calibration_table.under_the_head(args.out, "Published campaigns, simulated", text)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ use super::Kernel;
 use super::compress::with_directions;
 use super::covariance::Numbers;
 use super::dense;
-use nalgebra::{DMatrix, DMatrixView};
+use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -70,25 +70,12 @@ impl Passage {
 
     /// States (states, columns) an epoch later.
     fn forward(&self, states: &mut DMatrix<f64>, rates: usize) {
-        self.mixed(states, rates, [self.value[0], self.value[1], self.rate[0], self.rate[1]]);
+        mix(states, rates, [self.value[0], self.value[1], self.rate[0], self.rate[1]]);
     }
 
     /// The transpose of that.
     fn backward(&self, states: &mut DMatrix<f64>, rates: usize) {
-        self.mixed(states, rates, [self.value[0], self.rate[0], self.value[1], self.rate[1]]);
-    }
-
-    fn mixed(&self, states: &mut DMatrix<f64>, rates: usize, [vv, vw, wv, ww]: [f64; 4]) {
-        if rates == 0 {
-            return;
-        }
-        let rows = states.nrows();
-        for column in states.as_mut_slice().chunks_exact_mut(rows) {
-            let (w, v) = column.split_at_mut(rates);
-            for (v, w) in v.iter_mut().zip(w) {
-                (*v, *w) = (vv * *v + vw * *w, wv * *v + ww * *w);
-            }
-        }
+        mix(states, rates, [self.value[0], self.rate[0], self.value[1], self.rate[1]]);
     }
 
     /// The covariance (states, states) an epoch later.
@@ -104,6 +91,21 @@ impl Passage {
             w[rates + i] += across;
             v[i] += across;
             v[rates + i] += value;
+        }
+    }
+}
+
+/// Values and rates of states (states, columns) in place of themselves: factors of value and rate in a value, then in
+/// a rate.
+fn mix(states: &mut DMatrix<f64>, rates: usize, [vv, vw, wv, ww]: [f64; 4]) {
+    if rates == 0 {
+        return;
+    }
+    let rows = states.nrows();
+    for column in states.as_mut_slice().chunks_exact_mut(rows) {
+        let (w, v) = column.split_at_mut(rates);
+        for (v, w) in v.iter_mut().zip(w) {
+            (*v, *w) = (vv * *v + vw * *w, wv * *v + ww * *w);
         }
     }
 }
@@ -218,7 +220,7 @@ fn seen_directions(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut block = DMatrix::from_fn(coefficients, many, |_, _| rng.sample::<f64, _>(StandardNormal));
         for _ in 0..2 {
             block = &products * block;
-            block = apart(&directions.as_view(), block)?;
+            block = apart(&directions, block)?;
         }
         if block.ncols() == 0 {
             break;
@@ -230,7 +232,7 @@ fn seen_directions(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// Orthonormal columns of what `block` has beside `directions`; `None` where it is not finite.
-fn apart(directions: &DMatrixView<f64>, mut block: DMatrix<f64>) -> Option<DMatrix<f64>> {
+fn apart(directions: &DMatrix<f64>, mut block: DMatrix<f64>) -> Option<DMatrix<f64>> {
     // twice, for the first time leaves rounding errors of the size of the block
     for _ in 0..2 {
         let along = directions.transpose() * &block;
