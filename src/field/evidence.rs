@@ -6,8 +6,8 @@
 //! units of the noise and compressed, where N is 1, but for what epochs have in common, which adds `B B^T` over all.
 //!
 //! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers a profile, or in proportion to n'
-//! by a filter in time (`covariance`; `benches/field.rs`: 0.07 s for 50 profiles, 0.3 for 100, 1.4 for 200, 4.3 for
-//! 400, which take 13 s as a dense matrix).
+//! by a filter in time (`covariance`; `benches/field.rs`: 0.04 s for 40 profiles, 0.3 for 100, 1.4 for 200, 4.5 for
+//! 400, a third of what they take as a dense matrix).
 
 use super::compress::{Compressed, Compression, Told};
 use super::covariance::{Covariance, Numbers};
