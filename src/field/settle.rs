@@ -87,6 +87,8 @@ pub fn settle(
             Some(earlier) => earlier,
             None => {
                 steps[1] += 1;
+                // of many profiles each is hundreds of megabytes
+                last = None;
                 last.insert(evidence(&epochs, &coefficients)?)
             }
         };
@@ -99,6 +101,7 @@ pub fn settle(
         coefficients += step * (settings.longest / changes[1]).min(1.0);
         epochs = linearise(&coefficients);
         if changes[1] < settings.tolerance {
+            drop(last);
             let evidence = evidence(&epochs, &coefficients)?;
             return Ok(Settled { coefficients, evidence, steps, change: changes[1] });
         }
