@@ -231,7 +231,7 @@ def run(args):
     """Stars until there are enough, those that are in the table left out."""
     args.work.mkdir(parents=True, exist_ok=True)
     done = {(row["kind"], row["seed"]) for row in calibration_table.resumed(args.csv)}
-    for number, planet, kind in itertools.product(range(args.first, args.stars), (0, 1), KINDS):
+    for number, planet, kind in itertools.product(range(args.first, args.stars), (0, 1), args.kind or KINDS):
         able = [program for program in args.simulator if kind != "shear" or is_own(program)]
         if able and (kind, str(star(kind, number, planet)[0]["seed"])) not in done:
             simulator = able[number % len(able)]
@@ -242,6 +242,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--simulator", action="append", help=SIMULATOR)
     parser.add_argument("--search", help="dimcmc, or the example blind_search")
+    parser.add_argument("--kind", action="append", choices=KINDS, help="of stars, all if not given")
     parser.add_argument("--stars", type=int, default=25, help="of each kind, without and with a planet each")
     parser.add_argument("--first", type=int, default=0, help="number of the first star, for a share of the work")
     parser.add_argument("--static", type=int, default=6, help="how many of these are searched by spottedness as well")

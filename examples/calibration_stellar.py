@@ -1,6 +1,7 @@
 """Stellar parameters of simulated stars that change: best values and errors by integrated maps and by one map.
 
-    python3 examples/calibration_stellar.py --simulator target/release/dimcmc --program target/release/dimcmc
+    python3 examples/calibration_stellar.py --simulator SIMULATOR --simulator target/release/dimcmc \\
+        --program target/release/dimcmc
     python3 examples/calibration_stellar.py --table
 
 Stars of random geometry as in calibration_changing.py (inclination 20 to 75 degrees, vsini 15 to 70 km/s, lifetimes of
@@ -25,7 +26,7 @@ import calibration_table
 
 OBJECTIVES = ("marginal-likelihood", "spottedness")
 FREE = ("inclination_deg", "vsini_kms", "omega_eq_rad_d", "domega_rad_d", "k_kms", "porb_over_prot", "phi")
-COLUMNS = ["seed", "objective", "lifetime_d", "well_defined", "log_prob", "seconds", "error"]
+COLUMNS = ["seed", "simulator", "objective", "lifetime_d", "well_defined", "log_prob", "seconds", "error"]
 COLUMNS += [f"{prefix}{name}" for name in FREE for prefix in ("true_", "best_", "sd_")]
 
 
@@ -52,15 +53,16 @@ def config(truth, folder, objective, seed):
     return found
 
 
-def one(number, objective, args):
+def one(number, objective, simulator, args):
     row, options = calibration_changing.star("geometry", number, 1)
     folder = args.work / f"geometry-{row['seed']}"
     if not (folder / "config.json").exists():
-        calibration_changing.simulate(args.simulator, options, folder)
+        calibration_changing.simulate(simulator, options, folder)
     truth = {"inclination_deg": options["inclination"], "vsini_kms": options["vsini"], "domega_rad_d": 0.0}
     truth |= {"omega_eq_rad_d": 2 * math.pi / options["prot"], "k_kms": options["k"]}
     truth |= {"porb_over_prot": options["porb-over-prot"], "phi": options["phi"]}
-    line = {"seed": row["seed"], "objective": objective, "lifetime_d": row["lifetime_d"]}
+    line = {"seed": row["seed"], "simulator": Path(simulator).stem, "objective": objective}
+    line |= {"lifetime_d": row["lifetime_d"]}
     line |= {f"true_{name}": truth[name] for name in FREE}
     path, out = folder / f"stellar-{objective}.json", folder / f"stellar-{objective}"
     path.write_text(json.dumps(config(truth, folder, objective, row["seed"])))
@@ -80,10 +82,11 @@ def run(args):
     args.work.mkdir(parents=True, exist_ok=True)
     done = {(row["seed"], row["objective"]) for row in calibration_table.resumed(args.csv)}
     for number in range(args.stars):
-        for objective in OBJECTIVES:
+        simulator = args.simulator[number % len(args.simulator)]
+        for objective in args.objective or OBJECTIVES:
             seed = calibration_changing.star("geometry", number, 1)[0]["seed"]
             if (str(seed), objective) not in done:
-                calibration_table.append(args.csv, COLUMNS, one(number, objective, args))
+                calibration_table.append(args.csv, COLUMNS, one(number, objective, simulator, args))
 
 
 def table(args):
@@ -107,8 +110,9 @@ def table(args):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--simulator", help="dimcmc, or a script (calibration_changing.py)")
+    parser.add_argument("--simulator", action="append", help=calibration_changing.SIMULATOR)
     parser.add_argument("--program", help="dimcmc")
+    parser.add_argument("--objective", action="append", choices=OBJECTIVES, help="both if not given")
     parser.add_argument("--stars", type=int, default=40)
     parser.add_argument("--work", type=Path, default=Path("target/calibration-changing"), help="folder of the stars")
     parser.add_argument("--csv", type=Path, default=Path("results/calibration/stellar.csv"))
