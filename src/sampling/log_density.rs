@@ -105,6 +105,9 @@ pub trait Gradient: LogDensity {
 
     /// Natural steps of the sampling coordinates: what a search is scaled with.
     fn scales(&self) -> Vec<f64>;
+
+    /// Where the density of each sampling coordinate alone ends, in those coordinates; infinite where it does not.
+    fn bounds(&self) -> Vec<(f64, f64)>;
 }
 
 /// Evaluates a batch of parameter vectors; the order of the answers is the order of the questions.

@@ -1,5 +1,6 @@
 //! The maximum of a log-density and its curvature: a trust-region Newton method (argmin; Nocedal & Wright 2006, chapter
-//! 4) in scaled sampling coordinates, with Hessians from differences of gradients.
+//! 4) in scaled sampling coordinates, with Hessians from differences of gradients. A coordinate that is pressed against
+//! its bound is held there, while the others go on.
 //!
 //! Knows densities through [`Gradient`] alone.
 
@@ -69,7 +70,10 @@ const OPEN_CURVATURE: f64 = 1e-3;
 /// # Errors
 /// If the log-probability at the start is minus infinity.
 pub fn climb<D: Gradient>(density: &D, start: &[f64], tick: &(dyn Fn() + Sync)) -> Result<Optimum, OptimiseError> {
-    let landscape = Landscape { density, scales: density.scales(), evaluations: AtomicUsize::new(0), tick };
+    let scales = density.scales();
+    let scaled = |((low, high), scale): ((f64, f64), &f64)| (low / scale, high / scale);
+    let bounds = density.bounds().into_iter().zip(&scales).map(scaled).collect();
+    let landscape = Landscape { density, scales, bounds, evaluations: AtomicUsize::new(0), tick };
     let first = landscape.evaluate(start);
     if first.log_prob == f64::NEG_INFINITY {
         return Err(OptimiseError::Start(first.status));
@@ -89,6 +93,8 @@ pub fn climb<D: Gradient>(density: &D, start: &[f64], tick: &(dyn Fn() + Sync)) 
     let (Some(x), Some(hessian)) = (state.get_param(), state.get_hessian()) else {
         return Err(OptimiseError::Solver("no point was kept".into()));
     };
+    // that of coordinates on their bounds as if they were not held
+    let hessian = &if landscape.on_bounds(x) { landscape.bend(x) } else { hessian.clone() };
     let theta = landscape.written(x);
     let covariance = bounded_inverse(hessian);
     let unscale = Matrix::from_diagonal(&Vector::from_column_slice(&landscape.scales));
@@ -127,6 +133,7 @@ fn bounded_inverse(hessian: &Matrix) -> Matrix {
 struct Landscape<'a, D: Gradient> {
     density: &'a D,
     scales: Vec<f64>,
+    bounds: Vec<(f64, f64)>,
     evaluations: AtomicUsize,
     tick: &'a (dyn Fn() + Sync),
 }
@@ -147,8 +154,25 @@ impl<D: Gradient> Landscape<'_, D> {
         Vector::from_iterator(theta.len(), internal.iter().zip(&self.scales).map(|(x, s)| x / s))
     }
 
+    /// The point within the bounds that is nearest.
+    fn inside(&self, x: &Vector) -> Vector {
+        Vector::from_iterator(x.len(), x.iter().zip(&self.bounds).map(|(x, (low, high))| x.clamp(*low, *high)))
+    }
+
+    /// Whether a coordinate is on its bound, or beyond.
+    fn on_bounds(&self, x: &Vector) -> bool {
+        x.iter().zip(&self.bounds).any(|(x, (low, high))| x <= low || x >= high)
+    }
+
+    /// Whether the cost falls outwards in coordinate j, which is on its bound.
+    fn is_pressed(&self, j: usize, x: &Vector, slope: &Vector) -> bool {
+        let (low, high) = self.bounds[j];
+        (x[j] <= low && slope[j] > 0.0) || (x[j] >= high && slope[j] < 0.0)
+    }
+
+    /// Of the point within the bounds that is nearest.
     fn written(&self, x: &Vector) -> Vec<f64> {
-        let internal: Vec<f64> = x.iter().zip(&self.scales).map(|(x, s)| x * s).collect();
+        let internal: Vec<f64> = self.inside(x).iter().zip(&self.scales).map(|(x, s)| x * s).collect();
         self.density.to_physical(&internal)
     }
 
@@ -160,6 +184,30 @@ impl<D: Gradient> Landscape<'_, D> {
             return None;
         }
         Some(Vector::from_iterator(x.len(), gradient.iter().zip(&self.scales).map(|(g, s)| -g * s)))
+    }
+
+    /// Hessian of the cost, by differences of gradients.
+    fn bend(&self, x: &Vector) -> Matrix {
+        let x = &self.inside(x);
+        let at = |j: usize, h: f64| {
+            let mut shifted = x.clone();
+            shifted[j] += h;
+            let shifted = self.inside(&shifted);
+            (shifted[j] != x[j]).then(|| Some((shifted[j] - x[j], self.slope(&shifted)?))).flatten()
+        };
+        let here = std::sync::OnceLock::new();
+        let columns: Vec<Vector> = (0..x.len())
+            .into_par_iter()
+            .map(|j| {
+                let middle = || here.get_or_init(|| self.slope(x).unwrap_or_else(|| Vector::zeros(x.len()))).clone();
+                match (at(j, HESSIAN_STEP), at(j, -HESSIAN_STEP)) {
+                    (Some((h, plus)), Some((back, minus))) => (plus - minus) / (h - back),
+                    (Some((h, there)), None) | (None, Some((h, there))) => (there - middle()) / h,
+                    (None, None) => Vector::zeros(x.len()),
+                }
+            })
+            .collect();
+        symmetric(&Matrix::from_columns(&columns))
     }
 
     /// d(written) / d(internal), by differences that respect periodic coordinates.
@@ -196,7 +244,9 @@ impl<D: Gradient> ArgminGradient for &Landscape<'_, D> {
     type Param = Vector;
     type Gradient = Vector;
     fn gradient(&self, x: &Vector) -> Result<Vector, Error> {
-        Ok(self.slope(x).unwrap_or_else(|| Vector::zeros(x.len())))
+        let slope = self.slope(x).unwrap_or_else(|| Vector::zeros(x.len()));
+        let free = |j, _| if self.is_pressed(j, x, &slope) { 0.0 } else { slope[j] };
+        Ok(Vector::from_fn(x.len(), free))
     }
 }
 
@@ -204,26 +254,15 @@ impl<D: Gradient> Hessian for &Landscape<'_, D> {
     type Param = Vector;
     type Hessian = Matrix;
     fn hessian(&self, x: &Vector) -> Result<Matrix, Error> {
-        let at = |j: usize, h: f64| {
-            let mut shifted = x.clone();
-            shifted[j] += h;
-            self.slope(&shifted)
-        };
-        let here = std::sync::OnceLock::new();
-        let columns: Vec<Vector> = (0..x.len())
-            .into_par_iter()
-            .map(|j| {
-                let middle = || here.get_or_init(|| self.slope(x).unwrap_or_else(|| Vector::zeros(x.len()))).clone();
-                match (at(j, HESSIAN_STEP), at(j, -HESSIAN_STEP)) {
-                    (Some(plus), Some(minus)) => (plus - minus) / (2.0 * HESSIAN_STEP),
-                    (Some(plus), None) => (plus - middle()) / HESSIAN_STEP,
-                    (None, Some(minus)) => (middle() - minus) / HESSIAN_STEP,
-                    (None, None) => Vector::zeros(x.len()),
-                }
-            })
-            .collect();
-        let hessian = Matrix::from_columns(&columns);
-        Ok(symmetric(&hessian))
+        let mut hessian = self.bend(x);
+        if let Some(slope) = self.on_bounds(x).then(|| self.slope(x)).flatten() {
+            for j in (0..x.len()).filter(|j| self.is_pressed(*j, x, &slope)) {
+                hessian.column_mut(j).fill(0.0);
+                hessian.row_mut(j).fill(0.0);
+                hessian[(j, j)] = 1.0;
+            }
+        }
+        Ok(hessian)
     }
 }
 
@@ -270,16 +309,21 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::log_density::LogDensity;
+    use crate::sampling::log_density::{LogDensity, Status};
 
-    /// A curved valley: ln p = -(1 - a)^2 / 2 - 2 (b - a^2)^2.
-    struct Rosenbrock(Vec<String>);
+    /// A curved valley within bounds: ln p = -(1 - a)^2 / 2 - 2 (b - a^2)^2.
+    struct Rosenbrock(Vec<String>, [(f64, f64); 2]);
+
+    const OPEN: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
     impl LogDensity for Rosenbrock {
         fn names(&self) -> &[String] {
             &self.0
         }
         fn evaluate(&self, x: &[f64]) -> Evaluation {
+            if x.iter().zip(&self.1).any(|(x, (low, high))| x < low || x > high) {
+                return Evaluation::rejected(Status::OutsidePrior);
+            }
             Evaluation::of(-0.5 * (1.0 - x[0]).powi(2) - 2.0 * (x[1] - x[0] * x[0]).powi(2))
         }
     }
@@ -292,11 +336,14 @@ mod tests {
         fn scales(&self) -> Vec<f64> {
             vec![0.1, 0.1]
         }
+        fn bounds(&self) -> Vec<(f64, f64)> {
+            self.1.to_vec()
+        }
     }
 
     #[test]
     fn finds_the_maximum_and_its_covariance() {
-        let density = Rosenbrock(vec!["a".into(), "b".into()]);
+        let density = Rosenbrock(vec!["a".into(), "b".into()], [OPEN; 2]);
         let optimum = climb(&density, &[-1.2, 1.0], &|| ()).unwrap();
         assert!(optimum.converged && optimum.well_defined);
         assert!((optimum.theta[0] - 1.0).abs() < 0.07 && (optimum.theta[1] - 1.0).abs() < 0.14, "{optimum:?}");
@@ -304,5 +351,22 @@ mod tests {
         // curved valley
         assert!((optimum.covariance[(0, 0)] - 1.0).abs() < 0.4, "{}", optimum.covariance);
         assert!((optimum.covariance[(1, 1)] - 4.25).abs() < 1.0);
+    }
+
+    /// From the bound, from inside, and where the way leads along the bound and off it again.
+    #[test]
+    fn what_is_pressed_against_a_bound_is_held_there_while_the_rest_goes_on() {
+        let density = Rosenbrock(vec!["a".into(), "b".into()], [OPEN, (-1.0, 0.25)]);
+        for start in [[-1.2, 0.25], [0.0, 0.0], [1.5, 0.25]] {
+            let optimum = climb(&density, &start, &|| ()).unwrap();
+            assert!(optimum.converged, "{optimum:?}");
+            // 1 + a = 8 a^3
+            assert!((optimum.theta[0] - 0.5827).abs() < 0.03 && optimum.theta[1] == 0.25, "{optimum:?}");
+            // the curvature is that of both: [[12 a^2 + ..], [4]]
+            assert!((optimum.curvature[(1, 1)] - 4.0).abs() < 0.1, "{}", optimum.curvature);
+        }
+        let density = Rosenbrock(vec!["a".into(), "b".into()], [OPEN, (0.2, 9.0)]);
+        let optimum = climb(&density, &[0.1, 0.2], &|| ()).unwrap();
+        assert!(optimum.converged && (optimum.theta[0] - 1.0).abs() < 0.07, "{optimum:?}");
     }
 }

@@ -158,7 +158,7 @@ pub struct ImagingSettings {
     /// to 1.5.
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_amplitude: Hyperparameter,
-    /// With objective "marginal-likelihood": how fast the spots' power falls with the degree of the harmonics, from 0.3
+    /// With objective "marginal-likelihood": how fast the spots' power falls with the degree of the harmonics, from 0
     /// (small spots) to 3 (large ones).
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_slope: Hyperparameter,

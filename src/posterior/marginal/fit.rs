@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Bounds of amplitude, slope and lifetime (d).
-const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.3, 3.0), (0.3, 3000.0)];
+const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.0, 3.0), (0.3, 3000.0)];
 
 /// Where searches start: usual ones.
 const USUAL: [f64; 3] = [0.2, 0.9, 36.0];

@@ -202,4 +202,8 @@ impl Gradient for Forecast<'_> {
     fn scales(&self) -> Vec<f64> {
         self.space.scales()
     }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.space.sampling_bounds()
+    }
 }

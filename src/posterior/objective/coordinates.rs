@@ -260,6 +260,29 @@ impl ParameterSpace {
         self.polar.iter().fold(own, |sum, polar| sum - (TAU * theta[polar.k].max(SMALLEST_K_KMS)).ln())
     }
 
+    /// Bounds of the priors in sampling coordinates, infinite for those that make up velocities of an orbit; not so near
+    /// that rounding leads outside.
+    pub fn sampling_bounds(&self) -> Vec<(f64, f64)> {
+        const ROUNDING: f64 = 1e-12;
+        let inside = |low: f64, high: f64| match ROUNDING * (high - low) {
+            margin if margin.is_finite() => (low + margin, high - margin),
+            _ => (low, high),
+        };
+        let of_prior = |f: &FreeParameter| match f.prior {
+            Prior::Periodic => (f64::NEG_INFINITY, f64::INFINITY),
+            prior => {
+                let (low, high) = prior.bounds();
+                inside(f.parameter.to_sampling(low), f.parameter.to_sampling(high))
+            }
+        };
+        let mut bounds: Vec<(f64, f64)> = self.free.iter().map(of_prior).collect();
+        for polar in &self.polar {
+            bounds[polar.k] = (f64::NEG_INFINITY, f64::INFINITY);
+            bounds[polar.phi] = (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        bounds
+    }
+
     /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what
     /// numerical derivatives and a first trust region are scaled with.
     pub fn scales(&self) -> Vec<f64> {

@@ -394,4 +394,8 @@ impl Gradient for Posterior {
     fn scales(&self) -> Vec<f64> {
         self.space.scales()
     }
+
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.space.sampling_bounds()
+    }
 }
