@@ -107,6 +107,7 @@ fn epochs(harmonics: &Harmonics, profiles: usize) -> Vec<Epoch> {
                 beside: 0.0,
                 nuisances: DMatrix::zeros(NUMBERS, 0),
                 common: DMatrix::zeros(NUMBERS, 0),
+                divisor: DVector::zeros(0),
                 slopes: DMatrix::from_fn(NUMBERS, 1, |j, _| 1e-2 * (TAU * j as f64 / NUMBERS as f64).sin()),
             }
         })

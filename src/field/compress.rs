@@ -39,7 +39,7 @@ pub struct Compressed {
     /// Q (data, kept), orthonormal.
     directions: DMatrix<f64>,
     /// `Q^T W J c0`, which makes a residual of a misfit.
-    expected: DVector<f64>,
+    pub expected: DVector<f64>,
     /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data, and what
     /// is beside them.
     pub constant: f64,

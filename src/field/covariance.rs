@@ -5,10 +5,15 @@ use super::Kernel;
 use super::dense::{self, Factor};
 use super::filter::Filter;
 use nalgebra::{DMatrix, DVector};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
 /// Numbers of all epochs beyond which a filter is faster (`benches/field.rs`).
 const FILTER_BEYOND: usize = 5000;
+
+/// Products with random signs from which a filter has the diagonal of the inverse.
+const PROBES: usize = 32;
 
 /// Numbers of all epochs, in units of their noise.
 #[derive(Clone, Debug)]
@@ -122,6 +127,34 @@ impl Covariance {
             Covariance::Dense(factor) => factor.backward(b),
             Covariance::InTime(filter) => filter.backward(b),
         }
+    }
+
+    /// Diagonal of the inverse: by a filter from [`PROBES`] products with random signs.
+    fn inverse_diagonal(&self, n: usize) -> DVector<f64> {
+        let filter = match self {
+            Covariance::Dense(factor) => return factor.inverse_diagonal(),
+            Covariance::InTime(filter) => filter,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let signs = DMatrix::from_fn(n, PROBES, |_, _| if rng.random::<bool>() { 1.0 } else { -1.0 });
+        let mut products = signs.clone();
+        filter.forward_from(&mut products, &[0; PROBES]);
+        filter.backward(&mut products);
+        products.component_mul(&signs).column_mean()
+    }
+
+    /// How many of the numbers of each epoch the field explains: the trace of `C^-1 J K J^T` over them, their number
+    /// where there is no noise, 0 where all is noise.
+    pub fn explained(&self, numbers: &Numbers) -> Vec<f64> {
+        let mut noise = self.inverse_diagonal(numbers.rows.nrows());
+        if numbers.common.ncols() > 0 {
+            let mut solved = numbers.common.clone();
+            self.forward(&mut solved);
+            self.backward(&mut solved);
+            noise += solved.component_mul(&numbers.common).column_sum();
+        }
+        let of_epoch = |part: &Range<usize>| part.len() as f64 - noise.rows_range(part.clone()).sum();
+        numbers.parts.iter().map(of_epoch).collect()
     }
 
     /// `C^-1 x`.

@@ -2,7 +2,7 @@
 //! products of blocks, which nalgebra does with the best instructions of the processor (some 40 Gflop/s on one core;
 //! its own Cholesky factor, column by column, 1.5 to 4). One thread, and always the same order of sums.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Columns of a block.
 const BLOCK: usize = 64;
@@ -104,6 +104,12 @@ impl Factor {
         }
     }
 
+    /// Diagonal of the inverse of the matrix.
+    pub fn inverse_diagonal(&self) -> DVector<f64> {
+        let inverse = self.lower_inverse();
+        DVector::from_iterator(self.len(), inverse.column_iter().map(|column| column.norm_squared()))
+    }
+
     /// Lower triangle (diagonal blocks whole) of the inverse of the matrix.
     pub fn inverse(&self) -> DMatrix<f64> {
         let n = self.len();
@@ -166,6 +172,7 @@ mod tests {
             factor.forward_from(&mut b, &starts);
             assert!((plain.l() * b - late).amax() < 1e-11);
             assert!((factor.inverse().lower_triangle() - plain.inverse().lower_triangle()).amax() < 1e-11);
+            assert!((factor.inverse_diagonal() - plain.inverse().diagonal()).amax() < 1e-11);
         }
     }
 

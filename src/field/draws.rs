@@ -47,7 +47,8 @@ impl Evidence {
             let noise = normal(epoch.len()).component_mul(&epoch.variance.map(f64::sqrt));
             let misfit =
                 &epoch.jacobian * before.column(k) + noise + &epoch.nuisances * normal(epoch.nuisances.ncols());
-            Epoch { misfit, slopes: DMatrix::zeros(epoch.len(), 0), ..epoch.clone() }
+            // these data are linear in the field
+            Epoch { misfit, slopes: DMatrix::zeros(epoch.len(), 0), divisor: DVector::zeros(0), ..epoch.clone() }
         };
         let simulated: Vec<Epoch> = epochs.iter().enumerate().map(simulated).collect();
         let around = DMatrix::zeros(self.degrees.len(), epochs.len());
@@ -100,6 +101,7 @@ mod tests {
             beside: 0.0,
             slopes: DMatrix::zeros(2, 0),
             common: DMatrix::zeros(2, 0),
+            divisor: DVector::zeros(0),
         };
         let epochs: Vec<Epoch> =
             [normal(2, 5), normal(2, 5), normal(2, 5)].into_iter().enumerate().map(epoch).collect();

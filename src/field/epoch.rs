@@ -29,6 +29,9 @@ pub struct Epoch {
     /// numbers): they are integrated out, one of each for all epochs. The same number of columns in every epoch that
     /// has any.
     pub common: DMatrix<f64>,
+    /// Derivative, with respect to the coefficients (H), of the logarithm of what the model is divided by, such as a
+    /// continuum that is that of the same field; no elements where there is none.
+    pub divisor: DVector<f64>,
 }
 
 impl Epoch {
@@ -52,6 +55,7 @@ impl Epoch {
             && finite(self.nuisances.as_slice())
             && finite(self.slopes.as_slice())
             && finite(self.common.as_slice())
+            && finite(self.divisor.as_slice())
             && self.variance.iter().all(|v| v.is_finite() && *v > 0.0)
     }
 
@@ -94,6 +98,7 @@ impl Epoch {
         assert_eq!(self.nuisances.nrows(), n, "nuisances of an epoch");
         assert_eq!(self.slopes.nrows(), n, "slopes of an epoch");
         assert_eq!(self.common.nrows(), n, "what an epoch has in common with others");
+        assert!(self.divisor.is_empty() || self.divisor.len() == coefficients, "divisor of an epoch");
     }
 
     /// Covariance of the noise, nuisances of this epoch included.

@@ -12,7 +12,11 @@ impl Evidence {
 
     /// Most probable coefficients (H, times) at any times (d).
     pub fn coefficients_at(&self, times_d: &[f64]) -> DMatrix<f64> {
-        self.spread(&self.dual, times_d)
+        let found = self.spread(&self.dual, times_d);
+        match self.tilt.ncols() {
+            0 => found,
+            _ => found - self.tilted_away(times_d),
+        }
     }
 
     /// Mean of the field (points, times) at points, given their harmonics (H, points), and at any times (d).
@@ -73,12 +77,12 @@ impl Evidence {
 }
 
 /// k between some times (rows) and others (d).
-fn correlations(field: &Field, times_d: &[f64], others_d: &[f64]) -> DMatrix<f64> {
+pub(super) fn correlations(field: &Field, times_d: &[f64], others_d: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(times_d.len(), others_d.len(), |k, t| field.kernel.at(times_d[k] - others_d[t]))
 }
 
 /// Multiplies each row by a factor of its own.
-fn scale_rows(matrix: &mut DMatrix<f64>, factors: &[f64]) {
+pub(super) fn scale_rows(matrix: &mut DMatrix<f64>, factors: &[f64]) {
     for mut column in matrix.column_iter_mut() {
         column.iter_mut().zip(factors).for_each(|(x, factor)| *x *= factor);
     }

@@ -92,7 +92,12 @@ pub fn settle(
                 last.insert(evidence(&epochs, &coefficients)?)
             }
         };
-        let step = by.step(&sought.field, &coefficients, &pulled(&epochs)?);
+        let mut pulled = pulled(&epochs)?;
+        let tilt = by.tilt_of(&epochs);
+        if tilt.ncols() > 0 {
+            pulled -= tilt;
+        }
+        let step = by.step(&sought.field, &coefficients, &pulled);
         steps[0] += 1;
         changes = [changes[1], sought.watched.tr_mul(&step).amax()];
         if !changes[1].is_finite() {

@@ -130,6 +130,7 @@ impl Star {
             beside: 0.0,
             nuisances: DMatrix::zeros(halved.len(), 0),
             common: DMatrix::zeros(halved.len(), 0),
+            divisor: DVector::zeros(0),
             variance: halved,
             slopes: of_pairs(&slope(&depth, profile.velocity_kms[1] - profile.velocity_kms[0])),
         }

@@ -44,6 +44,7 @@ impl Problem {
                 slopes: some(400 + k, n, columns),
                 beside: 0.0,
                 common: DMatrix::zeros(n, 0),
+                divisor: DVector::zeros(0),
             }
         };
         let epochs = times_d.iter().enumerate().map(epoch).collect();
@@ -509,7 +510,8 @@ fn ln_z_of_a_model_that_is_not_linear_is_the_integral() {
             let (misfit, n) = (&data[k] - depth, 6);
             let variance = DVector::repeat(n, sigma * sigma);
             let [nuisances, slopes, common] = [0; 3].map(|columns| DMatrix::zeros(n, columns));
-            Epoch { time_d: k as f64, jacobian, misfit, variance, nuisances, beside: 0.0, slopes, common }
+            let divisor = continua[k].column(0) * (0.4 / continuum);
+            Epoch { time_d: k as f64, jacobian, misfit, variance, nuisances, beside: 0.0, slopes, common, divisor }
         };
         (0..2).map(epoch).collect()
     };
@@ -532,6 +534,64 @@ fn ln_z_of_a_model_that_is_not_linear_is_the_integral() {
     let (found, wanted) = (settled.evidence.ln_evidence(), (integral * cell).ln());
     // what the second order of the model does within the width of the integrand
     assert!((found - wanted).abs() < 0.02, "{found}, not {wanted}");
+}
+
+/// One epoch of many coefficients: the first is the continuum's, the others those of the line. Given the first all is
+/// linear, so that the integral is one over a line. The volume of the others is in proportion to the continuum.
+#[test]
+fn ln_z_counts_how_the_volume_of_maps_grows_with_the_continuum() {
+    let (lines, n, sigma) = (some(1, 30, 30), 30, 0.01);
+    let continuum = |c: &DVector<f64>| 1.0 + 0.4 * c[0];
+    let depth = |c: &DVector<f64>| (&lines * c.rows(1, n)).add_scalar(0.3) / continuum(c);
+    let degrees: Vec<usize> = std::iter::once(1).chain(std::iter::repeat_n(2, n)).collect();
+    let field = field(0.6, 0.5, Lifetime::Static, 0.0);
+    let sd: Vec<f64> = field.spectrum.variances(&degrees).into_iter().map(f64::sqrt).collect();
+    let truth = DVector::from_fn(n + 1, |h, _| sd[h] * 2.0 * some(2, n + 1, 1)[h]);
+    let data = depth(&truth) + some(3, n, 1).column(0) * (2.0 * sigma);
+    let found = |with_divisor: bool| {
+        let linearise = |maps: &DMatrix<f64>| {
+            let c = maps.column(0).into_owned();
+            let model = depth(&c);
+            let mut jacobian = DMatrix::zeros(n, n + 1);
+            jacobian.column_mut(0).copy_from(&(&model * (-0.4 / continuum(&c))));
+            jacobian.columns_mut(1, n).copy_from(&(&lines / continuum(&c)));
+            let mut divisor = DVector::zeros(n + 1);
+            divisor[0] = 0.4 / continuum(&c);
+            vec![Epoch {
+                time_d: 0.0,
+                jacobian,
+                misfit: &data - model,
+                variance: DVector::repeat(n, sigma * sigma),
+                nuisances: DMatrix::zeros(n, 0),
+                beside: 0.0,
+                slopes: DMatrix::zeros(n, 0),
+                common: DMatrix::zeros(n, 0),
+                divisor: if with_divisor { divisor } else { DVector::zeros(0) },
+            }]
+        };
+        let watched = DMatrix::identity(n + 1, n + 1);
+        let sought = Sought { field, degrees: &degrees, watched: &watched };
+        let settling = Settling { compression: EXACT, ..Settling::default() };
+        let settled = settle(linearise, sought, DMatrix::zeros(n + 1, 1), None, &settling).unwrap();
+        // where the search ended is where the field is
+        assert!((settled.evidence.coefficients() - &settled.coefficients).amax() < 1e-4);
+        settled.evidence.ln_evidence()
+    };
+    let spots = &lines * lines.transpose() * sd[1].powi(2);
+    let at = |first: f64| {
+        let level = 1.0 + 0.4 * first;
+        let covariance = &spots + DMatrix::identity(n, n) * (level * sigma).powi(2);
+        let factor = covariance.cholesky().unwrap();
+        let residual = (&data * level).add_scalar(-0.3);
+        let ln_normal = -0.5 * (residual.dot(&factor.solve(&residual)) + factor.ln_determinant() + n as f64 * TAU.ln());
+        let prior = -0.5 * ((first / sd[0]).powi(2) + TAU.ln()) - sd[0].ln();
+        (ln_normal + n as f64 * level.ln() + prior).exp()
+    };
+    let (cells, reach) = (4000, 7.0 * sd[0]);
+    let width = 2.0 * reach / f64::from(cells);
+    let wanted = ((0..cells).map(|i| at((f64::from(i) + 0.5) * width - reach) * width).sum::<f64>()).ln();
+    let (with, without) = (found(true) - wanted, found(false) - wanted);
+    assert!(with.abs() < 0.01 && without < -0.3, "{with}, {without} beside {wanted}");
 }
 
 #[test]

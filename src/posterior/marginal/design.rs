@@ -181,6 +181,7 @@ impl Design {
             variance: DVector::repeat(model.len(), 1.0),
             slopes: DMatrix::zeros(model.len(), 0),
             common: DMatrix::zeros(model.len(), 0),
+            divisor: self.continuum.column(k) * scale,
             misfit: &self.condensed.data[k] - model,
             nuisances: self.condensed.nuisances[k].clone(),
             beside: self.condensed.beside[k],

@@ -82,6 +82,7 @@ impl Light {
                     beside: 0.0,
                     slopes: DMatrix::zeros(1, 0),
                     common,
+                    divisor: DVector::zeros(0),
                 });
             }
             first += 2 * curve.segments;
