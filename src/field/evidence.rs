@@ -11,7 +11,8 @@
 
 use super::compress::{Compressed, Compression, Told};
 use super::covariance::{Covariance, Numbers};
-use super::maps::{correlations, scale_rows};
+use super::maps::{inverses, scale_rows};
+use super::tilt::Tilt;
 use super::{Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -28,11 +29,8 @@ pub struct Evidence {
     pub(super) covariance: Covariance,
     /// C^-1 r.
     pub(super) dual: DVector<f64>,
-    /// How many numbers of each epoch the field explains.
-    explained: Vec<f64>,
-    /// How ln of the volume of the fields that explain the data grows with their coefficients (H, epochs), with the
-    /// opposite sign; no columns where it does not.
-    pub(super) tilt: DMatrix<f64>,
+    /// Where the epochs are expanded; `None` at the most probable field.
+    pub(super) tilt: Option<Tilt>,
     epochs: Vec<Compressed>,
     quadratic: Quadratic,
 }
@@ -67,37 +65,21 @@ impl Evidence {
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
         let numbers = Numbers::new(times_d, &rows, &common, sd.len());
         let covariance = Covariance::new(&numbers, &field.kernel).ok_or(FieldError::NotPositive)?;
-        let explained = match epochs.iter().all(|epoch| epoch.divisor.is_empty()) {
-            true => vec![0.0; epochs.len()],
-            false => covariance.explained(&numbers),
-        };
-        let tilt = tilted(&explained, epochs, degrees.len());
-        if tilt.ncols() > 0 {
-            let mut moved = &tilt * correlations(&field, &numbers.times_d, &numbers.times_d);
-            scale_rows(&mut moved, &sd);
+        let tilt = Tilt::new(&covariance, &numbers, epochs);
+        if let Some(tilt) = &tilt {
+            let variances = field.spectrum.variances(degrees);
+            let lowered = tilt.lowers(&field, &numbers.times_d, &variances, &numbers.times_d);
+            let mut whitened = lowered.clone();
+            scale_rows(&mut whitened, &inverses(&sd));
             for (k, (of, part)) in compressed.iter_mut().zip(&numbers.parts).enumerate() {
-                of.expected += numbers.rows.rows_range(part.clone()) * moved.column(k);
-                let before: f64 =
-                    moved.column(k).iter().zip(&sd).zip(&tilt.column(k)).map(|((m, sd), a)| m * sd * a).sum();
-                of.constant += 0.5 * before + tilt.column(k).dot(&around.column(k));
+                of.expected += numbers.rows.rows_range(part.clone()) * whitened.column(k);
+                of.constant += tilt.taken_out(k, &lowered, around);
             }
         }
         let told = compressed.iter().zip(epochs).map(|(to, epoch)| to.tell(&epoch.misfit, &epoch.slopes)).collect();
         let (quadratic, dual) = quadratic(&covariance, &numbers.parts, &compressed, told);
         let (degrees, epochs) = (degrees.to_vec(), compressed);
-        Ok(Evidence { field, degrees, sd, numbers, covariance, dual, explained, tilt, epochs, quadratic })
-    }
-
-    /// The tilt of the same number of epochs of another model nearby.
-    pub(super) fn tilt_of(&self, epochs: &[Epoch]) -> DMatrix<f64> {
-        tilted(&self.explained, epochs, self.sd.len())
-    }
-
-    /// What the tilt takes from the coefficients (H, times) at any times (d).
-    pub(super) fn tilted_away(&self, times_d: &[f64]) -> DMatrix<f64> {
-        let mut moved = &self.tilt * correlations(&self.field, &self.numbers.times_d, times_d);
-        scale_rows(&mut moved, &self.field.spectrum.variances(&self.degrees));
-        moved
+        Ok(Evidence { field, degrees, sd, numbers, covariance, dual, tilt, epochs, quadratic })
     }
 
     /// The field that is assumed.
@@ -137,20 +119,6 @@ impl Evidence {
         });
         Ok(quadratic(&self.covariance, &self.numbers.parts, &self.epochs, told.collect::<Result<_, _>>()?).0)
     }
-}
-
-/// The tilt of epochs of which the field explains so many numbers.
-fn tilted(explained: &[f64], epochs: &[Epoch], coefficients: usize) -> DMatrix<f64> {
-    if epochs.iter().all(|epoch| epoch.divisor.is_empty()) {
-        return DMatrix::zeros(coefficients, 0);
-    }
-    let mut tilt = DMatrix::zeros(coefficients, epochs.len());
-    for (k, (epoch, explained)) in epochs.iter().zip(explained).enumerate() {
-        if !epoch.divisor.is_empty() {
-            tilt.set_column(k, &(&epoch.divisor * -*explained));
-        }
-    }
-    tilt
 }
 
 /// ln Z, gradient and information of misfits and slopes as told by `epochs`; and `C^-1 r`.

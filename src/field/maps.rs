@@ -13,10 +13,9 @@ impl Evidence {
     /// Most probable coefficients (H, times) at any times (d).
     pub fn coefficients_at(&self, times_d: &[f64]) -> DMatrix<f64> {
         let found = self.spread(&self.dual, times_d);
-        match self.tilt.ncols() {
-            0 => found,
-            _ => found - self.tilted_away(times_d),
-        }
+        let Some(tilt) = &self.tilt else { return found };
+        let variances = self.field.spectrum.variances(&self.degrees);
+        found - tilt.lowers(&self.field, &self.numbers.times_d, &variances, times_d)
     }
 
     /// Mean of the field (points, times) at points, given their harmonics (H, points), and at any times (d).
@@ -57,7 +56,7 @@ impl Evidence {
         scale_rows(&mut gradient, &field.spectrum.variances(&self.degrees));
         gradient -= coefficients;
         let mut scaled = gradient.clone();
-        scale_rows(&mut scaled, &self.sd.iter().map(|sd| if *sd > 0.0 { sd.recip() } else { 0.0 }).collect::<Vec<_>>());
+        scale_rows(&mut scaled, &inverses(&self.sd));
         let mut seen = DVector::zeros(self.numbers.rows.nrows());
         for (part, scaled) in self.numbers.parts.iter().zip(scaled.column_iter()) {
             seen.rows_range_mut(part.clone()).gemv(1.0, &self.numbers.rows.rows_range(part.clone()), &scaled, 0.0);
@@ -79,6 +78,11 @@ impl Evidence {
 /// k between some times (rows) and others (d).
 pub(super) fn correlations(field: &Field, times_d: &[f64], others_d: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(times_d.len(), others_d.len(), |k, t| field.kernel.at(times_d[k] - others_d[t]))
+}
+
+/// One over each, and 0 for 0.
+pub(super) fn inverses(numbers: &[f64]) -> Vec<f64> {
+    numbers.iter().map(|x| if *x > 0.0 { x.recip() } else { 0.0 }).collect()
 }
 
 /// Multiplies each row by a factor of its own.

@@ -8,11 +8,12 @@
 //! 1. Say what is assumed: a [`Field`] (amplitude, slope, lifetime or static, persistent share), and the degree of each
 //!    coefficient ([`Harmonics::degrees`]).
 //! 2. Write a closure from coefficients (H, epochs) to one [`Epoch`] a profile, made linear there: time, design J,
-//!    misfit, variance of the noise, columns of nuisances, slopes D' in the velocity. Errors that go together over
+//!    misfit, variance of the noise, columns of nuisances, slopes D' in the velocity, and what the model is divided by, if
+//!    that is of the field. Errors that go together over
 //!    neighbouring bins are larger variances; a velocity jitter that the field is to know of is
 //!    [`Epoch::jittered`].
 //! 3. [`settle()`] finds the most probable coefficients, from zeros once and from those of a reference afterwards, and
-//!    gives the [`Evidence`] there. For data that are linear, [`Evidence::new`] does.
+//!    gives the [`Evidence`] there (`tilt`: where exactly). For data that are linear, [`Evidence::new`] does.
 //! 4. [`Evidence::quadratic`]: ln Z, and its gradient and information in the velocities; numbers that are not asked
 //!    for, a jitter for example, go by [`Quadratic::integrated`]. [`Evidence::with`]: the same for another orbit,
 //!    design unchanged, by new misfits and slopes.
@@ -37,6 +38,7 @@ mod maps;
 mod quadratic;
 mod settle;
 mod spectrum;
+mod tilt;
 
 pub use compress::{Compression, leading_directions, with_directions};
 pub use derivatives::Derivatives;

@@ -93,9 +93,8 @@ pub fn settle(
             }
         };
         let mut pulled = pulled(&epochs)?;
-        let tilt = by.tilt_of(&epochs);
-        if tilt.ncols() > 0 {
-            pulled -= tilt;
+        if let Some(tilt) = &by.tilt {
+            pulled -= tilt.of(&epochs);
         }
         let step = by.step(&sought.field, &coefficients, &pulled);
         steps[0] += 1;
