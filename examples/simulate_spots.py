@@ -2,11 +2,11 @@
 
     python3 examples/simulate_spots.py OUT --how field --seed 1 --lifetime 15 [--k 0.1 --porb-over-prot 1.7 --phi 0.3]
 
-`field`: the Gaussian field that `dimcmc` integrates out (Matern 3/2 in time). `fading`: discs that keep their size while
-their filling factor grows and falls. `shrinking`: discs that keep their filling factor while their area does. Discs are
-at their largest at random times; `--lifetime` is the full width at half of it, `inf` keeps them. A simulator of
-calibration_changing.py, whose options it has; `--how` may stand in the name instead: a copy or a link of this file that
-is called `spots_field.py`. Needs numpy and scipy.
+`field`: the Gaussian field that `dimcmc` integrates out (Matern 3/2 in time). `fading`: discs that keep their size
+while their filling factor grows and falls. `shrinking`: discs that keep their filling factor while their area does.
+Discs are at their largest at random times; `--lifetime` is the full width at half of it, `inf` keeps them. A simulator
+of calibration_changing.py, whose options it has; `--how` may stand in the name instead: a copy or a link of this file
+that is called `spots_field.py`. Needs numpy and scipy.
 """
 
 import argparse

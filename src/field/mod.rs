@@ -8,8 +8,8 @@
 //! 1. Say what is assumed: a [`Field`] (amplitude, slope, lifetime or static, persistent share), and the degree of each
 //!    coefficient ([`Harmonics::degrees`]).
 //! 2. Write a closure from coefficients (H, epochs) to one [`Epoch`] a profile, made linear there: time, design J,
-//!    misfit, variance of the noise, columns of nuisances, slopes D' in the velocity, and what the model is divided by, if
-//!    that is of the field. Errors that go together over
+//!    misfit, variance of the noise, columns of nuisances, slopes D' in the velocity, and what the model is divided by,
+//!    if that is of the field. Errors that go together over
 //!    neighbouring bins are larger variances; a velocity jitter that the field is to know of is
 //!    [`Epoch::jittered`].
 //! 3. [`settle()`] finds the most probable coefficients, from zeros once and from those of a reference afterwards, and

@@ -1,12 +1,12 @@
 //! Where ln Z is expanded (`docs/method.md` section 9): not at the most probable field, but where it is most probable
 //! with the volume counted of all fields that explain the data.
 //!
-//! A model `(b - L c) / s(c)` that is divided by what depends on the field itself has a Jacobian in proportion to 1 / s,
-//! so that the fields that explain n numbers of an epoch as well fill a volume in proportion to `s^n`. Around the most
-//! probable field Laplace's approximation leaves that out, and finds ln Z of spots at S/N 1000 by some 10 too small.
-//! A linear tilt `exp(-a^T c)` of the integrand, `a = -n d ln s / dc` in every epoch, moves the place of the expansion
-//! to where the marginal of s is largest, and is taken out of the integral again. A Gaussian field with a tilt is one of
-//! another mean, `-K a`.
+//! A model `(b - L c) / s(c)` that is divided by what depends on the field itself has a Jacobian in proportion to
+//! 1 / s, so that the fields that explain n numbers of an epoch as well fill a volume in proportion to `s^n`. Around
+//! the most probable field Laplace's approximation leaves that out, and finds ln Z of spots at S/N 1000 by some 10 too
+//! small. A linear tilt `exp(-a^T c)` of the integrand, `a = -n d ln s / dc` in every epoch, moves the place of the
+//! expansion to where the marginal of s is largest, and is taken out of the integral again. A Gaussian field with a
+//! tilt is one of another mean, `-K a`.
 
 use super::covariance::{Covariance, Numbers};
 use super::maps::{correlations, scale_rows};

@@ -260,8 +260,8 @@ impl ParameterSpace {
         self.polar.iter().fold(own, |sum, polar| sum - (TAU * theta[polar.k].max(SMALLEST_K_KMS)).ln())
     }
 
-    /// Bounds of the priors in sampling coordinates, infinite for those that make up velocities of an orbit; not so near
-    /// that rounding leads outside.
+    /// Bounds of the priors in sampling coordinates, infinite for those that make up velocities of an orbit; not so
+    /// near that rounding leads outside.
     pub fn sampling_bounds(&self) -> Vec<(f64, f64)> {
         const ROUNDING: f64 = 1e-12;
         let inside = |low: f64, high: f64| match ROUNDING * (high - low) {
