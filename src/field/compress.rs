@@ -38,7 +38,8 @@ pub struct Compressed {
     whiten: DMatrix<f64>,
     /// Q (data, kept), orthonormal.
     directions: DMatrix<f64>,
-    /// `Q^T W J c0`, which makes a residual of a misfit.
+    /// `Q^T W J c0`, which makes a residual of a misfit; after these, numbers beside the data (`tilt`), which have no
+    /// misfit.
     pub expected: DVector<f64>,
     /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data, and what
     /// is beside them.
@@ -105,9 +106,10 @@ impl Compressed {
         let (misfit, slopes) = (&self.whiten * misfit, &self.whiten * slopes);
         let (kept, kept_slopes) = (self.directions.tr_mul(&misfit), self.directions.tr_mul(&slopes));
         let (rest, rest_slopes) = (misfit - &self.directions * &kept, slopes - &self.directions * &kept_slopes);
+        let numbers = self.expected.len();
         Told {
-            residual: kept + &self.expected,
-            slopes: kept_slopes,
+            residual: kept.resize_vertically(numbers, 0.0) + &self.expected,
+            slopes: kept_slopes.resize_vertically(numbers, 0.0),
             chi2: rest.norm_squared(),
             gradient: rest_slopes.tr_mul(&rest),
             information: rest_slopes.tr_mul(&rest_slopes),

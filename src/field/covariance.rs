@@ -153,7 +153,7 @@ impl Covariance {
             self.backward(&mut solved);
             noise += solved.component_mul(&numbers.common).column_sum();
         }
-        let of_epoch = |part: &Range<usize>| part.len() as f64 - noise.rows_range(part.clone()).sum();
+        let of_epoch = |part: &Range<usize>| (part.len() as f64 - noise.rows_range(part.clone()).sum()).max(0.0);
         numbers.parts.iter().map(of_epoch).collect()
     }
 

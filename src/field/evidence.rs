@@ -49,6 +49,17 @@ impl Evidence {
         around: &DMatrix<f64>,
         how: Compression,
     ) -> Result<Self, FieldError> {
+        Evidence::of(field, degrees, (epochs, around), how, None)
+    }
+
+    /// The same where it is known how many numbers of each epoch the field explains.
+    pub(super) fn of(
+        field: Field,
+        degrees: &[usize],
+        (epochs, around): (&[Epoch], &DMatrix<f64>),
+        how: Compression,
+        explained: Option<Vec<f64>>,
+    ) -> Result<Self, FieldError> {
         field.check()?;
         assert_eq!(around.shape(), (degrees.len(), epochs.len()), "coefficients of all epochs");
         let sd: Vec<f64> = field.spectrum.variances(degrees).into_iter().map(f64::sqrt).collect();
@@ -61,21 +72,40 @@ impl Evidence {
                 .ok_or(FieldError::NotFinite { epoch: k })
         });
         let (mut compressed, rows): (Vec<_>, Vec<_>) = compressed.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let (rows, common): (Vec<_>, Vec<_>) = rows.into_iter().map(|[rows, common]| (rows, common)).unzip();
+        let (mut rows, mut common): (Vec<_>, Vec<_>) = rows.into_iter().map(|[rows, common]| (rows, common)).unzip();
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
-        let numbers = Numbers::new(times_d, &rows, &common, sd.len());
-        let covariance = Covariance::new(&numbers, &field.kernel).ok_or(FieldError::NotPositive)?;
-        let tilt = Tilt::new(&covariance, &numbers, epochs);
-        if let Some(tilt) = &tilt {
-            let variances = field.spectrum.variances(degrees);
-            let lowered = tilt.lowers(&field, &numbers.times_d, &variances, &numbers.times_d);
-            let mut whitened = lowered.clone();
+        let factored = |rows: &[DMatrix<f64>], common: &[DMatrix<f64>]| {
+            let numbers = Numbers::new(times_d.clone(), rows, common, sd.len());
+            let covariance = Covariance::new(&numbers, &field.kernel).ok_or(FieldError::NotPositive)?;
+            Ok((numbers, covariance))
+        };
+        let mut tilt = None;
+        if Tilt::is_needed(epochs) {
+            let explained = match explained {
+                Some(explained) => explained,
+                None => {
+                    let (numbers, covariance) = factored(&rows, &common)?;
+                    covariance.explained(&numbers)
+                }
+            };
+            let tilt = tilt.insert(Tilt::new(explained, epochs));
+            let lowered = tilt.lowers(&field, &times_d, &field.spectrum.variances(degrees), &times_d);
+            let [mut whitened, mut coefficients] = [lowered.clone(), around.clone()];
             scale_rows(&mut whitened, &inverses(&sd));
-            for (k, (of, part)) in compressed.iter_mut().zip(&numbers.parts).enumerate() {
-                of.expected += numbers.rows.rows_range(part.clone()) * whitened.column(k);
+            scale_rows(&mut coefficients, &inverses(&sd));
+            for (k, of) in compressed.iter_mut().enumerate() {
                 of.constant += tilt.taken_out(k, &lowered, around);
+                if let Some(row) = tilt.row(k, &epochs[k], &sd) {
+                    let numbers = rows[k].nrows();
+                    rows[k].resize_vertically_mut(numbers + 1, 0.0);
+                    rows[k].set_row(numbers, &row);
+                    common[k].resize_vertically_mut(numbers + 1, 0.0);
+                    of.expected = std::mem::take(&mut of.expected).push((row * coefficients.column(k))[0]);
+                }
+                of.expected += &rows[k] * whitened.column(k);
             }
         }
+        let (numbers, covariance) = factored(&rows, &common)?;
         let told = compressed.iter().zip(epochs).map(|(to, epoch)| to.tell(&epoch.misfit, &epoch.slopes)).collect();
         let (quadratic, dual) = quadratic(&covariance, &numbers.parts, &compressed, told);
         let (degrees, epochs) = (degrees.to_vec(), compressed);
@@ -90,6 +120,11 @@ impl Evidence {
     /// Numbers that the data of all epochs were compressed to.
     pub fn compressed_len(&self) -> usize {
         self.numbers.rows.nrows()
+    }
+
+    /// How many numbers of each epoch the field was found to explain; `None` where no model is divided by anything.
+    pub(super) fn explained(&self) -> Option<Vec<f64>> {
+        self.tilt.as_ref().map(|tilt| tilt.explained.clone())
     }
 
     /// ln Z, all constants included.

@@ -79,17 +79,18 @@ pub fn settle(
     let mut changes = [f64::INFINITY; 2];
     let mut last: Option<Evidence> = None;
     let mut steps = [0; 2];
-    let evidence = |epochs: &[Epoch], around: &DMatrix<f64>| {
-        Evidence::new(sought.field, sought.degrees, epochs, around, settings.compression)
+    let evidence = |epochs: &[Epoch], around: &DMatrix<f64>, explained: Option<Vec<f64>>| {
+        Evidence::of(sought.field, sought.degrees, (epochs, around), settings.compression, explained)
     };
     while steps[0] < settings.steps {
         let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || converges(changes)) {
             Some(earlier) => earlier,
             None => {
                 steps[1] += 1;
+                let explained = last.as_ref().and_then(Evidence::explained);
                 // of many profiles each is hundreds of megabytes
                 last = None;
-                last.insert(evidence(&epochs, &coefficients)?)
+                last.insert(evidence(&epochs, &coefficients, explained)?)
             }
         };
         let mut pulled = pulled(&epochs)?;
@@ -105,8 +106,9 @@ pub fn settle(
         coefficients += step * (settings.longest / changes[1]).min(1.0);
         epochs = linearise(&coefficients);
         if changes[1] < settings.tolerance {
+            let explained = by.explained();
             drop(last);
-            let evidence = evidence(&epochs, &coefficients)?;
+            let evidence = evidence(&epochs, &coefficients, explained)?;
             return Ok(Settled { coefficients, evidence, steps, change: changes[1] });
         }
     }

@@ -4,39 +4,46 @@
 //! A model `(b - L c) / s(c)` that is divided by what depends on the field itself has a Jacobian in proportion to
 //! 1 / s, so that the fields that explain n numbers of an epoch as well fill a volume in proportion to `s^n`. Around
 //! the most probable field Laplace's approximation leaves that out, and finds ln Z of spots at S/N 1000 by some 10 too
-//! small. A linear tilt `exp(-a^T c)` of the integrand, `a = -n d ln s / dc` in every epoch, moves the place of the
-//! expansion to where the marginal of s is largest, and is taken out of the integral again. A Gaussian field with a
-//! tilt is one of another mean, `-K a`.
+//! small. `s^n` as a factor of the integrand moves the place of the expansion to where the marginal of s is largest; its
+//! value there is taken out of the integral again. To first order that is a tilt `exp(-a^T c)`, `a = -n d ln s / dc` in
+//! every epoch, and a Gaussian field with a tilt is one of another mean, `-K a`; to second order it is one more number
+//! that was measured.
 
-use super::covariance::{Covariance, Numbers};
 use super::maps::{correlations, scale_rows};
 use super::{Epoch, Field};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, RowDVector};
 
 /// The tilt of some epochs.
 #[derive(Clone, Debug)]
 pub struct Tilt {
     /// How many numbers of each epoch the field explains: n.
-    explained: Vec<f64>,
+    pub explained: Vec<f64>,
     /// a (H, epochs).
     by: DMatrix<f64>,
 }
 
 impl Tilt {
-    /// Of epochs of which this is the covariance of the compressed `numbers`; `None` where no model is divided by
-    /// anything.
-    pub fn new(covariance: &Covariance, numbers: &Numbers, epochs: &[Epoch]) -> Option<Self> {
-        let divided = epochs.iter().any(|epoch| !epoch.divisor.is_empty());
-        divided.then(|| {
-            let explained = covariance.explained(numbers);
-            let by = tilted(&explained, epochs);
-            Tilt { explained, by }
-        })
+    /// Of epochs of which the field explains so many numbers.
+    pub fn new(explained: Vec<f64>, epochs: &[Epoch]) -> Self {
+        let by = tilted(&explained, epochs);
+        Tilt { explained, by }
+    }
+
+    /// Whether any model is divided by anything.
+    pub fn is_needed(epochs: &[Epoch]) -> bool {
+        epochs.iter().any(|epoch| !epoch.divisor.is_empty())
     }
 
     /// a (H, epochs) of the same epochs linearised elsewhere.
     pub fn of(&self, epochs: &[Epoch]) -> DMatrix<f64> {
         tilted(&self.explained, epochs)
+    }
+
+    /// The second order of `n ln s` in epoch k as one more number, measured to be what it is: its row of `J S^(1/2)`
+    /// (H), given the standard deviations of the coefficients. None where nothing is divided.
+    pub fn row(&self, k: usize, epoch: &Epoch, sd: &[f64]) -> Option<RowDVector<f64>> {
+        let per_sd = |h: usize| self.explained[k].sqrt() * epoch.divisor[h] * sd[h];
+        (!epoch.divisor.is_empty()).then(|| RowDVector::from_fn(sd.len(), |_, h| per_sd(h)))
     }
 
     /// `K a` (H, times), by which the mean of the field falls at any times (d), given those of the epochs and the

@@ -181,9 +181,7 @@ impl Design {
             variance: DVector::repeat(model.len(), 1.0),
             slopes: DMatrix::zeros(model.len(), 0),
             common: DMatrix::zeros(model.len(), 0),
-            // the continuum would be `self.continuum.column(k) * scale`: with it the fields of simulated stars come out
-            // right, but where the star is far from the best one the maps do not settle (docs/method.md section 9)
-            divisor: DVector::zeros(0),
+            divisor: self.continuum.column(k) * scale,
             misfit: &self.condensed.data[k] - model,
             nuisances: self.condensed.nuisances[k].clone(),
             beside: self.condensed.beside[k],

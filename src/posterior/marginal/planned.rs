@@ -94,7 +94,8 @@ impl<'a> Planned<'a> {
             if self.assumed.jitter_kms > 0.0 {
                 epoch = epoch.jittered(&[self.assumed.jitter_kms]);
             }
-            Epoch { slopes, ..epoch }
+            // where ln Z would be expanded says nothing of information
+            Epoch { slopes, divisor: DVector::zeros(0), ..epoch }
         };
         let all = self.design.epochs(self.imager, maps).into_iter().zip(slopes);
         all.skip(profiles.start).take(profiles.len()).map(noisy).collect()
