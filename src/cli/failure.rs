@@ -78,7 +78,10 @@ impl Failure {
         match error {
             ReferenceError::TargetBelowFloor { .. } => {
                 let config = path.display();
-                Failure::input(format!("{config}: imaging.chi2_target: {error}; `dimcmc map {config}` tries out why"))
+                Failure::input(format!(
+                    "{config}: imaging.chi2_target: {error}; `dimcmc map {config}` tries out why, and a star whose spots \
+                     change takes imaging.objective \"marginal-likelihood\""
+                ))
             }
             ReferenceError::NothingToFit { .. } => {
                 Failure::input(format!("{}: imaging.chi2_target: {error}", path.display()))

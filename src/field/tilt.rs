@@ -4,10 +4,10 @@
 //! A model `(b - L c) / s(c)` that is divided by what depends on the field itself has a Jacobian in proportion to
 //! 1 / s, so that the fields that explain n numbers of an epoch as well fill a volume in proportion to `s^n`. Around
 //! the most probable field Laplace's approximation leaves that out, and finds ln Z of spots at S/N 1000 by some 10 too
-//! small. `s^n` as a factor of the integrand moves the place of the expansion to where the marginal of s is largest; its
-//! value there is taken out of the integral again. To first order that is a tilt `exp(-a^T c)`, `a = -n d ln s / dc` in
-//! every epoch, and a Gaussian field with a tilt is one of another mean, `-K a`; to second order it is one more number
-//! that was measured.
+//! small. `s^n` as a factor of the integrand moves the place of the expansion to where the marginal of s is largest;
+//! its value there is taken out of the integral again. To first order that is a tilt `exp(-a^T c)`, `a = -n d ln s /
+//! dc` in every epoch, and a Gaussian field with a tilt is one of another mean, `-K a`; to second order it is one more
+//! number that was measured.
 
 use super::maps::{correlations, scale_rows};
 use super::{Epoch, Field};

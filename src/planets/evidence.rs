@@ -13,6 +13,7 @@
 use super::periodogram::orbits::{Trial, mid_cycle, scan};
 use super::periodogram::two_planets::without;
 use super::velocities::VelocityQuadratic;
+use crate::numerics::logarithms::ln_sum;
 use crate::star::kepler::true_anomaly;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use rand::{Rng, SeedableRng};
@@ -116,14 +117,6 @@ fn repeated(seed: u64, estimate: impl Fn(&mut ChaCha8Rng) -> f64 + Sync) -> LnBa
     let relative: Vec<f64> = all.iter().map(|x| (x - ln_bayes).exp()).collect();
     let variance = relative.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / (REPETITIONS - 1) as f64;
     LnBayes { ln_bayes, sd: Some((variance / REPETITIONS as f64).sqrt()) }
-}
-
-fn ln_sum(terms: &[f64]) -> f64 {
-    let highest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if highest == f64::NEG_INFINITY {
-        return highest;
-    }
-    highest + terms.iter().map(|x| (x - highest).exp()).sum::<f64>().ln()
 }
 
 /// Marginal likelihoods at the frequencies of a prior.

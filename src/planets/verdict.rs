@@ -95,33 +95,14 @@ pub fn one_sided(z: f64) -> f64 {
     normal::cumulative(-z)
 }
 
-/// 95 % upper limit on a number of 0 or more of which `value +- sigma` is measured.
-pub fn upper95(value: f64, sigma: f64) -> f64 {
-    const HALVINGS: usize = 200;
-    let least = -value / sigma;
-    // of what lies above zero, a twentieth is above the limit
-    let beyond = 0.05 * one_sided(least);
-    if beyond < f64::MIN_POSITIVE {
-        // so far below zero what is left is exponential
-        return 0.05f64.recip().ln() * sigma / least;
-    }
-    let (mut low, mut high) = (least, least.max(0.0) + 40.0);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if one_sided(middle) > beyond { low = middle } else { high = middle }
-    }
-    value + sigma * low
-}
-
 impl Verdict {
     /// Of a planet of known ephemeris: `alone` is K with its error where there is no planet in the model, `signal`
-    /// where there is. The false-alarm probability is that of one period, one-sided.
-    pub fn of_known(alone: [f64; 2], signal: Signal, remarks: &[Remark]) -> Self {
+    /// where there is, and its 95 % upper limit. The false-alarm probability is that of one period, one-sided.
+    pub fn of_known(alone: [f64; 2], signal: Signal, k_upper95_kms: f64, remarks: &[Remark]) -> Self {
         let significance = alone[0] / alone[1];
         if !significance.is_finite() {
             return Verdict::not_judged("the profiles do not bound K at this ephemeris");
         }
-        let k_upper95_kms = upper95(signal.k_kms, signal.sigma_k_kms);
         Verdict::judged(one_sided(significance), signal, remarks, Some(Known { significance, k_upper95_kms }))
     }
 
@@ -250,24 +231,15 @@ mod tests {
 
     #[test]
     fn a_known_planet_is_judged_by_its_own_period() {
-        // 1.6449 sigma one-sided is 5 %, and 1.96 sigma are the limit of a number whose bound at zero does not matter
         assert!((one_sided(1.6449) - 0.05).abs() < 1e-5);
-        assert!((upper95(1.0, 0.01) - (1.0 + 0.016449)).abs() < 1e-6);
-        assert!((upper95(0.0, 1.0) - 1.95996).abs() < 1e-4);
-        assert!(
-            upper95(-3.0, 1.0) > 0.0
-                && upper95(-60.0, 1.0) > 0.0
-                && upper95(-60.0, 1.0) < 0.06
-                && (upper95(-36.0, 1.0) * 36.0 - 3.0).abs() < 0.02
-        );
-        let verdict = Verdict::of_known([0.1, 0.01], SIGNAL, &[]);
+        let verdict = Verdict::of_known([0.1, 0.01], SIGNAL, 0.12, &[]);
         assert_eq!(verdict.finding, Finding::Detection);
         assert!(verdict.sentence.contains("10.0 sigma"), "{}", verdict.sentence);
         let less = verdict.with(&[Remark::against("one night decides", "")]);
         assert_eq!(less.finding, Finding::Candidate);
         assert!(less.sentence.ends_with("Against it: one night decides."), "{}", less.sentence);
-        assert_eq!(Verdict::of_known([0.01, 0.01], SIGNAL, &[]).finding, Finding::NoPlanetNeeded);
-        assert_eq!(Verdict::of_known([0.0, 0.0], SIGNAL, &[]).finding, Finding::NotJudged);
+        assert_eq!(Verdict::of_known([0.01, 0.01], SIGNAL, 0.12, &[]).finding, Finding::NoPlanetNeeded);
+        assert_eq!(Verdict::of_known([0.0, 0.0], SIGNAL, 0.12, &[]).finding, Finding::NotJudged);
     }
 
     #[test]

@@ -15,6 +15,7 @@
 //! probability of a candidate.
 
 use super::MeasuredJitter;
+use crate::numerics::logarithms::ln_sum;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::posterior::expansion::{Expansion, UNRESOLVED_SPOTS};
@@ -291,15 +292,6 @@ fn contrasts(n: usize) -> DMatrix<f64> {
             _ => 0.0,
         }
     })
-}
-
-/// ln of the sum of the exponentials.
-fn ln_sum(ln: &[f64]) -> f64 {
-    let highest = ln.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if highest == f64::NEG_INFINITY {
-        return highest;
-    }
-    highest + ln.iter().map(|x| (x - highest).exp()).sum::<f64>().ln()
 }
 
 /// To three digits: the last bits of a fit mean nothing, and everything after it hangs on them.

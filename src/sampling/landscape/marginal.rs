@@ -5,6 +5,7 @@
 //! opposite to its highest node. A node without a value counts as impossible.
 
 use super::{Axis, Landscape};
+use crate::numerics::logarithms::ln_sum;
 
 /// Steps of the integrals to each cell.
 const STEPS: usize = 64;
@@ -96,16 +97,7 @@ fn integrated(landscape: &Landscape, target: usize, prior: &dyn Fn(usize, f64) -
         let weight: f64 = others.map(|(i, k)| weights[i][*k].ln()).sum();
         log_terms[position[target]].push(node.evaluation.log_prob + weight);
     }
-    log_terms.iter().map(|terms| log_sum(terms)).collect()
-}
-
-/// ln of the sum of exponentials.
-fn log_sum(terms: &[f64]) -> f64 {
-    let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if largest == f64::NEG_INFINITY {
-        return largest;
-    }
-    largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
+    log_terms.iter().map(|terms| ln_sum(terms)).collect()
 }
 
 /// What each node of an axis counts in the integral over it: by the trapezoid, or with L linear between nodes where the

@@ -1,0 +1,10 @@
+//! Numbers too large or too small for anything but their logarithms.
+
+/// ln of the sum of the exponentials; minus infinity of nothing.
+pub fn ln_sum(terms: &[f64]) -> f64 {
+    let highest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if highest == f64::NEG_INFINITY {
+        return highest;
+    }
+    highest + terms.iter().map(|x| (x - highest).exp()).sum::<f64>().ln()
+}
