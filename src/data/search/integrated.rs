@@ -26,10 +26,13 @@ const SMALLEST_E: f64 = 0.01;
 const SMALL_PART: f64 = 0.8;
 
 /// Places that ln Z is expanded around at most: from an inclination that is far off it takes some.
-const MOST_ROUNDS: usize = 12;
+const MOST_ROUNDS: usize = 16;
 
 /// Parts of the way to the top of an expansion that are tried.
 const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
+
+/// Where the top is higher, so many times the way is tried: curvatures of the expansion are often too large.
+const BEYOND: [f64; 2] = [2.0, 4.0];
 
 /// A round that is lower than the one before by this much in log-probability is not followed.
 const DOWN: f64 = 0.1;
@@ -51,15 +54,17 @@ pub(super) fn find(
         None => without_search(imager, space, settings)?,
     };
     let mut highest: Option<Found> = None;
+    let (mut before, mut settled) = (f64::NEG_INFINITY, false);
     for _ in 0..MOST_ROUNDS {
         at(Stage::Reference);
         let values = space.clone().with_field_of(&field).values_at(&theta);
         let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, jitter_kms) else { break };
         let here = posterior.evaluate(&theta);
-        // a quadratic that has led astray
-        if highest.as_ref().is_some_and(|best| best.optimum.evaluation.log_prob > here.log_prob + DOWN) {
+        // an expansion that has led astray
+        if before > here.log_prob + DOWN {
             break;
         }
+        before = here.log_prob;
         at(Stage::Refining);
         let Ok(mut next) = forecast(&posterior).and_then(|forecast| Ok(climb(&forecast, &theta, &|| ())?)) else {
             break;
@@ -67,7 +72,7 @@ pub(super) fn find(
         let left_over = shift(space, &theta, &next);
         (next.theta, next.evaluation) = uphill(&posterior, (&theta, here), &next.theta);
         let moved = shift(space, &theta, &next);
-        next.converged &= left_over < REFERENCE_SHIFT || moved > 0.0;
+        settled = left_over < REFERENCE_SHIFT;
         theta.clone_from(&next.theta);
         let posterior = Density::Integrated(Box::new(posterior));
         highest = Some(Found { posterior, optimum: next, attempts: Vec::new(), detection: None });
@@ -76,6 +81,7 @@ pub(super) fn find(
         }
     }
     let mut found = highest.ok_or(FieldError::NotPositive)?;
+    found.optimum.converged &= settled;
     found.detection = detection;
     if let Density::Integrated(posterior) = &found.posterior {
         found.attempts = attempts(posterior, &found.optimum.theta)?;
@@ -90,14 +96,24 @@ fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64])
     let (theta, here) = from;
     let (a, b) = (space.to_sampling(theta), space.to_sampling(to));
     let at = |share: f64| -> Vec<f64> { a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect() };
-    let tried = SHARES.iter().map(|share| {
+    let evaluated = |share: &f64| {
         let there = space.to_physical(&at(*share));
         let evaluation = posterior.evaluate(&there);
         (there, evaluation)
-    });
-    let mut higher = tried.filter(|(_, e)| e.log_prob.is_finite() && e.log_prob >= here.log_prob);
-    let found = higher.next();
-    found.unwrap_or_else(|| (theta.to_vec(), here))
+    };
+    let rises = |(_, there): &(Vec<f64>, Evaluation), over: &Evaluation| {
+        there.log_prob.is_finite() && there.log_prob >= over.log_prob
+    };
+    let shorter = SHARES.iter().map(evaluated).find(|there| rises(there, &here));
+    let Some(mut best) = shorter else { return (theta.to_vec(), here) };
+    for share in BEYOND {
+        let further = evaluated(&share);
+        if !rises(&further, &best.1) {
+            break;
+        }
+        best = further;
+    }
+    best
 }
 
 /// Where to begin: vector, field and jitter.
