@@ -28,7 +28,8 @@ import calibration_table
 
 OBJECTIVES = ("marginal-likelihood", "spottedness")
 FREE = ("inclination_deg", "vsini_kms", "omega_eq_rad_d", "domega_rad_d", "k_kms", "porb_over_prot", "phi")
-COLUMNS = ["seed", "simulator", "objective", "lifetime_d", "well_defined", "log_prob", "seconds", "error", "chi2_target"]
+COLUMNS = ["seed", "simulator", "objective", "lifetime_d", "well_defined", "log_prob", "seconds", "error"]
+COLUMNS += ["chi2_target"]
 COLUMNS += [f"{prefix}{name}" for name in FREE for prefix in ("true_", "best_", "sd_")]
 
 

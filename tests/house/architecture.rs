@@ -12,7 +12,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("star", &[], &["numerics"]),
     ("maxent", &[], &["numerics"]),
     ("field", &[], &["numerics"]),
-    ("planets", &["velocities", "verdict", "periodogram", "evidence"], &["numerics", "star::kepler"]),
+    ("planets", &["mixture", "velocities", "verdict", "periodogram", "evidence"], &["numerics", "star::kepler"]),
     ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics", "planets::verdict"]),
     (
         "posterior",

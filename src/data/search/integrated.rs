@@ -1,6 +1,6 @@
 //! The search where all maps are integrated over: it begins at the orbit that a blind search finds, with the field and
 //! the jitter as they are with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the top of the
-//! expansion becomes the next place to expand it around, as long as ln Z rises and until that place stays.
+//! expansion, or what is higher beyond, becomes the next place to expand it around, until that place stays.
 
 use super::{
     Attempt, Found, OTHER_STARTS, PEAK_DROP, Progress, REFERENCE_SHIFT, SearchError, SearchSettings, Stage, shift,
@@ -34,7 +34,8 @@ const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 /// Where the top is higher, so many times the way is tried: curvatures of the expansion are often too large.
 const BEYOND: [f64; 2] = [2.0, 4.0];
 
-/// A round that is lower than the one before by this much in log-probability is not followed.
+/// A round that is lower than the one before by this much in log-probability went too far; one that is higher by less
+/// may be the last.
 const DOWN: f64 = 0.1;
 
 pub(super) fn find(
@@ -54,29 +55,33 @@ pub(super) fn find(
         None => without_search(imager, space, settings)?,
     };
     let mut highest: Option<Found> = None;
-    let (mut before, mut settled) = (f64::NEG_INFINITY, false);
+    let (mut last, mut settled): (Option<(Vec<f64>, f64)>, _) = (None, false);
     for _ in 0..MOST_ROUNDS {
         at(Stage::Reference);
         let values = space.clone().with_field_of(&field).values_at(&theta);
         let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, jitter_kms) else { break };
         let here = posterior.evaluate(&theta);
-        // an expansion that has led astray
-        if before > here.log_prob + DOWN {
-            break;
+        // an expansion that has led astray: half of the way
+        if let Some((before, height)) = &last
+            && *height > here.log_prob + DOWN
+        {
+            theta = on_the_way(space, before, &theta, 0.5);
+            continue;
         }
-        before = here.log_prob;
+        let height = here.log_prob;
         at(Stage::Refining);
         let Ok(mut next) = forecast(&posterior).and_then(|forecast| Ok(climb(&forecast, &theta, &|| ())?)) else {
             break;
         };
         let left_over = shift(space, &theta, &next);
         (next.theta, next.evaluation) = uphill(&posterior, (&theta, here), &next.theta);
-        let moved = shift(space, &theta, &next);
-        settled = left_over < REFERENCE_SHIFT;
-        theta.clone_from(&next.theta);
+        // away from the best star curvatures may be negative, and no measure of the way
+        let stays = shift(space, &theta, &next) < REFERENCE_SHIFT && next.evaluation.log_prob - height < DOWN;
+        settled = stays && left_over < REFERENCE_SHIFT;
+        last = Some((std::mem::replace(&mut theta, next.theta.clone()), height));
         let posterior = Density::Integrated(Box::new(posterior));
         highest = Some(Found { posterior, optimum: next, attempts: Vec::new(), detection: None });
-        if moved < REFERENCE_SHIFT {
+        if stays {
             break;
         }
     }
@@ -89,15 +94,12 @@ pub(super) fn find(
     Ok(found)
 }
 
-/// The first of ever shorter parts of the way from a point to the top of the expansion around it that leads up; the
-/// point itself, where none does. Far from the best star the expansion promises too much.
+/// The first of ever shorter parts of the way from a point to the top of the expansion around it that leads up, or what
+/// is higher beyond the top; the point itself, where none does. Far from the best star the expansion promises too much.
 fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64]) -> (Vec<f64>, Evaluation) {
-    let space = posterior.space();
     let (theta, here) = from;
-    let (a, b) = (space.to_sampling(theta), space.to_sampling(to));
-    let at = |share: f64| -> Vec<f64> { a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect() };
     let evaluated = |share: &f64| {
-        let there = space.to_physical(&at(*share));
+        let there = on_the_way(posterior.space(), theta, to, *share);
         let evaluation = posterior.evaluate(&there);
         (there, evaluation)
     };
@@ -114,6 +116,12 @@ fn uphill(posterior: &MarginalPosterior, from: (&[f64], Evaluation), to: &[f64])
         best = further;
     }
     best
+}
+
+/// Part of the way between two points.
+fn on_the_way(space: &ParameterSpace, from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
+    let (a, b) = (space.to_sampling(from), space.to_sampling(to));
+    space.to_physical(&a.iter().zip(&b).map(|(a, b)| a + share * (b - a)).collect::<Vec<_>>())
 }
 
 /// Where to begin: vector, field and jitter.
