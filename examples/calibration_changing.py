@@ -14,6 +14,7 @@ import argparse
 import itertools
 import json
 import math
+import shlex
 import subprocess
 import sys
 import time
@@ -43,7 +44,10 @@ SHEAR_RAD_D = (0.02, 0.1)
 # bins of 1.8 km/s as far from the edge of the line as with 57 bins at 40 km/s
 STEP_KMS, MARGIN_KMS = 1.8, 11.3
 
-SIMULATOR = "dimcmc, or a script that makes a star: OUT --seed N --lifetime D --k KMS ...; several take turns"
+SIMULATOR = (
+    "dimcmc, or a script that makes a star (OUT --seed N --lifetime D --k KMS ...), with options of its own as in "
+    "'examples/simulate_spots.py --how field'; several take turns"
+)
 COLUMNS = (
     "kind planet seed profiles true_k_kms true_porb_over_prot true_phi rotation_period_d inclination_deg vsini_kms "
     "lifetime_d false_alarm finding k_kms sigma_k_kms porb_over_prot sigma_porb_over_prot phi sigma_phi on_edge "
@@ -86,7 +90,9 @@ def simulate(program, options, folder):
     """Writes profiles and config.json, star parameters at the truth."""
     if not is_own(program):
         flags = [f"--{name}" if value is True else f"--{name}={value}" for name, value in options.items()]
-        subprocess.run([sys.executable, program, folder, *flags], check=True, capture_output=True, text=True)
+        script, *more = shlex.split(program)
+        command = [sys.executable, script, folder, *more, *flags]
+        subprocess.run(command, check=True, capture_output=True, text=True)
         return
     config, simulated = own(options)
     folder.mkdir()
@@ -99,7 +105,13 @@ def simulate(program, options, folder):
 
 def is_own(program):
     """Whether a simulator is `dimcmc` rather than a Python script."""
-    return not program.endswith(".py")
+    return not shlex.split(program)[0].endswith(".py")
+
+
+def name_of(program):
+    """A simulator in tables: its name with its own options, without folders."""
+    script, *more = shlex.split(program)
+    return " ".join([Path(script).stem, *more])
 
 
 def own(options):
@@ -217,7 +229,7 @@ def searched(row, folder, args, static):
 
 def one(kind, number, planet, simulator, args):
     row, options = star(kind, number, planet)
-    row["simulator"] = Path(simulator).stem
+    row["simulator"] = name_of(simulator)
     folder = args.work / f"{kind.replace(' ', '-')}-{row['seed']}"
     try:
         if not (folder / "config.json").exists():

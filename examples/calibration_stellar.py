@@ -70,7 +70,7 @@ def one(number, objective, simulator, args):
     truth = {"inclination_deg": options["inclination"], "vsini_kms": options["vsini"], "domega_rad_d": 0.0}
     truth |= {"omega_eq_rad_d": 2 * math.pi / options["prot"], "k_kms": options["k"]}
     truth |= {"porb_over_prot": options["porb-over-prot"], "phi": options["phi"]}
-    line = {"seed": row["seed"], "simulator": Path(simulator).stem, "objective": objective}
+    line = {"seed": row["seed"], "simulator": calibration_changing.name_of(simulator), "objective": objective}
     line |= {"lifetime_d": row["lifetime_d"]}
     line |= {f"true_{name}": truth[name] for name in FREE}
     path, out = folder / f"stellar-{objective}.json", folder / f"stellar-{objective}"
@@ -108,14 +108,14 @@ def table(args):
     """Shares of true values within 1 and 2 standard errors, of all stars whose search ended."""
     rows = calibration_table.read(args.csv)
     ended = [row for row in rows if not row["error"]]
-    discs = [row for row in ended if row["simulator"] != "spots_field"]
+    discs = [row for row in ended if not row["simulator"].endswith("field")]
     integrated = [row for row in discs if row["objective"] == OBJECTIVES[0]]
     fast = lambda row: float(row["true_vsini_kms"]) > FAST
     groups = {
         "integrated maps": integrated,
         f"the same, vsini below {FAST:.0f} km/s": [row for row in integrated if not fast(row)],
         f"the same, vsini above {FAST:.0f} km/s": [row for row in integrated if fast(row)],
-        "integrated maps, spots from a Gaussian field": [row for row in ended if row["simulator"] == "spots_field"],
+        "integrated maps, spots from a Gaussian field": [row for row in ended if row["simulator"].endswith("field")],
         "spottedness": [row for row in discs if row["objective"] == OBJECTIVES[1]],
     }
     lines = ["| parameter | stars by | stars | within 1 sd (68 %) | within 2 sd (95 %) | median sd | median error |"]

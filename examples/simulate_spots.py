@@ -5,8 +5,8 @@
 `field`: the Gaussian field that `dimcmc` integrates out (Matern 3/2 in time). `fading`: discs that keep their size
 while their filling factor grows and falls. `shrinking`: discs that keep their filling factor while their area does.
 Discs are at their largest at random times; `--lifetime` is the full width at half of it, `inf` keeps them. A simulator
-of calibration_changing.py, whose options it has; `--how` may stand in the name instead: a copy or a link of this file
-that is called `spots_field.py`. Needs numpy and scipy.
+of calibration_changing.py, whose options it has: `--simulator 'examples/simulate_spots.py --how field'`. Needs numpy
+and scipy.
 """
 
 import argparse
@@ -132,8 +132,7 @@ def write(options, times, depths, velocity):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    named = Path(__file__).stem.rpartition("_")[2]
-    parser.add_argument("--how", choices=HOW, default=named if named in HOW else "shrinking")
+    parser.add_argument("--how", choices=HOW, default="shrinking")
     for name, default in {"seed": 1, "nights": 15, "seasons": 1, "bins": 57}.items():
         parser.add_argument(f"--{name}", type=int, default=default)
     numbers = {"lifetime": np.inf, "k": 0.0, "porb-over-prot": 1.7, "phi": 0.3, "prot": 3.0, "inclination": 38.0}

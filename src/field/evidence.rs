@@ -11,7 +11,6 @@
 
 use super::compress::{Compressed, Compression, Told};
 use super::covariance::{Covariance, Numbers};
-use super::maps::{inverses, scale_rows};
 use super::tilt::Tilt;
 use super::{Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};
@@ -89,21 +88,7 @@ impl Evidence {
                 }
             };
             let tilt = tilt.insert(Tilt::new(explained, epochs));
-            let lowered = tilt.lowers(&field, &times_d, &field.spectrum.variances(degrees), &times_d);
-            let [mut whitened, mut coefficients] = [lowered.clone(), around.clone()];
-            scale_rows(&mut whitened, &inverses(&sd));
-            scale_rows(&mut coefficients, &inverses(&sd));
-            for (k, of) in compressed.iter_mut().enumerate() {
-                of.constant += tilt.taken_out(k, &lowered, around);
-                if let Some(row) = tilt.row(k, &epochs[k], &sd) {
-                    let numbers = rows[k].nrows();
-                    rows[k].resize_vertically_mut(numbers + 1, 0.0);
-                    rows[k].set_row(numbers, &row);
-                    common[k].resize_vertically_mut(numbers + 1, 0.0);
-                    of.expected = std::mem::take(&mut of.expected).push((row * coefficients.column(k))[0]);
-                }
-                of.expected += &rows[k] * whitened.column(k);
-            }
+            tilt.count((&field, &sd), (epochs, around), &mut compressed, [&mut rows, &mut common]);
         }
         let (numbers, covariance) = factored(&rows, &common)?;
         let told = compressed.iter().zip(epochs).map(|(to, epoch)| to.tell(&epoch.misfit, &epoch.slopes)).collect();

@@ -63,7 +63,8 @@ pub struct Settled {
 /// is no model it gives numbers that are not finite.
 ///
 /// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
-/// left of the way is an error of ln Z (`docs/method.md` section 9).
+/// left of the way is an error of ln Z (`docs/method.md` section 9). How many numbers of an epoch the field explains
+/// (`tilt`) is found with the first covariance that is made, or is as nearby; ln Z depends on it to second order only.
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].

@@ -9,9 +9,10 @@
 //! dc` in every epoch, and a Gaussian field with a tilt is one of another mean, `-K a`; to second order it is one more
 //! number that was measured.
 
-use super::maps::{correlations, scale_rows};
+use super::compress::Compressed;
+use super::maps::{correlations, inverses, scale_rows};
 use super::{Epoch, Field};
-use nalgebra::{DMatrix, RowDVector};
+use nalgebra::DMatrix;
 
 /// The tilt of some epochs.
 #[derive(Clone, Debug)]
@@ -39,11 +40,36 @@ impl Tilt {
         tilted(&self.explained, epochs)
     }
 
-    /// The second order of `n ln s` in epoch k as one more number, measured to be what it is: its row of `J S^(1/2)`
-    /// (H), given the standard deviations of the coefficients. None where nothing is divided.
-    pub fn row(&self, k: usize, epoch: &Epoch, sd: &[f64]) -> Option<RowDVector<f64>> {
-        let per_sd = |h: usize| self.explained[k].sqrt() * epoch.divisor[h] * sd[h];
-        (!epoch.divisor.is_empty()).then(|| RowDVector::from_fn(sd.len(), |_, h| per_sd(h)))
+    /// Counts the volume in what epochs around these coefficients (H, epochs) were compressed to, and in their `rows`
+    /// and `common` columns: the mean of the field, whose coefficients have these standard deviations, falls by `K a`,
+    /// and each epoch that is divided by anything has one number more.
+    pub fn count(
+        &self,
+        (field, sd): (&Field, &[f64]),
+        (epochs, around): (&[Epoch], &DMatrix<f64>),
+        compressed: &mut [Compressed],
+        [rows, common]: [&mut [DMatrix<f64>]; 2],
+    ) {
+        let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
+        let variances: Vec<f64> = sd.iter().map(|sd| sd * sd).collect();
+        let lowered = self.lowers(field, &times_d, &variances, &times_d);
+        let mut whitened = lowered.clone();
+        scale_rows(&mut whitened, &inverses(sd));
+        for (k, (of, epoch)) in compressed.iter_mut().zip(epochs).enumerate() {
+            let (a, around) = (self.by.column(k), around.column(k));
+            // 1/2 a^T K a + a^T c0
+            of.constant += 0.5 * a.dot(&lowered.column(k)) + a.dot(&around);
+            if !epoch.divisor.is_empty() {
+                // n ln s to second order: a number, measured to be what it is
+                let row = epoch.divisor.transpose() * self.explained[k].sqrt();
+                let numbers = rows[k].nrows();
+                rows[k].resize_vertically_mut(numbers + 1, 0.0);
+                common[k].resize_vertically_mut(numbers + 1, 0.0);
+                rows[k].row_mut(numbers).iter_mut().zip(&row).zip(sd).for_each(|((to, row), sd)| *to = row * sd);
+                of.expected = std::mem::take(&mut of.expected).push((row * around)[0]);
+            }
+            of.expected += &rows[k] * whitened.column(k);
+        }
     }
 
     /// `K a` (H, times), by which the mean of the field falls at any times (d), given those of the epochs and the
@@ -52,13 +78,6 @@ impl Tilt {
         let mut lowered = &self.by * correlations(field, epochs_d, times_d);
         scale_rows(&mut lowered, variances);
         lowered
-    }
-
-    /// What epoch k adds to ln Z, expanded around these coefficients, where the mean falls by `lowered`:
-    /// `1/2 a^T K a + a^T c0`.
-    pub fn taken_out(&self, k: usize, lowered: &DMatrix<f64>, around: &DMatrix<f64>) -> f64 {
-        let a = self.by.column(k);
-        0.5 * a.dot(&lowered.column(k)) + a.dot(&around.column(k))
     }
 }
 

@@ -90,6 +90,9 @@ pub struct Known {
     pub k_upper95_kms: f64,
 }
 
+/// Why a planet of known ephemeris is not judged.
+pub const UNBOUNDED: &str = "the profiles do not bound K at this ephemeris";
+
 /// The probability that a standard normal number exceeds `z`.
 pub fn one_sided(z: f64) -> f64 {
     normal::cumulative(-z)
@@ -101,7 +104,7 @@ impl Verdict {
     pub fn of_known(alone: [f64; 2], signal: Signal, k_upper95_kms: f64, remarks: &[Remark]) -> Self {
         let significance = alone[0] / alone[1];
         if !significance.is_finite() {
-            return Verdict::not_judged("the profiles do not bound K at this ephemeris");
+            return Verdict::not_judged(UNBOUNDED);
         }
         Verdict::judged(one_sided(significance), signal, remarks, Some(Known { significance, k_upper95_kms }))
     }

@@ -10,7 +10,7 @@ use crate::data::ephemeris::Ephemeris;
 use crate::data::scene::Scene;
 use crate::planets::mixture::{Mixture, Part};
 use crate::planets::velocities::VelocityQuadratic;
-use crate::planets::verdict::{Remark, Signal, Verdict};
+use crate::planets::verdict::{Remark, Signal, UNBOUNDED, Verdict};
 use crate::posterior::detection::{Detection, DetectionSettings, View};
 use crate::posterior::objective::{Clock, Elements, ParameterValues, for_blind_search};
 use nalgebra::DVector;
@@ -70,7 +70,7 @@ fn verdict(
     match View::new(&scene.imager, values, settings, Some(&found.planet_free)) {
         Ok(view) => {
             let Some(k) = over_errors(&view.quadratic, &values, ephemeris, clock) else {
-                return Verdict::not_judged("the profiles do not bound K at this ephemeris");
+                return Verdict::not_judged(UNBOUNDED);
             };
             let [k_kms, sigma_k_kms] = k.moments();
             let signal = Signal { period_d: ephemeris.period_d[0], k_kms, sigma_k_kms };

@@ -9,6 +9,7 @@ mod ensemble;
 mod expansion;
 mod field;
 mod field_algebra;
+mod field_settling;
 mod figure;
 mod first_look;
 mod forward;

@@ -34,9 +34,8 @@ const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
 /// Where the top is higher, so many times the way is tried: curvatures of the expansion are often too large.
 const BEYOND: [f64; 2] = [2.0, 4.0];
 
-/// A round that is lower than the one before by this much in log-probability went too far; one that is higher by less
-/// may be the last.
-const DOWN: f64 = 0.1;
+/// Log-probabilities of rounds as close as this count as the same: maps are found from others in each.
+const SAME: f64 = 0.1;
 
 pub(super) fn find(
     imager: &Imager,
@@ -63,7 +62,7 @@ pub(super) fn find(
         let here = posterior.evaluate(&theta);
         // an expansion that has led astray: half of the way
         if let Some((before, height)) = &last
-            && *height > here.log_prob + DOWN
+            && *height > here.log_prob + SAME
         {
             theta = on_the_way(space, before, &theta, 0.5);
             continue;
@@ -76,7 +75,7 @@ pub(super) fn find(
         let left_over = shift(space, &theta, &next);
         (next.theta, next.evaluation) = uphill(&posterior, (&theta, here), &next.theta);
         // away from the best star curvatures may be negative, and no measure of the way
-        let stays = shift(space, &theta, &next) < REFERENCE_SHIFT && next.evaluation.log_prob - height < DOWN;
+        let stays = shift(space, &theta, &next) < REFERENCE_SHIFT && next.evaluation.log_prob - height < SAME;
         settled = stays && left_over < REFERENCE_SHIFT;
         last = Some((std::mem::replace(&mut theta, next.theta.clone()), height));
         let posterior = Density::Integrated(Box::new(posterior));

@@ -15,6 +15,7 @@
 
 use super::spots::UNRESOLVED_SPOTS;
 use super::{Expansion, free_stellar, nuisances};
+use crate::numerics::logarithms::ln_sum;
 use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues, Posterior};
 use crate::sampling::log_density::{Evaluation, Status};
 use nalgebra::{DMatrix, DVector};
@@ -108,8 +109,7 @@ impl SpotsCounted {
     fn ln_density(&self, step: &DVector<f64>, times: f64, rest: f64) -> f64 {
         let whole = step.dot(&(&self.entropy.information * step));
         let terms: Vec<f64> = self.sizes.iter().map(|size| size.ln_density(step, times, whole, rest)).collect();
-        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
+        ln_sum(&terms)
     }
 
     /// The posterior's `evaluation` at `theta`, unresolved spots counted.
