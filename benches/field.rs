@@ -49,7 +49,7 @@ fn measure(profiles: usize, table: &mut Table) {
     let harmonics = Harmonics::new(36);
     let degrees = harmonics.degrees();
     let epochs = epochs(&harmonics, profiles);
-    let spectrum = Spectrum { amplitude: 0.25, slope: 0.75 };
+    let spectrum = Spectrum { amplitude: 0.25, slope: 0.75, break_degree: 0.0 };
     let field = Field { spectrum, kernel: Kernel::of(Lifetime::Days(20.0)) };
     let around = DMatrix::zeros(degrees.len(), profiles);
     let new = || Evidence::new(field, &degrees, &epochs, &around, Compression::default()).unwrap();

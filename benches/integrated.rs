@@ -5,7 +5,7 @@ mod common;
 
 use common::stopwatch::{fastest, seconds};
 use common::table::{Table, Target};
-use dimcmc::internals::posterior::marginal::{Basis, Known, MarginalPosterior, fit};
+use dimcmc::internals::posterior::marginal::{Basis, Held, Known, MarginalPosterior, fit};
 use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, Prior};
 use dimcmc::{Config, LogDensity as _, Scene};
 use serde_json::json;
@@ -61,7 +61,7 @@ fn scene(profiles: usize) -> Scene {
 fn measure(profiles: usize, table: &mut Table) {
     let scene = scene(profiles);
     let mut values = scene.settings.values;
-    let field = [(Parameter::SpotAmplitude, 0.25), (Parameter::SpotSlope, 0.6), (Parameter::SpotLifetime, 30.0)];
+    let field = [(Parameter::SpotAmplitude, 0.25), (Parameter::SpotSlope, 1.5), (Parameter::SpotLifetime, 30.0)];
     field.into_iter().for_each(|(p, value)| values[p] = value);
     let posterior = |free: &[Parameter]| {
         let wide = |parameter: &Parameter| FreeParameter {
@@ -69,7 +69,8 @@ fn measure(profiles: usize, table: &mut Table) {
             prior: Prior::Uniform { min: 0.0, max: 3000.0 },
         };
         let space = scene.space_of(&free.iter().map(wide).collect::<Vec<_>>());
-        MarginalPosterior::new(scene.imager.clone(), &space, values, 0.0).expect("a reference")
+        let held = Held { break_degree: Known::default().break_degree(), jitter_kms: 0.0 };
+        MarginalPosterior::new(scene.imager.clone(), &space, values, held).expect("a reference")
     };
     // a few parts in a hundred of the parameters away, another place each time
     let ms = |posterior: &MarginalPosterior| {

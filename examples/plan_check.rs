@@ -74,6 +74,7 @@ fn fitted_before(output: &str, seed: u64) -> Option<Known> {
     Some(Known {
         amplitude: Some(row[2]),
         slope: Some(row[3]),
+        break_degree: Some(Known::default().break_degree()),
         lifetime: Some(Lifetime::Days(row[4])),
         jitter_kms: Some(row[5]),
         ..Known::default()
@@ -130,10 +131,9 @@ fn main() {
         stars.push(Star { campaign, range, per_cycle, sigma, assumed });
     }
     let of = |number: fn(&Assumed) -> f64| median(stars.iter().map(|star| number(&star.assumed)));
-    let spectrum = Spectrum {
-        amplitude: of(|assumed| assumed.field.spectrum.amplitude),
-        slope: of(|assumed| assumed.field.spectrum.slope),
-    };
+    let (amplitude, slope) =
+        (of(|assumed| assumed.field.spectrum.amplitude), of(|assumed| assumed.field.spectrum.slope));
+    let spectrum = Spectrum { amplitude, slope, ..stars[0].assumed.field.spectrum };
     let lifetime = of(|assumed| assumed.field.kernel.lifetime.days().unwrap_or(f64::INFINITY));
     let typical = Assumed { field: Field { spectrum, kernel: Kernel::of(Lifetime::Days(lifetime)) }, jitter_kms: 0.0 };
     println!("typical spots: {typical:?}");

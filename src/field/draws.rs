@@ -66,7 +66,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     fn field() -> Field {
-        let spectrum = Spectrum { amplitude: 0.5, slope: 0.9 };
+        let spectrum = Spectrum { amplitude: 0.5, slope: 0.9, break_degree: 0.0 };
         Field { spectrum, kernel: Kernel::of(Lifetime::Days(4.0)) }
     }
 

@@ -105,13 +105,14 @@ impl Field {
     /// [`FieldError::NoSuchField`] for a number that is not finite, a negative amplitude, a lifetime that is not
     /// positive or a share outside [0, 1].
     pub fn check(&self) -> Result<(), FieldError> {
-        let (Spectrum { amplitude, slope }, Kernel { lifetime, persistent }) = (self.spectrum, self.kernel);
+        let Field { spectrum: Spectrum { amplitude, slope, break_degree }, kernel: Kernel { lifetime, persistent } } =
+            *self;
         let lifetime_d = match lifetime {
             Lifetime::Static => f64::INFINITY,
             Lifetime::Days(days) => days,
         };
         let lives = lifetime == Lifetime::Static || (lifetime_d > 0.0 && lifetime_d.is_finite());
-        let good = amplitude >= 0.0 && amplitude.is_finite() && slope.is_finite();
+        let good = amplitude >= 0.0 && amplitude.is_finite() && slope.is_finite() && break_degree >= 0.0;
         match good && lives && (0.0..=1.0).contains(&persistent) {
             true => Ok(()),
             false => Err(FieldError::NoSuchField { amplitude, slope, lifetime_d, persistent }),

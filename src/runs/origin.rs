@@ -9,7 +9,7 @@ use crate::data::scene::Scene;
 use crate::data::search::Found;
 use crate::field::FieldError;
 use crate::posterior::density::Density;
-use crate::posterior::marginal::{MarginalPosterior, bounds};
+use crate::posterior::marginal::{Held, MarginalPosterior, bounds};
 use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues, Posterior, Reference, ReferenceError};
 use crate::sampling::optimise::Optimum;
 use serde::de::{DeserializeOwned, Error as _};
@@ -75,6 +75,9 @@ impl<'de> Deserialize<'de> for ReferenceRecord {
 pub struct FieldRecord {
     /// All parameters, those of the field among them; without a lifetime spots live for ever.
     pub parameters: BTreeMap<String, f64>,
+    /// Degree below which the spectrum of the spots is flat.
+    #[serde(default)]
+    pub spot_break_degree: f64,
     /// Scatter of the profiles' velocity zero points (km/s).
     pub velocity_jitter_kms: f64,
     /// ln of the evidence.
@@ -236,7 +239,7 @@ impl Origin {
                 (Density::Mapped(Box::new(posterior)), "lambda", then.lambda, now)
             }
             ReferenceRecord::Field(then) => {
-                let posterior = MarginalPosterior::new(imager, &space, values, then.velocity_jitter_kms)?;
+                let posterior = MarginalPosterior::new(imager, &space, values, then.held())?;
                 let now = posterior.reference_ln_evidence();
                 (Density::Integrated(Box::new(posterior)), "ln of the evidence", then.ln_evidence, now)
             }
@@ -341,12 +344,19 @@ impl ReferenceRecord {
 
 impl FieldRecord {
     fn of(posterior: &MarginalPosterior) -> Self {
+        let Held { break_degree, jitter_kms } = posterior.reference().assumed.held();
         FieldRecord {
             parameters: by_name(&posterior.reference().values),
-            velocity_jitter_kms: posterior.reference().assumed.jitter_kms,
+            spot_break_degree: break_degree,
+            velocity_jitter_kms: jitter_kms,
             ln_evidence: posterior.reference_ln_evidence(),
             data: posterior.imager().data.depth.len(),
         }
+    }
+
+    /// What is no parameter.
+    fn held(&self) -> Held {
+        Held { break_degree: self.spot_break_degree, jitter_kms: self.velocity_jitter_kms }
     }
 
     /// Parameters of the field that lie on a bound of its search.

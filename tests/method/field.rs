@@ -199,7 +199,7 @@ fn halved(values: &[f64]) -> Vec<f64> {
 
 fn field(oracle: &Value) -> Field {
     let of = |key| number(oracle, &["hyper", key]);
-    let spectrum = Spectrum { amplitude: of("amplitude"), slope: of("slope") };
+    let spectrum = Spectrum { amplitude: of("amplitude"), slope: of("slope"), break_degree: 0.0 };
     Field { spectrum, kernel: Kernel::of(Lifetime::Days(of("lifetime_d"))) }
 }
 

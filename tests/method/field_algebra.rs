@@ -26,7 +26,7 @@ pub struct Problem {
 }
 
 pub fn field(amplitude: f64, slope: f64, lifetime: Lifetime, persistent: f64) -> Field {
-    Field { spectrum: Spectrum { amplitude, slope }, kernel: Kernel { lifetime, persistent } }
+    Field { spectrum: Spectrum { amplitude, slope, break_degree: 0.0 }, kernel: Kernel { lifetime, persistent } }
 }
 
 impl Problem {

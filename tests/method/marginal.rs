@@ -3,7 +3,7 @@
 use dimcmc::internals::field::Lifetime;
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings, orbits};
 use dimcmc::internals::posterior::detection::{Detection, DetectionSettings, Evidence};
-use dimcmc::internals::posterior::marginal::{Basis, Change, Known, MarginalPosterior, fit};
+use dimcmc::internals::posterior::marginal::{Basis, Change, Held, Known, MarginalPosterior, fit};
 use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterValues, Prior};
 use dimcmc::{Config, Scene};
 use serde_json::json;
@@ -132,7 +132,7 @@ fn posterior(free: &[Parameter]) -> MarginalPosterior {
         },
     };
     let space = scene.space_of(&free.iter().map(|p| wide(*p)).collect::<Vec<_>>());
-    MarginalPosterior::new(scene.imager.clone(), &space, values, 0.0).unwrap()
+    MarginalPosterior::new(scene.imager.clone(), &space, values, Held { break_degree: 0.0, jitter_kms: 0.0 }).unwrap()
 }
 
 const ORBIT: [Parameter; 3] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];

@@ -29,7 +29,10 @@ fn planned_information_is_that_of_dense_algebra() {
     let scene = scene();
     let (imager, mut values) = (&scene.imager, scene.settings.values);
     values[Parameter::K] = 0.0;
-    let field = Field { spectrum: Spectrum { amplitude: 0.15, slope: 0.9 }, kernel: Kernel::of(Lifetime::Days(5.0)) };
+    let field = Field {
+        spectrum: Spectrum { amplitude: 0.15, slope: 0.9, break_degree: 0.0 },
+        kernel: Kernel::of(Lifetime::Days(5.0)),
+    };
     for jitter_kms in [0.0, 0.05] {
         let planned = Planned::new(imager, values, Assumed { field, jitter_kms }, &[], None);
         for maps in [planned.mean_maps(), planned.drawn_maps(4).unwrap()] {

@@ -18,6 +18,9 @@ use crate::posterior::objective::{Clock, Elements, FreeParameter, ObjectiveKind,
 use crate::star::{BrightnessModel, StarSettings};
 use std::path::Path;
 
+/// Largest degree of a break: harmonics go to 36.
+const MOST_BREAK_DEGREE: f64 = 30.0;
+
 /// Fewest and most pixels of an image or a simulated star.
 pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 
@@ -205,6 +208,15 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
 
 fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<(), Fault> {
     check_pixels("imaging.pixels", imaging.pixels)?;
+    if let Some(degree) = imaging.spot_break_degree {
+        let fault = |problem: String| Fault::new("imaging.spot_break_degree", problem);
+        if imaging.objective != ObjectiveKind::MarginalLikelihood {
+            return Err(fault("it has no meaning but with imaging.objective \"marginal-likelihood\"".into()));
+        }
+        if !(0.0..=MOST_BREAK_DEGREE).contains(&degree) {
+            return Err(fault(format!("{degree} must be from 0 to {MOST_BREAK_DEGREE}")));
+        }
+    }
     if !(imaging.default_spot > 0.0 && imaging.default_spot < 0.5) {
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));

@@ -162,6 +162,11 @@ pub struct ImagingSettings {
     /// (small spots) to 3 (large ones).
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_slope: Hyperparameter,
+    /// With objective "marginal-likelihood": degree of the harmonics below which the spots' power does not rise any
+    /// more, from 0 (a power law all the way) to 30. If not given, 0 or 7 (spots of 10 to 25 degrees, here and there),
+    /// whichever has the higher evidence; 0 with a number as `spot_slope`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spot_break_degree: Option<f64>,
     /// With objective "marginal-likelihood": how long spots live, from 0.3 to 3000 d, or "static".
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
     pub spot_lifetime_d: Hyperparameter,
@@ -184,6 +189,7 @@ impl Default for ImagingSettings {
             objective: ObjectiveKind::default(),
             spot_amplitude: Hyperparameter::Fitted,
             spot_slope: Hyperparameter::Fitted,
+            spot_break_degree: None,
             spot_lifetime_d: Hyperparameter::Fitted,
             unresolved_spots: UnresolvedSpots::default(),
             nuisances: None,
@@ -370,6 +376,7 @@ impl Settings {
         Known {
             amplitude: number(0, spot_amplitude),
             slope: number(1, spot_slope),
+            break_degree: self.imaging.spot_break_degree,
             lifetime: match spot_lifetime_d {
                 Hyperparameter::Static => Some(Lifetime::Static),
                 days => number(2, days).map(Lifetime::Days),

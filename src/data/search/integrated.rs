@@ -12,7 +12,7 @@ use crate::posterior::density::Density;
 use crate::posterior::detection::{Detection, DetectionSettings, Spots};
 use crate::posterior::expansion::nuisances;
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::{Basis, Fitted, Forecast, MarginalPosterior, fit};
+use crate::posterior::marginal::{Basis, Fitted, Forecast, Held, MarginalPosterior, fit};
 use crate::posterior::objective::{Elements, Parameter, ParameterSpace, ParameterValues, for_blind_search};
 use crate::posterior::surrogate::Surrogate;
 use crate::sampling::log_density::{Evaluation, LogDensity as _};
@@ -49,7 +49,7 @@ pub(super) fn find(
         Some((detection, start)) => (Some(Box::new(detection)), start),
         None => (None, None),
     };
-    let (mut theta, field, jitter_kms) = match start {
+    let (mut theta, field, held) = match start {
         Some(start) => start,
         None => without_search(imager, space, settings)?,
     };
@@ -58,7 +58,7 @@ pub(super) fn find(
     for _ in 0..MOST_ROUNDS {
         at(Stage::Reference);
         let values = space.clone().with_field_of(&field).values_at(&theta);
-        let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, jitter_kms) else { break };
+        let Ok(posterior) = MarginalPosterior::new(imager.clone(), space, values, held) else { break };
         let here = posterior.evaluate(&theta);
         // an expansion that has led astray: half of the way
         if let Some((before, height)) = &last
@@ -124,7 +124,7 @@ fn on_the_way(space: &ParameterSpace, from: &[f64], to: &[f64], share: f64) -> V
 }
 
 /// Where to begin: vector, field and jitter.
-type Start = (Vec<f64>, ParameterValues, f64);
+type Start = (Vec<f64>, ParameterValues, Held);
 
 /// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
 fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> Option<(Detection, Option<Start>)> {
@@ -175,7 +175,7 @@ fn blind(imager: &Imager, space: &ParameterSpace, settings: SearchSettings) -> O
     let mut theta = with_field(space, space.theta_of(&values), &values);
     // phi as its prior has it
     theta = space.to_physical(&space.to_sampling(&theta));
-    let start = space.log_prior(&theta).is_finite().then_some((theta, values, marginal.assumed.jitter_kms));
+    let start = space.log_prior(&theta).is_finite().then_some((theta, values, marginal.assumed.held()));
     Some((found, start))
 }
 
@@ -184,8 +184,8 @@ fn without_search(imager: &Imager, space: &ParameterSpace, settings: SearchSetti
     let basis = Basis::new(&imager.grid);
     let start = space.start();
     let fitted = fit(imager, &basis, without_planet(space, &start), settings.known, None)?;
-    let (field, jitter_kms) = (fitted.marginal.values, fitted.marginal.assumed.jitter_kms);
-    let first = MarginalPosterior::new(imager.clone(), space, field, jitter_kms)?;
+    let (field, held) = (fitted.marginal.values, fitted.marginal.assumed.held());
+    let first = MarginalPosterior::new(imager.clone(), space, field, held)?;
     // where the field is free its best values are the start
     let attempts = attempts(&first, &with_field(space, start, &field))?;
     let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
@@ -195,9 +195,9 @@ fn without_search(imager: &Imager, space: &ParameterSpace, settings: SearchSetti
     let with_orbit = first.space().values_at(&theta);
     Ok(match fit(imager, &basis, with_orbit, settings.known, Some(&fitted.marginal)) {
         Ok(Fitted { marginal, .. }) => {
-            (with_field(space, theta, &marginal.values), marginal.values, marginal.assumed.jitter_kms)
+            (with_field(space, theta, &marginal.values), marginal.values, marginal.assumed.held())
         }
-        Err(_) => (theta, field, jitter_kms),
+        Err(_) => (theta, field, held),
     })
 }
 

@@ -14,7 +14,16 @@ use std::sync::Arc;
 const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.0, 3.0), (0.3, 3000.0)];
 
 /// Where searches start: usual ones.
-const USUAL: [f64; 3] = [0.2, 0.9, 36.0];
+const USUAL: [f64; 3] = [0.2, 1.5, 36.0];
+
+/// Degree below which the spectrum of spots is flat: those of 10 to 25 deg, here and there.
+const BREAK_DEGREE: f64 = 7.0;
+
+/// Amplitude and slope of a spectrum without a break over those of one with it that is as good.
+const WITHOUT_BREAK: (f64, f64) = (1.2, 0.47);
+
+/// From so much lower in ln Z no climb makes good.
+const FAR_BELOW: f64 = 5.0;
 
 /// Bounds of a parameter of the field, in the units of its name.
 pub fn bounds(parameter: Parameter) -> (f64, f64) {
@@ -56,6 +65,8 @@ pub struct Known {
     pub amplitude: Option<f64>,
     /// Slope of the spectrum.
     pub slope: Option<f64>,
+    /// Degree below which the spectrum is flat; if it is not known, nor the slope, a fit takes the better one of 0 and 7.
+    pub break_degree: Option<f64>,
     /// Lifetime.
     pub lifetime: Option<Lifetime>,
     /// Velocity jitter (km/s).
@@ -72,16 +83,27 @@ impl Known {
         Known {
             amplitude: Some(field.spectrum.amplitude),
             slope: Some(field.spectrum.slope),
+            break_degree: Some(field.spectrum.break_degree),
             lifetime: Some(field.kernel.lifetime),
             jitter_kms: Some(jitter_kms),
             priors: [None; 3],
         }
     }
 
+    /// Degree below which the spectrum is flat where a search starts: a slope that is given is that of a power law all
+    /// the way, unless a break is given, too.
+    pub fn break_degree(&self) -> f64 {
+        self.break_degree.unwrap_or(if self.slope.is_some() { 0.0 } else { BREAK_DEGREE })
+    }
+
     /// The spectrum where a search starts.
     fn spectrum(&self) -> Spectrum {
         let usual = |i: usize| self.within(i, USUAL[i]);
-        Spectrum { amplitude: self.amplitude.unwrap_or(usual(0)), slope: self.slope.unwrap_or(usual(1)) }
+        Spectrum {
+            amplitude: self.amplitude.unwrap_or(usual(0)),
+            slope: self.slope.unwrap_or(usual(1)),
+            break_degree: self.break_degree(),
+        }
     }
 
     /// Bounds of amplitude, slope or lifetime: those of their prior, where there is one.
@@ -234,6 +256,9 @@ pub fn fit(
         }
     };
     let mut marginal = climb(first, &known, &at)?;
+    if near.is_none() && known.break_degree.is_none() && known.slope.is_none() {
+        marginal = with_or_without_break(marginal, &known, &at)?;
+    }
     if known.jitter_kms.is_none() {
         marginal = with_or_without_jitter(marginal, &known, &at)?;
     }
@@ -274,6 +299,28 @@ fn higher(best: Option<Found>, next: Found, known: &Known) -> Found {
     }
 }
 
+/// The fit with a spectrum that is a power law all the way in place of one with a break, where that is better.
+fn with_or_without_break(
+    fitted: Marginal,
+    known: &Known,
+    at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
+) -> Result<Marginal, FieldError> {
+    let mut assumed = fitted.assumed;
+    let spectrum = &mut assumed.field.spectrum;
+    spectrum.break_degree = 0.0;
+    if known.amplitude.is_none() {
+        spectrum.amplitude = known.within(0, WITHOUT_BREAK.0 * spectrum.amplitude);
+    }
+    spectrum.slope = known.within(1, WITHOUT_BREAK.1 * spectrum.slope);
+    match at(assumed, Some(&fitted)) {
+        Ok(other) if known.height(&other) > known.height(&fitted) - FAR_BELOW => {
+            let other = climb(other, known, at)?;
+            Ok(if known.height(&other) > known.height(&fitted) { other } else { fitted })
+        }
+        _ => Ok(fitted),
+    }
+}
+
 /// The fit with a jitter in place of one without, or the other way round, where that is better.
 fn with_or_without_jitter(
     fitted: Marginal,
@@ -305,7 +352,7 @@ fn assumed_at(place: Vector4<f64>, like: &Assumed) -> Assumed {
         Lifetime::Days(_) => Lifetime::Days(place[2].exp()),
     };
     let field = Field {
-        spectrum: Spectrum { amplitude: place[0].exp(), slope: place[1] },
+        spectrum: Spectrum { amplitude: place[0].exp(), slope: place[1], ..like.field.spectrum },
         kernel: Kernel { lifetime, ..like.field.kernel },
     };
     Assumed { field, jitter_kms: if like.jitter_kms == 0.0 { 0.0 } else { place[3].exp() } }

@@ -61,12 +61,27 @@ pub struct Assumed {
     pub jitter_kms: f64,
 }
 
+/// What is assumed and is no parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Held {
+    /// Degree below which the spectrum of the spots is flat.
+    pub break_degree: f64,
+    /// Scatter of the profiles' velocity zero points (km/s).
+    pub jitter_kms: f64,
+}
+
 impl Assumed {
-    /// The field among the parameters, beside a jitter.
-    pub fn of(values: &ParameterValues, jitter_kms: f64) -> Self {
-        let spectrum = Spectrum { amplitude: values[Parameter::SpotAmplitude], slope: values[Parameter::SpotSlope] };
+    /// The field among the parameters, beside what is no parameter.
+    pub fn of(values: &ParameterValues, Held { break_degree, jitter_kms }: Held) -> Self {
+        let (amplitude, slope) = (values[Parameter::SpotAmplitude], values[Parameter::SpotSlope]);
+        let spectrum = Spectrum { amplitude, slope, break_degree };
         let lifetime = values.given(Parameter::SpotLifetime).map_or(Lifetime::Static, Lifetime::Days);
         Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms }
+    }
+
+    /// What of it is no parameter.
+    pub fn held(&self) -> Held {
+        Held { break_degree: self.field.spectrum.break_degree, jitter_kms: self.jitter_kms }
     }
 
     /// `values` with this field among them.

@@ -5,7 +5,7 @@
 //! orbit is free ln Z is the quadratic of the reference. Where the field is free the maps are found anew, and the orbit
 //! is that of the quadratic around them. Where the star is free its profiles are made anew as well.
 
-use super::{Assumed, Basis, Design, Marginal};
+use super::{Assumed, Basis, Design, Held, Marginal};
 use crate::field::FieldError;
 use crate::posterior::expansion::{Expansion, STELLAR, free_stellar};
 use crate::posterior::imaging::Imager;
@@ -47,7 +47,7 @@ enum Anew {
 }
 
 impl MarginalPosterior {
-    /// The posterior of `space` around `values`, those of the field among them, and a velocity jitter. Maps are found
+    /// The posterior of `space` around `values`, those of the field among them. Maps are found
     /// from uniform ones: the same values give the same bytes.
     ///
     /// # Errors
@@ -56,11 +56,11 @@ impl MarginalPosterior {
         imager: Imager,
         space: &ParameterSpace,
         values: ParameterValues,
-        jitter_kms: f64,
+        held: Held,
     ) -> Result<Self, FieldError> {
         let basis = Arc::new(Basis::exact(&imager.grid));
         let design = Arc::new(Design::new(&imager, &basis, &values.state()));
-        let assumed = Assumed::of(&values, jitter_kms);
+        let assumed = Assumed::of(&values, held);
         let reference = Arc::new(Marginal::new(&imager, &basis, design, values, assumed, None)?);
         let velocities = Arc::new(reference.expansion(&imager, &basis, &[])?);
         let is_free = |what: &dyn Fn(Parameter) -> bool| space.free().iter().any(|f| what(f.parameter));
@@ -115,7 +115,7 @@ impl MarginalPosterior {
             }
             false => Arc::clone(&reference.design),
         };
-        let assumed = Assumed::of(&values, reference.assumed.jitter_kms);
+        let assumed = Assumed::of(&values, reference.assumed.held());
         Marginal::new(imager, basis, design, values, assumed, Some(reference))
     }
 

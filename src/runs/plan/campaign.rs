@@ -253,7 +253,11 @@ fn taken(config: &Config) -> Result<Taken, CampaignError> {
 /// A usual field, but for what is known.
 fn usual(known: Known) -> Assumed {
     let (amplitude, slope, lifetime_d) = USUAL;
-    let spectrum = Spectrum { amplitude: known.amplitude.unwrap_or(amplitude), slope: known.slope.unwrap_or(slope) };
+    let spectrum = Spectrum {
+        amplitude: known.amplitude.unwrap_or(amplitude),
+        slope: known.slope.unwrap_or(slope),
+        break_degree: known.break_degree(),
+    };
     let lifetime = known.lifetime.unwrap_or(Lifetime::Days(lifetime_d));
     Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms: known.jitter_kms.unwrap_or(0.0) }
 }

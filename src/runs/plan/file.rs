@@ -73,6 +73,9 @@ pub struct SpotsRecord {
     pub spot_amplitude: f64,
     /// Slope of the spectrum.
     pub spot_slope: f64,
+    /// Degree below which the spectrum is flat.
+    #[serde(default)]
+    pub spot_break_degree: f64,
     /// Lifetime (d); null for spots that do not change.
     pub spot_lifetime_d: Option<f64>,
     /// Scatter of the velocity zero points (km/s).
@@ -235,6 +238,7 @@ impl ScheduleRecord {
                 source: campaign.source,
                 spot_amplitude: spectrum.amplitude,
                 spot_slope: spectrum.slope,
+                spot_break_degree: spectrum.break_degree,
                 spot_lifetime_d: campaign.assumed.field.kernel.lifetime.days(),
                 velocity_jitter_kms: campaign.assumed.jitter_kms,
             },
@@ -252,7 +256,7 @@ impl ScheduleRecord {
 
     /// Spots, and what there is after more and more nights and at some periods.
     fn table(&self) -> String {
-        let SpotsRecord { source, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms } = self.spots;
+        let SpotsRecord { source, spot_amplitude, spot_slope, spot_lifetime_d, velocity_jitter_kms, .. } = self.spots;
         let lives = spot_lifetime_d.map_or("that do not change".into(), |d| format!("that live {d:.1} d"));
         let mut text = format!(
             "spots {lives}, amplitude {spot_amplitude:.2}, slope {spot_slope:.2} ({}); velocity jitter \

@@ -6,12 +6,13 @@ use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::quantities::QuantitiesRecord;
 use super::robustness::RobustnessRecord;
 use crate::data::evidence::EvidenceRecord;
+use crate::field::Field;
 use crate::numerics::json::number_or_null;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::posterior::marginal::{Change, Fitted, Known};
+use crate::posterior::marginal::{Assumed, Change, Fitted};
 use crate::posterior::objective::ParameterValues;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -69,6 +70,9 @@ pub struct FieldRecord {
     pub spot_amplitude: f64,
     /// Slope of its spectrum.
     pub spot_slope: f64,
+    /// Degree below which the spectrum is flat.
+    #[serde(default)]
+    pub spot_break_degree: f64,
     /// Lifetime (d); null for a star that does not change.
     pub spot_lifetime_d: Option<f64>,
     /// Velocity jitter (km/s).
@@ -82,12 +86,13 @@ pub struct FieldRecord {
 impl FieldRecord {
     /// Of a fit.
     pub fn of(fitted: &Fitted) -> Self {
-        let Known { amplitude, slope, lifetime, jitter_kms, .. } = Known::of(&fitted.marginal);
+        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
         FieldRecord {
-            spot_amplitude: amplitude.unwrap_or(f64::NAN),
-            spot_slope: slope.unwrap_or(f64::NAN),
-            spot_lifetime_d: lifetime.and_then(|lifetime| lifetime.days()),
-            velocity_jitter_kms: jitter_kms.unwrap_or(0.0),
+            spot_amplitude: spectrum.amplitude,
+            spot_slope: spectrum.slope,
+            spot_break_degree: spectrum.break_degree,
+            spot_lifetime_d: kernel.lifetime.days(),
+            velocity_jitter_kms: jitter_kms,
             ln_evidence: fitted.ln_evidence,
             at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
         }
