@@ -51,7 +51,7 @@ SIMULATOR = (
 COLUMNS = (
     "kind planet seed profiles true_k_kms true_porb_over_prot true_phi rotation_period_d inclination_deg vsini_kms "
     "lifetime_d false_alarm finding k_kms sigma_k_kms porb_over_prot sigma_porb_over_prot phi sigma_phi on_edge "
-    "median_sigma_k_kms amplitude slope fitted_lifetime_d jitter_kms at_bounds "
+    "median_sigma_k_kms amplitude slope break_degree fitted_lifetime_d jitter_kms at_bounds "
     "along_kms sigma_along_kms across_kms sigma_across_kms chi2_orbit k_there_kms sigma_k_there_kms phi_there "
     "sigma_phi_there seconds static_false_alarm static_finding static_k_kms static_sigma_k_kms static_porb_over_prot "
     "static_seconds season_d simulator ln_bayes_circle ln_bayes_ellipse ln_bayes_two_circles chi2_rv "
@@ -205,6 +205,7 @@ def searched(row, folder, args, static):
     for name in "k_kms sigma_k_kms porb_over_prot sigma_porb_over_prot phi sigma_phi on_edge".split():
         row[name] = best[name]
     row["amplitude"], row["slope"] = field["spot_amplitude"], field["spot_slope"]
+    row["break_degree"] = field["spot_break_degree"]
     row["fitted_lifetime_d"], row["jitter_kms"] = field["spot_lifetime_d"], field["velocity_jitter_kms"]
     row["at_bounds"] = " ".join(field["at_bounds"])
     for planets, factor in found["evidence"].items():

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
-use crate::data::config::{self, Settings};
+use crate::data::config::{self, DataSetSettings, Settings};
 use crate::data::io::truth::InjectedTruth;
 use crate::data::io::{atomic, lsd, truth};
 use crate::data::scene::Scene;
@@ -23,7 +23,8 @@ const CONFIG: &str = "config.json";
 /// white (half way between two bins, the worst case, 0.93 of its variance, with a correlation of 0.07 between
 /// neighbours); beyond the ends of a profile the continuum goes on flat. Stokes V and N are left out. Writes
 /// observations.txt and the profiles it lists, config.json (the config, for these profiles; its start is not the orbit
-/// put in) and truth.json. An orbit that the profiles have already adds up with it.
+/// put in) and truth.json; of several data sets the profiles of each go to a folder of its name. An orbit that the
+/// profiles have already adds up with it.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  dimcmc inject configs/demo.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.25 --out \
@@ -50,15 +51,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| name == CONFIG || lsd::is_written(name) || name == truth::FILE)?;
-    if scene.settings.sets.len() > 1 {
-        let problem = "several data sets: put the orbit into each of them, by a config with that one alone";
-        return Err(Failure::input(format!("{}: observations: {problem}", args.config.display())));
+    let several = scene.settings.sets.len() > 1;
+    let folder_of = |set: &DataSetSettings| if several { format!("{}/", set.name) } else { String::new() };
+    for set in &scene.settings.sets {
+        args.output.spare_below(&folder_of(set), &scene.files(), lsd::is_written)?;
     }
     let (whole, labels) = scene.whole()?;
     let orbit = orbit(args, &whole)?;
     let star = &scene.imager.star;
     let injected = inject(&whole, star, &[orbit]);
-    let text = config::to_text(&scene.settings.with_observations("observations.txt"));
+    let config = scene.settings.with_observations(|set| format!("{}observations.txt", folder_of(set)));
     let velocity_kms: Vec<f64> =
         whole.profiles.iter().map(|profile| orbit.velocity_kms(star.cycle(profile.time_d))).collect();
     let largest = velocity_kms.iter().map(|v| v.abs()).fold(0.0, f64::max);
@@ -70,16 +72,24 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         provenance: scene.provenance(),
     };
     let folder = args.output.create()?;
-    lsd::write_as(folder, &injected, &labels, "with an orbit put in")?;
+    for (s, set) in scene.settings.sets.iter().enumerate() {
+        let of_set = scene.imager.profiles_of(s);
+        let own = Observations { profiles: injected.profiles[of_set.clone()].to_vec() };
+        let folder = folder.join(folder_of(set));
+        let failed = |e| Failure::failed(format!("{}: cannot be created: {e}", folder.display()));
+        std::fs::create_dir_all(&folder).map_err(failed)?;
+        lsd::write_as(&folder, &own, &labels[of_set], "with an orbit put in")?;
+    }
     truth::write(folder, &truth)?;
-    atomic::write(&folder.join(CONFIG), text.as_bytes())?;
+    atomic::write(&folder.join(CONFIG), config::to_text(&config).as_bytes())?;
     let mut report = Report::default()
         .line("profiles", format!("{}, shifted by up to {largest:.4} km/s", labels.len()))
         .line("orbit", format!("K {} km/s, Porb/Prot {}, phi {}", orbit.k_kms, orbit.porb_over_prot, orbit.phi));
     for note in outside(&scene.settings, &orbit) {
         report = report.line("note", note);
     }
-    report.written(folder, format!("observations.txt, p000.prof ..., {CONFIG}, truth.json")).print();
+    let where_to = if several { "of each data set, in a folder of its name, " } else { "" };
+    report.written(folder, format!("{where_to}observations.txt, p000.prof ..., {CONFIG}, truth.json")).print();
     Ok(())
 }
 

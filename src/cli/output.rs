@@ -66,9 +66,14 @@ impl Output {
 
     /// That nothing which the command has read is replaced by what it `writes`, whatever the user says.
     pub fn spare(&self, read: &[PathBuf], writes: impl Fn(&str) -> bool) -> Result<(), Failure> {
+        self.spare_below("", read, writes)
+    }
+
+    /// The same of files in a folder `below` it.
+    pub fn spare_below(&self, below: &str, read: &[PathBuf], writes: impl Fn(&str) -> bool) -> Result<(), Failure> {
         let is_written = |file: &Path| file.file_name().is_some_and(|name| writes(&name.to_string_lossy()));
         let mut targets =
-            read.iter().filter(|file| is_written(file)).map(|file| (file, self.folder.join(name_of(file))));
+            read.iter().filter(|file| is_written(file)).map(|file| (file, self.folder.join(below).join(name_of(file))));
         match targets.find(|(file, target)| is_same(file, target)) {
             Some((file, _)) => Err(read_too(&self.folder, file)),
             None => Ok(()),

@@ -174,7 +174,7 @@ fn of_changing(fit: &ChangingFit) -> Vec<(&'static str, String)> {
     let times: Vec<String> = fit.maps.iter().map(|map| format!("{:.3}", map.time_d)).collect();
     let mut lines = vec![
         ("amplitude", format!("{:.4} (of the spot filling factor)", field.spot_amplitude)),
-        ("slope", format!("{:.3}{}", field.spot_slope, bound("spot_slope"))),
+        ("slope", format!("{:.3} ({}){}", field.spot_slope, field.spectrum(), bound("spot_slope"))),
         ("lifetime", format!("{lifetime}{}", bound("spot_lifetime_d"))),
         ("jitter", format!("{:.4} km/s", field.velocity_jitter_kms)),
         ("ln evidence", format!("{:.2}", field.ln_evidence)),

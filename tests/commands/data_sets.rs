@@ -1,6 +1,8 @@
 //! Several data sets in one config: two spectrographs in two seasons, a transit left out.
 
 use super::desk::{Desk, dimcmc, says, text};
+use dimcmc::Scene;
+use dimcmc::internals::star::observation::Profile;
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -12,7 +14,7 @@ fn two_sets() -> Value {
         "star": { "rotation_period_d": 3.0, "inclination_deg": 60.0, "vsini_kms": 22.0, "contrast": 0.3,
                   "line": { "sigma_kms": 3.0, "equivalent_width_kms": 6.0 } },
         "planet": { "k_kms": 0.15, "porb_over_prot": 1.7, "phi": 0.3 },
-        "imaging": { "pixels": 200, "objective": "marginal-likelihood" },
+        "imaging": { "pixels": 200, "objective": "marginal-likelihood", "spot_amplitude": 0.2, "spot_slope": 0.9 },
         "parameters": { "k_kms": { "prior": "uniform", "min": 0, "max": 1 }, "phi": { "prior": "periodic" } },
         "sampler": { "ensembles": 2, "walkers": 10, "steps": 2, "ess": 1e6 },
         "observations": [
@@ -64,6 +66,45 @@ fn two_spectrographs_from_files_to_a_chain() {
     says(&text(&sampled.stderr), &["blue: 1 of 7 left out"]);
     desk.succeed(&["report", "run"]);
     says(&desk.read("run/report.html"), &["blue: 6 profiles", "red: 7 profiles"]);
+}
+
+#[test]
+fn an_orbit_is_put_into_all_sets() {
+    let desk = Desk::new(two_sets());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let mut config = from_files(&two_sets());
+    config["observations"][0]["exclude"] = json!([[1.0, 1.2]]);
+    desk.write("star.json", &config.to_string());
+    let orbit = ["--k-kms", "0.7", "--porb-over-prot", "1.7", "--phi", "0.3"];
+    let said = desk.succeed(&[&["inject", "star.json", "--out", "injected"][..], &orbit].concat());
+    says(&said, &["13, shifted by up to 0.6"]);
+    // its start is not the orbit put in, and what the sets say of themselves stays
+    let written = desk.json("injected/config.json");
+    assert_eq!(written["planet"]["k_kms"], 0.15);
+    assert_eq!(written["observations"][1]["zero_point_kms"], "fitted");
+    assert_eq!(written["observations"][1]["path"], "red/observations.txt");
+    // first moments have the noise of each profile, and what the ends of its window cut off
+    let (before, after) = (mean_velocities(&desk, "star.json"), mean_velocities(&desk, "injected/config.json"));
+    let truth = desk.json("injected/truth.json");
+    for (k, (before, after)) in before.iter().zip(&after).enumerate() {
+        let velocity = truth["velocity_kms"][k].as_f64().unwrap();
+        assert!((after - before - velocity).abs() < 0.1, "{k}: {before} {after} {velocity}");
+    }
+    let over_itself = [&["inject", "star.json", "--force", "--out", "data"][..], &orbit].concat();
+    says(&desk.refusal(&over_itself), &["data"]);
+    desk.succeed(&["plot", "injected"]);
+}
+
+/// First moments of all profiles of a config (km/s).
+fn mean_velocities(desk: &Desk, config: &str) -> Vec<f64> {
+    let scene = Scene::load(&desk.path(config)).unwrap();
+    let moment = |profile: &Profile| {
+        let depths = profile.intensity.iter().map(|intensity| 1.0 - intensity);
+        let velocity = |j: usize| profile.first_velocity_kms + j as f64 * profile.step_kms;
+        let (sum, moved) = depths.enumerate().fold((0.0, 0.0), |(s, m), (j, d)| (s + d, m + d * velocity(j)));
+        moved / sum
+    };
+    scene.observations.profiles.iter().map(moment).collect()
 }
 
 #[test]

@@ -321,23 +321,22 @@ impl Settings {
         Ok(())
     }
 
-    /// The config, of one data set, with other observations in place of its own, those of a list at `path`; cut and
+    /// The config with other observations in place of its own, those of each data set in a list at `path_of` it; cut and
     /// errors of observed ones stay.
-    pub fn with_observations(&self, path: &str) -> serde_json::Value {
+    pub fn with_observations(&self, path_of: impl Fn(&DataSetSettings) -> String) -> serde_json::Value {
         let mut config = self.resolved.clone();
         if let Some(top) = config.as_object_mut() {
             top.remove("$schema");
         }
         self.with_light_curves_from_here(&mut config);
-        let section = &mut config["observations"];
-        match section.as_object_mut().filter(|section| !section.contains_key("simulate")) {
-            Some(section) => {
-                section.insert("path".into(), path.into());
-            }
-            None => {
-                let jitter = section.get("velocity_jitter_kms").cloned();
-                *section = serde_json::json!({ "path": path });
-                jitter.into_iter().for_each(|jitter| section["velocity_jitter_kms"] = jitter);
+        let sections = match &mut config["observations"] {
+            serde_json::Value::Array(sections) => sections.iter_mut().collect(),
+            one => vec![one],
+        };
+        for (section, set) in sections.into_iter().zip(&self.sets) {
+            if let Some(section) = section.as_object_mut() {
+                section.remove("simulate");
+                section.insert("path".into(), path_of(set).into());
             }
         }
         config

@@ -15,6 +15,7 @@ pub(super) fn chapter(file: &ChangingFitFile) -> Chapter {
     let rows = [
         ("amplitude of the spot filling factor", number(field.spot_amplitude, 4)),
         ("slope of its spectrum", number(field.spot_slope, 3) + bound("spot_slope")),
+        ("degree below which that is flat", number(field.spot_break_degree, 1)),
         ("lifetime of the spots (d)", lifetime + bound("spot_lifetime_d")),
         ("velocity jitter (km/s)", number(field.velocity_jitter_kms, 4)),
         ("ln of the evidence", number(field.ln_evidence, 2)),

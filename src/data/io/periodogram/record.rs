@@ -98,13 +98,19 @@ impl FieldRecord {
         }
     }
 
+    /// Shape of the spectrum in words.
+    pub fn spectrum(&self) -> &'static str {
+        if self.spot_break_degree > 0.0 { "flat at low degrees" } else { "a power law" }
+    }
+
     /// It in a line.
     pub fn line(&self) -> String {
         let FieldRecord { spot_amplitude, spot_slope, velocity_jitter_kms, ln_evidence, .. } = self;
         let life = self.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2} d"));
         format!(
-            "spots, integrated over: amplitude {spot_amplitude:.3}, slope {spot_slope:.2}, lifetime {life}; velocity \
-            jitter {velocity_jitter_kms:.3} km/s; ln of the evidence {ln_evidence:.1}\n"
+            "spots, integrated over: amplitude {spot_amplitude:.3}, slope {spot_slope:.2} ({}), lifetime {life}; \
+            velocity jitter {velocity_jitter_kms:.3} km/s; ln of the evidence {ln_evidence:.1}\n",
+            self.spectrum()
         )
     }
 }
