@@ -21,7 +21,7 @@ pub struct Sought<'a> {
     pub field: Field,
     /// Degree of each coefficient (H).
     pub degrees: &'a [usize],
-    /// Harmonics (H, points) of the points at which changes of the field are watched: some hundred.
+    /// Harmonics (points, H) of the points at which changes of the field are watched: some hundred.
     pub watched: &'a DMatrix<f64>,
 }
 
@@ -100,7 +100,7 @@ pub fn settle(
         }
         let step = by.step(&sought.field, &coefficients, &pulled);
         steps[0] += 1;
-        changes = [changes[1], sought.watched.tr_mul(&step).amax()];
+        changes = [changes[1], (sought.watched * &step).amax()];
         if !changes[1].is_finite() {
             break;
         }

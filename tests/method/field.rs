@@ -40,7 +40,7 @@ struct Star {
     profiles: Vec<Observed>,
     views: Vec<View>,
     degrees: Vec<usize>,
-    /// Harmonics (H, points) at which changes are watched.
+    /// Harmonics (points, H) at which changes are watched.
     watched: DMatrix<f64>,
 }
 
@@ -110,7 +110,7 @@ impl Star {
             profiles,
             views,
             degrees: harmonics.degrees(),
-            watched: basis.columns_with_step(0, pixels.len().div_ceil(37), 36).into_owned(),
+            watched: basis.columns_with_step(0, pixels.len().div_ceil(37), 36).transpose(),
         }
     }
 

@@ -28,7 +28,7 @@ fn the_most_probable_field_is_where_its_gradient_vanishes() {
 }
 
 fn check_settled(problem: &Problem) {
-    let watched = some(7, 15, 20);
+    let watched = some(7, 20, 15);
     let sought = Sought { field: problem.field, degrees: &problem.degrees, watched: &watched };
     let start = DMatrix::zeros(15, 5);
     let settings = Settling { tolerance: 1e-11, ..Settling::default() };

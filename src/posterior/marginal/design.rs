@@ -20,7 +20,7 @@ pub struct Basis {
     pub degrees: Vec<usize>,
     /// The harmonics (pixels, H).
     pub on_pixels: DMatrix<f64>,
-    /// The harmonics (H, points) where changes of the maps are watched.
+    /// The harmonics (points, H) where changes of the maps are watched.
     pub(super) watched: DMatrix<f64>,
     /// How exactly maps are found.
     pub(super) settling: Settling,
@@ -37,7 +37,7 @@ impl Basis {
         let watched: Vec<usize> = (0..grid.len()).step_by(each).collect();
         Basis {
             degrees: harmonics.degrees(),
-            watched: on_pixels.select_columns(&watched),
+            watched: on_pixels.select_columns(&watched).transpose(),
             on_pixels: on_pixels.transpose(),
             settling: Settling { tolerance: 1e-3, ..Settling::default() },
             jittered: 1,
