@@ -87,7 +87,7 @@ def one(number, objective, simulator, args):
     if done.returncode:
         return line | {"error": done.stderr.strip().splitlines()[-1][:200]}
     found = json.loads((out / "optimum.json").read_text())
-    line |= {"well_defined": found["well_defined"], "log_prob": found["log_prob"]}
+    line |= {"well_defined": found["well_defined"] and found["converged"], "log_prob": found["log_prob"]}
     for name in FREE:
         line[f"best_{name}"], line[f"sd_{name}"] = found["parameters"][name], found["sd"][name]
     return line

@@ -64,7 +64,8 @@ pub struct Settled {
 ///
 /// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
 /// left of the way is an error of ln Z (`docs/method.md` section 9). How many numbers of an epoch the field explains
-/// (`tilt`) is found with the first covariance that is made, or is as nearby; ln Z depends on it to second order only.
+/// (`tilt`) is found with each covariance that is made, or is as nearby; ln Z depends on it to second order only. The
+/// first covariance alone will not do: far from the answer it is off by 2 in ln Z.
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].
@@ -88,10 +89,9 @@ pub fn settle(
             Some(earlier) => earlier,
             None => {
                 steps[1] += 1;
-                let explained = last.as_ref().and_then(Evidence::explained);
                 // of many profiles each is hundreds of megabytes
                 last = None;
-                last.insert(evidence(&epochs, &coefficients, explained)?)
+                last.insert(evidence(&epochs, &coefficients, None)?)
             }
         };
         let mut pulled = pulled(&epochs)?;

@@ -119,7 +119,9 @@ fn a_zero_point_that_is_not_known_is_found_and_held() {
     let whole = both.whole().unwrap().0;
     let injected = both.injected(&whole, &[]).unwrap();
     assert_eq!(injected.settings.sets[1].held, both.settings.sets[1].held);
-    assert_eq!(injected.imager.sets, both.imager.sets);
+    let firsts = |scene: &Scene| scene.imager.profiles().map(|profile| profile.1).collect::<Vec<f64>>();
+    // held in one step rather than in several
+    assert!(firsts(&injected).iter().zip(firsts(&both)).all(|(a, b)| (a - b).abs() < 1e-12));
     // of a night left out, sets and zero points stay in their places
     let second = both.imager.without(&(0..8).collect::<Vec<_>>());
     assert_eq!((second.sets.len(), second.zero_points[0].set), (1, 0));

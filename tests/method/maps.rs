@@ -144,7 +144,7 @@ fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
 #[test]
 fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
     // profiles of a faster star: no spots explain them
-    let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 32.0).with("observations.simulate.snr", 5000.0);
+    let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 40.0).with("observations.simulate.snr", 5000.0);
     let scene = with_profiles(Scene::new(&other).unwrap().observations, 0.0);
     let status = |times: Option<&[f64]>| scene.changing_maps(times).map(|_| ()).map_err(|error| error.status());
     assert_eq!(status(None), Err("not-settled"));
@@ -152,4 +152,8 @@ fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
         assert_eq!(status(Some(times)), Err("no-such-times"), "{times:?}");
     }
     assert!(matches!(scene.changing_maps(Some(&[])), Err(NoField::Times(_))));
+    // of one that is less fast maps are found, and said to be no good
+    let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 32.0).with("observations.simulate.snr", 5000.0);
+    let fit = with_profiles(Scene::new(&other).unwrap().observations, 0.0).changing_maps(None).unwrap();
+    assert!(fit.warnings.iter().any(|warning| warning.contains("do not explain the profiles")), "{:?}", fit.warnings);
 }

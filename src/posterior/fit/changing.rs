@@ -19,6 +19,9 @@ use std::sync::Arc;
 /// Profiles further apart than this (d) have maps of their own.
 const NIGHT_GAP_D: f64 = 0.5;
 
+/// Maps of a larger chi2 per datum do not explain the profiles: those of a right star and right errors have some 0.9.
+const WORST_CHI2: f64 = 2.0;
+
 /// Maps of a star that may change, and what they make of the data.
 #[derive(Clone, Debug)]
 pub struct ChangingFit {
@@ -197,6 +200,13 @@ impl ChangingFit {
         warnings.extend(far(&times_d, observations, &marginal.assumed.field.kernel));
         let velocities = velocities(imager, &basis, observations, marginal, &modelled).map_err(NoFit::from)?;
         let mut summary = summarise(imager, observations, &marginal.values, &residuals, &velocities);
+        if summary.chi2_per_datum > WORST_CHI2 {
+            warnings.push(format!(
+                "the maps do not explain the profiles: chi2 is {:.2} per datum. star.vsini_kms, star.line or the errors \
+                are wrong; observations.sigma_scale \"auto\" measures these",
+                summary.chi2_per_datum
+            ));
+        }
         summary.chi2_per_datum_unchanging =
             unchanging.as_ref().map(|modelled| chi2(&super::residuals(observations, &modelled.depths())).0);
         let counted = |counted: bool| modelled.estimates.iter().filter(move |_| counted);
