@@ -23,8 +23,8 @@ const CONFIG: &str = "config.json";
 /// white (half way between two bins, the worst case, 0.93 of its variance, with a correlation of 0.07 between
 /// neighbours); beyond the ends of a profile the continuum goes on flat. Stokes V and N are left out. Writes
 /// observations.txt and the profiles it lists, config.json (the config, for these profiles; its start is not the orbit
-/// put in) and truth.json; of several data sets the profiles of each go to a folder of its name. An orbit that the
-/// profiles have already adds up with it.
+/// put in) and truth.json; of several data sets profiles and truth.json of each go to a folder of its name. An orbit
+/// that the profiles have already adds up with it.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  dimcmc inject configs/demo.json --k-kms 0.2 --porb-over-prot 2.6 --phi 0.25 --out \
@@ -64,13 +64,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let velocity_kms: Vec<f64> =
         whole.profiles.iter().map(|profile| orbit.velocity_kms(star.cycle(profile.time_d))).collect();
     let largest = velocity_kms.iter().map(|v| v.abs()).fold(0.0, f64::max);
-    let truth = InjectedTruth {
-        injected: orbit,
-        before: scene.truth,
-        times_d: whole.times_d(),
-        velocity_kms,
-        provenance: scene.provenance(),
-    };
     let folder = args.output.create()?;
     for (s, set) in scene.settings.sets.iter().enumerate() {
         let of_set = scene.imager.profiles_of(s);
@@ -78,9 +71,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let folder = folder.join(folder_of(set));
         let failed = |e| Failure::failed(format!("{}: cannot be created: {e}", folder.display()));
         std::fs::create_dir_all(&folder).map_err(failed)?;
-        lsd::write_as(&folder, &own, &labels[of_set], "with an orbit put in")?;
+        lsd::write_as(&folder, &own, &labels[of_set.clone()], "with an orbit put in")?;
+        let truth = InjectedTruth {
+            injected: orbit,
+            before: scene.truth,
+            times_d: own.times_d(),
+            velocity_kms: velocity_kms[of_set].to_vec(),
+            provenance: scene.provenance(),
+        };
+        truth::write(&folder, &truth)?;
     }
-    truth::write(folder, &truth)?;
     atomic::write(&folder.join(CONFIG), config::to_text(&config).as_bytes())?;
     let mut report = Report::default()
         .line("profiles", format!("{}, shifted by up to {largest:.4} km/s", labels.len()))
@@ -88,8 +88,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     for note in outside(&scene.settings, &orbit) {
         report = report.line("note", note);
     }
-    let where_to = if several { "of each data set, in a folder of its name, " } else { "" };
-    report.written(folder, format!("{where_to}observations.txt, p000.prof ..., {CONFIG}, truth.json")).print();
+    let where_to = if several { " of each data set in a folder of its name" } else { "" };
+    report.written(folder, format!("{CONFIG}, observations.txt, p000.prof ... and truth.json{where_to}")).print();
     Ok(())
 }
 
