@@ -1,6 +1,6 @@
 //! How much of the field each degree of its spherical harmonics holds (`docs/method.md` section 9):
-//! `S_l = amplitude^2 [b(b+1) + l(l+1)]^-slope / norm` with a break at degree b, the norm such that the variances of all
-//! coefficients sum to amplitude^2.
+//! `S_l = amplitude^2 [b(b+1) + l(l+1)]^-slope / norm` with a break at degree b, the norm such that the variances of
+//! all coefficients sum to amplitude^2.
 //!
 //! With harmonics of unit mean square that sum is the variance of the field, the same at every point of the sphere.
 

@@ -321,8 +321,8 @@ impl Settings {
         Ok(())
     }
 
-    /// The config with other observations in place of its own, those of each data set in a list at `path_of` it; cut and
-    /// errors of observed ones stay.
+    /// The config with other observations in place of its own, those of each data set in a list at `path_of` it; cut
+    /// and errors of observed ones stay.
     pub fn with_observations(&self, path_of: impl Fn(&DataSetSettings) -> String) -> serde_json::Value {
         let mut config = self.resolved.clone();
         if let Some(top) = config.as_object_mut() {

@@ -202,8 +202,8 @@ impl ChangingFit {
         let mut summary = summarise(imager, observations, &marginal.values, &residuals, &velocities);
         if summary.chi2_per_datum > WORST_CHI2 {
             warnings.push(format!(
-                "the maps do not explain the profiles: chi2 is {:.2} per datum. star.vsini_kms, star.line or the errors \
-                are wrong; observations.sigma_scale \"auto\" measures these",
+                "the maps do not explain the profiles: chi2 is {:.2} per datum. star.vsini_kms, star.line or the \
+                errors are wrong; observations.sigma_scale \"auto\" measures these",
                 summary.chi2_per_datum
             ));
         }

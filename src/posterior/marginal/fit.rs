@@ -65,7 +65,8 @@ pub struct Known {
     pub amplitude: Option<f64>,
     /// Slope of the spectrum.
     pub slope: Option<f64>,
-    /// Degree below which the spectrum is flat; if it is not known, nor the slope, a fit takes the better one of 0 and 7.
+    /// Degree below which the spectrum is flat; if neither it nor the slope is known, a fit takes the better one of 0
+    /// and 7.
     pub break_degree: Option<f64>,
     /// Lifetime.
     pub lifetime: Option<Lifetime>,
