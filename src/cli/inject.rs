@@ -50,11 +50,12 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
     let scene = Scene::load(&args.config)?;
-    args.output.spare(&scene.files(), |name| name == CONFIG || lsd::is_written(name) || name == truth::FILE)?;
+    args.output.spare(&scene.files(), |name| name == CONFIG)?;
     let several = scene.settings.sets.len() > 1;
     let folder_of = |set: &DataSetSettings| if several { format!("{}/", set.name) } else { String::new() };
     for set in &scene.settings.sets {
-        args.output.spare_below(&folder_of(set), &scene.files(), lsd::is_written)?;
+        args.output
+            .spare_below(&folder_of(set), &scene.files(), |name| lsd::is_written(name) || name == truth::FILE)?;
     }
     let (whole, labels) = scene.whole()?;
     let orbit = orbit(args, &whole)?;

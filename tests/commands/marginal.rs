@@ -88,6 +88,11 @@ fn what_has_no_meaning_is_refused() {
         },
         &["imaging.spot_lifetime_d", "static"],
     );
+    refused(&|config| config["imaging"]["spot_break_degree"] = json!(31), &["imaging.spot_break_degree", "0 to 30"]);
+    refused(
+        &|config| config["imaging"] = json!({ "pixels": 200, "spot_break_degree": 7 }),
+        &["imaging.spot_break_degree", "marginal-likelihood"],
+    );
     refused(&|config| config["imaging"]["spot_amplitude"] = json!("static"), &["imaging.spot_amplitude"]);
     refused(&|config| config["imaging"]["spot_amplitude"] = json!(7), &["imaging.spot_amplitude", "0.01 to 1.5"]);
     refused(

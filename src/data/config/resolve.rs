@@ -21,6 +21,9 @@ use std::path::Path;
 /// Largest degree of a break: harmonics go to 36.
 const MOST_BREAK_DEGREE: f64 = 30.0;
 
+/// What is said of spots where one map is found.
+const OF_INTEGRATED_MAPS: &str = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
+
 /// Fewest and most pixels of an image or a simulated star.
 pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 
@@ -176,8 +179,7 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
         let prior = raw.parameters.slot(parameter).is_some();
         let wanted = [(prior, "parameters"), (axis, "grid.axes"), (!given.is_default(), "imaging")];
         if let Some((_, section)) = wanted.into_iter().find(|(is_there, _)| *is_there && !integrated) {
-            let problem = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
-            return Err(Fault::new(format!("{section}.{name}"), problem));
+            return Err(Fault::new(format!("{section}.{name}"), OF_INTEGRATED_MAPS));
         }
         match given {
             _ if !integrated => {}
@@ -209,12 +211,12 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
 fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<(), Fault> {
     check_pixels("imaging.pixels", imaging.pixels)?;
     if let Some(degree) = imaging.spot_break_degree {
-        let fault = |problem: String| Fault::new("imaging.spot_break_degree", problem);
+        const KEY: &str = "imaging.spot_break_degree";
         if imaging.objective != ObjectiveKind::MarginalLikelihood {
-            return Err(fault("it has no meaning but with imaging.objective \"marginal-likelihood\"".into()));
+            return Err(Fault::new(KEY, OF_INTEGRATED_MAPS));
         }
         if !(0.0..=MOST_BREAK_DEGREE).contains(&degree) {
-            return Err(fault(format!("{degree} must be from 0 to {MOST_BREAK_DEGREE}")));
+            return Err(Fault::new(KEY, format!("{degree} must be from 0 to {MOST_BREAK_DEGREE}")));
         }
     }
     if !(imaging.default_spot > 0.0 && imaging.default_spot < 0.5) {

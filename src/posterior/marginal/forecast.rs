@@ -4,7 +4,7 @@
 //! Second derivatives in velocities and star are those of the model linearised at the most probable maps. Those maps
 //! follow the field, and the determinant follows them: what concerns the field, and the slopes and second derivatives
 //! along each of the star's parameters, are differences of ln Z with its maps found anew. Where spots change these are
-//! smaller than those of the linearised model, along rotation and shear by factors of 1.3 to 30.
+//! smaller than those of the linearised model, along rotation and shear by factors of 1.4 to 30.
 
 use super::{Marginal, MarginalPosterior};
 use crate::field::FieldError;
@@ -96,12 +96,11 @@ impl MarginalPosterior {
             // what ln Z itself has along the parameter, its correlations as they are
             let bend = (2.0 * own.log_likelihood - above - below) / h.powi(2);
             let linear = information[(at, at)];
-            if linear <= 0.0 {
-                continue;
+            if linear > 0.0 {
+                let factor = (bend / linear).clamp(LEAST_BEND, MOST_BEND).sqrt();
+                information.column_mut(at).scale_mut(factor);
+                information.row_mut(at).scale_mut(factor);
             }
-            let factor = (bend / linear).clamp(LEAST_BEND, MOST_BEND).sqrt();
-            information.column_mut(at).scale_mut(factor);
-            information.row_mut(at).scale_mut(factor);
         }
         for (q, p) in field.iter().enumerate() {
             self.close(*p, known + q, &mut information);

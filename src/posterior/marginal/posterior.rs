@@ -47,8 +47,8 @@ enum Anew {
 }
 
 impl MarginalPosterior {
-    /// The posterior of `space` around `values`, those of the field among them. Maps are found
-    /// from uniform ones: the same values give the same bytes.
+    /// The posterior of `space` around `values`, those of the field among them. Maps are found from uniform ones: the
+    /// same values give the same bytes.
     ///
     /// # Errors
     /// [`FieldError`], where there is no reference.
