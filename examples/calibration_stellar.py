@@ -7,16 +7,17 @@
 Stars of random geometry as in calibration_changing.py (inclination 20 to 75 degrees, vsini 15 to 70 km/s, lifetimes of
 7 d to for ever), with a planet. Orbit, rotation, shear, inclination, vsini and the field are free; the search begins at
 values that are off: inclination by up to 15 degrees, vsini by up to 1 km/s, the rate of rotation by up to 0.3 %.
-`dimcmc optimise` gives best values with errors by the curvature. Where no single map comes down to the usual chi2 the
-target is set above what it comes down to, as a user would. A line a star and objective goes to
-results/calibration/stellar.csv; the script can be stopped, and goes on. The second command writes
-results/calibration-stellar.md. Needs numpy.
+Best values have errors by the curvature; with `--steps` a short chain of integrated maps follows, most of whose moves
+are independent draws, so that a few hundred are enough. Where no single map comes down to the usual chi2 the target is
+set above what it comes down to, as a user would. A line a star and objective goes to results/calibration/stellar.csv;
+the script can be stopped, and goes on. The second command writes results/calibration-stellar.md. Needs numpy.
 """
 
 import argparse
 import json
 import math
 import re
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -31,6 +32,11 @@ FREE = ("inclination_deg", "vsini_kms", "omega_eq_rad_d", "domega_rad_d", "k_kms
 COLUMNS = ["seed", "simulator", "objective", "lifetime_d", "well_defined", "log_prob", "seconds", "error"]
 COLUMNS += ["chi2_target"]
 COLUMNS += [f"{prefix}{name}" for name in FREE for prefix in ("true_", "best_", "sd_")]
+# of chains: the share of draws below the true value, and the standard deviation of draws
+TOLD = ("inclination_deg", "vsini_kms", "omega_eq_rad_d", "domega_rad_d", "k_kms")
+COLUMNS += ["draws", "accepted", *(f"{prefix}{name}" for name in TOLD for prefix in ("below_", "spread_"))]
+# the chain's first steps are left out
+BURN_IN, ENSEMBLES, WALKERS = 2, 2, 20
 
 
 # where the target of chi2 is out of reach it becomes this many times what a map comes down to
@@ -62,6 +68,17 @@ def config(truth, folder, objective, seed):
     return found
 
 
+def of_chain(out, truth):
+    """What the table has of a chain."""
+    draws = [json.loads(line) for line in (out / "chain.jsonl").read_text().splitlines()]
+    draws = [draw for draw in draws if draw["step"] >= BURN_IN]
+    line = {"draws": len(draws), "accepted": round(np.mean([draw["accepted"] for draw in draws]), 3)}
+    for name in TOLD:
+        of = np.array([draw[name] for draw in draws])
+        line |= {f"below_{name}": round(np.mean(of < truth[name]), 4), f"spread_{name}": f"{np.std(of):.6g}"}
+    return line
+
+
 def one(number, objective, simulator, args):
     row, options = calibration_changing.star("geometry", number, 1)
     folder = args.work / f"geometry-{row['seed']}"
@@ -76,9 +93,14 @@ def one(number, objective, simulator, args):
     path, out = folder / f"stellar-{objective}.json", folder / f"stellar-{objective}"
     asked = config(truth, folder, objective, row["seed"])
     began = time.monotonic()
+    sampled = args.steps > 0 and objective == OBJECTIVES[0]
+    if sampled:
+        asked["sampler"] = {"ensembles": ENSEMBLES, "walkers": WALKERS, "steps": args.steps}
+        shutil.rmtree(out, ignore_errors=True)
+    command = ["sample"] if sampled else ["optimise", "--force"]
     while True:
         path.write_text(json.dumps(asked))
-        done = subprocess.run([args.program, "optimise", path, "--out", out, "--force"], capture_output=True, text=True)
+        done = subprocess.run([args.program, *command, path, "--out", out], capture_output=True, text=True)
         floor = re.search(r"comes down to ([0-9.]+) per datum", done.stderr)
         if not done.returncode or not floor or "chi2_target" in asked["imaging"]:
             break
@@ -86,8 +108,13 @@ def one(number, objective, simulator, args):
     line["seconds"] = round(time.monotonic() - began, 1)
     if done.returncode:
         return line | {"error": done.stderr.strip().splitlines()[-1][:200]}
-    found = json.loads((out / "optimum.json").read_text())
-    line |= {"well_defined": found["well_defined"] and found["converged"], "log_prob": found["log_prob"]}
+    if sampled:
+        found = json.loads((out / "manifest.json").read_text())["optimum"]
+        line |= of_chain(out, truth)
+    else:
+        found = json.loads((out / "optimum.json").read_text())
+        line["well_defined"] = found["well_defined"] and found["converged"]
+    line["log_prob"] = found["log_prob"]
     for name in FREE:
         line[f"best_{name}"], line[f"sd_{name}"] = found["parameters"][name], found["sd"][name]
     return line
@@ -96,7 +123,7 @@ def one(number, objective, simulator, args):
 def run(args):
     args.work.mkdir(parents=True, exist_ok=True)
     done = {(row["seed"], row["objective"]) for row in calibration_table.resumed(args.csv)}
-    for number in range(args.stars):
+    for number in range(args.first, args.stars):
         simulator = args.simulator[number % len(args.simulator)]
         for objective in args.objective or OBJECTIVES:
             seed = calibration_changing.star("geometry", number, 1)[0]["seed"]
@@ -139,6 +166,8 @@ if __name__ == "__main__":
     parser.add_argument("--program", help="dimcmc")
     parser.add_argument("--objective", action="append", choices=OBJECTIVES, help="both if not given")
     parser.add_argument("--stars", type=int, default=40)
+    parser.add_argument("--first", type=int, default=0, help="number of the first star, for a share of the work")
+    parser.add_argument("--steps", type=int, default=0, help="of a chain of integrated maps; none if 0")
     parser.add_argument("--work", type=Path, default=Path("target/calibration-changing"), help="folder of the stars")
     parser.add_argument("--csv", type=Path, default=Path("results/calibration/stellar.csv"))
     parser.add_argument("--out", type=Path, default=Path("results/calibration-stellar.md"))

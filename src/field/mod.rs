@@ -47,6 +47,7 @@ pub use evidence::Evidence;
 pub use harmonics::Harmonics;
 pub use kernel::{Kernel, Lifetime};
 pub use quadratic::Quadratic;
+pub(crate) use settle::approach;
 pub use settle::{Settled, Settling, Sought, settle};
 pub use spectrum::Spectrum;
 

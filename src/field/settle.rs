@@ -70,20 +70,47 @@ pub struct Settled {
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].
 pub fn settle(
-    mut linearise: impl FnMut(&DMatrix<f64>) -> Vec<Epoch>,
+    linearise: impl FnMut(&DMatrix<f64>) -> Vec<Epoch>,
     sought: Sought,
     start: DMatrix<f64>,
     nearby: Option<&Evidence>,
     settings: &Settling,
 ) -> Result<Settled, FieldError> {
+    let Way { coefficients, epochs, last, steps, change } = approach(linearise, sought, start, nearby, settings)?;
+    let explained = last.as_ref().or(nearby).and_then(Evidence::explained);
+    drop(last);
+    let evidence = sought.evidence((&epochs, &coefficients), settings, explained)?;
+    Ok(Settled { coefficients, evidence, steps, change })
+}
+
+/// The way to the most probable field.
+pub(crate) struct Way {
+    /// Where it ends: coefficients of the field (H, epochs).
+    pub coefficients: DMatrix<f64>,
+    /// The epochs made linear there.
+    epochs: Vec<Epoch>,
+    /// The last evidence that was made on it, beside its end; `None` if that nearby was enough.
+    pub last: Option<Evidence>,
+    steps: [usize; 2],
+    change: f64,
+}
+
+/// The same without the evidence at the end.
+///
+/// # Errors
+/// As there.
+pub(crate) fn approach(
+    mut linearise: impl FnMut(&DMatrix<f64>) -> Vec<Epoch>,
+    sought: Sought,
+    start: DMatrix<f64>,
+    nearby: Option<&Evidence>,
+    settings: &Settling,
+) -> Result<Way, FieldError> {
     let mut coefficients = start;
     let mut epochs = linearise(&coefficients);
     let mut changes = [f64::INFINITY; 2];
     let mut last: Option<Evidence> = None;
     let mut steps = [0; 2];
-    let evidence = |epochs: &[Epoch], around: &DMatrix<f64>, explained: Option<Vec<f64>>| {
-        Evidence::of(sought.field, sought.degrees, (epochs, around), settings.compression, explained)
-    };
     while steps[0] < settings.steps {
         let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || converges(changes)) {
             Some(earlier) => earlier,
@@ -91,7 +118,7 @@ pub fn settle(
                 steps[1] += 1;
                 // of many profiles each is hundreds of megabytes
                 last = None;
-                last.insert(evidence(&epochs, &coefficients, None)?)
+                last.insert(sought.evidence((&epochs, &coefficients), settings, None)?)
             }
         };
         let mut pulled = pulled(&epochs)?;
@@ -107,13 +134,22 @@ pub fn settle(
         coefficients += step * (settings.longest / changes[1]).min(1.0);
         epochs = linearise(&coefficients);
         if changes[1] < settings.tolerance {
-            let explained = by.explained();
-            drop(last);
-            let evidence = evidence(&epochs, &coefficients, explained)?;
-            return Ok(Settled { coefficients, evidence, steps, change: changes[1] });
+            return Ok(Way { coefficients, epochs, last, steps, change: changes[1] });
         }
     }
     Err(FieldError::NotSettled { steps: steps[0], change: changes[1] })
+}
+
+impl Sought<'_> {
+    /// Of epochs linear around these coefficients.
+    fn evidence(
+        &self,
+        (epochs, around): (&[Epoch], &DMatrix<f64>),
+        settings: &Settling,
+        explained: Option<Vec<f64>>,
+    ) -> Result<Evidence, FieldError> {
+        Evidence::of(self.field, self.degrees, (epochs, around), settings.compression, explained)
+    }
 }
 
 /// Whether steps by the covariance of an earlier one come nearer.

@@ -118,6 +118,37 @@ fn a_prior_of_the_field_counts_in_its_fit() {
     assert_eq!(below.at_bounds, ["spot_lifetime_d"]);
 }
 
+/// A share of them says where to begin; what is found is the best field of all of them.
+#[test]
+fn the_field_of_many_profiles_is_the_best_of_its_neighbours() {
+    let cycles: Vec<f64> = (0..168).map(|k| 0.113 * f64::from(k) + 0.05 * f64::from(k % 3)).collect();
+    let config = Config::default()
+        .with("star", json!({ "rotation_period_d": 2.0, "inclination_deg": 50.0, "vsini_kms": 7.0, "contrast": 0.1 }))
+        .with("star.line", json!({ "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }))
+        .with("observations.simulate.random_spots", json!({ "number": 16, "lifetime_d": 15, "seed": 2 }))
+        .with("observations.simulate.cycles", cycles)
+        .with("observations.simulate.velocity_kms", json!({ "min": -16.0, "max": 16.0, "step": 2.0 }))
+        .with("observations.simulate.snr", 300.0)
+        .with("imaging", json!({ "objective": "marginal-likelihood", "pixels": 500 }));
+    let scene = Scene::new(&config).unwrap();
+    let basis = Basis::exact(&scene.imager.grid);
+    let known = Known { jitter_kms: Some(0.0), ..Known::default() };
+    let best = fit(&scene.imager, &basis, scene.settings.values, known, None).unwrap();
+    let of = Known::of(&best.marginal);
+    let days = of.lifetime.and_then(Lifetime::days).unwrap();
+    for (i, factor) in [(0, 1.1), (0, 0.9), (1, 1.1), (1, 0.9), (2, 1.15), (2, 0.87)] {
+        let by = |j: usize| if i == j { factor } else { 1.0 };
+        let beside = Known {
+            amplitude: of.amplitude.map(|x| x * by(0)),
+            slope: of.slope.map(|x| x * by(1)),
+            lifetime: Some(Lifetime::Days(days * by(2))),
+            ..of
+        };
+        let there = fit(&scene.imager, &basis, scene.settings.values, beside, None).unwrap().ln_evidence;
+        assert!(there < best.ln_evidence + 0.02, "{beside:?}: {there}, {}", best.ln_evidence);
+    }
+}
+
 /// The posterior of slow-planet with these parameters free, around its planet and the field of the reference.
 fn posterior(free: &[Parameter]) -> MarginalPosterior {
     let (scene, mut values, _) = star("slow-planet");

@@ -7,7 +7,8 @@
 //! kept: where that gains enough the star changes, and where it gains nothing it does not. In between, the changing
 //! field is fitted as well, with an orbit of its own.
 
-use super::fit::{Fitted, Known, NoFit, fit, usual};
+use super::Known;
+use super::fit::{Fitted, NoFit, fit, share_of, usual};
 use super::{Assumed, Basis, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::planets::periodogram::Frequencies;
@@ -40,11 +41,24 @@ pub struct Change {
 }
 
 impl Change {
-    /// Compares both for the profiles of `imager`, all but the orbit as in `values`, the `nuisances` integrated out.
+    /// Compares both for the profiles of `imager`, all but the orbit as in `values`, the `nuisances` integrated out. Of
+    /// many profiles a share is asked first, which shows most changes at a small part of the work.
     ///
     /// # Errors
     /// [`NoFit`] where the field that does not change cannot be fitted.
     pub fn of(
+        imager: &Imager,
+        values: ParameterValues,
+        frequencies: &Frequencies,
+        nuisances: &[Nuisance],
+        known: Known,
+    ) -> Result<Self, NoFit> {
+        let among = |imager: &Imager| Change::among(imager, values, frequencies, nuisances, known);
+        let by_a_share = share_of(imager).and_then(|share| among(&share).ok()).filter(Change::is_changing);
+        by_a_share.map_or_else(|| among(imager), Ok)
+    }
+
+    fn among(
         imager: &Imager,
         values: ParameterValues,
         frequencies: &Frequencies,

@@ -1,23 +1,14 @@
 //! What the profiles say of the field itself: the amplitude, slope and lifetime for which ln Z is largest, and the
 //! jitter.
 
+use super::known::{BOUNDS, Known, USUAL};
 use super::{Assumed, Basis, Design, Marginal};
 use crate::field::{Field, FieldError, Kernel, Lifetime, Spectrum};
 use crate::posterior::imaging::Imager;
-use crate::posterior::objective::{Parameter, ParameterValues, Prior};
+use crate::posterior::objective::{Parameter, ParameterValues};
 use nalgebra::{Matrix4, Vector4};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// Bounds of amplitude, slope and lifetime (d).
-const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.0, 3.0), (0.3, 3000.0)];
-
-/// Where searches start: usual ones.
-const USUAL: [f64; 3] = [0.2, 1.5, 36.0];
-
-/// Degree below which the spectrum of spots is flat: those of 10 to 25 deg, here and there.
-const BREAK_DEGREE: f64 = 7.0;
 
 /// Amplitude and slope of a spectrum without a break over those of one with it that is as good.
 const WITHOUT_BREAK: (f64, f64) = (1.2, 0.47);
@@ -25,25 +16,14 @@ const WITHOUT_BREAK: (f64, f64) = (1.2, 0.47);
 /// From so much lower in ln Z no climb makes good.
 const FAR_BELOW: f64 = 5.0;
 
-/// Bounds of a parameter of the field, in the units of its name.
-pub fn bounds(parameter: Parameter) -> (f64, f64) {
-    BOUNDS[place_of(parameter)]
-}
-
-/// A usual value of a parameter of the field.
-pub fn usual_value(parameter: Parameter) -> f64 {
-    USUAL[place_of(parameter)]
-}
-
-fn place_of(parameter: Parameter) -> usize {
-    Parameter::FIELD.iter().position(|p| *p == parameter).expect("a parameter of the field")
-}
-
 const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
 const USUAL_JITTER_KMS: f64 = 0.1;
 
 /// Bounds of a jitter (km/s); that of none is 0.
 const JITTER_KMS: (f64, f64) = (1e-3, 3.0);
+
+/// A fit of so many profiles starts from that of a share of them, at most half as many.
+const MANY: usize = 160;
 
 /// A search ends when a step would gain less than this in ln Z, or after so many.
 const GAIN: f64 = 0.02;
@@ -57,89 +37,6 @@ const LEAST_BEND: f64 = 10.0;
 
 /// Longest step in ln amplitude, slope and ln lifetime: maps are found from those of the step before.
 const LONGEST: f64 = 0.35;
-
-/// What is known of the field beforehand; what is `None` is fitted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Known {
-    /// Standard deviation of the filling factor.
-    pub amplitude: Option<f64>,
-    /// Slope of the spectrum.
-    pub slope: Option<f64>,
-    /// Degree below which the spectrum is flat; if neither it nor the slope is known, a fit takes the better one of 0
-    /// and 7.
-    pub break_degree: Option<f64>,
-    /// Lifetime.
-    pub lifetime: Option<Lifetime>,
-    /// Velocity jitter (km/s).
-    pub jitter_kms: Option<f64>,
-    /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are even between the bounds
-    /// in ln amplitude, slope and ln lifetime.
-    pub priors: [Option<Prior>; 3],
-}
-
-impl Known {
-    /// All as it was fitted.
-    pub fn of(marginal: &Marginal) -> Self {
-        let Assumed { field, jitter_kms } = marginal.assumed;
-        Known {
-            amplitude: Some(field.spectrum.amplitude),
-            slope: Some(field.spectrum.slope),
-            break_degree: Some(field.spectrum.break_degree),
-            lifetime: Some(field.kernel.lifetime),
-            jitter_kms: Some(jitter_kms),
-            priors: [None; 3],
-        }
-    }
-
-    /// Degree below which the spectrum is flat where a search starts: a slope that is given is that of a power law all
-    /// the way, unless a break is given, too.
-    pub fn break_degree(&self) -> f64 {
-        self.break_degree.unwrap_or(if self.slope.is_some() { 0.0 } else { BREAK_DEGREE })
-    }
-
-    /// The spectrum where a search starts.
-    fn spectrum(&self) -> Spectrum {
-        let usual = |i: usize| self.within(i, USUAL[i]);
-        Spectrum {
-            amplitude: self.amplitude.unwrap_or(usual(0)),
-            slope: self.slope.unwrap_or(usual(1)),
-            break_degree: self.break_degree(),
-        }
-    }
-
-    /// Bounds of amplitude, slope or lifetime: those of their prior, where there is one.
-    fn bounds(&self, i: usize) -> (f64, f64) {
-        let (low, high) = BOUNDS[i];
-        let (least, most) = self.priors[i].map_or(BOUNDS[i], |prior| prior.bounds());
-        (low.max(least), high.min(most))
-    }
-
-    fn within(&self, i: usize, x: f64) -> f64 {
-        let (low, high) = self.bounds(i);
-        x.clamp(low, high)
-    }
-
-    /// ln of the prior density in the coordinates of [`place`].
-    fn log_prior(&self, assumed: &Assumed) -> f64 {
-        let Field { spectrum, kernel } = assumed.field;
-        let numbers = [Some(spectrum.amplitude), Some(spectrum.slope), kernel.lifetime.days()];
-        let of = |i: usize| {
-            let (prior, x) = (self.priors[i]?, numbers[i]?);
-            free(assumed, self)[i].then(|| prior.log_density(x) + Parameter::FIELD[i].log_jacobian(x))
-        };
-        (0..3).filter_map(of).sum()
-    }
-
-    /// What is maximised: ln Z, and what is known of the field beforehand.
-    fn height(&self, of: &Marginal) -> f64 {
-        of.ln_evidence() + self.log_prior(&of.assumed)
-    }
-
-    /// The same of a star that does not change.
-    pub fn unchanging(self) -> Self {
-        Known { lifetime: Some(Lifetime::Static), ..self }
-    }
-}
 
 /// The most probable field.
 #[derive(Clone, Debug)]
@@ -218,7 +115,8 @@ pub(super) fn usual(
     Ok(Fitted { marginal, ln_evidence, at_bounds: Vec::new() })
 }
 
-/// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from several lifetimes.
+/// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from several lifetimes; of
+/// many profiles from what a share of them says, whether the spectrum has a break included.
 ///
 /// # Errors
 /// [`NoFit`]: of the last attempt, where none succeeds.
@@ -233,12 +131,14 @@ pub fn fit(
     let at = |assumed: Assumed, nearby: Option<&Marginal>| {
         Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
     };
-    let first = match near {
-        Some(near) => at(near.assumed, Some(near)).or_else(|_| {
+    let share = near.is_none().then(|| by_a_share(imager, basis, values, known)).flatten();
+    let first = match (near, share) {
+        (Some(near), _) => at(near.assumed, Some(near)).or_else(|_| {
             // maps of another orbit may be too far away
             at(near.assumed, None)
         })?,
-        None => {
+        (None, Some(assumed)) => at(assumed, None)?,
+        (None, None) => {
             let rough = basis.roughly();
             // of many profiles each is hundreds of megabytes: only the best so far is kept
             let higher = |best, next| higher(best, next, &known);
@@ -257,7 +157,7 @@ pub fn fit(
         }
     };
     let mut marginal = climb(first, &known, &at)?;
-    if near.is_none() && known.break_degree.is_none() && known.slope.is_none() {
+    if near.is_none() && share.is_none() && known.break_degree.is_none() && known.slope.is_none() {
         marginal = with_or_without_break(marginal, &known, &at)?;
     }
     if known.jitter_kms.is_none() {
@@ -266,6 +166,21 @@ pub fn fit(
     let ln_evidence = marginal.ln_evidence();
     let at_bounds = reached(&marginal.assumed, &known);
     Fitted { marginal, ln_evidence, at_bounds }.checked()
+}
+
+/// The field of a share of the profiles: nearly that of all of them, at a small part of the work. `None` where there
+/// are few, the share does not tell it, or nothing is left to tell.
+fn by_a_share(imager: &Imager, basis: &Basis, values: ParameterValues, known: Known) -> Option<Assumed> {
+    let share = share_of(imager).filter(|_| known.is_open())?;
+    Some(fit(&share, basis, values, known, None).ok()?.marginal.assumed)
+}
+
+/// Every n-th profile, where there are [`MANY`]: at most half as many as that.
+pub(super) fn share_of(imager: &Imager) -> Option<Imager> {
+    let profiles = imager.profiles().count();
+    let every = profiles.div_ceil(MANY / 2);
+    let others = || (0..profiles).filter(|k| k % every != 0).collect::<Vec<_>>();
+    (profiles >= MANY).then(|| imager.without(&others()))
 }
 
 /// Where a fit may start: several lifetimes, each with and without a jitter, as far as they are not known.
@@ -370,15 +285,9 @@ fn limits(known: &Known) -> [(f64, f64); 4] {
 
 /// Which of the fitted numbers lie on a bound.
 fn reached(assumed: &Assumed, known: &Known) -> Vec<&'static str> {
-    let (place, free, limits) = (place(assumed), free(assumed, known), limits(known));
+    let (place, free, limits) = (place(assumed), known.free(assumed), limits(known));
     let on = |i: &usize| free[*i] && (place[*i] <= limits[*i].0 + 1e-9 || place[*i] >= limits[*i].1 - 1e-9);
     (0..3).filter(on).map(|i| Parameter::FIELD[i].name()).collect()
-}
-
-fn free(assumed: &Assumed, known: &Known) -> [bool; 4] {
-    let lives = known.lifetime.is_none() && assumed.field.kernel.lifetime != Lifetime::Static;
-    let jitters = known.jitter_kms.is_none() && assumed.jitter_kms > 0.0;
-    [known.amplitude.is_none(), known.slope.is_none(), lives, jitters]
 }
 
 /// The way up from `first` by quasi-Newton steps (BFGS; Nocedal & Wright 2006, chapter 6), within the bounds.
@@ -387,7 +296,7 @@ fn climb(
     known: &Known,
     at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
 ) -> Result<Marginal, FieldError> {
-    let (free, limits) = (free(&first.assumed, known), limits(known));
+    let (free, limits) = (known.free(&first.assumed), limits(known));
     let height = |of: &Marginal| known.height(of);
     // gradient, and second derivatives along each number. Derivatives at fixed maps are not enough: the determinant
     // changes with the maps, and outweighs the rest

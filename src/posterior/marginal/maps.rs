@@ -1,7 +1,7 @@
 //! The most probable maps of a fitted field at any times, with their errors (`docs/method.md` section 9).
 
 use super::{Assumed, Basis, Marginal};
-use crate::field::{Epoch, Evidence, FieldError, Settled, Sought, settle};
+use crate::field::{Epoch, Evidence, FieldError, Settled, Sought, approach, settle};
 use crate::posterior::imaging::Imager;
 use nalgebra::DMatrix;
 
@@ -45,7 +45,8 @@ impl Marginal {
     /// [`FieldError`].
     pub(super) fn with_jitter(mut self, imager: &Imager, basis: &Basis, times: usize) -> Result<Self, FieldError> {
         let sought = Sought { field: self.assumed.field, degrees: &basis.degrees, watched: &basis.watched };
-        for _ in 0..times {
+        let mut last: Option<Evidence> = None;
+        for left in (0..times).rev() {
             let slopes = self.slopes_of_epochs(imager, basis, &[]);
             let jittered = |(epoch, slopes): (Epoch, &DMatrix<f64>)| {
                 Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[self.assumed.jitter_kms])
@@ -53,7 +54,15 @@ impl Marginal {
             let linearise =
                 |maps: &DMatrix<f64>| self.design.epochs(imager, maps).into_iter().zip(&slopes).map(jittered).collect();
             let start = self.settled.coefficients.clone();
-            self.settled = settle(linearise, sought, start, Some(&self.settled.evidence), &basis.settling)?;
+            let nearby = Some(last.as_ref().unwrap_or(&self.settled.evidence));
+            if left > 0 {
+                // the evidence of slopes that are found anew is not needed
+                let way = approach(linearise, sought, start, nearby, &basis.settling)?;
+                self.settled.coefficients = way.coefficients;
+                last = way.last.or(last);
+            } else {
+                self.settled = settle(linearise, sought, start, nearby, &basis.settling)?;
+            }
         }
         Ok(self)
     }

@@ -21,6 +21,7 @@ mod design;
 mod expand;
 mod fit;
 mod forecast;
+mod known;
 mod light;
 mod maps;
 mod planned;
@@ -29,8 +30,9 @@ pub mod zero_points;
 
 pub use change::Change;
 pub use design::{Basis, Design};
-pub use fit::{Fitted, Known, NoFit, bounds, fit, usual_value};
+pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
+pub use known::{Known, bounds, usual_value};
 pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
 pub use planned::Planned;
