@@ -145,16 +145,24 @@ def table(args):
         "integrated maps, spots from a Gaussian field": [row for row in ended if row["simulator"].endswith("field")],
         "spottedness": [row for row in discs if row["objective"] == OBJECTIVES[1]],
     }
-    lines = ["| parameter | stars by | stars | within 1 sd (68 %) | within 2 sd (95 %) | median sd | median error |"]
+    lines = ["| parameter | stars by | stars | within 1 sd (68 %) | within 2 sd (95 %) | rms error / sd | median sd |"]
     lines.append("| --- | --- | --- | --- | --- | --- | --- |")
-    for name in FREE[:4]:
+    for name in TOLD:
         for group, of in groups.items():
             if not of:
                 continue
             number = lambda prefix: np.array([float(row[prefix + name]) for row in of])
             off, sd = np.abs(number("best_") - number("true_")), number("sd_")
             cells = [name, group, str(len(of)), *(calibration_table.share(off < n * sd) for n in (1, 2))]
-            lines.append("| " + " | ".join(cells + [f"{np.median(sd):.3g}", f"{np.median(off):.3g}"]) + " |")
+            cells += [f"{np.sqrt(np.mean((off / sd) ** 2)):.2f}", f"{np.median(sd):.3g}"]
+            lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "| parameter | chains of stars | inside 68 % | inside 95 % | spread of draws / sd |"]
+    lines.append("| --- | --- | --- | --- | --- |")
+    chains = [row for row in integrated if row["draws"]]
+    for name in TOLD:
+        below, spread, sd = (np.array([float(row[p + name]) for row in chains]) for p in ("below_", "spread_", "sd_"))
+        inside = [calibration_table.share(np.abs(below - 0.5) < share / 2) for share in (0.68, 0.95)]
+        lines.append("| " + " | ".join([name, str(len(chains)), *inside, f"{np.median(spread / sd):.2f}"]) + " |")
     failed = [f"- {row['seed']}, {row['objective']}: {row['error']}" for row in rows if row["error"]]
     text = "\n".join([*lines, "", *failed])
     calibration_table.under_the_head(args.out, "Stellar parameters of stars that change", text)

@@ -97,7 +97,8 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         others => format!(" from {} images", others + 1),
     };
     console::line(format_args!("{}{images}", meter.cost(landscape)));
-    for warning in header.origin.reference.warnings() {
+    let axes: Vec<String> = landscape.grid().names().map(str::to_owned).collect();
+    for warning in header.origin.reference.warnings(&axes) {
         console::line(format_args!("note: {warning}"));
     }
     console::line(format_args!("written: {}: {HEADER}, {NODES}, {PARABOLOID}", shown(folder)));

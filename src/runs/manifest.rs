@@ -72,7 +72,7 @@ impl Manifest {
             format!("another maximum, not much lower, where walkers started too: {}", place(rival))
         };
         let measured = self.origin.measured.lines().into_iter().map(|(label, text)| format!("{label}: {text}"));
-        self.origin.rivals.iter().map(line).chain(self.origin.reference.warnings()).chain(measured).collect()
+        self.origin.rivals.iter().map(line).chain(self.origin.reference.warnings(&self.names)).chain(measured).collect()
     }
 
     /// A line where the period found is the rotation's or a fraction of it: spots that the map leaves over look like an

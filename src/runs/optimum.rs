@@ -149,7 +149,7 @@ impl OptimumFile {
         };
         let _ = writeln!(table, "{maximum}; ln P = {:.3}{}", self.optimum.log_prob, listed(&self.numbers));
         let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());
-        for note in remarks.chain(self.reference.warnings()) {
+        for note in remarks.chain(self.reference.warnings(&self.names)) {
             let _ = writeln!(table, "note: {note}");
         }
         table

@@ -322,11 +322,11 @@ impl ReferenceRecord {
         }
     }
 
-    /// What has to be known of it.
-    pub fn warnings(&self) -> Vec<String> {
+    /// What has to be known of it, and of the parameters that are free.
+    pub fn warnings(&self, free: &[String]) -> Vec<String> {
         match self {
             ReferenceRecord::Image(record) => record.warning().into_iter().collect(),
-            ReferenceRecord::Field(record) => record.warnings(),
+            ReferenceRecord::Field(record) => record.warnings(free),
         }
     }
 
@@ -359,8 +359,8 @@ impl FieldRecord {
         Held { break_degree: self.spot_break_degree, jitter_kms: self.velocity_jitter_kms }
     }
 
-    /// Parameters of the field that lie on a bound of its search.
-    fn warnings(&self) -> Vec<String> {
+    /// Parameters of the field that lie on a bound of its search, and free ones whose errors are too small.
+    fn warnings(&self, free: &[String]) -> Vec<String> {
         /// Nearer than this part a bound is reached.
         const REACHED: f64 = 0.01;
         let on_bound = |p: &Parameter| {
@@ -372,7 +372,23 @@ impl FieldRecord {
                 _ => format!("{} lies on the bound of its search, {bound}", p.name()),
             })
         };
-        Parameter::FIELD.iter().filter_map(on_bound).collect()
+        Parameter::FIELD.iter().filter_map(on_bound).chain(self.too_sure(free)).collect()
+    }
+
+    /// Which errors are known to be too small (`results/calibration-stellar.md`).
+    fn too_sure(&self, free: &[String]) -> Option<String> {
+        /// Above this vsini (km/s) they are.
+        const FAST_KMS: f64 = 45.0;
+        let is_fast = *self.parameters.get(Parameter::Vsini.name())? > FAST_KMS;
+        let of = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination].map(Parameter::name);
+        let of: Vec<&str> = of.into_iter().filter(|name| free.iter().any(|free| free == name)).collect();
+        (is_fast && !of.is_empty()).then(|| {
+            format!(
+                "vsini is above {FAST_KMS:.0} km/s: take {} with twice the errors, which on simulated stars with spots \
+                like discs were too small by factors of 1.4 to 1.7",
+                of.join(", ")
+            )
+        })
     }
 }
 
@@ -424,4 +440,23 @@ impl OptimumRecord {
 /// The values that are given, by name.
 pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
     Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.given(p)?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fast_stars_are_too_sure_of_their_shear() {
+        let of = |vsini_kms: f64, free: &[&str]| {
+            let parameters = BTreeMap::from([("vsini_kms".to_owned(), vsini_kms)]);
+            let (spot_break_degree, velocity_jitter_kms, ln_evidence, data) = (7.0, 0.0, 0.0, 1);
+            let record = FieldRecord { parameters, spot_break_degree, velocity_jitter_kms, ln_evidence, data };
+            record.warnings(&free.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
+        };
+        let [warning] = &of(60.0, &["k_kms", "domega_rad_d", "inclination_deg"])[..] else { panic!("one warning") };
+        assert!(warning.contains("take domega_rad_d, inclination_deg with twice the errors"), "{warning}");
+        assert!(of(40.0, &["domega_rad_d"]).is_empty());
+        assert!(of(60.0, &["k_kms", "vsini_kms"]).is_empty());
+    }
 }

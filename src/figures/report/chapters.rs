@@ -262,7 +262,7 @@ fn best(file: &OptimumFile) -> Chapter {
     Chapter {
         heading: "Optimum".into(),
         verdicts,
-        warnings: remarks.chain(file.reference.warnings()).collect(),
+        warnings: remarks.chain(file.reference.warnings(&file.names)).collect(),
         notes,
         tables: vec![(
             "The best parameters, with errors from the curvature.".into(),

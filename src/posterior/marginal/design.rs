@@ -114,6 +114,8 @@ impl Design {
         };
         let lines: Vec<DMatrix<f64>> = (0..response.profiles()).map(of_profile).collect();
         let continuum = DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]);
+        // of many profiles it is hundreds of megabytes
+        drop(columns);
         let (bare, bare_continuum) = apply(&vec![1.0; response.pixels()]);
         let condensed = match like {
             Some(like) => Arc::clone(&like.condensed),
