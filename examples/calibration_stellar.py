@@ -107,7 +107,7 @@ def one(number, objective, simulator, args):
         asked["imaging"]["chi2_target"] = line["chi2_target"] = round(ABOVE_FLOOR * float(floor[1]), 4)
     line["seconds"] = round(time.monotonic() - began, 1)
     if done.returncode:
-        return line | {"error": done.stderr.strip().splitlines()[-1][:200]}
+        return line | {"error": done.stderr.strip().splitlines()[-1].split(".json: ")[-1][:200]}
     if sampled:
         found = json.loads((out / "manifest.json").read_text())["optimum"]
         line |= of_chain(out, truth)
@@ -163,7 +163,8 @@ def table(args):
         below, spread, sd = (np.array([float(row[p + name]) for row in chains]) for p in ("below_", "spread_", "sd_"))
         inside = [calibration_table.share(np.abs(below - 0.5) < share / 2) for share in (0.68, 0.95)]
         lines.append("| " + " | ".join([name, str(len(chains)), *inside, f"{np.median(spread / sd):.2f}"]) + " |")
-    failed = [f"- {row['seed']}, {row['objective']}: {row['error']}" for row in rows if row["error"]]
+    why = lambda row: row["error"].split(": at these")[0].removeprefix("imaging.chi2_target: ")
+    failed = [f"- {row['seed']}, {row['objective']}: {why(row)}" for row in rows if row["error"]]
     text = "\n".join([*lines, "", *failed])
     calibration_table.under_the_head(args.out, "Stellar parameters of stars that change", text)
 
