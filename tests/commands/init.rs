@@ -306,7 +306,7 @@ fn a_model_that_does_not_fit_is_no_dead_end() {
     assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
     let failed = dimcmc(&["map", "star.json", "--out", "map"], &desk.path(""));
     assert_eq!(failed.status.code(), Some(1));
-    says(&text(&failed.stderr), &["no map (", "the width of the local line is the likely reason"]);
+    says(&text(&failed.stderr), &["no map (amplitude-at-bound)", "the width of the local line is the likely reason"]);
     desk.succeed(
         &[&INIT[..], &["--line-sigma", "9", "--vsini", "25", "--force", "--objective", "spottedness"]].concat(),
     );
