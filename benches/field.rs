@@ -101,7 +101,7 @@ fn epochs(harmonics: &Harmonics, profiles: usize) -> Vec<Epoch> {
             let rows = DMatrix::from_fn(seen.len(), harmonics.len(), |i, h| basis[(h, seen[i])]);
             Epoch {
                 time_d,
-                jacobian: lines * rows,
+                jacobian: (lines * rows).into(),
                 misfit: DVector::from_fn(NUMBERS, |j, _| 1e-3 * ((j * j + 7 * k) as f64).sin()),
                 variance: DVector::from_element(NUMBERS, 1e-6),
                 beside: 0.0,

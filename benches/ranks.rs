@@ -238,7 +238,7 @@ impl Evaluator for Instantly {
 /// Seconds of a sampler's step for each walker, evaluations left out.
 fn proposal_s(scene: &Scene, posterior: &Posterior, points: &[Vec<f64>]) -> f64 {
     let mut settings = scene.settings.sampler.clone();
-    (settings.ensembles, settings.walkers) = (2, BATCH / 2);
+    (settings.ensembles, settings.walkers) = (2, Some(BATCH / 2));
     let surrogate = Surrogate::new(&scene.imager, &scene.space, posterior.reference()).unwrap();
     let sampler = Sampler::new(posterior, &Instantly, &settings).unwrap();
     let sampler = sampler.with_move(settings.moves.surrogate, Box::new(SurrogateMove(surrogate)));

@@ -38,8 +38,8 @@ pub struct Compressed {
     whiten: DMatrix<f64>,
     /// Q (data, kept), orthonormal.
     directions: DMatrix<f64>,
-    /// `Q^T W J c0`, which makes a residual of a misfit; after these, numbers beside the data (`tilt`), which have no
-    /// misfit.
+    /// `Q^T W J c0`, which makes a residual of a misfit; where the model is divided by anything 0 after these, the place
+    /// of a number beside the data (`tilt`), which has no misfit.
     pub expected: DVector<f64>,
     /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data, and what
     /// is beside them.
@@ -63,8 +63,9 @@ pub struct Told {
 
 impl Compressed {
     /// Of an epoch linearised around the coefficients `around` (H), which have these prior standard deviations `sd`;
-    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers). `None` where
-    /// the covariance of the noise has no Cholesky factor.
+    /// its `Q^T W J S^(1/2)` (kept, H), and what it has in common with others, `Q^T W B` (kept, numbers), both with a
+    /// row of zeros where the model is divided by anything. `None` where the covariance of the noise has no Cholesky
+    /// factor.
     pub fn new(
         epoch: &Epoch,
         around: DVectorView<f64>,
@@ -74,28 +75,21 @@ impl Compressed {
         let factor = epoch.noise().cholesky()?.unpack();
         let n = epoch.len();
         let whiten = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
-        let mut rows = match epoch.nuisances.ncols() {
-            // W is diagonal
-            0 => {
-                let mut rows = epoch.jacobian.clone();
-                rows.column_iter_mut().for_each(|mut column| column.component_mul_assign(&whiten.diagonal()));
-                rows
-            }
-            _ => &whiten * &epoch.jacobian,
-        };
-        rows.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
         let mut common = &whiten * &epoch.common;
         let mut directions = DMatrix::identity(n, n);
         if how.left_out > 0.0 && n > 0 {
-            directions = leading_directions(&rows, how)?;
+            let variances: Vec<f64> = sd.iter().map(|sd| sd * sd).collect();
+            directions = leading_directions(&whiten * epoch.jacobian.covariance(&variances) * whiten.transpose(), how)?;
             directions = with_directions(directions, &(&whiten * &epoch.misfit));
             directions = with_directions(directions, &(&whiten * &epoch.slopes));
             directions = with_directions(directions, &common);
             common = directions.tr_mul(&common);
-            // nalgebra's own product with a transpose is no product of blocks: five times slower
-            rows = directions.transpose() * rows;
         }
-        let expected = directions.tr_mul(&(&whiten * (&epoch.jacobian * around)));
+        let numbers = directions.ncols() + usize::from(!epoch.divisor.is_empty());
+        let mut rows = epoch.jacobian.after(&(directions.transpose() * &whiten).resize_vertically(numbers, 0.0));
+        rows.column_iter_mut().zip(sd).for_each(|(mut column, sd)| column *= *sd);
+        common.resize_vertically_mut(numbers, 0.0);
+        let expected = directions.tr_mul(&(&whiten * epoch.jacobian.times(around))).resize_vertically(numbers, 0.0);
         let ln_noise = 2.0 * factor.diagonal().iter().map(|x| x.ln()).sum::<f64>();
         let constant = epoch.beside - 0.5 * (ln_noise + n as f64 * TAU.ln());
         Some((Compressed { whiten, directions, expected, constant }, [rows, common]))
@@ -122,11 +116,11 @@ impl Compressed {
     }
 }
 
-/// Orthonormal directions (data, kept) that hold all of `rows` (data, H) but what may be lost; `None` if that is not
-/// finite.
-pub fn leading_directions(rows: &DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
-    let n = rows.nrows();
-    let eigen = (rows * rows.transpose()).try_symmetric_eigen(f64::EPSILON, MOST_ROTATIONS)?;
+/// Orthonormal directions (data, kept) that hold all of this `covariance` (data, data) but what may be lost; `None` if
+/// that is not finite.
+pub fn leading_directions(covariance: DMatrix<f64>, how: Compression) -> Option<DMatrix<f64>> {
+    let n = covariance.nrows();
+    let eigen = covariance.try_symmetric_eigen(f64::EPSILON, MOST_ROTATIONS)?;
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     let mut left_out = 0.0;

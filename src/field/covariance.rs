@@ -23,13 +23,22 @@ pub struct Numbers {
     pub parts: Vec<Range<usize>>,
     /// J S^(1/2) (n, H).
     pub rows: DMatrix<f64>,
+    /// As many of its columns, from the first, as are no zeros to any purpose.
+    telling: usize,
     /// What epochs have in common (n, numbers).
     pub common: DMatrix<f64>,
 }
 
 impl Numbers {
-    /// Of epochs at these times, and their parts of both matrices.
-    pub fn new(times_d: Vec<f64>, rows: &[DMatrix<f64>], common: &[DMatrix<f64>], coefficients: usize) -> Self {
+    /// Of epochs at these times, and their parts of both matrices. Of the variance of all numbers, `left_out` may be
+    /// missing in products.
+    pub fn new(
+        times_d: Vec<f64>,
+        rows: &[DMatrix<f64>],
+        common: &[DMatrix<f64>],
+        coefficients: usize,
+        left_out: f64,
+    ) -> Self {
         let mut end = 0;
         let part = |rows: &DMatrix<f64>| {
             end += rows.nrows();
@@ -38,12 +47,61 @@ impl Numbers {
         let parts: Vec<Range<usize>> = rows.iter().map(part).collect();
         let numbers = common.iter().map(DMatrix::ncols).max().unwrap_or(0);
         let (rows, common) = (stacked(rows, &parts, coefficients), stacked(common, &parts, numbers));
-        Numbers { times_d, parts, rows, common }
+        let mut left = left_out;
+        let beyond = rows.column_iter().rev().take_while(|column| {
+            left -= column.norm_squared();
+            left >= 0.0
+        });
+        let telling = coefficients - beyond.count();
+        Numbers { times_d, parts, rows, common, telling }
     }
 
     /// J S J^T (n, n), lower triangle.
     pub fn spatial(&self) -> DMatrix<f64> {
-        dense::gram(&self.rows)
+        dense::gram(&self.rows.columns(0, self.telling))
+    }
+
+    /// Puts other rows (numbers, H) in the place of some, in [`Numbers::spatial`] as well if that is given.
+    pub fn replace(&mut self, places: &[usize], rows: &DMatrix<f64>, spatial: Option<&mut DMatrix<f64>>) {
+        for (place, row) in places.iter().zip(rows.row_iter()) {
+            self.rows.set_row(*place, &row);
+        }
+        let Some(spatial) = spatial else { return };
+        let across = self.rows.columns(0, self.telling) * rows.columns(0, self.telling).transpose();
+        for (place, across) in places.iter().zip(across.column_iter()) {
+            for (other, product) in across.iter().enumerate() {
+                spatial[(other.max(*place), other.min(*place))] = *product;
+            }
+        }
+    }
+
+    /// `J S^(1/2)` times coefficients (H, epochs), each epoch its own.
+    pub fn seen(&self, coefficients: &DMatrix<f64>) -> DVector<f64> {
+        let mut seen = DVector::zeros(self.rows.nrows());
+        // by columns, as they stand in memory
+        for (rows, coefficients) in self.rows.column_iter().zip(coefficients.row_iter()) {
+            for (part, coefficient) in self.parts.iter().zip(coefficients.iter()) {
+                let rows = &rows.as_slice()[part.clone()];
+                seen.as_mut_slice()[part.clone()].iter_mut().zip(rows).for_each(|(to, row)| *to += row * coefficient);
+            }
+        }
+        seen
+    }
+
+    /// `S^(1/2) J^T` times numbers (H, epochs), each epoch its own.
+    pub fn pulled(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        let x = x.as_slice();
+        let dot = |rows: &[f64], x: &[f64]| rows.iter().zip(x).map(|(row, x)| row * x).sum::<f64>();
+        DMatrix::from_fn(self.parts.len(), self.rows.ncols(), |k, h| {
+            let part = self.parts[k].clone();
+            dot(&self.rows.column(h).as_slice()[part.clone()], &x[part])
+        })
+        .transpose()
+    }
+
+    /// Whether a filter is faster than dense matrices.
+    pub fn are_many(&self) -> bool {
+        self.rows.nrows() > FILTER_BEYOND
     }
 
     /// Multiplies the blocks of the lower triangle of a matrix (n, n) by a function of their delay.
@@ -91,11 +149,11 @@ pub enum Covariance {
 }
 
 impl Covariance {
-    /// `None` where it is not positive definite or not finite.
-    pub fn new(numbers: &Numbers, kernel: &Kernel) -> Option<Self> {
-        match numbers.rows.nrows() > FILTER_BEYOND {
-            true => Filter::new(numbers, kernel).map(Covariance::InTime),
-            false => numbers.dense(numbers.spatial(), kernel).map(Covariance::Dense),
+    /// Dense of numbers whose `spatial` part is given. `None` where it is not positive definite or not finite.
+    pub fn new(numbers: &Numbers, spatial: Option<DMatrix<f64>>, kernel: &Kernel) -> Option<Self> {
+        match spatial {
+            None => Filter::new(numbers, kernel).map(Covariance::InTime),
+            Some(spatial) => numbers.dense(spatial, kernel).map(Covariance::Dense),
         }
     }
 

@@ -46,7 +46,7 @@ impl Evidence {
             let mut normal = |n: usize| DVector::from_fn(n, |_, _| rng.sample::<f64, _>(StandardNormal));
             let noise = normal(epoch.len()).component_mul(&epoch.variance.map(f64::sqrt));
             let misfit =
-                &epoch.jacobian * before.column(k) + noise + &epoch.nuisances * normal(epoch.nuisances.ncols());
+                epoch.jacobian.times(before.column(k)) + noise + &epoch.nuisances * normal(epoch.nuisances.ncols());
             // these data are linear in the field
             Epoch { misfit, slopes: DMatrix::zeros(epoch.len(), 0), divisor: DVector::zeros(0), ..epoch.clone() }
         };
@@ -94,7 +94,7 @@ mod tests {
         let mut normal = |r: usize, c: usize| DMatrix::from_fn(r, c, |_, _| rng.sample::<f64, _>(StandardNormal));
         let epoch = |(k, numbers): (usize, DMatrix<f64>)| Epoch {
             time_d: k as f64,
-            jacobian: numbers.columns(0, 3).into_owned(),
+            jacobian: numbers.columns(0, 3).into_owned().into(),
             misfit: numbers.column(3).into_owned(),
             variance: DVector::repeat(2, 0.2),
             nuisances: numbers.columns(4, 1).into_owned(),

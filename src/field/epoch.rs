@@ -1,6 +1,6 @@
 //! The data of one time, linear in the field: `r = J c + noise`.
 
-use super::FieldError;
+use super::{FieldError, Jacobian};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix, OMatrix, Storage};
 
@@ -11,7 +11,7 @@ pub struct Epoch {
     /// Time (d).
     pub time_d: f64,
     /// J (data, H): derivative of the model with respect to the coefficients.
-    pub jacobian: DMatrix<f64>,
+    pub jacobian: Jacobian,
     /// Data minus model at c0.
     pub misfit: DVector<f64>,
     /// Variance of the noise of each datum (positive).
@@ -50,7 +50,7 @@ impl Epoch {
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         self.time_d.is_finite()
             && self.beside.is_finite()
-            && finite(self.jacobian.as_slice())
+            && self.jacobian.is_finite()
             && finite(self.misfit.as_slice())
             && finite(self.nuisances.as_slice())
             && finite(self.slopes.as_slice())
@@ -137,9 +137,9 @@ pub(super) fn pulled(epochs: &[Epoch]) -> Result<DMatrix<f64>, FieldError> {
         let found = inner.cholesky().ok_or(not_finite(first))?.solve(&along);
         sharing.iter().for_each(|(k, own)| weighed[*k] -= own * &found);
     }
-    let mut all = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.ncols()), epochs.len());
+    let mut all = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.shape().1), epochs.len());
     for (k, (epoch, weighed)) in epochs.iter().zip(&weighed).enumerate() {
-        let pulled = epoch.jacobian.tr_mul(weighed);
+        let pulled = epoch.jacobian.tr_times(weighed);
         if !pulled.iter().all(|x| x.is_finite()) {
             return Err(not_finite(k));
         }

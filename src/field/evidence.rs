@@ -15,6 +15,7 @@ use super::tilt::Tilt;
 use super::{Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Data with the field integrated out.
 #[derive(Clone, Debug)]
@@ -32,6 +33,8 @@ pub struct Evidence {
     pub(super) tilt: Option<Tilt>,
     epochs: Vec<Compressed>,
     quadratic: Quadratic,
+    /// How many numbers of each epoch the field explains here, once it is asked for.
+    explained: OnceLock<Vec<f64>>,
 }
 
 impl Evidence {
@@ -57,7 +60,7 @@ impl Evidence {
         degrees: &[usize],
         (epochs, around): (&[Epoch], &DMatrix<f64>),
         how: Compression,
-        explained: Option<Vec<f64>>,
+        explained: Option<&[f64]>,
     ) -> Result<Self, FieldError> {
         field.check()?;
         assert_eq!(around.shape(), (degrees.len(), epochs.len()), "coefficients of all epochs");
@@ -71,30 +74,31 @@ impl Evidence {
                 .ok_or(FieldError::NotFinite { epoch: k })
         });
         let (mut compressed, rows): (Vec<_>, Vec<_>) = compressed.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let (mut rows, mut common): (Vec<_>, Vec<_>) = rows.into_iter().map(|[rows, common]| (rows, common)).unzip();
+        let (rows, common): (Vec<_>, Vec<_>) = rows.into_iter().map(|[rows, common]| (rows, common)).unzip();
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
-        let factored = |rows: &[DMatrix<f64>], common: &[DMatrix<f64>]| {
-            let numbers = Numbers::new(times_d.clone(), rows, common, sd.len());
-            let covariance = Covariance::new(&numbers, &field.kernel).ok_or(FieldError::NotPositive)?;
-            Ok((numbers, covariance))
+        let mut numbers = Numbers::new(times_d, &rows, &common, sd.len(), how.left_out);
+        drop((rows, common));
+        let mut spatial = (!numbers.are_many()).then(|| numbers.spatial());
+        let factored = |numbers: &Numbers, spatial: Option<DMatrix<f64>>| {
+            Covariance::new(numbers, spatial, &field.kernel).ok_or(FieldError::NotPositive)
         };
-        let mut tilt = None;
+        let (mut tilt, own) = (None, OnceLock::new());
         if Tilt::is_needed(epochs) {
             let explained = match explained {
-                Some(explained) => explained,
+                Some(explained) => explained.to_vec(),
                 None => {
-                    let (numbers, covariance) = factored(&rows, &common)?;
-                    covariance.explained(&numbers)
+                    let found = factored(&numbers, spatial.clone())?.explained(&numbers);
+                    own.get_or_init(|| found).clone()
                 }
             };
             let tilt = tilt.insert(Tilt::new(explained, epochs));
-            tilt.count((&field, &sd), (epochs, around), &mut compressed, [&mut rows, &mut common]);
+            tilt.count((&field, &sd), (epochs, around), &mut compressed, (&mut numbers, spatial.as_mut()));
         }
-        let (numbers, covariance) = factored(&rows, &common)?;
+        let covariance = factored(&numbers, spatial)?;
         let told = compressed.iter().zip(epochs).map(|(to, epoch)| to.tell(&epoch.misfit, &epoch.slopes)).collect();
         let (quadratic, dual) = quadratic(&covariance, &numbers.parts, &compressed, told);
         let (degrees, epochs) = (degrees.to_vec(), compressed);
-        Ok(Evidence { field, degrees, sd, numbers, covariance, dual, tilt, epochs, quadratic })
+        Ok(Evidence { field, degrees, sd, numbers, covariance, dual, tilt, epochs, quadratic, explained: own })
     }
 
     /// The field that is assumed.
@@ -107,9 +111,19 @@ impl Evidence {
         self.numbers.rows.nrows()
     }
 
-    /// How many numbers of each epoch the field was found to explain; `None` where no model is divided by anything.
-    pub(super) fn explained(&self) -> Option<Vec<f64>> {
-        self.tilt.as_ref().map(|tilt| tilt.explained.clone())
+    /// How many numbers of each epoch the field explains; `None` where no model is divided by anything.
+    pub(super) fn explained(&self) -> Option<&[f64]> {
+        let tilt = self.tilt.as_ref()?;
+        let found = || {
+            // without the numbers of the volume
+            let mut numbers = self.numbers.clone();
+            let places = tilt.places(&numbers);
+            numbers.replace(&places, &DMatrix::zeros(places.len(), self.sd.len()), None);
+            let spatial = (!numbers.are_many()).then(|| numbers.spatial());
+            let covariance = Covariance::new(&numbers, spatial, &self.field.kernel);
+            covariance.map_or_else(|| tilt.explained.clone(), |covariance| covariance.explained(&numbers))
+        };
+        Some(self.explained.get_or_init(found))
     }
 
     /// ln Z, all constants included.

@@ -57,19 +57,13 @@ impl Evidence {
         gradient -= coefficients;
         let mut scaled = gradient.clone();
         scale_rows(&mut scaled, &inverses(&self.sd));
-        let mut seen = DVector::zeros(self.numbers.rows.nrows());
-        for (part, scaled) in self.numbers.parts.iter().zip(scaled.column_iter()) {
-            seen.rows_range_mut(part.clone()).gemv(1.0, &self.numbers.rows.rows_range(part.clone()), &scaled, 0.0);
-        }
+        let seen = self.numbers.seen(&scaled);
         gradient - self.spread(&self.covariance.solve(&seen), &self.numbers.times_d)
     }
 
     /// `K J^T N^(-1/2) x`, coefficients (H, times) at any times (d), of numbers x as compressed.
     fn spread(&self, x: &DVector<f64>, times_d: &[f64]) -> DMatrix<f64> {
-        let mut pulls = DMatrix::zeros(self.sd.len(), self.numbers.times_d.len());
-        for (part, mut pull) in self.numbers.parts.iter().zip(pulls.column_iter_mut()) {
-            pull.gemv_tr(1.0, &self.numbers.rows.rows_range(part.clone()), &x.rows_range(part.clone()), 0.0);
-        }
+        let mut pulls = self.numbers.pulled(x);
         scale_rows(&mut pulls, &self.sd);
         pulls * correlations(&self.field, &self.numbers.times_d, times_d)
     }

@@ -10,6 +10,7 @@
 //! number that was measured.
 
 use super::compress::Compressed;
+use super::covariance::Numbers;
 use super::maps::{correlations, inverses, scale_rows};
 use super::{Epoch, Field};
 use nalgebra::DMatrix;
@@ -21,13 +22,21 @@ pub struct Tilt {
     pub explained: Vec<f64>,
     /// a (H, epochs).
     by: DMatrix<f64>,
+    /// Which epochs are divided by anything.
+    divided: Vec<usize>,
 }
 
 impl Tilt {
     /// Of epochs of which the field explains so many numbers.
     pub fn new(explained: Vec<f64>, epochs: &[Epoch]) -> Self {
         let by = tilted(&explained, epochs);
-        Tilt { explained, by }
+        let divided = (0..epochs.len()).filter(|k| !epochs[*k].divisor.is_empty()).collect();
+        Tilt { explained, by, divided }
+    }
+
+    /// Where the numbers of the volume stand.
+    pub fn places(&self, numbers: &Numbers) -> Vec<usize> {
+        self.divided.iter().map(|k| numbers.parts[*k].end - 1).collect()
     }
 
     /// Whether any model is divided by anything.
@@ -40,35 +49,38 @@ impl Tilt {
         tilted(&self.explained, epochs)
     }
 
-    /// Counts the volume in what epochs around these coefficients (H, epochs) were compressed to, and in their `rows`
-    /// and `common` columns: the mean of the field, whose coefficients have these standard deviations, falls by `K a`,
-    /// and each epoch that is divided by anything has one number more.
+    /// Counts the volume, if it is needed, in what epochs around these coefficients (H, epochs) were compressed to, and in their numbers
+    /// and `spatial` part: the mean of the field, whose coefficients have these standard deviations, falls by `K a`,
+    /// and the last number of each epoch that is divided by anything is the volume.
     pub fn count(
         &self,
         (field, sd): (&Field, &[f64]),
         (epochs, around): (&[Epoch], &DMatrix<f64>),
         compressed: &mut [Compressed],
-        [rows, common]: [&mut [DMatrix<f64>]; 2],
+        (numbers, spatial): (&mut Numbers, Option<&mut DMatrix<f64>>),
     ) {
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
         let variances: Vec<f64> = sd.iter().map(|sd| sd * sd).collect();
-        let lowered = self.lowers(field, &times_d, &variances, &times_d);
-        let mut whitened = lowered.clone();
-        scale_rows(&mut whitened, &inverses(sd));
+        let mut lowered = self.lowers(field, &times_d, &variances, &times_d);
+        let mut rows = Vec::new();
         for (k, (of, epoch)) in compressed.iter_mut().zip(epochs).enumerate() {
             let (a, around) = (self.by.column(k), around.column(k));
             // 1/2 a^T K a + a^T c0
             of.constant += 0.5 * a.dot(&lowered.column(k)) + a.dot(&around);
             if !epoch.divisor.is_empty() {
                 // n ln s to second order: a number, measured to be what it is
-                let row = epoch.divisor.transpose() * self.explained[k].sqrt();
-                let numbers = rows[k].nrows();
-                rows[k].resize_vertically_mut(numbers + 1, 0.0);
-                common[k].resize_vertically_mut(numbers + 1, 0.0);
-                rows[k].row_mut(numbers).iter_mut().zip(&row).zip(sd).for_each(|((to, row), sd)| *to = row * sd);
-                of.expected = std::mem::take(&mut of.expected).push((row * around)[0]);
+                let mut row = &epoch.divisor * self.explained[k].sqrt();
+                let last = of.expected.len() - 1;
+                of.expected[last] = row.dot(&around);
+                row.iter_mut().zip(sd).for_each(|(row, sd)| *row *= sd);
+                rows.push(row.transpose());
             }
-            of.expected += &rows[k] * whitened.column(k);
+        }
+        numbers.replace(&self.places(numbers), &DMatrix::from_rows(&rows), spatial);
+        scale_rows(&mut lowered, &inverses(sd));
+        let seen = numbers.seen(&lowered);
+        for (of, part) in compressed.iter_mut().zip(&numbers.parts) {
+            of.expected += seen.rows_range(part.clone());
         }
     }
 
@@ -82,7 +94,7 @@ impl Tilt {
 }
 
 fn tilted(explained: &[f64], epochs: &[Epoch]) -> DMatrix<f64> {
-    let mut by = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.ncols()), epochs.len());
+    let mut by = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.shape().1), epochs.len());
     for (k, (epoch, n)) in epochs.iter().zip(explained).enumerate().filter(|(_, (e, _))| !e.divisor.is_empty()) {
         by.set_column(k, &(&epoch.divisor * -*n));
     }

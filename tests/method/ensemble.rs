@@ -74,16 +74,17 @@ impl Evaluator for Serial<'_> {
 const KINDS: [ParameterKind; 3] = [ParameterKind::Amplitude, ParameterKind::Periodic, ParameterKind::Linear];
 
 fn settings(ensembles: usize, walkers: usize, steps: usize) -> SamplerSettings {
-    SamplerSettings { ensembles, walkers, steps, seed: 5, ..SamplerSettings::default() }
+    SamplerSettings { ensembles, walkers: Some(walkers), steps, seed: 5, ..SamplerSettings::default() }
 }
 
 fn shape(density: &dyn LogDensity, settings: &SamplerSettings) -> Shape {
-    Shape::of(density, settings.ensembles, settings.walkers)
+    Shape::of(density, settings.ensembles, settings.walkers())
 }
 
 fn start(density: &dyn LogDensity, settings: &SamplerSettings) -> Positions {
     let covariance = DMatrix::from_diagonal(&nalgebra::dvector![0.03f64.powi(2), 0.03f64.powi(2), 64.0]);
-    let SamplerSettings { ensembles, walkers, seed, .. } = *settings;
+    let SamplerSettings { ensembles, seed, .. } = *settings;
+    let walkers = settings.walkers();
     let centre = [0.1, 0.97, 0.0];
     let draw = StartDraw { centre: &centre, covariance: &covariance, scale: 1.5, ensembles, walkers, seed };
     let fine = |theta: &[f64]| {

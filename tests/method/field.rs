@@ -125,7 +125,7 @@ impl Star {
         let halved = DVector::from_column_slice(&halved(&profile.variance)) / 2.0;
         Epoch {
             time_d: profile.time_d,
-            jacobian: of_pairs(&jacobian),
+            jacobian: of_pairs(&jacobian).into(),
             misfit: of_pairs(&(&observed - &depth)).column(0).into_owned(),
             beside: 0.0,
             nuisances: DMatrix::zeros(halved.len(), 0),

@@ -37,7 +37,7 @@ impl Problem {
             let n = data + k % 2;
             Epoch {
                 time_d: *time_d,
-                jacobian: some(10 + k, n, degrees.len()) * 3.0,
+                jacobian: (some(10 + k, n, degrees.len()) * 3.0).into(),
                 misfit: some(100 + k, n, 1).column(0).into_owned(),
                 variance: some(200 + k, n, 1).column(0).map(|x| 0.05 + 0.04 * x),
                 nuisances: some(300 + k, n, nuisances) * 0.4,
@@ -123,7 +123,7 @@ impl Problem {
     }
 
     pub fn design(&self) -> DMatrix<f64> {
-        self.apart(|epoch| epoch.jacobian.clone())
+        self.apart(|epoch| epoch.jacobian.whole())
     }
 
     fn slopes(&self) -> DMatrix<f64> {
@@ -131,7 +131,7 @@ impl Problem {
     }
 
     fn residual(&self) -> DVector<f64> {
-        let of = |(k, epoch): (usize, &Epoch)| &epoch.misfit + &epoch.jacobian * self.around.column(k);
+        let of = |(k, epoch): (usize, &Epoch)| &epoch.misfit + epoch.jacobian.times(self.around.column(k));
         let all: Vec<f64> = self.epochs.iter().enumerate().flat_map(|of_k| of(of_k).data.as_vec().clone()).collect();
         DVector::from_vec(all)
     }
@@ -350,7 +350,7 @@ fn smooth(field: Field) -> Problem {
     for epoch in &mut problem.epochs {
         let n = epoch.len();
         let width = DMatrix::from_fn(n, n, |i, j| (-0.02 * (i as f64 - j as f64).powi(2)).exp());
-        epoch.jacobian = width * &epoch.jacobian;
+        epoch.jacobian = epoch.jacobian.after(&width).into();
     }
     problem
 }
@@ -416,7 +416,8 @@ fn what_is_no_field_or_not_finite_is_refused() {
 fn numbers_beyond_sense_come_to_an_end() {
     for (size, how) in [(1e200, EXACT), (1e200, Compression::default()), (f64::MAX, Compression::default())] {
         let mut problem = Problem::of_degree_3(field(0.3, 0.8, Lifetime::Days(4.0), 0.1));
-        problem.epochs[1].jacobian.fill(size);
+        let (data, coefficients) = problem.epochs[1].jacobian.shape();
+        problem.epochs[1].jacobian = DMatrix::repeat(data, coefficients, size).into();
         assert!(Evidence::new(problem.field, &problem.degrees, &problem.epochs, &problem.around, how).is_err());
     }
     let mut problem = Problem::of_degree_3(field(0.3, 0.8, Lifetime::Days(4.0), 0.1));
@@ -429,7 +430,7 @@ fn numbers_beyond_sense_come_to_an_end() {
 fn without_data_the_field_is_as_before() {
     let mut problem = Problem::new(field(0.3, 0.8, Lifetime::Days(4.0), 0.1), &[1, 1, 1], &[0.0, 1.0], 0, 0, 1);
     // the second epoch has one datum, which the field does not touch
-    problem.epochs[1].jacobian.fill(0.0);
+    problem.epochs[1].jacobian = DMatrix::zeros(1, 3).into();
     let epoch = &problem.epochs[1];
     let alone = -0.5 * (epoch.misfit[0].powi(2) / epoch.variance[0] + (TAU * epoch.variance[0]).ln());
     for how in [EXACT, Compression::default()] {

@@ -10,13 +10,14 @@ use std::f64::consts::TAU;
 fn bent(problem: &Problem, coefficients: &DMatrix<f64>) -> Vec<Epoch> {
     let bent = |(k, epoch): (usize, &Epoch)| {
         let c = coefficients.column(k);
-        let straight = &epoch.jacobian * c;
+        let mut jacobian = epoch.jacobian.whole();
+        let straight = &jacobian * c;
         let mut epoch = epoch.clone();
         for (j, value) in straight.iter().enumerate() {
             epoch.misfit[j] -= value + 0.2 * value * value;
-            epoch.jacobian.row_mut(j).scale_mut(1.0 + 0.4 * value);
+            jacobian.row_mut(j).scale_mut(1.0 + 0.4 * value);
         }
-        epoch
+        Epoch { jacobian: jacobian.into(), ..epoch }
     };
     problem.epochs.iter().enumerate().map(bent).collect()
 }
@@ -69,7 +70,7 @@ fn ln_z_of_a_model_that_is_not_linear_is_the_integral() {
         let epoch = |k: usize| {
             let c = maps.column(k).into_owned();
             let (depth, continuum) = model(k, &c);
-            let jacobian = (&lines[k] - &depth * continua[k].column(0).transpose() * 0.4) / continuum;
+            let jacobian = ((&lines[k] - &depth * continua[k].column(0).transpose() * 0.4) / continuum).into();
             let (misfit, n) = (&data[k] - depth, 6);
             let variance = DVector::repeat(n, sigma * sigma);
             let [nuisances, slopes, common] = [0; 3].map(|columns| DMatrix::zeros(n, columns));
@@ -122,7 +123,7 @@ fn ln_z_counts_how_the_volume_of_maps_grows_with_the_continuum() {
             divisor[0] = 0.4 / continuum(&c);
             vec![Epoch {
                 time_d: 0.0,
-                jacobian,
+                jacobian: jacobian.into(),
                 misfit: &data - model,
                 variance: DVector::repeat(n, sigma * sigma),
                 nuisances: DMatrix::zeros(n, 0),

@@ -74,8 +74,8 @@ fn ln_z_of_profiles_and_a_light_curve_is_that_of_dense_algebra() {
     let mut row = 0;
     for (k, epoch) in epochs[..5].iter().enumerate() {
         let n = epoch.len();
-        design.rows_mut(row, n).copy_from(&epoch.jacobian);
-        residual.rows_mut(row, n).copy_from(&(&epoch.misfit + &epoch.jacobian * coefficients.column(k)));
+        design.rows_mut(row, n).copy_from(&epoch.jacobian.whole());
+        residual.rows_mut(row, n).copy_from(&(&epoch.misfit + epoch.jacobian.times(coefficients.column(k))));
         let own = DMatrix::from_diagonal(&epoch.variance) + &epoch.nuisances * epoch.nuisances.transpose();
         noise.view_mut((row, row), (n, n)).copy_from(&own);
         times_d.extend(vec![epoch.time_d; n]);

@@ -38,14 +38,14 @@ fn posterior(oracle: &Oracle, grid: SurfaceGrid, kind: ObjectiveKind, chi2_per_d
 
 /// A chain to an effective size, by the affine-invariant moves alone or with the surrogate move.
 fn sample(posterior: &Posterior, surrogate: bool, ess: f64) -> Summary {
-    let settings = SamplerSettings { walkers: 16, steps: 3000, ess, seed: 7, ..SamplerSettings::default() };
+    let settings = SamplerSettings { walkers: Some(16), steps: 3000, ess, seed: 7, ..SamplerSettings::default() };
     let optimum = climb(posterior, &posterior.space().start(), &|| ()).unwrap();
     let draw = StartDraw {
         centre: &optimum.theta,
         covariance: &optimum.covariance,
         scale: 1.5,
         ensembles: settings.ensembles,
-        walkers: settings.walkers,
+        walkers: settings.walkers(),
         seed: settings.seed,
     };
     let start = draw_start(posterior, &draw, &|theta| posterior.space().log_prior(theta).is_finite()).unwrap();
@@ -57,7 +57,7 @@ fn sample(posterior: &Posterior, surrogate: bool, ess: f64) -> Summary {
         assert!(acceptance > 0.8, "{acceptance}");
         sampler = sampler.with_move(settings.moves.surrogate, Box::new(SurrogateMove(surrogate)));
     }
-    let mut chain = Chain::new(Shape::of(posterior, settings.ensembles, settings.walkers));
+    let mut chain = Chain::new(Shape::of(posterior, settings.ensembles, settings.walkers()));
     chain.push_step(&sampler.start(&start).unwrap().1).unwrap();
     let policy = StopPolicy::new(&settings);
     let nothing = &mut |_: &[_], _: Option<&_>| Ok::<(), std::convert::Infallible>(());

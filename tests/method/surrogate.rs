@@ -82,7 +82,7 @@ fn chain(density: &Tilted, steps: usize, weight: f64) -> Summary {
 
 /// The same with another surrogate than the density's.
 fn chain_with(surrogate: &Surrogate, density: &Tilted, steps: usize, weight: f64) -> Summary {
-    let settings = SamplerSettings { ensembles: 4, walkers: 16, seed: 3, ..SamplerSettings::default() };
+    let settings = SamplerSettings { ensembles: 4, walkers: Some(16), seed: 3, ..SamplerSettings::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let mut draw = || density.space.to_physical(&density.surrogate.draw(&mut rng).unwrap());
     let start: Vec<Vec<Vec<f64>>> = (0..4).map(|_| (0..16).map(|_| draw()).collect()).collect();

@@ -11,7 +11,7 @@ use super::resolve_photometry::resolve_photometry;
 use super::resolve_sets::resolve_sets;
 use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
-use super::{Automatic, Hyperparameter, ImagingSettings, SamplerSettings, Settings, VelocityJitter};
+use super::{Automatic, Hyperparameter, ImagingSettings, Settings, VelocityJitter};
 use crate::posterior::marginal;
 use crate::posterior::nuisances::LineAndContinuum;
 use crate::posterior::objective::{Clock, Elements, FreeParameter, ObjectiveKind, Parameter, ParameterValues, Prior};
@@ -20,6 +20,9 @@ use std::path::Path;
 
 /// Largest degree of a break: harmonics go to 36.
 const MOST_BREAK_DEGREE: f64 = 30.0;
+
+/// Fewest walkers of each ensemble where most moves are independent draws, if their number is not given.
+const FEW_WALKERS: usize = 16;
 
 /// What is said of spots where one map is found.
 const OF_INTEGRATED_MAPS: &str = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
@@ -39,7 +42,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
     let free = resolve_free(&mut raw, &mut values, clock)?;
     check_orbits(&free, &values, clock, raw.star.mass_msun)?;
-    check_sampler(&raw.sampler, free.len())?;
+    resolve_sampler(&mut raw, free.len())?;
     if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
         return Err(Fault::new(
             "parameters.contrast",
@@ -269,10 +272,16 @@ pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
     }
 }
 
-fn check_sampler(sampler: &SamplerSettings, free: usize) -> Result<(), Fault> {
+/// The sampler, the number of its walkers filled in.
+fn resolve_sampler(raw: &mut Config, free: usize) -> Result<(), Fault> {
+    let usual = match raw.imaging.objective {
+        ObjectiveKind::MarginalLikelihood => FEW_WALKERS.max(2 * free),
+        _ => raw.sampler.walkers(),
+    };
+    raw.sampler.walkers.get_or_insert(usual);
     // Commands that do not sample need no free parameter. The message starts with the key.
     let message = |e: String| {
         e.split_once(": ").map(|(key, problem)| Fault::new(key, problem)).unwrap_or(Fault::new("sampler", e))
     };
-    sampler.validate(free.max(1)).map_err(|e| message(e.to_string()))
+    raw.sampler.validate(free.max(1)).map_err(|e| message(e.to_string()))
 }

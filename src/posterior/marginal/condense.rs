@@ -55,7 +55,8 @@ impl Condensed {
             let mut nuisances = data.nuisances.line_and_continuum_of(bins.clone());
             nuisances.column_iter_mut().for_each(|mut column| column.component_mul_assign(&weights));
             let all = || DMatrix::identity(bins.len(), bins.len());
-            let directions = leading_directions(&rough, Compression { left_out: LEFT_OUT }).unwrap_or_else(all);
+            let directions =
+                leading_directions(&rough * rough.transpose(), Compression { left_out: LEFT_OUT }).unwrap_or_else(all);
             let own = DMatrix::from_columns(&[weighed(bare), weighed(&slopes)]);
             let directions = with_directions(with_directions(directions, &own), &nuisances);
             let depths = weighed(&data.depth);

@@ -3,7 +3,7 @@
 use super::condense::Condensed;
 use super::light::Light;
 use super::{DEGREE, MEAN_FILLING};
-use crate::field::{Compression, Epoch, Harmonics, Settling};
+use crate::field::{Compression, Epoch, Harmonics, Jacobian, Settling};
 use crate::posterior::imaging::Imager;
 use crate::star::{Response, StarState, SurfaceGrid};
 use nalgebra::{DMatrix, DVector};
@@ -75,7 +75,7 @@ pub struct Design {
     response: Response,
     condensed: Arc<Condensed>,
     /// Of each profile (numbers, H).
-    line: Vec<DMatrix<f64>>,
+    line: Vec<Arc<DMatrix<f64>>>,
     /// (H, profiles).
     continuum: DMatrix<f64>,
     /// The same of a star without spots.
@@ -121,7 +121,7 @@ impl Design {
             Some(like) => Arc::clone(&like.condensed),
             None => Arc::new(Condensed::new(imager, basis, (&response, state), &lines, &bare)),
         };
-        let line = lines.par_iter().enumerate().map(|(k, line)| condensed.tell(k, line)).collect();
+        let line = lines.par_iter().enumerate().map(|(k, line)| Arc::new(condensed.tell(k, line))).collect();
         let bare = |k: usize| {
             let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &bare[response.bins(k)]);
             condensed.tell(k, &bins).column(0).into_owned()
@@ -158,7 +158,7 @@ impl Design {
         let bare = 1.0 - q * MEAN_FILLING;
         let continuum = bare * self.bare_continuum[k] - q * self.continuum.column(k).dot(coefficients);
         let line = &self.bare_line[k] * bare;
-        ((line - &self.line[k] * coefficients * q) / continuum, continuum)
+        ((line - &*self.line[k] * coefficients * q) / continuum, continuum)
     }
 
     /// The profiles, then the bins of light curves, linearised around maps of these coefficients (H, epochs), without
@@ -175,15 +175,15 @@ impl Design {
     fn epoch(&self, time_d: f64, k: usize, coefficients: &DVector<f64>) -> Epoch {
         let (model, continuum) = self.depths(k, coefficients);
         let scale = -(1.0 - self.response.contrast(k)) / continuum;
-        let mut jacobian = &self.line[k] * scale;
-        jacobian.ger(-scale, &model, &self.continuum.column(k), 1.0);
+        let divisor = self.continuum.column(k) * scale;
+        let jacobian = Jacobian::new(Arc::clone(&self.line[k]), scale, (-&model, divisor.clone()));
         Epoch {
             time_d,
             jacobian,
             variance: DVector::repeat(model.len(), 1.0),
             slopes: DMatrix::zeros(model.len(), 0),
             common: DMatrix::zeros(model.len(), 0),
-            divisor: self.continuum.column(k) * scale,
+            divisor,
             misfit: &self.condensed.data[k] - model,
             nuisances: self.condensed.nuisances[k].clone(),
             beside: self.condensed.beside[k],

@@ -84,6 +84,9 @@ impl Marginal {
     /// How the numbers of each epoch change with a velocity and with the star's parameters, at the most probable maps
     /// (numbers, 1 + parameters).
     pub(super) fn slopes_of_epochs(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+        if stellar.is_empty() {
+            return self.velocity_slopes(imager, basis).to_vec();
+        }
         let mut slopes = self.design.condensed(&self.slopes(imager, basis, stellar));
         slopes.extend(self.flux_slopes(imager, basis, stellar));
         slopes

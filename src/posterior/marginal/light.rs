@@ -75,7 +75,7 @@ impl Light {
                 common[first + 2 * bin.segment + 1] = LEVEL * bin.place;
                 epochs.push(Epoch {
                     time_d: bin.time_d,
-                    jacobian: self.jacobian.rows(k, 1).into_owned(),
+                    jacobian: self.jacobian.rows(k, 1).into_owned().into(),
                     misfit: DVector::from_element(1, bin.flux - fluxes[k]),
                     variance: DVector::from_element(1, bin.sigma * bin.sigma),
                     nuisances: DMatrix::zeros(1, 0),

@@ -42,7 +42,7 @@ use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectru
 use crate::posterior::imaging::Imager;
 use crate::posterior::objective::{Parameter, ParameterValues};
 use nalgebra::DMatrix;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Mean of the field: the spot filling factor of a star of which nothing else is known. Profiles do not tell it.
 pub const MEAN_FILLING: f64 = 0.06;
@@ -108,6 +108,8 @@ pub struct Marginal {
     /// The most probable maps (their coefficients, a column a profile and then a bin of light curves), and the evidence
     /// there.
     pub settled: Settled,
+    /// How the numbers of each epoch change with a velocity, once it is asked for.
+    velocity_slopes: OnceLock<Vec<DMatrix<f64>>>,
 }
 
 impl Marginal {
@@ -131,18 +133,24 @@ impl Marginal {
         };
         let values = assumed.among(values);
         if let Some(nearby) = nearby.filter(|_| assumed.jitter_kms > 0.0) {
-            let begun = Marginal { values, assumed, design, settled: nearby.settled.clone() };
             let times = if nearby.assumed.jitter_kms > 0.0 { basis.jittered } else { JITTERED };
-            return begun.with_jitter(imager, basis, times);
+            return Marginal::with_jitter((imager, basis), design, values, assumed, (nearby, times));
         }
         let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
         let by = nearby.map(|nearby| &nearby.settled.evidence);
         let settled = settle(linearise, sought, start, by, &basis.settling)?;
-        let marginal = Marginal { values, assumed, design, settled };
+        let marginal = Marginal::settled_at(design, values, assumed, settled);
         match assumed.jitter_kms {
             0.0 => Ok(marginal),
-            _ => marginal.with_jitter(imager, basis, JITTERED),
+            _ => {
+                let design = Arc::clone(&marginal.design);
+                Marginal::with_jitter((imager, basis), design, values, assumed, (&marginal, JITTERED))
+            }
         }
+    }
+
+    fn settled_at(design: Arc<Design>, values: ParameterValues, assumed: Assumed, settled: Settled) -> Self {
+        Marginal { values, assumed, design, settled, velocity_slopes: OnceLock::new() }
     }
 
     /// The brightness of each pixel (rows) in the most probable map of each profile (columns).

@@ -295,7 +295,7 @@ fn new_manifest(
         numbers: target.number_names().iter().map(|name| (*name).to_owned()).collect(),
         priors: scene.space.free().iter().map(prior).collect(),
         ensembles: scene.settings.sampler.ensembles,
-        walkers: scene.settings.sampler.walkers,
+        walkers: scene.settings.sampler.walkers(),
         seed: scene.settings.sampler.seed,
         extend_to: None,
         merged_seeds: Vec::new(),

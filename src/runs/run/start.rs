@@ -50,7 +50,7 @@ pub(super) fn around_maxima(
             covariance: &maximum.covariance,
             scale: OVERDISPERSION,
             ensembles: sampler.ensembles,
-            walkers: sampler.walkers,
+            walkers: sampler.walkers(),
             seed: sampler.seed.wrapping_add(m as u64),
         };
         draw_start(target, &draw, &|theta| scene.space.log_prior(theta).is_finite())
@@ -63,7 +63,7 @@ pub(super) fn around_maxima(
     };
     let choose = |e: usize, w: usize| if w.is_multiple_of(2) { e % maxima.len() } else { (w / 2) % maxima.len() };
     let walker = |e: usize, w: usize| around[choose(e, w)][e][w].clone();
-    Ok((0..sampler.ensembles).map(|e| (0..sampler.walkers).map(|w| walker(e, w)).collect()).collect())
+    Ok((0..sampler.ensembles).map(|e| (0..sampler.walkers()).map(|w| walker(e, w)).collect()).collect())
 }
 
 /// Draws from the prior at which the reconstruction succeeds.
@@ -80,8 +80,8 @@ fn reconstructed(
     draw: impl Fn(&mut ChaCha8Rng) -> Option<Vec<f64>>,
 ) -> Option<Positions> {
     let sampler = &scene.settings.sampler;
-    let walkers = sampler.ensembles * sampler.walkers;
-    let numbers = |index| start_numbers(sampler.seed, index / sampler.walkers, index % sampler.walkers);
+    let walkers = sampler.ensembles * sampler.walkers();
+    let numbers = |index| start_numbers(sampler.seed, index / sampler.walkers(), index % sampler.walkers());
     let mut numbers: Vec<ChaCha8Rng> = (0..walkers).map(numbers).collect();
     let mut positions: Vec<Option<Vec<f64>>> = vec![None; walkers];
     for _ in 0..tries {
@@ -97,5 +97,5 @@ fn reconstructed(
         }
     }
     let positions: Vec<Vec<f64>> = positions.into_iter().collect::<Option<_>>()?;
-    Some(positions.chunks(sampler.walkers).map(<[_]>::to_vec).collect())
+    Some(positions.chunks(sampler.walkers()).map(<[_]>::to_vec).collect())
 }

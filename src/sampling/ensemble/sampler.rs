@@ -73,7 +73,8 @@ impl<'a> Sampler<'a> {
         settings: &SamplerSettings,
     ) -> Result<Self, EnsembleError> {
         settings.validate(density.names().len())?;
-        let SamplerSettings { ensembles, walkers, seed, .. } = *settings;
+        let SamplerSettings { ensembles, seed, .. } = *settings;
+        let walkers = settings.walkers();
         Ok(Sampler { density, evaluator, ensembles, walkers, seed, mix: settings.moves.mix() })
     }
 

@@ -12,8 +12,10 @@ use serde::{Deserialize, Serialize};
 pub struct SamplerSettings {
     /// Number of independent ensembles. Convergence is judged between them, so at least 2, better 4.
     pub ensembles: usize,
-    /// Walkers of each ensemble: even, at least 4 and at least twice the number of sampled parameters.
-    pub walkers: usize,
+    /// Walkers of each ensemble: even, at least 4 and at least twice the number of sampled parameters. Without it 32; or,
+    /// where all maps are integrated over, 16 or twice that number: most moves are independent draws there, and every
+    /// walker needs its own time to forget its start.
+    pub walkers: Option<usize>,
     /// Step limit. The chain ends earlier once every parameter has reached both goals, `rhat` and `ess`.
     pub steps: usize,
     /// Seed of the random numbers. The same seed gives the same chain, on any number of threads.
@@ -30,7 +32,7 @@ impl Default for SamplerSettings {
     fn default() -> Self {
         SamplerSettings {
             ensembles: 4,
-            walkers: 32,
+            walkers: None,
             steps: 2000,
             seed: 1,
             rhat: 1.01,
@@ -41,13 +43,18 @@ impl Default for SamplerSettings {
 }
 
 impl SamplerSettings {
+    /// Walkers of each ensemble.
+    pub fn walkers(&self) -> usize {
+        self.walkers.unwrap_or(WALKERS)
+    }
+
     /// Checks the settings for a density of `dimension` parameters.
     ///
     /// # Errors
     /// [`EnsembleError::Setting`], naming the first key at fault.
     pub fn validate(&self, dimension: usize) -> Result<(), EnsembleError> {
         let refuse = |key, problem| Err(EnsembleError::Setting { key, problem });
-        let least = 4.max(2 * dimension);
+        let (walkers, least) = (self.walkers(), 4.max(2 * dimension));
         if dimension == 0 {
             return refuse("parameters", "nothing to sample: at least one parameter is needed".to_owned());
         }
@@ -57,14 +64,14 @@ impl SamplerSettings {
         if self.ensembles > MOST_ENSEMBLES {
             return refuse("sampler.ensembles", format!("must be at most {MOST_ENSEMBLES}, not {}", self.ensembles));
         }
-        if !self.walkers.is_multiple_of(2) {
-            return refuse("sampler.walkers", format!("must be even, not {}", self.walkers));
+        if !walkers.is_multiple_of(2) {
+            return refuse("sampler.walkers", format!("must be even, not {walkers}"));
         }
-        if self.walkers < least {
-            let why = format!("must be at least {least} for {dimension} sampled parameters, not {}", self.walkers);
+        if walkers < least {
+            let why = format!("must be at least {least} for {dimension} sampled parameters, not {walkers}");
             return refuse("sampler.walkers", why);
         }
-        let all = self.ensembles.saturating_mul(self.walkers);
+        let all = self.ensembles.saturating_mul(walkers);
         if all > MOST_WALKERS {
             let whole = format!("in all ensembles must be at most {MOST_WALKERS}, not {all}");
             return refuse("sampler.walkers", whole);
@@ -84,6 +91,9 @@ impl SamplerSettings {
         self.moves.validate()
     }
 }
+
+/// Walkers of each ensemble, usually.
+const WALKERS: usize = 32;
 
 /// Bound on ensembles: far beyond use.
 const MOST_ENSEMBLES: usize = 1000;
@@ -108,14 +118,16 @@ mod tests {
     #[test]
     fn errors_name_the_key() {
         assert_eq!(SamplerSettings::default().validate(8), Ok(()));
-        assert!(refused(|s| s.walkers = 33).starts_with("sampler.walkers: must be even"));
-        assert!(refused(|s| s.walkers = 14).starts_with("sampler.walkers: must be at least 16"));
+        assert!(refused(|s| s.walkers = Some(33)).starts_with("sampler.walkers: must be even"));
+        assert!(refused(|s| s.walkers = Some(14)).starts_with("sampler.walkers: must be at least 16"));
         assert!(refused(|s| s.ensembles = 0).starts_with("sampler.ensembles"));
         assert!(refused(|s| s.steps = 0).starts_with("sampler.steps"));
         assert!(refused(|s| s.steps = usize::MAX).starts_with("sampler.steps: must be at most"));
         assert!(refused(|s| s.ensembles = 100_000).starts_with("sampler.ensembles: must be at most 1000"));
-        assert!(refused(|s| s.walkers = 1_000_000).starts_with("sampler.walkers: in all ensembles must be at most"));
-        assert!(refused(|s| (s.ensembles, s.walkers) = (500, 1000)).contains("not 500000"));
+        assert!(
+            refused(|s| s.walkers = Some(1_000_000)).starts_with("sampler.walkers: in all ensembles must be at most")
+        );
+        assert!(refused(|s| (s.ensembles, s.walkers) = (500, Some(1000))).contains("not 500000"));
         for rhat in [1.0, f64::NAN, f64::INFINITY] {
             assert!(refused(|s| s.rhat = rhat).starts_with("sampler.rhat"));
         }
@@ -131,7 +143,7 @@ mod tests {
     fn partial_settings_take_defaults_and_unknown_keys_are_refused() {
         let text = r#"{ "ensembles": 2, "moves": { "stretch": 0.2 } }"#;
         let settings: SamplerSettings = serde_json::from_str(text).unwrap();
-        assert_eq!((settings.ensembles, settings.walkers, settings.ess), (2, 32, 1000.0));
+        assert_eq!((settings.ensembles, settings.walkers(), settings.ess), (2, 32, 1000.0));
         assert_eq!(settings.moves, MoveWeights { stretch: 0.2, ..MoveWeights::default() });
         assert!(serde_json::from_str::<SamplerSettings>(r#"{ "walker": 2 }"#).is_err());
         let back: SamplerSettings = serde_json::from_str(&serde_json::to_string(&settings).unwrap()).unwrap();

@@ -136,7 +136,7 @@ pub fn sample(
     let evaluator = Threads(density);
     let sampler = Sampler::new(density, &evaluator, settings)?;
     let (_, first) = sampler.start(start)?;
-    let shape = Shape::of(density, settings.ensembles, settings.walkers);
+    let shape = Shape::of(density, settings.ensembles, settings.walkers());
     let kinds = vec![ParameterKind::Linear; shape.names.len()];
     let mut chain = Chain::new(shape);
     chain.push_step(&first).expect(OURS);

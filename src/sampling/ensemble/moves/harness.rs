@@ -130,13 +130,13 @@ fn recover<F: Fn(&[f64]) -> f64 + Sync>(
     truths: &[Truth],
     start: &dyn Fn([f64; 3]) -> Vec<f64>,
 ) -> Result<(), String> {
-    let settings = SamplerSettings { ensembles: ENSEMBLES, walkers: 12, seed: 7, ..SamplerSettings::default() };
+    let settings = SamplerSettings { ensembles: ENSEMBLES, walkers: Some(12), seed: 7, ..SamplerSettings::default() };
     let evaluator = Serial(density);
     let sampler = Sampler::new(density, &evaluator, &settings).map_err(|e| e.to_string())?.with_mix(mix);
     let unit = |n: usize, root: f64| 2.0 * ((n as f64 + 1.0) * root).fract() - 1.0;
     let place = |n: usize| start([unit(n, 0.754878), unit(n, 0.569840), unit(n, 0.414214)]);
     let positions: Positions =
-        (0..ENSEMBLES).map(|e| (0..settings.walkers).map(|w| place(e * settings.walkers + w)).collect()).collect();
+        (0..ENSEMBLES).map(|e| (0..settings.walkers()).map(|w| place(e * settings.walkers() + w)).collect()).collect();
     let (mut state, _) = sampler.start(&positions).map_err(|e| e.to_string())?;
     let mut sums = vec![[0.0; ENSEMBLES]; truths.len()];
     for step in 0..STEPS {
@@ -145,7 +145,7 @@ fn recover<F: Fn(&[f64]) -> f64 + Sync>(
             sums.iter_mut().zip(truths).for_each(|(sum, truth)| sum[record.ensemble] += (truth.of)(&record.theta));
         }
     }
-    let count = ((STEPS - DISCARD) * settings.walkers) as f64;
+    let count = ((STEPS - DISCARD) * settings.walkers()) as f64;
     for (sum, Truth { what, value, .. }) in sums.iter().zip(truths) {
         let mean = sum.iter().sum::<f64>() / (count * ENSEMBLES as f64);
         let variance = sum.iter().map(|s| (s / count - mean).powi(2)).sum::<f64>() / (ENSEMBLES as f64 - 1.0);

@@ -1,0 +1,115 @@
+//! How the model of an epoch changes with the coefficients of the field.
+//!
+//! The large part of it, a row a datum, is that of what is divided by a continuum, and the same wherever the model is
+//! made linear: it is shared, not copied.
+
+use nalgebra::{DMatrix, DVector, DVectorView};
+use std::sync::Arc;
+
+/// `J = scale A + u d^T` (data, H): of a model `(a + A c) / s(c)`, for example, 1 / s, and minus the model times the
+/// derivative of ln s.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Jacobian {
+    /// A (data, H).
+    rows: Arc<DMatrix<f64>>,
+    scale: f64,
+    /// u (data) and d (H); zeros where there is no such part.
+    outer: (DVector<f64>, DVector<f64>),
+}
+
+impl From<DMatrix<f64>> for Jacobian {
+    fn from(rows: DMatrix<f64>) -> Self {
+        let outer = (DVector::zeros(rows.nrows()), DVector::zeros(rows.ncols()));
+        Jacobian::new(Arc::new(rows), 1.0, outer)
+    }
+}
+
+impl Jacobian {
+    /// `scale A + u d^T`. Panics where shapes do not go together.
+    pub fn new(rows: Arc<DMatrix<f64>>, scale: f64, (u, d): (DVector<f64>, DVector<f64>)) -> Self {
+        assert_eq!(rows.shape(), (u.len(), d.len()), "both parts of J");
+        Jacobian { rows, scale, outer: (u, d) }
+    }
+
+    /// Numbers of data and of coefficients.
+    pub fn shape(&self) -> (usize, usize) {
+        self.rows.shape()
+    }
+
+    /// Whether all numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
+        let (u, d) = &self.outer;
+        self.scale.is_finite() && finite(self.rows.as_slice()) && finite(u.as_slice()) && finite(d.as_slice())
+    }
+
+    /// J (data, H).
+    pub fn whole(&self) -> DMatrix<f64> {
+        self.after(&DMatrix::identity(self.rows.nrows(), self.rows.nrows()))
+    }
+
+    /// `J c`.
+    pub fn times(&self, c: DVectorView<f64>) -> DVector<f64> {
+        let (u, d) = &self.outer;
+        let mut product = u * d.dot(&c);
+        product.gemv(self.scale, &self.rows, &c, 1.0);
+        product
+    }
+
+    /// `J^T x`.
+    pub fn tr_times(&self, x: &DVector<f64>) -> DVector<f64> {
+        let (u, d) = &self.outer;
+        let mut product = d * u.dot(x);
+        product.gemv_tr(self.scale, &self.rows, x, 1.0);
+        product
+    }
+
+    /// `P J` (rows, H) for P (rows, data).
+    pub fn after(&self, p: &DMatrix<f64>) -> DMatrix<f64> {
+        let (u, d) = &self.outer;
+        let mut product = p * &*self.rows;
+        product *= self.scale;
+        product.ger(1.0, &(p * u), d, 1.0);
+        product
+    }
+
+    /// `J S J^T` (data, data), S diagonal.
+    pub fn covariance(&self, variances: &[f64]) -> DMatrix<f64> {
+        let (u, d) = &self.outer;
+        let mut turned = self.rows.transpose();
+        for mut column in turned.column_iter_mut() {
+            column.iter_mut().zip(variances).for_each(|(x, variance)| *x *= variance);
+        }
+        let along = turned.tr_mul(d) * self.scale;
+        let own: f64 = d.iter().zip(variances).map(|(d, variance)| d * d * variance).sum();
+        let mut covariance = &*self.rows * turned;
+        covariance *= self.scale * self.scale;
+        covariance.ger(1.0, &along, u, 1.0);
+        covariance.ger(1.0, u, &along, 1.0);
+        covariance.ger(own, u, u, 1.0);
+        covariance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_those_of_the_whole_matrix() {
+        let some = |n: usize, m: usize| DMatrix::from_fn(n, m, |i, j| ((7 * i + 5 * j + 3 * i * j) % 11) as f64 - 4.5);
+        let (u, d, variances) = (some(4, 1).column(0).into_owned(), some(9, 1).column(0).into_owned(), [0.3; 9]);
+        let whole = some(4, 9) * 0.7 + &u * d.transpose();
+        let jacobian = Jacobian::new(Arc::new(some(4, 9)), 0.7, (u, d));
+        let close = |got: &DMatrix<f64>, known: &DMatrix<f64>| (got - known).amax() < 1e-12 * known.amax();
+        let column = |x: DVector<f64>| DMatrix::from_column_slice(x.len(), 1, x.as_slice());
+        assert!(close(&jacobian.whole(), &whole));
+        assert!(close(&column(jacobian.times(some(9, 2).column(1))), &column(&whole * some(9, 2).column(1))));
+        let x = some(4, 3).column(2).into_owned();
+        assert!(close(&column(jacobian.tr_times(&x)), &column(whole.transpose() * &x)));
+        assert!(close(&jacobian.after(&some(2, 4)), &(some(2, 4) * &whole)));
+        let spread = DMatrix::from_diagonal(&DVector::from_row_slice(&variances));
+        assert!(close(&jacobian.covariance(&variances), &(&whole * spread * whole.transpose())));
+        assert!(jacobian.is_finite() && !Jacobian::from(DMatrix::repeat(1, 2, f64::NAN)).is_finite());
+    }
+}
