@@ -223,3 +223,46 @@ impl Covariance {
         column.column(0).into_owned()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn some(n: usize, m: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(n, m, |i, j| ((i * 7919 + j * 104_729 + i * j * 31) % 1009) as f64 / 1009.0 - 0.5)
+    }
+
+    fn numbers(left_out: f64) -> Numbers {
+        let mut rows = [some(3, 9), some(4, 9) * 2.0, some(2, 9)];
+        // of the last two columns there is next to nothing
+        rows.iter_mut().for_each(|rows| rows.columns_range_mut(7..).scale_mut(1e-4));
+        let common = [0; 3].map(|_| DMatrix::zeros(0, 0));
+        Numbers::new(vec![0.0, 1.0, 5.0], &rows, &common, 9, left_out)
+    }
+
+    #[test]
+    fn rows_that_are_replaced_are_in_the_products() {
+        for left_out in [0.0, 1e-6] {
+            let mut numbers = numbers(left_out);
+            assert_eq!(numbers.telling, if left_out > 0.0 { 7 } else { 9 });
+            let all = numbers.rows.clone() * numbers.rows.transpose();
+            let mut spatial = numbers.spatial();
+            assert!((spatial.lower_triangle() - all.lower_triangle()).amax() <= left_out);
+            numbers.replace(&[2, 6], &some(2, 9), Some(&mut spatial));
+            assert_eq!(numbers.rows.row(6), some(2, 9).row(1));
+            assert!((spatial.lower_triangle() - numbers.spatial().lower_triangle()).amax() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn each_epoch_sees_its_own_coefficients() {
+        let numbers = numbers(0.0);
+        let (seen, x) = (numbers.seen(&some(9, 3)), some(9, 1).column(0).into_owned());
+        let pulled = numbers.pulled(&x);
+        for (k, part) in numbers.parts.iter().enumerate() {
+            let rows = numbers.rows.rows_range(part.clone()).into_owned();
+            assert!((seen.rows_range(part.clone()) - &rows * some(9, 3).column(k)).amax() < 1e-14);
+            assert!((pulled.column(k) - rows.transpose() * x.rows_range(part.clone())).amax() < 1e-14);
+        }
+    }
+}

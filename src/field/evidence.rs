@@ -187,3 +187,40 @@ fn quadratic(
     covariance.backward(&mut dual);
     (Quadratic { ln_evidence, gradient, information }, dual.column(0).into_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Kernel, Lifetime, Spectrum};
+    use super::*;
+
+    /// Whatever it was told, the field explains as much.
+    #[test]
+    fn how_much_the_field_explains_is_its_own() {
+        let some = |n: usize, m: usize| DMatrix::from_fn(n, m, |i, j| ((7 * i + 5 * j + 3 * i * j) % 11) as f64 - 4.5);
+        let epoch = |k: usize| Epoch {
+            time_d: k as f64,
+            jacobian: (some(5, 8) * (1.0 + k as f64)).into(),
+            misfit: some(5, 1).column(0).into_owned(),
+            variance: DVector::repeat(5, 2.0),
+            nuisances: DMatrix::zeros(5, 0),
+            beside: 0.0,
+            slopes: DMatrix::zeros(5, 0),
+            common: DMatrix::zeros(5, 0),
+            divisor: if k == 1 { DVector::zeros(0) } else { DVector::repeat(8, 0.3) },
+        };
+        let field = Field {
+            spectrum: Spectrum { amplitude: 0.8, slope: 0.5, break_degree: 0.0 },
+            kernel: Kernel::of(Lifetime::Days(3.0)),
+        };
+        let of = |explained: Option<&[f64]>| {
+            let (epochs, around) = ([epoch(0), epoch(1), epoch(2)], DMatrix::zeros(8, 3));
+            Evidence::of(field, &[1, 1, 1, 2, 2, 2, 2, 2], (&epochs, &around), Compression::default(), explained)
+                .unwrap()
+        };
+        let (own, told) = (of(None), of(Some(&[0.5, 0.5, 0.5])));
+        assert_ne!(own.ln_evidence(), told.ln_evidence());
+        for (own, told) in own.explained().unwrap().iter().zip(told.explained().unwrap()) {
+            assert!(*own > 1.0 && *own < 5.0 && (own - told).abs() < 1e-9, "{own} {told}");
+        }
+    }
+}
