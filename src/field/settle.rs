@@ -4,7 +4,7 @@
 //! The largest change of the field in a step is limited: far from the answer the linear model promises too much. Start
 //! from no field at all or from the answer of the same hyperparameters nearby; from that of others it may not come
 //! back. Where the field hardly changes any more, steps by the covariance of an earlier one come nearer as well, and
-//! cost next to nothing: each mixed with those before, by a factor of three or four.
+//! cost next to nothing: each is mixed with those before, and leaves some fifth of the way.
 
 use super::epoch::pulled;
 use super::{Compression, Epoch, Evidence, Field, FieldError};
