@@ -156,13 +156,17 @@ def table(args):
             cells = [name, group, str(len(of)), *(calibration_table.share(off < n * sd) for n in (1, 2))]
             cells += [f"{np.sqrt(np.mean((off / sd) ** 2)):.2f}", f"{np.median(sd):.3g}"]
             lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", "| parameter | chains of stars | inside 68 % | inside 95 % | spread of draws / sd |"]
-    lines.append("| --- | --- | --- | --- | --- |")
+    lines += ["", "| parameter | chains of stars with vsini | stars | inside 68 % | inside 95 % | spread of draws / sd |"]
+    lines.append("| --- | --- | --- | --- | --- | --- |")
     chains = [row for row in integrated if row["draws"]]
+    groups = {f"below {FAST:.0f} km/s": [row for row in chains if not fast(row)]}
+    groups[f"above {FAST:.0f} km/s"] = [row for row in chains if fast(row)]
     for name in TOLD:
-        below, spread, sd = (np.array([float(row[p + name]) for row in chains]) for p in ("below_", "spread_", "sd_"))
-        inside = [calibration_table.share(np.abs(below - 0.5) < share / 2) for share in (0.68, 0.95)]
-        lines.append("| " + " | ".join([name, str(len(chains)), *inside, f"{np.median(spread / sd):.2f}"]) + " |")
+        for group, of in groups.items():
+            below, spread, sd = (np.array([float(row[p + name]) for row in of]) for p in ("below_", "spread_", "sd_"))
+            inside = [calibration_table.share(np.abs(below - 0.5) < share / 2) for share in (0.68, 0.95)]
+            cells = [name, group, str(len(of)), *inside, f"{np.median(spread / sd):.2f}"]
+            lines.append("| " + " | ".join(cells) + " |")
     why = lambda row: row["error"].split(": at these")[0].removeprefix("imaging.chi2_target: ")
     failed = [f"- {row['seed']}, {row['objective']}: {why(row)}" for row in rows if row["error"]]
     text = "\n".join([*lines, "", *failed])

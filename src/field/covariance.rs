@@ -23,22 +23,13 @@ pub struct Numbers {
     pub parts: Vec<Range<usize>>,
     /// J S^(1/2) (n, H).
     pub rows: DMatrix<f64>,
-    /// As many of its columns, from the first, as are no zeros to any purpose.
-    telling: usize,
     /// What epochs have in common (n, numbers).
     pub common: DMatrix<f64>,
 }
 
 impl Numbers {
-    /// Of epochs at these times, and their parts of both matrices. Of the variance of all numbers, `left_out` may be
-    /// missing in products.
-    pub fn new(
-        times_d: Vec<f64>,
-        rows: &[DMatrix<f64>],
-        common: &[DMatrix<f64>],
-        coefficients: usize,
-        left_out: f64,
-    ) -> Self {
+    /// Of epochs at these times, and their parts of both matrices.
+    pub fn new(times_d: Vec<f64>, rows: &[DMatrix<f64>], common: &[DMatrix<f64>], coefficients: usize) -> Self {
         let mut end = 0;
         let part = |rows: &DMatrix<f64>| {
             end += rows.nrows();
@@ -47,18 +38,12 @@ impl Numbers {
         let parts: Vec<Range<usize>> = rows.iter().map(part).collect();
         let numbers = common.iter().map(DMatrix::ncols).max().unwrap_or(0);
         let (rows, common) = (stacked(rows, &parts, coefficients), stacked(common, &parts, numbers));
-        let mut left = left_out;
-        let beyond = rows.column_iter().rev().take_while(|column| {
-            left -= column.norm_squared();
-            left >= 0.0
-        });
-        let telling = coefficients - beyond.count();
-        Numbers { times_d, parts, rows, common, telling }
+        Numbers { times_d, parts, rows, common }
     }
 
     /// J S J^T (n, n), lower triangle.
     pub fn spatial(&self) -> DMatrix<f64> {
-        dense::gram(&self.rows.columns(0, self.telling))
+        dense::gram(&self.rows)
     }
 
     /// Puts other rows (numbers, H) in the place of some, in [`Numbers::spatial`] as well if that is given.
@@ -67,7 +52,7 @@ impl Numbers {
             self.rows.set_row(*place, &row);
         }
         let Some(spatial) = spatial else { return };
-        let across = self.rows.columns(0, self.telling) * rows.columns(0, self.telling).transpose();
+        let across = &self.rows * rows.transpose();
         for (place, across) in places.iter().zip(across.column_iter()) {
             for (other, product) in across.iter().enumerate() {
                 spatial[(other.max(*place), other.min(*place))] = *product;
@@ -232,31 +217,24 @@ mod tests {
         DMatrix::from_fn(n, m, |i, j| ((i * 7919 + j * 104_729 + i * j * 31) % 1009) as f64 / 1009.0 - 0.5)
     }
 
-    fn numbers(left_out: f64) -> Numbers {
-        let mut rows = [some(3, 9), some(4, 9) * 2.0, some(2, 9)];
-        // of the last two columns there is next to nothing
-        rows.iter_mut().for_each(|rows| rows.columns_range_mut(7..).scale_mut(1e-4));
+    fn numbers() -> Numbers {
+        let rows = [some(3, 9), some(4, 9) * 2.0, some(2, 9)];
         let common = [0; 3].map(|_| DMatrix::zeros(0, 0));
-        Numbers::new(vec![0.0, 1.0, 5.0], &rows, &common, 9, left_out)
+        Numbers::new(vec![0.0, 1.0, 5.0], &rows, &common, 9)
     }
 
     #[test]
     fn rows_that_are_replaced_are_in_the_products() {
-        for left_out in [0.0, 1e-6] {
-            let mut numbers = numbers(left_out);
-            assert_eq!(numbers.telling, if left_out > 0.0 { 7 } else { 9 });
-            let all = numbers.rows.clone() * numbers.rows.transpose();
-            let mut spatial = numbers.spatial();
-            assert!((spatial.lower_triangle() - all.lower_triangle()).amax() <= left_out);
-            numbers.replace(&[2, 6], &some(2, 9), Some(&mut spatial));
-            assert_eq!(numbers.rows.row(6), some(2, 9).row(1));
-            assert!((spatial.lower_triangle() - numbers.spatial().lower_triangle()).amax() < 1e-14);
-        }
+        let mut numbers = numbers();
+        let mut spatial = numbers.spatial();
+        numbers.replace(&[2, 6], &some(2, 9), Some(&mut spatial));
+        assert_eq!(numbers.rows.row(6), some(2, 9).row(1));
+        assert!((spatial.lower_triangle() - numbers.spatial().lower_triangle()).amax() < 1e-14);
     }
 
     #[test]
     fn each_epoch_sees_its_own_coefficients() {
-        let numbers = numbers(0.0);
+        let numbers = numbers();
         let (seen, x) = (numbers.seen(&some(9, 3)), some(9, 1).column(0).into_owned());
         let pulled = numbers.pulled(&x);
         for (k, part) in numbers.parts.iter().enumerate() {

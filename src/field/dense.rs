@@ -2,19 +2,18 @@
 //! products of blocks, which nalgebra does with the best instructions of the processor (some 40 Gflop/s on one core;
 //! its own Cholesky factor, column by column, 1.5 to 4). One thread, and always the same order of sums.
 
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{DMatrix, DVector};
 
 /// Columns of a block.
 const BLOCK: usize = 64;
 
 /// Lower triangle (diagonal blocks whole) of `A A^T`, for A (n, m); what is above is zero.
-pub fn gram<'a>(a: impl Into<DMatrixView<'a, f64>>) -> DMatrix<f64> {
-    let a = a.into();
+pub fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     product_with_transpose(a, a)
 }
 
 /// Lower triangle of `A B^T`, for A and B (n, m) whose product is known to be symmetric.
-pub fn product_with_transpose(a: DMatrixView<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
+pub fn product_with_transpose(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.nrows();
     let turned = b.transpose();
     let mut product = DMatrix::zeros(n, n);

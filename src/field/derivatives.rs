@@ -41,7 +41,7 @@ impl Evidence {
         let by_slope = self.field.spectrum.log_variances_by_slope(&self.degrees);
         let mut weighted = numbers.rows.clone();
         weighted.column_iter_mut().zip(by_slope).for_each(|(mut column, weight)| column *= weight);
-        let by_slope = dense::product_with_transpose(weighted.as_view(), numbers.rows.as_view());
+        let by_slope = dense::product_with_transpose(&weighted, &numbers.rows);
         Derivatives {
             ln_amplitude: 2.0 * along(&spatial, &|delay| kernel.at(delay)),
             slope: along(&by_slope, &|delay| kernel.at(delay)),

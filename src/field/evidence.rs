@@ -76,7 +76,7 @@ impl Evidence {
         let (mut compressed, rows): (Vec<_>, Vec<_>) = compressed.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let (rows, common): (Vec<_>, Vec<_>) = rows.into_iter().map(|[rows, common]| (rows, common)).unzip();
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
-        let mut numbers = Numbers::new(times_d, &rows, &common, sd.len(), how.left_out);
+        let mut numbers = Numbers::new(times_d, &rows, &common, sd.len());
         drop((rows, common));
         let mut spatial = (!numbers.are_many()).then(|| numbers.spatial());
         let factored = |numbers: &Numbers, spatial: Option<DMatrix<f64>>| {

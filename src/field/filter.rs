@@ -112,7 +112,7 @@ fn mix(states: &mut DMatrix<f64>, rates: usize, [vv, vw, wv, ww]: [f64; 4]) {
 
 impl Filter {
     /// `None` where the covariance is not positive definite or not finite.
-    pub fn new(Numbers { times_d, parts, rows, common, .. }: &Numbers, kernel: &Kernel) -> Option<Self> {
+    pub fn new(Numbers { times_d, parts, rows, common }: &Numbers, kernel: &Kernel) -> Option<Self> {
         let directions = seen_directions(rows)?;
         let seen = rows * &directions;
         let (changes, stays) = (!kernel.is_static(), kernel.is_static() || kernel.persistent > 0.0);
@@ -270,7 +270,7 @@ mod tests {
         };
         let rows: Vec<_> = (0..times_d.len()).map(of).collect();
         let common: Vec<_> = rows.iter().map(|rows| some(rows.nrows(), 2)).collect();
-        Numbers::new(times_d, &rows, &common, 100, 0.0)
+        Numbers::new(times_d, &rows, &common, 100)
     }
 
     fn dense_and_filter(kernel: &Kernel) -> (Factor, Filter, usize) {

@@ -7,15 +7,15 @@
 //! cost next to nothing: each is mixed with those before, and leaves some fifth of the way.
 
 use super::epoch::pulled;
+use super::tilt::tilted;
 use super::{Compression, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Largest change of the field in a step after which the next is made by the same covariance.
-const FROZEN_BELOW: f64 = 0.3;
-
-/// Largest change of the field in a step over that in the step before, up to which one covariance will do.
+/// Largest change of the field in a step over that in the step before, up to which one covariance will do; and for how
+/// many steps.
 const FALLS: f64 = 0.9;
+const FROZEN: usize = 10;
 
 /// Steps that one is mixed with.
 const MIXED: usize = 3;
@@ -70,8 +70,8 @@ pub struct Settled {
 ///
 /// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
 /// left of the way is an error of ln Z (`docs/method.md` section 9). How many numbers of an epoch the field explains
-/// (`tilt`) is found with each covariance that is made, or is as nearby; ln Z depends on it to second order only, and is
-/// 0.004 too low by it in the median of a chain, and at most 0.16. The first covariance alone will not do: made far from
+/// (`tilt`) is found with each covariance that is made, or is as nearby; ln Z depends on it to second order only: on a
+/// star's chain it was 0.004 too low in the median, 0.16 at most. The first covariance alone will not do: made far from
 /// the answer it put ln Z of one star 2.6 too low.
 ///
 /// # Errors
@@ -118,21 +118,25 @@ pub(crate) fn approach(
     let mut epochs = linearise(&coefficients);
     let mut changes = [f64::INFINITY; 2];
     let mut last: Option<Evidence> = None;
-    let mut mixed = Mixing::default();
+    let mut mixing = Mixing::default();
     let mut steps = [0; 2];
     while steps[0] < settings.steps {
-        let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || converges(changes)) {
+        // steps by another covariance say nothing of those by this
+        let [before, change] = changes;
+        let falls = change < settings.longest && change < FALLS * before && mixing.steps < FROZEN;
+        let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || falls) {
             Some(earlier) => earlier,
             None => {
                 steps[1] += 1;
                 last = None;
-                mixed = Mixing::default();
+                mixing = Mixing::default();
+                changes = [f64::INFINITY; 2];
                 last.insert(sought.evidence((&epochs, &coefficients), settings, None)?)
             }
         };
         let mut pulled = pulled(&epochs)?;
-        if let Some(tilt) = &by.tilt {
-            pulled -= tilt.of(&epochs);
+        if let Some(explained) = by.explained() {
+            pulled -= tilted(explained, &epochs);
         }
         let step = by.step(&sought.field, &coefficients, &pulled);
         steps[0] += 1;
@@ -140,12 +144,12 @@ pub(crate) fn approach(
         if !changes[1].is_finite() {
             break;
         }
-        match changes[1] < FROZEN_BELOW {
-            true => mixed.advance(&mut coefficients, step),
-            false => coefficients += step * (settings.longest / changes[1]).min(1.0),
-        }
+        let ends = changes[1] < settings.tolerance;
+        let way = if ends || changes[1] > settings.longest { step } else { mixing.mixed(&coefficients, step) };
+        let length = (sought.watched * &way).amax();
+        coefficients += way * if length > settings.longest { settings.longest / length } else { 1.0 };
         epochs = linearise(&coefficients);
-        if changes[1] < settings.tolerance {
+        if ends {
             return Ok(Way { coefficients, epochs, last, steps, change: changes[1] });
         }
     }
@@ -172,13 +176,16 @@ struct Mixing {
     last: Option<[DMatrix<f64>; 2]>,
     /// From place to place, and from step to step.
     differences: Vec<[DMatrix<f64>; 2]>,
+    /// How many there were.
+    steps: usize,
 }
 
 impl Mixing {
-    /// From `place` by a step, and by what those before tell of where it leads.
-    fn advance(&mut self, place: &mut DMatrix<f64>, step: DMatrix<f64>) {
+    /// The way from `place` by a step and by what those before tell of where it leads.
+    fn mixed(&mut self, place: &DMatrix<f64>, step: DMatrix<f64>) -> DMatrix<f64> {
+        self.steps += 1;
         if let Some([place_before, step_before]) = self.last.take() {
-            self.differences.push([&*place - place_before, &step - step_before]);
+            self.differences.push([place - place_before, &step - step_before]);
             if self.differences.len() > MIXED {
                 self.differences.remove(0);
             }
@@ -187,18 +194,14 @@ impl Mixing {
         let n = self.differences.len();
         let products = DMatrix::from_fn(n, n, |i, j| self.differences[i][1].dot(&self.differences[j][1]));
         let along = DVector::from_fn(n, |i, _| self.differences[i][1].dot(&step));
-        *place += step;
+        let mut way = step;
         if let Some(factor) = products.cholesky() {
             for ([places, steps], share) in self.differences.iter().zip(factor.solve(&along).iter()) {
-                *place -= (places + steps) * *share;
+                way -= (places + steps) * *share;
             }
         }
+        way
     }
-}
-
-/// Whether steps by the covariance of an earlier one come nearer.
-fn converges([before, last]: [f64; 2]) -> bool {
-    last < FROZEN_BELOW && last < FALLS * before
 }
 
 #[cfg(test)]
@@ -218,7 +221,7 @@ mod tests {
         let mut mixing = Mixing::default();
         for _ in 0..8 {
             let here = step(&mixed);
-            mixing.advance(&mut mixed, here);
+            mixed += mixing.mixed(&mixed, here);
             plain += step(&plain);
         }
         let off = |place: &DMatrix<f64>| (place.column(0) - &answer).norm();

@@ -44,12 +44,7 @@ impl Tilt {
         epochs.iter().any(|epoch| !epoch.divisor.is_empty())
     }
 
-    /// a (H, epochs) of the same epochs linearised elsewhere.
-    pub fn of(&self, epochs: &[Epoch]) -> DMatrix<f64> {
-        tilted(&self.explained, epochs)
-    }
-
-    /// Counts the volume, if it is needed, in what epochs around these coefficients (H, epochs) were compressed to, and in their numbers
+    /// Counts the volume in what epochs around these coefficients (H, epochs) were compressed to, and in their numbers
     /// and `spatial` part: the mean of the field, whose coefficients have these standard deviations, falls by `K a`,
     /// and the last number of each epoch that is divided by anything is the volume.
     pub fn count(
@@ -93,7 +88,8 @@ impl Tilt {
     }
 }
 
-fn tilted(explained: &[f64], epochs: &[Epoch]) -> DMatrix<f64> {
+/// a (H, epochs) of epochs of which the field explains so many numbers.
+pub fn tilted(explained: &[f64], epochs: &[Epoch]) -> DMatrix<f64> {
     let mut by = DMatrix::zeros(epochs.first().map_or(0, |epoch| epoch.jacobian.shape().1), epochs.len());
     for (k, (epoch, n)) in epochs.iter().zip(explained).enumerate().filter(|(_, (e, _))| !e.divisor.is_empty()) {
         by.set_column(k, &(&epoch.divisor * -*n));

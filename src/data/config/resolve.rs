@@ -21,7 +21,7 @@ use std::path::Path;
 /// Largest degree of a break: harmonics go to 36.
 const MOST_BREAK_DEGREE: f64 = 30.0;
 
-/// Fewest walkers of each ensemble where most moves are independent draws, if their number is not given.
+/// Walkers of each ensemble where all maps are integrated over, if their number is not given.
 const FEW_WALKERS: usize = 16;
 
 /// What is said of spots where one map is found.
@@ -275,13 +275,40 @@ pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
 /// The sampler, the number of its walkers filled in.
 fn resolve_sampler(raw: &mut Config, free: usize) -> Result<(), Fault> {
     let usual = match raw.imaging.objective {
-        ObjectiveKind::MarginalLikelihood => FEW_WALKERS.max(2 * free),
+        ObjectiveKind::MarginalLikelihood => FEW_WALKERS,
         _ => raw.sampler.walkers(),
     };
-    raw.sampler.walkers.get_or_insert(usual);
+    raw.sampler.walkers.get_or_insert(usual.max(2 * free));
     // Commands that do not sample need no free parameter. The message starts with the key.
     let message = |e: String| {
         e.split_once(": ").map(|(key, problem)| Fault::new(key, problem)).unwrap_or(Fault::new("sampler", e))
     };
     raw.sampler.validate(free.max(1)).map_err(|e| message(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn walkers_are_as_many_as_the_objective_and_the_parameters_need() {
+        let walkers = |objective: &str, more: &[&str], given: Option<usize>| {
+            let mut free =
+                json!({ "k_kms": { "prior": "uniform", "min": 0, "max": 1 }, "phi": { "prior": "periodic" } });
+            for name in more {
+                free[*name] = json!({ "prior": "uniform", "min": 1, "max": 80 });
+            }
+            let star = json!({ "rotation_period_d": 3, "inclination_deg": 40, "vsini_kms": 30, "contrast": 0.1,
+                "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 } });
+            let config = crate::Config::default().with("star", star).with("instrument.resolving_power", 65_000.0);
+            let config = config.with("observations.path", "star.txt").with("imaging.objective", objective);
+            config.with("parameters", free).with("sampler.walkers", given).settings().unwrap().sampler.walkers()
+        };
+        let many = ["vsini_kms", "inclination_deg", "porb_over_prot", "line_sigma_kms"];
+        assert_eq!(walkers("spottedness", &many, None), 32);
+        // with the three numbers of the spots
+        assert_eq!([walkers("marginal-likelihood", &[], None), walkers("marginal-likelihood", &many, None)], [16, 18]);
+        assert_eq!(walkers("marginal-likelihood", &many, Some(40)), 40);
+    }
 }

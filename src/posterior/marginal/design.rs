@@ -44,7 +44,7 @@ impl Basis {
         }
     }
 
-    /// The same where ln Z is compared with that of neighbours: good to some 0.003.
+    /// The same where ln Z is compared with that of neighbours: maps exact enough for ln Z to some 0.003.
     pub fn exact(grid: &SurfaceGrid) -> Self {
         let settling = Settling { tolerance: 2e-4, ..Settling::default() };
         Basis { settling, jittered: 2, ..Basis::new(grid) }

@@ -55,7 +55,8 @@ impl Marginal {
     ) -> Result<Self, FieldError> {
         let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
         let mut coefficients = nearby.settled.coefficients.clone();
-        let mut slopes = match Arc::ptr_eq(&design, &nearby.design) {
+        let same = Arc::ptr_eq(&design, &nearby.design) && values.state() == nearby.values.state();
+        let mut slopes = match same {
             true => nearby.velocity_slopes(imager, basis).to_vec(),
             false => design.velocity_slopes((imager, basis), &values, &coefficients),
         };
