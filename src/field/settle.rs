@@ -12,7 +12,7 @@ use super::{Compression, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Largest change of the field in a step over that in the step before, up to which one covariance will do; and for how
+/// Largest change of the field in a step over that in the step before the last, up to which one covariance will do; and for how
 /// many steps.
 const FALLS: f64 = 0.9;
 const FROZEN: usize = 10;
@@ -116,13 +116,13 @@ pub(crate) fn approach(
 ) -> Result<Way, FieldError> {
     let mut coefficients = start;
     let mut epochs = linearise(&coefficients);
-    let mut changes = [f64::INFINITY; 2];
+    let mut changes = [f64::INFINITY; 3];
     let mut last: Option<Evidence> = None;
     let mut mixing = Mixing::default();
     let mut steps = [0; 2];
     while steps[0] < settings.steps {
         // steps by another covariance say nothing of those by this
-        let [before, change] = changes;
+        let [before, _, change] = changes;
         let falls = change < settings.longest && change < FALLS * before && mixing.steps < FROZEN;
         let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || falls) {
             Some(earlier) => earlier,
@@ -130,7 +130,7 @@ pub(crate) fn approach(
                 steps[1] += 1;
                 last = None;
                 mixing = Mixing::default();
-                changes = [f64::INFINITY; 2];
+                changes = [f64::INFINITY; 3];
                 last.insert(sought.evidence((&epochs, &coefficients), settings, None)?)
             }
         };
@@ -140,20 +140,20 @@ pub(crate) fn approach(
         }
         let step = by.step(&sought.field, &coefficients, &pulled);
         steps[0] += 1;
-        changes = [changes[1], (sought.watched * &step).amax()];
-        if !changes[1].is_finite() {
+        changes = [changes[1], changes[2], (sought.watched * &step).amax()];
+        if !changes[2].is_finite() {
             break;
         }
-        let ends = changes[1] < settings.tolerance;
-        let way = if ends || changes[1] > settings.longest { step } else { mixing.mixed(&coefficients, step) };
+        let ends = changes[2] < settings.tolerance;
+        let way = if ends || changes[2] > settings.longest { step } else { mixing.mixed(&coefficients, step) };
         let length = (sought.watched * &way).amax();
         coefficients += way * if length > settings.longest { settings.longest / length } else { 1.0 };
         epochs = linearise(&coefficients);
         if ends {
-            return Ok(Way { coefficients, epochs, last, steps, change: changes[1] });
+            return Ok(Way { coefficients, epochs, last, steps, change: changes[2] });
         }
     }
-    Err(FieldError::NotSettled { steps: steps[0], change: changes[1] })
+    Err(FieldError::NotSettled { steps: steps[0], change: changes[2] })
 }
 
 impl Sought<'_> {
