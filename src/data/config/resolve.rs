@@ -288,7 +288,6 @@ fn resolve_sampler(raw: &mut Config, free: usize) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use serde_json::json;
 
     #[test]
