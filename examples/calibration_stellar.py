@@ -156,7 +156,7 @@ def table(args):
             cells = [name, group, str(len(of)), *(calibration_table.share(off < n * sd) for n in (1, 2))]
             cells += [f"{np.sqrt(np.mean((off / sd) ** 2)):.2f}", f"{np.median(sd):.3g}"]
             lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", "| parameter | chains of stars with vsini | stars | inside 68 % | inside 95 % | spread of draws / sd |"]
+    lines += ["", "| parameter | chains of stars with vsini | stars | inside 68 % | inside 95 % | spread / sd |"]
     lines.append("| --- | --- | --- | --- | --- | --- |")
     chains = [row for row in integrated if row["draws"]]
     groups = {f"below {FAST:.0f} km/s": [row for row in chains if not fast(row)]}

@@ -85,7 +85,8 @@
 //! }
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let settings = SamplerSettings { ensembles: 2, walkers: Some(10), rhat: 1.05, ess: 500.0, ..SamplerSettings::default() };
+//! let usual = SamplerSettings::default();
+//! let settings = SamplerSettings { ensembles: 2, walkers: Some(10), rhat: 1.05, ess: 500.0, ..usual };
 //! let walker = |k: usize| vec![(1.7 * k as f64).sin(), (2.3 * k as f64).cos()];
 //! let start: Vec<Vec<Vec<f64>>> = (0..2).map(|e| (10 * e..10 * e + 10).map(walker).collect()).collect();
 //! let (chain, summary) = sample(&Gaussian(["x".into(), "y".into()]), &settings, &start)?;

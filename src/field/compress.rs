@@ -38,8 +38,8 @@ pub struct Compressed {
     whiten: DMatrix<f64>,
     /// Q (data, kept), orthonormal.
     directions: DMatrix<f64>,
-    /// `Q^T W J c0`, which makes a residual of a misfit; where the model is divided by anything one more, for the volume
-    /// (`tilt`), which has no misfit: 0 until that is counted.
+    /// `Q^T W J c0`, which makes a residual of a misfit; where the model is divided by anything one more, for the
+    /// volume (`tilt`), which has no misfit: 0 until that is counted.
     pub expected: DVector<f64>,
     /// What ln Z has beyond squares and determinants of these numbers: `-1/2 ln |N| - n/2 ln 2 pi`, n data, and what
     /// is beside them.

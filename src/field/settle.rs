@@ -12,8 +12,8 @@ use super::{Compression, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// Largest change of the field in a step over that in the step before the last, up to which one covariance will do; and for how
-/// many steps.
+/// Largest change of the field in a step over that in the step before the last, up to which one covariance will do;
+/// and for how many steps.
 const FALLS: f64 = 0.9;
 const FROZEN: usize = 10;
 

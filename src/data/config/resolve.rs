@@ -288,6 +288,7 @@ fn resolve_sampler(raw: &mut Config, free: usize) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::written::Config;
     use serde_json::json;
 
     #[test]
@@ -300,7 +301,7 @@ mod tests {
             }
             let star = json!({ "rotation_period_d": 3, "inclination_deg": 40, "vsini_kms": 30, "contrast": 0.1,
                 "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 } });
-            let config = crate::Config::default().with("star", star).with("instrument.resolving_power", 65_000.0);
+            let config = Config::default().with("star", star).with("instrument.resolving_power", 65_000.0);
             let config = config.with("observations.path", "star.txt").with("imaging.objective", objective);
             config.with("parameters", free).with("sampler.walkers", given).settings().unwrap().sampler.walkers()
         };
