@@ -84,7 +84,9 @@ pub fn settle(
     settings: &Settling,
 ) -> Result<Settled, FieldError> {
     let Way { coefficients, epochs, last, steps, change } = approach(linearise, sought, start, nearby, settings)?;
-    let explained = last.as_ref().or(nearby).and_then(Evidence::explained).map(<[f64]>::to_vec);
+    // a reference has its own: neighbours begin from that
+    let known = nearby.and_then(|nearby| last.as_ref().unwrap_or(nearby).explained());
+    let explained = known.map(<[f64]>::to_vec);
     // of many profiles each is hundreds of megabytes
     drop(last);
     let evidence = sought.evidence((&epochs, &coefficients), settings, explained.as_deref())?;
@@ -123,7 +125,8 @@ pub(crate) fn approach(
     while steps[0] < settings.steps {
         // steps by another covariance say nothing of those by this
         let [before, _, change] = changes;
-        let falls = change < settings.longest && change < FALLS * before && mixing.steps < FROZEN;
+        let near = if nearby.is_some() { settings.longest } else { 0.5 * settings.longest };
+        let falls = change < near && change < FALLS * before && mixing.steps < FROZEN;
         let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || falls) {
             Some(earlier) => earlier,
             None => {
