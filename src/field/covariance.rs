@@ -46,6 +46,11 @@ impl Numbers {
         dense::gram(&self.rows)
     }
 
+    /// The same, unless there are so many numbers that a filter is faster than dense matrices.
+    pub fn spatial_of_few(&self) -> Option<DMatrix<f64>> {
+        (self.rows.nrows() <= FILTER_BEYOND).then(|| self.spatial())
+    }
+
     /// Puts other rows (numbers, H) in the place of some, in [`Numbers::spatial`] as well if that is given.
     pub fn replace(&mut self, places: &[usize], rows: &DMatrix<f64>, spatial: Option<&mut DMatrix<f64>>) {
         for (place, row) in places.iter().zip(rows.row_iter()) {
@@ -82,11 +87,6 @@ impl Numbers {
             dot(&self.rows.column(h).as_slice()[part.clone()], &x[part])
         })
         .transpose()
-    }
-
-    /// Whether a filter is faster than dense matrices.
-    pub fn are_many(&self) -> bool {
-        self.rows.nrows() > FILTER_BEYOND
     }
 
     /// Multiplies the blocks of the lower triangle of a matrix (n, n) by a function of their delay.

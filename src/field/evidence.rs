@@ -78,7 +78,7 @@ impl Evidence {
         let times_d: Vec<f64> = epochs.iter().map(|epoch| epoch.time_d).collect();
         let mut numbers = Numbers::new(times_d, &rows, &common, sd.len());
         drop((rows, common));
-        let mut spatial = (!numbers.are_many()).then(|| numbers.spatial());
+        let mut spatial = numbers.spatial_of_few();
         let factored = |numbers: &Numbers, spatial: Option<DMatrix<f64>>| {
             Covariance::new(numbers, spatial, &field.kernel).ok_or(FieldError::NotPositive)
         };
@@ -119,8 +119,7 @@ impl Evidence {
             let mut numbers = self.numbers.clone();
             let places = tilt.places(&numbers);
             numbers.replace(&places, &DMatrix::zeros(places.len(), self.sd.len()), None);
-            let spatial = (!numbers.are_many()).then(|| numbers.spatial());
-            let covariance = Covariance::new(&numbers, spatial, &self.field.kernel);
+            let covariance = Covariance::new(&numbers, numbers.spatial_of_few(), &self.field.kernel);
             covariance.map_or_else(|| tilt.explained.clone(), |covariance| covariance.explained(&numbers))
         };
         Some(self.explained.get_or_init(found))

@@ -70,9 +70,9 @@ pub struct Settled {
 ///
 /// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
 /// left of the way is an error of ln Z (`docs/method.md` section 9). How many numbers of an epoch the field explains
-/// (`tilt`) is found with each covariance that is made, or is as nearby; ln Z depends on it to second order only: on a
-/// star's chain it was 0.004 too low in the median, 0.16 at most. The first covariance alone will not do: made far from
-/// the answer it put ln Z of one star 2.6 too low.
+/// (`tilt`) is found with each covariance that is made on the way, or is as nearby; in the evidence at the end it is that
+/// of the end, unless there is one nearby. ln Z depends on it to second order only, but one found far from the answer
+/// put ln Z of one star 2.6 too low.
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].
@@ -122,10 +122,11 @@ pub(crate) fn approach(
     let mut last: Option<Evidence> = None;
     let mut mixing = Mixing::default();
     let mut steps = [0; 2];
+    // a reference, from which others begin, is to be found more closely
+    let near = if nearby.is_some() { settings.longest } else { 0.5 * settings.longest };
     while steps[0] < settings.steps {
         // steps by another covariance say nothing of those by this
         let [before, _, change] = changes;
-        let near = if nearby.is_some() { settings.longest } else { 0.5 * settings.longest };
         let falls = change < near && change < FALLS * before && mixing.steps < FROZEN;
         let by = match last.as_ref().or(nearby).filter(|_| steps[0] == 0 || falls) {
             Some(earlier) => earlier,
