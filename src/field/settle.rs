@@ -70,9 +70,9 @@ pub struct Settled {
 ///
 /// With the evidence of a model and a field `nearby`, found before, first steps are made by its covariance. What is
 /// left of the way is an error of ln Z (`docs/method.md` section 9). How many numbers of an epoch the field explains
-/// (`tilt`) is found with each covariance that is made on the way, or is as nearby; in the evidence at the end it is that
-/// of the end, unless there is one nearby. ln Z depends on it to second order only, but one found far from the answer
-/// put ln Z of one star 2.6 too low.
+/// (`tilt`) is found with each covariance that is made on the way, or is as nearby; in the evidence at the end it is
+/// that of the end, unless there is one nearby. ln Z depends on it to second order only, but one found far from the
+/// answer put ln Z of one star 2.6 too low.
 ///
 /// # Errors
 /// Those of [`Evidence::new`], and [`FieldError::NotSettled`].
