@@ -11,9 +11,11 @@
 
 use super::compress::{Compressed, Compression, Told};
 use super::covariance::{Covariance, Numbers};
+use super::dense::{self, Factor};
 use super::tilt::Tilt;
 use super::{Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -95,8 +97,13 @@ impl Evidence {
             tilt.count((&field, &sd), (epochs, around), &mut compressed, (&mut numbers, spatial.as_mut()));
         }
         let covariance = factored(&numbers, spatial)?;
-        let told = compressed.iter().zip(epochs).map(|(to, epoch)| to.tell(&epoch.misfit, &epoch.slopes)).collect();
-        let (quadratic, dual) = quadratic(&covariance, &numbers.parts, &compressed, told);
+        let told: Vec<Told> =
+            compressed.iter().zip(epochs).map(|(to, epoch)| to.tell(&epoch.misfit, &epoch.slopes)).collect();
+        let whitened = covariance.whitened(&told, &numbers.parts);
+        let quadratic = quadratic(&covariance, &whitened, &compressed, &told);
+        let mut dual = whitened.columns(0, 1).into_owned();
+        covariance.backward(&mut dual);
+        let dual = dual.column(0).into_owned();
         let (degrees, epochs) = (degrees.to_vec(), compressed);
         Ok(Evidence { field, degrees, sd, numbers, covariance, dual, tilt, epochs, quadratic, explained: own })
     }
@@ -142,6 +149,55 @@ impl Evidence {
     /// # Errors
     /// [`FieldError::NotFinite`]. Shapes other than those of the epochs panic.
     pub fn with(&self, misfits: &[DVector<f64>], slopes: &[DMatrix<f64>]) -> Result<Quadratic, FieldError> {
+        let told = self.told(misfits, slopes)?;
+        let whitened = self.covariance.whitened(&told, &self.numbers.parts);
+        Ok(quadratic(&self.covariance, &whitened, &self.epochs, &told))
+    }
+
+    /// The same without each of these groups of epochs (ascending), as if they had never been: the numbers of an epoch
+    /// that is left out are not among those of the others. Where the model is linear is kept.
+    ///
+    /// With `P = C^-1` and B the residual and all slopes, those left out being s: `B^T P B - (P B)_s^T P_ss^-1 (P B)_s`
+    /// in place of `B^T P B`.
+    ///
+    /// # Errors
+    /// As there, and [`FieldError::NotPositive`].
+    pub fn without_each(
+        &self,
+        misfits: &[DVector<f64>],
+        slopes: &[DMatrix<f64>],
+        groups: &[Vec<usize>],
+    ) -> Result<Vec<Quadratic>, FieldError> {
+        let told = self.told(misfits, slopes)?;
+        let whitened = self.covariance.whitened(&told, &self.numbers.parts);
+        let all = quadratic(&self.covariance, &whitened, &self.epochs, &told);
+        let per_epoch = told.first().map_or(0, |of| of.slopes.ncols());
+        let without = |group: &Vec<usize>| {
+            let numbers: Vec<usize> = group.iter().flat_map(|k| self.numbers.parts[*k].clone()).collect();
+            let mut units = DMatrix::zeros(whitened.nrows(), numbers.len());
+            numbers.iter().enumerate().for_each(|(column, row)| units[(*row, column)] = 1.0);
+            self.covariance.forward_from(&mut units, &numbers);
+            let (own, mut across) = (dense::gram(&units.transpose()), units.tr_mul(&whitened));
+            let factor = Factor::new(own).ok_or(FieldError::NotPositive)?;
+            let starts = vec![0; across.ncols()];
+            factor.forward_from(&mut across, &starts);
+            let (residual, slopes) = (across.column(0), across.columns_range(1..));
+            let mut ln_evidence = all.ln_evidence + 0.5 * (residual.norm_squared() - factor.ln_determinant());
+            ln_evidence -= group.iter().map(|k| self.epochs[*k].constant - 0.5 * told[*k].chi2).sum::<f64>();
+            let left: Vec<usize> = (0..told.len()).filter(|k| group.binary_search(k).is_err()).collect();
+            let left: Vec<usize> = left.iter().flat_map(|k| k * per_epoch..(k + 1) * per_epoch).collect();
+            let slopes = slopes.select_columns(&left);
+            Ok(Quadratic {
+                ln_evidence,
+                gradient: all.gradient.select_rows(&left) - slopes.tr_mul(&residual),
+                information: all.information.select_rows(&left).select_columns(&left) - slopes.tr_mul(&slopes),
+            })
+        };
+        groups.par_iter().map(without).collect()
+    }
+
+    /// Misfits and slopes of all epochs in the numbers of these.
+    fn told(&self, misfits: &[DVector<f64>], slopes: &[DMatrix<f64>]) -> Result<Vec<Told>, FieldError> {
         assert_eq!((misfits.len(), slopes.len()), (self.epochs.len(), self.epochs.len()), "misfits and slopes");
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         let told = self.epochs.iter().enumerate().map(|(k, to)| {
@@ -150,41 +206,41 @@ impl Evidence {
             let sound = finite(misfit.as_slice()) && finite(slopes.as_slice());
             sound.then(|| to.tell(misfit, slopes)).ok_or(FieldError::NotFinite { epoch: k })
         });
-        Ok(quadratic(&self.covariance, &self.numbers.parts, &self.epochs, told.collect::<Result<_, _>>()?).0)
+        told.collect()
     }
 }
 
-/// ln Z, gradient and information of misfits and slopes as told by `epochs`; and `C^-1 r`.
-fn quadratic(
-    covariance: &Covariance,
-    parts: &[Range<usize>],
-    epochs: &[Compressed],
-    told: Vec<Told>,
-) -> (Quadratic, DVector<f64>) {
-    let per_epoch = told.first().map_or(0, |of| of.slopes.ncols());
-    // r, then the slopes, each column zero but in the rows of its epoch
-    let mut columns = DMatrix::zeros(parts.last().map_or(0, |part| part.end), 1 + per_epoch * told.len());
-    for (k, (of, part)) in told.iter().zip(parts).enumerate() {
-        assert_eq!(of.slopes.ncols(), per_epoch, "slopes of all epochs");
-        columns.view_mut((part.start, 0), (part.len(), 1)).copy_from(&of.residual);
-        columns.view_mut((part.start, 1 + k * per_epoch), (part.len(), per_epoch)).copy_from(&of.slopes);
+impl Covariance {
+    /// `L^-1` times the residual and then the slopes, each of which is zero but in the rows of its epoch.
+    fn whitened(&self, told: &[Told], parts: &[Range<usize>]) -> DMatrix<f64> {
+        let per_epoch = told.first().map_or(0, |of| of.slopes.ncols());
+        let mut columns = DMatrix::zeros(parts.last().map_or(0, |part| part.end), 1 + per_epoch * told.len());
+        for (k, (of, part)) in told.iter().zip(parts).enumerate() {
+            assert_eq!(of.slopes.ncols(), per_epoch, "slopes of all epochs");
+            columns.view_mut((part.start, 0), (part.len(), 1)).copy_from(&of.residual);
+            columns.view_mut((part.start, 1 + k * per_epoch), (part.len(), per_epoch)).copy_from(&of.slopes);
+        }
+        let starts = parts.iter().flat_map(|part| std::iter::repeat_n(part.start, per_epoch));
+        self.forward_from(&mut columns, &std::iter::once(0).chain(starts).collect::<Vec<_>>());
+        columns
     }
-    let starts = parts.iter().flat_map(|part| std::iter::repeat_n(part.start, per_epoch));
-    covariance.forward_from(&mut columns, &std::iter::once(0).chain(starts).collect::<Vec<_>>());
-    let (residual, slopes) = (columns.column(0), columns.columns_range(1..));
+}
+
+/// ln Z, gradient and information of misfits and slopes as told by `epochs`, `whitened`.
+fn quadratic(covariance: &Covariance, whitened: &DMatrix<f64>, epochs: &[Compressed], told: &[Told]) -> Quadratic {
+    let (residual, slopes) = (whitened.column(0), whitened.columns_range(1..));
     let mut gradient = slopes.tr_mul(&residual);
     let mut information = slopes.transpose() * slopes;
     let mut ln_evidence = -0.5 * (residual.norm_squared() + covariance.ln_determinant());
     for (k, (of, epoch)) in told.iter().zip(epochs).enumerate() {
+        let per_epoch = of.slopes.ncols();
         ln_evidence += epoch.constant - 0.5 * of.chi2;
         let mut part = gradient.rows_mut(k * per_epoch, per_epoch);
         part += &of.gradient;
         let mut block = information.view_mut((k * per_epoch, k * per_epoch), (per_epoch, per_epoch));
         block += &of.information;
     }
-    let mut dual = residual.clone_owned().reshape_generic(nalgebra::Dyn(residual.len()), nalgebra::Dyn(1));
-    covariance.backward(&mut dual);
-    (Quadratic { ln_evidence, gradient, information }, dual.column(0).into_owned())
+    Quadratic { ln_evidence, gradient, information }
 }
 
 #[cfg(test)]
@@ -192,34 +248,66 @@ mod tests {
     use super::super::{Kernel, Lifetime, Spectrum};
     use super::*;
 
-    /// Whatever it was told, the field explains as much.
-    #[test]
-    fn how_much_the_field_explains_is_its_own() {
-        let some = |n: usize, m: usize| DMatrix::from_fn(n, m, |i, j| ((7 * i + 5 * j + 3 * i * j) % 11) as f64 - 4.5);
-        let epoch = |k: usize| Epoch {
+    fn some(n: usize, m: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(n, m, |i, j| ((7 * i + 5 * j + 3 * i * j) % 11) as f64 - 4.5)
+    }
+
+    fn epoch(k: usize) -> Epoch {
+        Epoch {
             time_d: k as f64,
             jacobian: (some(5, 8) * (1.0 + k as f64)).into(),
             misfit: some(5, 1).column(0).into_owned(),
             variance: DVector::repeat(5, 2.0),
             nuisances: DMatrix::zeros(5, 0),
             beside: 0.0,
-            slopes: DMatrix::zeros(5, 0),
+            slopes: some(5, 2) * (3.0 - k as f64),
             common: DMatrix::zeros(5, 0),
-            divisor: if k == 1 { DVector::zeros(0) } else { DVector::repeat(8, 0.3) },
-        };
-        let field = Field {
-            spectrum: Spectrum { amplitude: 0.8, slope: 0.5, break_degree: 0.0 },
-            kernel: Kernel::of(Lifetime::Days(3.0)),
-        };
+            divisor: DVector::zeros(0),
+        }
+    }
+
+    const DEGREES: [usize; 8] = [1, 1, 1, 2, 2, 2, 2, 2];
+
+    fn field() -> Field {
+        let spectrum = Spectrum { amplitude: 0.8, slope: 0.5, break_degree: 0.0 };
+        Field { spectrum, kernel: Kernel::of(Lifetime::Days(3.0)) }
+    }
+
+    /// Whatever it was told, the field explains as much.
+    #[test]
+    fn how_much_the_field_explains_is_its_own() {
         let of = |explained: Option<&[f64]>| {
-            let (epochs, around) = ([epoch(0), epoch(1), epoch(2)], DMatrix::zeros(8, 3));
-            Evidence::of(field, &[1, 1, 1, 2, 2, 2, 2, 2], (&epochs, &around), Compression::default(), explained)
-                .unwrap()
+            let mut epochs = [epoch(0), epoch(1), epoch(2)];
+            epochs[0].divisor = DVector::repeat(8, 0.3);
+            epochs[2].divisor = DVector::repeat(8, 0.3);
+            let around = DMatrix::zeros(8, 3);
+            Evidence::of(field(), &DEGREES, (&epochs, &around), Compression::default(), explained).unwrap()
         };
         let (own, told) = (of(None), of(Some(&[0.5, 0.5, 0.5])));
         assert_ne!(own.ln_evidence(), told.ln_evidence());
         for (own, told) in own.explained().unwrap().iter().zip(told.explained().unwrap()) {
             assert!(*own > 1.0 && *own < 5.0 && (own - told).abs() < 1e-9, "{own} {told}");
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_might_never_have_been() {
+        let epochs = [0, 1, 2, 3, 4].map(epoch);
+        let of = |these: &[usize]| {
+            let epochs: Vec<Epoch> = these.iter().map(|k| epochs[*k].clone()).collect();
+            let around = some(8, 5).select_columns(these) * 0.1;
+            // several numbers are compressed away
+            Evidence::new(field(), &DEGREES, &epochs, &around, Compression { left_out: 1e-9 }).unwrap()
+        };
+        let misfits: Vec<DVector<f64>> = epochs.iter().map(|epoch| epoch.misfit.clone()).collect();
+        let slopes: Vec<DMatrix<f64>> = epochs.iter().map(|epoch| epoch.slopes.clone()).collect();
+        let groups = [vec![1], vec![0, 3], vec![2, 3, 4]];
+        let all = of(&[0, 1, 2, 3, 4]).without_each(&misfits, &slopes, &groups).unwrap();
+        for (got, left) in all.iter().zip([vec![0, 2, 3, 4], vec![1, 2, 4], vec![0, 1]]) {
+            let known = of(&left).quadratic().clone();
+            assert!((got.ln_evidence - known.ln_evidence).abs() < 1e-7, "{left:?}");
+            assert!((&got.gradient - &known.gradient).amax() < 1e-7 * known.gradient.amax(), "{left:?}");
+            assert!((&got.information - &known.information).amax() < 1e-7 * known.information.amax(), "{left:?}");
         }
     }
 }

@@ -219,8 +219,7 @@ impl View {
         let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
         if let Spots::Integrated(known) = settings.spots {
             let basis = Basis::new(&imager.grid);
-            let near = near.and_then(View::field).map(|field| &field.marginal);
-            let fitted = fit(imager, &basis, values, known, near)?;
+            let fitted = fit(imager, &basis, values, known, near.and_then(View::field))?;
             let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
             let quadratic = expansion.velocities(nuisances);
             let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);

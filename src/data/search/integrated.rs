@@ -193,7 +193,7 @@ fn without_search(imager: &Imager, space: &ParameterSpace, settings: SearchSetti
     let theta = best.end.clone()?.theta;
     // with the planet in the model the field and the jitter are others
     let with_orbit = first.space().values_at(&theta);
-    Ok(match fit(imager, &basis, with_orbit, settings.known, Some(&fitted.marginal)) {
+    Ok(match fit(imager, &basis, with_orbit, settings.known, Some(&fitted)) {
         Ok(Fitted { marginal, .. }) => {
             (with_field(space, theta, &marginal.values), marginal.values, marginal.assumed.held())
         }

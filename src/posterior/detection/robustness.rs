@@ -2,12 +2,13 @@
 //! night.
 //!
 //! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other
-//! target, or of the profiles that remain.
+//! target, or of the profiles that remain. Where maps are integrated over, profiles are taken out of the evidence.
 
-use super::{Detection, DetectionError, DetectionSettings, Spots, View};
+use super::{Detection, DetectionSettings, View};
 use crate::planets::periodogram::{CircularOrbit, orbits};
+use crate::planets::velocities::VelocityQuadratic;
 use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::Known;
+use crate::posterior::marginal::Basis;
 use crate::posterior::objective::{Parameter, ParameterValues};
 use rayon::prelude::*;
 
@@ -60,7 +61,7 @@ pub struct Robustness {
 }
 
 /// Tries the best orbit of `found` out, all else as in `values`. Where maps are integrated over there are no targets,
-/// and the field without a night is that of all profiles.
+/// and without a night the field, and the maps around which profiles are linear, are those of all.
 pub fn robustness(
     imager: &Imager,
     mut values: ParameterValues,
@@ -68,43 +69,49 @@ pub fn robustness(
     found: &Detection,
 ) -> Robustness {
     let peak = &found.best;
-    let field = found.last().field();
-    let spots = field.map_or(settings.spots, |field| Spots::Integrated(Known::of(&field.marginal)));
-    let settings = &DetectionSettings { spots, ..settings.clone() };
     values[Parameter::K] = peak.orbit.k_kms;
     values[Parameter::PorbOverProt] = peak.porb_over_prot;
     values[Parameter::Phi] = peak.orbit.phi;
-    let orbit = |view: &View| orbits::at(&view.quadratic, 1.0 / peak.porb_over_prot).orbit;
+    let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
+    let orbit_of = |view: &View| orbit(&view.quadratic);
     let at = |factor: f64| {
         let chi2_target = factor * settings.chi2_target;
         let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
         AtTarget {
             chi2_target,
             on_target: view.as_ref().is_ok_and(|view| view.image().is_none_or(|image| image.on_target)),
-            orbit: view.ok().as_ref().and_then(orbit),
+            orbit: view.ok().as_ref().and_then(orbit_of),
         }
     };
     let times_d = imager.times_d();
-    let without = |night: &Vec<usize>| {
-        let times = || night.iter().map(|&k| times_d[k]);
-        let view: Result<View, DetectionError> = View::new(&imager.without(night), values, settings, None);
-        WithoutNight {
-            span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
-            profiles: night.len(),
-            orbit: view.ok().as_ref().and_then(orbit),
-        }
-    };
     let mut nights = nights(&times_d, NIGHT_GAP_D);
     nights.retain(|night| times_d.len() - night.len() >= FEWEST);
     if nights.len() < 2 {
         nights.clear();
     }
-    let targets = match field {
-        Some(_) => Vec::new(),
-        None => TARGETS.map(at).to_vec(),
+    nights.iter_mut().for_each(|night| night.sort_unstable());
+    let (targets, without) = match found.last().field() {
+        Some(field) => {
+            let (basis, stellar) = (Basis::new(&imager.grid), &found.last().expansion.stellar);
+            let all = field.marginal.expansions_without(imager, &basis, stellar, &nights).unwrap_or_default();
+            let of_others = all.iter().map(|others| orbit(&others.velocities(&settings.nuisances)));
+            (Vec::new(), of_others.chain(std::iter::repeat(None)).take(nights.len()).collect())
+        }
+        None => {
+            let others = |night: &[usize]| View::new(&imager.without(night), values, settings, None).ok();
+            let orbit = |night: &Vec<usize>| others(night).as_ref().and_then(orbit_of);
+            (TARGETS.map(at).to_vec(), nights.par_iter().map(orbit).collect::<Vec<_>>())
+        }
     };
-    let all = orbit(found.last());
-    Robustness { all, targets, nights: nights.par_iter().map(without).collect() }
+    let without = nights.iter().zip(without).map(|(night, orbit)| {
+        let times = || night.iter().map(|&k| times_d[k]);
+        WithoutNight {
+            span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
+            profiles: night.len(),
+            orbit,
+        }
+    });
+    Robustness { all: orbit_of(found.last()), targets, nights: without.collect() }
 }
 
 /// Profiles night by night, in order of time; nights are more than `gap_d` apart.

@@ -76,7 +76,7 @@ impl Change {
         if let Some(best) = shortened(&still)?.filter(|best| best.gain < NOTHING) {
             return Ok(best.change());
         }
-        let still = fit(imager, &basis, values, unchanging, Some(&still.marginal))?;
+        let still = fit(imager, &basis, values, unchanging, Some(&still))?;
         let Some(best) = shortened(&still)? else {
             return Ok(Change { ln_evidence_gain: f64::NEG_INFINITY, spot_lifetime_d: time_base_d });
         };
@@ -85,11 +85,12 @@ impl Change {
         }
         let known = Known { lifetime: None, ..known };
         let values = with_best_orbit(&best.marginal)?;
-        let Ok(changing) = fit(imager, &basis, values, known, Some(&best.marginal)) else { return Ok(best.change()) };
+        let (change, near) = (best.change(), Fitted::near(best.marginal));
+        let Ok(changing) = fit(imager, &basis, values, known, Some(&near)) else { return Ok(change) };
         let gain = changing.ln_evidence - still.ln_evidence;
         Ok(match changing.marginal.assumed.field.kernel.lifetime.days() {
             Some(lifetime_d) if gain > best.gain => Change { ln_evidence_gain: gain, spot_lifetime_d: lifetime_d },
-            _ => best.change(),
+            _ => change,
         })
     }
 

@@ -21,7 +21,36 @@ impl Marginal {
     /// # Errors
     /// [`FieldError`].
     pub fn expansion(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
-        let quadratic = self.quadratic(imager, basis, stellar)?;
+        self.with_zero_points_integrated(imager, stellar, self.quadratic(imager, basis, stellar)?)
+    }
+
+    /// The same without each of these groups of profiles (ascending), for what the maps are linearised around kept.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn expansions_without(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+        groups: &[Vec<usize>],
+    ) -> Result<Vec<Expansion>, FieldError> {
+        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
+        let all = self.settled.evidence.without_each(&misfits, &slopes, groups)?;
+        let of_group = |(group, quadratic): (&Vec<usize>, Quadratic)| {
+            let (epochs, profiles) = (misfits.len(), self.design.response().profiles());
+            let quadratic = summed(&quadratic, epochs - group.len(), profiles - group.len(), stellar.len());
+            self.with_zero_points_integrated(&imager.without(group), stellar, quadratic)
+        };
+        groups.iter().zip(all).map(of_group).collect()
+    }
+
+    fn with_zero_points_integrated(
+        &self,
+        imager: &Imager,
+        stellar: &[Parameter],
+        quadratic: Quadratic,
+    ) -> Result<Expansion, FieldError> {
         if imager.zero_points.is_empty() {
             return Ok(self.expanded(imager, stellar, quadratic));
         }
@@ -74,11 +103,19 @@ impl Marginal {
     }
 
     fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
-        let slopes = self.slopes_of_epochs(imager, basis, stellar);
-        let misfits: Vec<DVector<f64>> =
-            self.design.epochs(imager, &self.settled.coefficients).into_iter().map(|epoch| epoch.misfit).collect();
+        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
         let of_all = self.settled.evidence.with(&misfits, &slopes)?;
         Ok(summed(&of_all, misfits.len(), self.design.response().profiles(), stellar.len()))
+    }
+
+    fn misfits_and_slopes(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> (Vec<DVector<f64>>, Vec<DMatrix<f64>>) {
+        let epochs = self.design.epochs(imager, &self.settled.coefficients);
+        (epochs.into_iter().map(|epoch| epoch.misfit).collect(), self.slopes_of_epochs(imager, basis, stellar))
     }
 
     /// How the numbers of each epoch change with a velocity and with the star's parameters, at the most probable maps

@@ -16,6 +16,7 @@
 //! 9. [`Planned`]: what profiles that are not yet taken will say of velocities.
 
 pub mod change;
+mod climb;
 mod condense;
 mod design;
 mod expand;
