@@ -134,11 +134,26 @@ pub enum Covariance {
 }
 
 impl Covariance {
-    /// Dense of numbers whose `spatial` part is given. `None` where it is not positive definite or not finite.
-    pub fn new(numbers: &Numbers, spatial: Option<DMatrix<f64>>, kernel: &Kernel) -> Option<Self> {
+    /// Dense of numbers whose `spatial` part is given, or else a filter, with directions of coefficients `near` those
+    /// that it sees (H, directions), if they are known. `None` where it is not positive definite or not finite.
+    pub fn new(
+        numbers: &Numbers,
+        spatial: Option<DMatrix<f64>>,
+        kernel: &Kernel,
+        near: Option<&DMatrix<f64>>,
+    ) -> Option<Self> {
         match spatial {
-            None => Filter::new(numbers, kernel).map(Covariance::InTime),
+            None => Filter::new(numbers, kernel, near).map(Covariance::InTime),
             Some(spatial) => numbers.dense(spatial, kernel).map(Covariance::Dense),
+        }
+    }
+
+    /// Directions of the coefficients, in units of their standard deviations, that epochs see (H, directions); `None`
+    /// of a dense factor, which does not ask.
+    pub fn directions(&self) -> Option<&DMatrix<f64>> {
+        match self {
+            Covariance::Dense(_) => None,
+            Covariance::InTime(filter) => Some(&filter.directions),
         }
     }
 

@@ -39,6 +39,20 @@ pub struct Evidence {
     explained: OnceLock<Vec<f64>>,
 }
 
+/// What the evidence of a field and a star nearby tells of another one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Nearby {
+    /// How many numbers of each epoch the field explains, if that is not to be found anew.
+    pub explained: Option<Vec<f64>>,
+    /// Directions of the coefficients that epochs see (H, directions), where that was asked for.
+    pub seen: Option<DMatrix<f64>>,
+}
+
+/// Rows times numbers of their own.
+fn scaled(matrix: &DMatrix<f64>, rows: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * rows[i])
+}
+
 impl Evidence {
     /// Of epochs that are linear around the coefficients `around` (H, epochs), for a field of harmonics of these
     /// `degrees` (H).
@@ -53,16 +67,16 @@ impl Evidence {
         around: &DMatrix<f64>,
         how: Compression,
     ) -> Result<Self, FieldError> {
-        Evidence::of(field, degrees, (epochs, around), how, None)
+        Evidence::of(field, degrees, (epochs, around), how, &Nearby::default())
     }
 
-    /// The same where it is known how many numbers of each epoch the field explains.
+    /// The same with what is known from the evidence of a field and a star nearby.
     pub(super) fn of(
         field: Field,
         degrees: &[usize],
         (epochs, around): (&[Epoch], &DMatrix<f64>),
         how: Compression,
-        explained: Option<&[f64]>,
+        Nearby { explained, seen }: &Nearby,
     ) -> Result<Self, FieldError> {
         field.check()?;
         assert_eq!(around.shape(), (degrees.len(), epochs.len()), "coefficients of all epochs");
@@ -81,13 +95,14 @@ impl Evidence {
         let mut numbers = Numbers::new(times_d, &rows, &common, sd.len());
         drop((rows, common));
         let mut spatial = numbers.spatial_of_few();
+        let directions = seen.as_ref().map(|seen| scaled(seen, &sd));
         let factored = |numbers: &Numbers, spatial: Option<DMatrix<f64>>| {
-            Covariance::new(numbers, spatial, &field.kernel).ok_or(FieldError::NotPositive)
+            Covariance::new(numbers, spatial, &field.kernel, directions.as_ref()).ok_or(FieldError::NotPositive)
         };
         let (mut tilt, own) = (None, OnceLock::new());
         if Tilt::is_needed(epochs) {
             let explained = match explained {
-                Some(explained) => explained.to_vec(),
+                Some(explained) => explained.clone(),
                 None => {
                     let found = factored(&numbers, spatial.clone())?.explained(&numbers);
                     own.get_or_init(|| found).clone()
@@ -108,6 +123,12 @@ impl Evidence {
         Ok(Evidence { field, degrees, sd, numbers, covariance, dual, tilt, epochs, quadratic, explained: own })
     }
 
+    /// Directions of the coefficients that epochs see (H, directions), where that was asked for.
+    pub(super) fn seen(&self) -> Option<DMatrix<f64>> {
+        let inverse: Vec<f64> = self.sd.iter().map(|sd| if *sd > 0.0 { sd.recip() } else { 0.0 }).collect();
+        Some(scaled(self.covariance.directions()?, &inverse))
+    }
+
     /// The field that is assumed.
     pub fn field(&self) -> &Field {
         &self.field
@@ -126,7 +147,8 @@ impl Evidence {
             let mut numbers = self.numbers.clone();
             let places = tilt.places(&numbers);
             numbers.replace(&places, &DMatrix::zeros(places.len(), self.sd.len()), None);
-            let covariance = Covariance::new(&numbers, numbers.spatial_of_few(), &self.field.kernel);
+            let covariance =
+                Covariance::new(&numbers, numbers.spatial_of_few(), &self.field.kernel, self.covariance.directions());
             covariance.map_or_else(|| tilt.explained.clone(), |covariance| covariance.explained(&numbers))
         };
         Some(self.explained.get_or_init(found))
@@ -276,14 +298,15 @@ mod tests {
     /// Whatever it was told, the field explains as much.
     #[test]
     fn how_much_the_field_explains_is_its_own() {
-        let of = |explained: Option<&[f64]>| {
+        let of = |explained: Option<Vec<f64>>| {
             let mut epochs = [epoch(0), epoch(1), epoch(2)];
             epochs[0].divisor = DVector::repeat(8, 0.3);
             epochs[2].divisor = DVector::repeat(8, 0.3);
             let around = DMatrix::zeros(8, 3);
-            Evidence::of(field(), &DEGREES, (&epochs, &around), Compression::default(), explained).unwrap()
+            let nearby = Nearby { explained, seen: None };
+            Evidence::of(field(), &DEGREES, (&epochs, &around), Compression::default(), &nearby).unwrap()
         };
-        let (own, told) = (of(None), of(Some(&[0.5, 0.5, 0.5])));
+        let (own, told) = (of(None), of(Some(vec![0.5; 3])));
         assert_ne!(own.ln_evidence(), told.ln_evidence());
         for (own, told) in own.explained().unwrap().iter().zip(told.explained().unwrap()) {
             assert!(*own > 1.0 && *own < 5.0 && (own - told).abs() < 1e-9, "{own} {told}");

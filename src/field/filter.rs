@@ -13,7 +13,7 @@
 use super::Kernel;
 use super::compress::with_directions;
 use super::covariance::Numbers;
-use super::dense;
+use super::dense::{self, Factor};
 use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,6 +26,9 @@ const LEFT_OUT: f64 = 1e-3;
 /// Directions that are looked for at once.
 const AT_ONCE: usize = 64;
 
+/// Columns of the states' covariance that are changed at once, to stay in the cache.
+const COLUMNS: usize = 32;
+
 /// The factor L, an epoch at a time.
 #[derive(Clone, Debug)]
 pub struct Filter {
@@ -35,6 +38,8 @@ pub struct Filter {
     states: usize,
     /// How many rates there are.
     rates: usize,
+    /// Orthonormal directions of the coefficients that epochs see (H, directions).
+    pub directions: DMatrix<f64>,
 }
 
 /// An epoch.
@@ -68,97 +73,155 @@ impl Passage {
         Passage { value, rate, noise: [1.0 - dot(value, value), -dot(value, rate), 1.0 - dot(rate, rate)] }
     }
 
+    /// The columns of a rate and its value in the covariance (columns of `states` numbers), rows and then columns.
+    fn pair(&self, covariance: &mut [f64], [rate, value]: [usize; 2], states: usize) {
+        let (before, from_value) = covariance.split_at_mut(value * states);
+        let (of_rate, of_value) = (&mut before[rate * states..][..states], &mut from_value[..states]);
+        for column in [&mut *of_rate, &mut *of_value] {
+            self.column(column, value - rate);
+        }
+        mix(of_rate, of_value, self.factors());
+        let [own, across, of_rates] = self.noise;
+        of_rate[rate] += of_rates;
+        of_rate[value] += across;
+        of_value[rate] += across;
+        of_value[value] += own;
+    }
+
+    /// A column of states.
+    fn column(&self, column: &mut [f64], rates: usize) {
+        let (rate, value) = column.split_at_mut(rates);
+        mix(rate, value, self.factors());
+    }
+
+    fn factors(&self) -> [f64; 4] {
+        [self.value[0], self.value[1], self.rate[0], self.rate[1]]
+    }
+
     /// States (states, columns) an epoch later.
     fn forward(&self, states: &mut DMatrix<f64>, rates: usize) {
-        mix(states, rates, [self.value[0], self.value[1], self.rate[0], self.rate[1]]);
+        mix_all(states, rates, self.factors());
     }
 
     /// The transpose of that.
     fn backward(&self, states: &mut DMatrix<f64>, rates: usize) {
-        mix(states, rates, [self.value[0], self.rate[0], self.value[1], self.rate[1]]);
-    }
-
-    /// The covariance (states, states) an epoch later.
-    fn covariance(&self, covariance: &mut DMatrix<f64>, rates: usize) {
-        self.forward(covariance, rates);
-        let [value, across, rate] = self.noise;
-        for i in 0..rates {
-            let (mut w, mut v) = covariance.columns_range_pair_mut(i, rates + i);
-            for (v, w) in v.iter_mut().zip(w.iter_mut()) {
-                (*v, *w) = (self.value[0] * *v + self.value[1] * *w, self.rate[0] * *v + self.rate[1] * *w);
-            }
-            w[i] += rate;
-            w[rates + i] += across;
-            v[i] += across;
-            v[rates + i] += value;
-        }
+        mix_all(states, rates, [self.value[0], self.rate[0], self.value[1], self.rate[1]]);
     }
 }
 
-/// Values and rates of states (states, columns) in place of themselves: factors of value and rate in a value, then in
-/// a rate.
-fn mix(states: &mut DMatrix<f64>, rates: usize, [vv, vw, wv, ww]: [f64; 4]) {
-    if rates == 0 {
-        return;
+/// Rates and values in place of themselves: factors of value and rate in a value, then in a rate.
+fn mix(rates: &mut [f64], values: &mut [f64], [vv, vw, wv, ww]: [f64; 4]) {
+    for (v, w) in values.iter_mut().zip(rates) {
+        (*v, *w) = (vv * *v + vw * *w, wv * *v + ww * *w);
     }
+}
+
+/// The same of all columns of states (states, columns), rates first.
+fn mix_all(states: &mut DMatrix<f64>, rates: usize, factors: [f64; 4]) {
     let rows = states.nrows();
     for column in states.as_mut_slice().chunks_exact_mut(rows) {
         let (w, v) = column.split_at_mut(rates);
-        for (v, w) in v.iter_mut().zip(w) {
-            (*v, *w) = (vv * *v + vw * *w, wv * *v + ww * *w);
+        mix(w, v, factors);
+    }
+}
+
+/// The covariance of the states (states, states), once through it an epoch.
+struct Spread {
+    covariance: DMatrix<f64>,
+    rates: usize,
+    /// What the epoch before told of it: `gain gain^T` less.
+    told: Option<DMatrix<f64>>,
+}
+
+impl Spread {
+    fn new(states: usize, rates: usize) -> Self {
+        Spread { covariance: DMatrix::identity(states, states), rates, told: None }
+    }
+
+    /// Goes on to the next epoch, that sees of a state but its rates what is `seen` (numbers, states - rates): the
+    /// covariance of the states and these numbers (states, numbers).
+    fn go_on(&mut self, passage: Option<Passage>, seen: &DMatrix<f64>) -> DMatrix<f64> {
+        let (states, rates) = (self.covariance.nrows(), self.rates);
+        let (told, passage) = (self.told.take(), passage.filter(|_| rates > 0));
+        let mut along = DMatrix::zeros(states, seen.nrows());
+        let mut first = 0;
+        while first < states - rates {
+            let last = (first + COLUMNS).min(if first < rates { rates } else { states - rates });
+            // values with their rates, and then what has none
+            let values = rates + first..rates + last;
+            let pairs = if first < rates { first..last } else { 0..0 };
+            if let Some(told) = &told {
+                for columns in [values.clone(), pairs.clone()] {
+                    let own = told.rows_range(columns.clone()).transpose();
+                    self.covariance.columns_range_mut(columns).gemm(-1.0, told, &own, 1.0);
+                }
+            }
+            if let Some(passage) = &passage {
+                let covariance = self.covariance.as_mut_slice();
+                for rate in pairs.clone() {
+                    passage.pair(covariance, [rate, rates + rate], states);
+                }
+                for column in values.clone().skip(pairs.len()) {
+                    passage.column(&mut covariance[column * states..][..states], rates);
+                }
+            }
+            let turned = seen.columns(first, last - first).transpose();
+            along.gemm(1.0, &self.covariance.columns_range(values), &turned, 1.0);
+            first = last;
         }
+        along
     }
 }
 
 impl Filter {
-    /// `None` where the covariance is not positive definite or not finite.
-    pub fn new(Numbers { times_d, parts, rows, common }: &Numbers, kernel: &Kernel) -> Option<Self> {
-        let directions = seen_directions(rows)?;
-        let seen = rows * &directions;
-        let (changes, stays) = (!kernel.is_static(), kernel.is_static() || kernel.persistent > 0.0);
+    /// With the directions that epochs see, as far as they are known from others near by (H, directions). `None` where
+    /// the covariance is not positive definite or not finite.
+    pub fn new(
+        Numbers { times_d, parts, rows, common }: &Numbers,
+        kernel: &Kernel,
+        near: Option<&DMatrix<f64>>,
+    ) -> Option<Self> {
+        let (directions, seen) = match near.and_then(|near| all_seen_along(rows, near)) {
+            Some(found) => found,
+            None => {
+                let directions = seen_directions(rows)?;
+                let seen = rows * &directions;
+                (directions, seen)
+            }
+        };
         let share = if kernel.is_static() { 1.0 } else { kernel.persistent };
-        let rates = if changes { directions.ncols() } else { 0 };
-        let mut blocks = Vec::new();
-        if changes {
-            blocks.push(&seen * (1.0 - share).sqrt());
-        }
-        if stays {
-            blocks.push(&seen * share.sqrt());
-        }
-        blocks.push(common.clone());
-        let width: usize = blocks.iter().map(DMatrix::ncols).sum();
-        let states = rates + width;
+        // of what changes and what does not
+        let shares: Vec<f64> = [1.0 - share, share].into_iter().filter(|share| *share > 0.0).map(f64::sqrt).collect();
+        let rates = if kernel.is_static() { 0 } else { directions.ncols() };
+        let width = shares.len() * directions.ncols() + common.ncols();
         let mut order: Vec<usize> = (0..parts.len()).collect();
         order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
-        let mut covariance = DMatrix::<f64>::identity(states, states);
+        let mut spread = Spread::new(rates + width, rates);
         let mut steps = Vec::with_capacity(order.len());
         let mut before = None;
         for k in order {
             let part = parts[k].clone();
             let passed = before.map_or(0.0, |before| kernel.scaled(times_d[k] - before).unwrap_or(0.0));
             before = Some(times_d[k]);
-            if passed > 0.0 {
-                Passage::after(passed).covariance(&mut covariance, rates);
+            let mut sees = DMatrix::zeros(part.len(), width);
+            let own = seen.rows_range(part.clone());
+            for (block, share) in shares.iter().enumerate() {
+                sees.columns_mut(block * own.ncols(), own.ncols()).copy_from(&(own * *share));
             }
-            let mut seen = DMatrix::zeros(part.len(), width);
-            let mut from = 0;
-            for block in &blocks {
-                seen.columns_mut(from, block.ncols()).copy_from(&block.rows_range(part.clone()));
-                from += block.ncols();
-            }
-            let along = covariance.columns_range(rates..) * seen.transpose();
-            let mut innovation = &seen * along.rows_range(rates..);
+            sees.columns_mut(width - common.ncols(), common.ncols()).copy_from(&common.rows_range(part.clone()));
+            let along = spread.go_on((passed > 0.0).then(|| Passage::after(passed)), &sees);
+            let mut innovation = &sees * along.rows_range(rates..);
             innovation.iter_mut().step_by(part.len() + 1).for_each(|variance| *variance += 1.0);
             let lower = innovation.cholesky()?.unpack();
             let inverse = lower.solve_lower_triangular(&DMatrix::identity(part.len(), part.len()))?;
             let gain = along * inverse.transpose();
-            covariance.gemm(-1.0, &gain, &gain.transpose(), 1.0);
             if !lower.diagonal().iter().all(|x| x.is_finite()) {
                 return None;
             }
-            steps.push(Step { part, passed, seen, gain, lower, inverse });
+            spread.told = Some(gain.clone());
+            steps.push(Step { part, passed, seen: sees, gain, lower, inverse });
         }
-        Some(Filter { steps, states, rates })
+        Some(Filter { steps, states: rates + width, rates, directions })
     }
 
     /// Logarithm of the determinant of the covariance.
@@ -202,6 +265,18 @@ impl Filter {
             }
         }
     }
+}
+
+/// The directions `near` (H, directions) made orthonormal, and what `rows` (n, H) see of them (n, directions); `None`
+/// where they see more.
+fn all_seen_along(rows: &DMatrix<f64>, near: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let turned = near.transpose();
+    let factor = Factor::new(dense::gram(&turned))?;
+    let mut directions = turned;
+    factor.forward_from(&mut directions, &vec![0; near.nrows()]);
+    let directions = directions.transpose();
+    let seen = rows * &directions;
+    (rows.norm_squared() - seen.norm_squared() <= LEFT_OUT).then_some((directions, seen))
 }
 
 /// Orthonormal directions (H, few) that hold all of `rows` (n, H) but what may be lost: blocks of random ones, turned
@@ -252,7 +327,6 @@ fn joined(directions: DMatrix<f64>, more: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::Lifetime;
-    use super::super::dense::Factor;
     use super::*;
 
     /// Numbers that look random, (n, m).
@@ -276,7 +350,7 @@ mod tests {
     fn dense_and_filter(kernel: &Kernel) -> (Factor, Filter, usize) {
         let numbers = numbers();
         let n = numbers.rows.nrows();
-        (numbers.dense(numbers.spatial(), kernel).unwrap(), Filter::new(&numbers, kernel).unwrap(), n)
+        (numbers.dense(numbers.spatial(), kernel).unwrap(), Filter::new(&numbers, kernel, None).unwrap(), n)
     }
 
     #[test]
@@ -310,6 +384,20 @@ mod tests {
     }
 
     #[test]
+    fn directions_nearby_are_enough_if_they_hold_all_that_is_seen() {
+        let rows = numbers().rows;
+        let known = seen_directions(&rows).unwrap();
+        let fewer = known.columns(0, known.ncols() / 2).into_owned();
+        assert!(all_seen_along(&rows, &fewer).is_none());
+        // of coefficients in other units
+        let units = DMatrix::from_diagonal(&nalgebra::DVector::from_fn(100, |i, _| 1.0 + 0.05 * i as f64));
+        let (directions, seen) = all_seen_along(&(&rows * &units), &(&units * known)).unwrap();
+        let orthonormal = directions.tr_mul(&directions) - DMatrix::identity(directions.ncols(), directions.ncols());
+        assert!(orthonormal.amax() < 1e-12);
+        assert!((seen - &rows * &units * directions).amax() < 1e-9);
+    }
+
+    #[test]
     fn of_what_epochs_see_little_is_left_out() {
         let numbers = numbers();
         let directions = seen_directions(&numbers.rows).unwrap();
@@ -323,6 +411,6 @@ mod tests {
     fn what_is_not_finite_has_no_factor() {
         let mut numbers = numbers();
         numbers.rows[(7, 3)] = f64::NAN;
-        assert!(Filter::new(&numbers, &Kernel::of(Lifetime::Days(6.0))).is_none());
+        assert!(Filter::new(&numbers, &Kernel::of(Lifetime::Days(6.0)), None).is_none());
     }
 }

@@ -7,6 +7,7 @@
 //! cost next to nothing: each is mixed with those before, and leaves some fifth of the way.
 
 use super::epoch::pulled;
+use super::evidence::Nearby;
 use super::tilt::tilted;
 use super::{Compression, Epoch, Evidence, Field, FieldError};
 use nalgebra::{DMatrix, DVector};
@@ -87,9 +88,10 @@ pub fn settle(
     // a reference has its own: neighbours begin from that
     let known = nearby.and_then(|nearby| last.as_ref().unwrap_or(nearby).explained());
     let explained = known.map(<[f64]>::to_vec);
+    let seen = last.as_ref().or(nearby).and_then(Evidence::seen);
     // of many profiles each is hundreds of megabytes
     drop(last);
-    let evidence = sought.evidence((&epochs, &coefficients), settings, explained.as_deref())?;
+    let evidence = sought.evidence((&epochs, &coefficients), settings, &Nearby { explained, seen })?;
     Ok(Settled { coefficients, evidence, steps, change })
 }
 
@@ -132,10 +134,11 @@ pub(crate) fn approach(
             Some(earlier) => earlier,
             None => {
                 steps[1] += 1;
-                last = None;
+                let seen = last.take().as_ref().or(nearby).and_then(Evidence::seen);
                 mixing = Mixing::default();
                 changes = [f64::INFINITY; 3];
-                last.insert(sought.evidence((&epochs, &coefficients), settings, None)?)
+                let known = Nearby { explained: None, seen };
+                last.insert(sought.evidence((&epochs, &coefficients), settings, &known)?)
             }
         };
         let mut pulled = pulled(&epochs)?;
@@ -166,9 +169,9 @@ impl Sought<'_> {
         &self,
         (epochs, around): (&[Epoch], &DMatrix<f64>),
         settings: &Settling,
-        explained: Option<&[f64]>,
+        nearby: &Nearby,
     ) -> Result<Evidence, FieldError> {
-        Evidence::of(self.field, self.degrees, (epochs, around), settings.compression, explained)
+        Evidence::of(self.field, self.degrees, (epochs, around), settings.compression, nearby)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The way up to the most probable field: ln Z in ln amplitude, slope, ln lifetime and ln jitter, by quasi-Newton steps.
+//! The way up to the most probable field, by quasi-Newton steps in ln amplitude, slope, ln lifetime and ln jitter.
 
 use super::known::Known;
 use super::{Assumed, Marginal};
