@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
 /// Numbers of all epochs beyond which a filter is faster (`benches/field.rs`).
-const FILTER_BEYOND: usize = 5000;
+const FILTER_BEYOND: usize = 4000;
 
 /// Products with random signs from which a filter has the diagonal of the inverse.
 const PROBES: usize = 32;

@@ -24,6 +24,21 @@ pub fn product_with_transpose(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64
     product
 }
 
+/// Lower triangle (diagonal blocks whole) of `A^T A`, for A (n, m); what is above is zero. A is turned a share at a time:
+/// it may have hundreds of megabytes.
+pub fn gram_of_columns(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let m = a.ncols();
+    let mut product = DMatrix::zeros(m, m);
+    for (row, rows) in blocks(a.nrows(), 16 * BLOCK) {
+        let turned = a.rows(row, rows).transpose();
+        for (first, width) in blocks(m, 2 * BLOCK) {
+            let mut below = product.view_mut((first, first), (m - first, width));
+            below.gemm(1.0, &turned.rows(first, m - first), &a.view((row, first), (rows, width)), 1.0);
+        }
+    }
+    product
+}
+
 /// First column and number of columns of every block.
 fn blocks(n: usize, block: usize) -> impl DoubleEndedIterator<Item = (usize, usize)> + ExactSizeIterator {
     (0..n.div_ceil(block)).map(move |b| (b * block, block.min(n - b * block)))
@@ -174,6 +189,12 @@ mod tests {
             assert!((factor.inverse().lower_triangle() - plain.inverse().lower_triangle()).amax() < 1e-11);
             assert!((factor.inverse_diagonal() - plain.inverse().diagonal()).amax() < 1e-11);
         }
+    }
+
+    #[test]
+    fn many_rows_are_taken_a_share_at_a_time() {
+        let a = some(2500, 30);
+        assert!((gram_of_columns(&a).lower_triangle() - a.tr_mul(&a).lower_triangle()).amax() < 1e-10);
     }
 
     #[test]

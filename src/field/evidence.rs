@@ -6,8 +6,8 @@
 //! units of the noise and compressed, where N is 1, but for what epochs have in common, which adds `B B^T` over all.
 //!
 //! The work is n'^2 H for `J K J^T` and n'^3 / 3 for its factor, n' some 20 numbers a profile, or in proportion to n'
-//! by a filter in time (`covariance`; `benches/field.rs`: 0.04 s for 40 profiles, 0.3 for 100, 1.4 for 200, 4.5 for
-//! 400, a third of what they take as a dense matrix).
+//! by a filter in time (`covariance`; `benches/field.rs`: 0.04 s for 40 profiles, 0.3 for 100, 2.0 for 200, 4.3 for
+//! 400; half of that where another field of the same star is known).
 
 use super::compress::{Compressed, Compression, Told};
 use super::covariance::{Covariance, Numbers};
@@ -199,7 +199,7 @@ impl Evidence {
             let mut units = DMatrix::zeros(whitened.nrows(), numbers.len());
             numbers.iter().enumerate().for_each(|(column, row)| units[(*row, column)] = 1.0);
             self.covariance.forward_from(&mut units, &numbers);
-            let (own, mut across) = (dense::gram(&units.transpose()), units.tr_mul(&whitened));
+            let (own, mut across) = (dense::gram_of_columns(&units), units.tr_mul(&whitened));
             let factor = Factor::new(own).ok_or(FieldError::NotPositive)?;
             let starts = vec![0; across.ncols()];
             factor.forward_from(&mut across, &starts);

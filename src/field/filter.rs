@@ -283,7 +283,7 @@ fn all_seen_along(rows: &DMatrix<f64>, near: &DMatrix<f64>) -> Option<(DMatrix<f
 /// towards the largest by two products with `rows^T rows` (Halko, Martinsson & Tropp 2011). `None` where that is not
 /// finite.
 fn seen_directions(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let mut products = dense::gram(&rows.transpose());
+    let mut products = dense::gram_of_columns(rows);
     products.fill_upper_triangle_with_lower_triangle();
     let all = products.trace();
     let mut rng = ChaCha8Rng::seed_from_u64(1);

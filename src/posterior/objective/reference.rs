@@ -105,8 +105,20 @@ pub enum ReferenceError {
         blank: f64,
     },
     /// The solver failed.
-    #[error("the maximum-entropy image did not converge ({0:?})")]
+    #[error("the maximum-entropy image did not converge: {}", why(*.0))]
     Solver(Termination),
+}
+
+/// Why there is no image, and what to look at.
+fn why(termination: Termination) -> &'static str {
+    match termination {
+        Termination::StepLimit => {
+            "its steps ran out, as they do where the star is not that of the profiles; star.vsini_kms, star.line or \
+            star.vsys_kms may be wrong, or imaging.chi2_target too low"
+        }
+        Termination::Unreachable | Termination::Converged => "imaging.chi2_target is out of reach",
+        Termination::NonFinite => "a number that is not finite appeared; data or errors are beyond sense",
+    }
 }
 
 impl ReferenceError {
