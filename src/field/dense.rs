@@ -24,8 +24,8 @@ pub fn product_with_transpose(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64
     product
 }
 
-/// Lower triangle (diagonal blocks whole) of `A^T A`, for A (n, m); what is above is zero. A is turned a share at a time:
-/// it may have hundreds of megabytes.
+/// Lower triangle (diagonal blocks whole) of `A^T A`, for A (n, m); what is above is zero. A share of A at a time is
+/// transposed: it may have hundreds of megabytes.
 pub fn gram_of_columns(a: &DMatrix<f64>) -> DMatrix<f64> {
     let m = a.ncols();
     let mut product = DMatrix::zeros(m, m);
