@@ -176,46 +176,50 @@ impl Evidence {
         Ok(quadratic(&self.covariance, &whitened, &self.epochs, &told))
     }
 
-    /// The same without each of these groups of epochs (ascending), as if they had never been: the numbers of an epoch
-    /// that is left out are not among those of the others. Where the model is linear is kept.
+    /// The same without each of these groups of epochs (ascending): what `then` makes of the quadratic of all others.
+    /// The maps that the model is linear around, and the tilt, are those of all epochs; otherwise those left out might
+    /// never have been.
     ///
     /// With `P = C^-1` and B the residual and all slopes, those left out being s: `B^T P B - (P B)_s^T P_ss^-1 (P B)_s`
     /// in place of `B^T P B`.
     ///
     /// # Errors
-    /// As there, and [`FieldError::NotPositive`].
-    pub fn without_each(
+    /// As there; [`FieldError::NotPositive`] of a group. Groups that are not ascending panic.
+    pub fn without_each<T: Send>(
         &self,
         misfits: &[DVector<f64>],
         slopes: &[DMatrix<f64>],
         groups: &[Vec<usize>],
-    ) -> Result<Vec<Quadratic>, FieldError> {
+        then: impl Fn(&[usize], Quadratic) -> T + Sync,
+    ) -> Result<Vec<Result<T, FieldError>>, FieldError> {
         let told = self.told(misfits, slopes)?;
-        let whitened = self.covariance.whitened(&told, &self.numbers.parts);
-        let all = quadratic(&self.covariance, &whitened, &self.epochs, &told);
+        let mut solved = self.covariance.whitened(&told, &self.numbers.parts);
+        let all = quadratic(&self.covariance, &solved, &self.epochs, &told);
+        self.covariance.backward(&mut solved);
         let per_epoch = told.first().map_or(0, |of| of.slopes.ncols());
         let without = |group: &Vec<usize>| {
+            assert!(group.is_sorted(), "epochs in order");
             let numbers: Vec<usize> = group.iter().flat_map(|k| self.numbers.parts[*k].clone()).collect();
-            let mut units = DMatrix::zeros(whitened.nrows(), numbers.len());
+            let mut units = DMatrix::zeros(solved.nrows(), numbers.len());
             numbers.iter().enumerate().for_each(|(column, row)| units[(*row, column)] = 1.0);
             self.covariance.forward_from(&mut units, &numbers);
-            let (own, mut across) = (dense::gram_of_columns(&units), units.tr_mul(&whitened));
-            let factor = Factor::new(own).ok_or(FieldError::NotPositive)?;
-            let starts = vec![0; across.ncols()];
-            factor.forward_from(&mut across, &starts);
+            let factor = Factor::new(dense::gram_of_columns(&units)).ok_or(FieldError::NotPositive)?;
+            let left: Vec<usize> = (0..told.len()).filter(|k| group.binary_search(k).is_err()).collect();
+            let left: Vec<usize> = left.iter().flat_map(|k| k * per_epoch..(k + 1) * per_epoch).collect();
+            let columns: Vec<usize> = std::iter::once(0).chain(left.iter().map(|column| 1 + column)).collect();
+            let mut across = solved.select_rows(&numbers).select_columns(&columns);
+            factor.forward_from(&mut across, &vec![0; columns.len()]);
             let (residual, slopes) = (across.column(0), across.columns_range(1..));
             let mut ln_evidence = all.ln_evidence + 0.5 * (residual.norm_squared() - factor.ln_determinant());
             ln_evidence -= group.iter().map(|k| self.epochs[*k].constant - 0.5 * told[*k].chi2).sum::<f64>();
-            let left: Vec<usize> = (0..told.len()).filter(|k| group.binary_search(k).is_err()).collect();
-            let left: Vec<usize> = left.iter().flat_map(|k| k * per_epoch..(k + 1) * per_epoch).collect();
-            let slopes = slopes.select_columns(&left);
-            Ok(Quadratic {
+            let others = Quadratic {
                 ln_evidence,
                 gradient: all.gradient.select_rows(&left) - slopes.tr_mul(&residual),
-                information: all.information.select_rows(&left).select_columns(&left) - slopes.tr_mul(&slopes),
-            })
+                information: all.information.select_rows(&left).select_columns(&left) - slopes.transpose() * slopes,
+            };
+            Ok(then(group, others))
         };
-        groups.par_iter().map(without).collect()
+        Ok(groups.par_iter().map(without).collect())
     }
 
     /// Misfits and slopes of all epochs in the numbers of these.
@@ -315,7 +319,8 @@ mod tests {
 
     #[test]
     fn what_is_left_out_might_never_have_been() {
-        let epochs = [0, 1, 2, 3, 4].map(epoch);
+        let mut epochs = [0, 1, 2, 3, 4].map(epoch);
+        epochs[1..4].iter_mut().for_each(|epoch| epoch.common = some(5, 1) * 0.2);
         let of = |these: &[usize]| {
             let epochs: Vec<Epoch> = these.iter().map(|k| epochs[*k].clone()).collect();
             let around = some(8, 5).select_columns(these) * 0.1;
@@ -325,8 +330,10 @@ mod tests {
         let misfits: Vec<DVector<f64>> = epochs.iter().map(|epoch| epoch.misfit.clone()).collect();
         let slopes: Vec<DMatrix<f64>> = epochs.iter().map(|epoch| epoch.slopes.clone()).collect();
         let groups = [vec![1], vec![0, 3], vec![2, 3, 4]];
-        let all = of(&[0, 1, 2, 3, 4]).without_each(&misfits, &slopes, &groups).unwrap();
-        for (got, left) in all.iter().zip([vec![0, 2, 3, 4], vec![1, 2, 4], vec![0, 1]]) {
+        let all = of(&[0, 1, 2, 3, 4]).without_each(&misfits, &slopes, &groups, |_, others| others).unwrap();
+        for (got, left) in
+            all.iter().map(|got| got.as_ref().unwrap()).zip([vec![0, 2, 3, 4], vec![1, 2, 4], vec![0, 1]])
+        {
             let known = of(&left).quadratic().clone();
             assert!((got.ln_evidence - known.ln_evidence).abs() < 1e-7, "{left:?}");
             assert!((&got.gradient - &known.gradient).amax() < 1e-7 * known.gradient.amax(), "{left:?}");

@@ -118,6 +118,9 @@ fn mix(rates: &mut [f64], values: &mut [f64], [vv, vw, wv, ww]: [f64; 4]) {
 
 /// The same of all columns of states (states, columns), rates first.
 fn mix_all(states: &mut DMatrix<f64>, rates: usize, factors: [f64; 4]) {
+    if rates == 0 {
+        return;
+    }
     let rows = states.nrows();
     for column in states.as_mut_slice().chunks_exact_mut(rows) {
         let (w, v) = column.split_at_mut(rates);
@@ -125,7 +128,7 @@ fn mix_all(states: &mut DMatrix<f64>, rates: usize, factors: [f64; 4]) {
     }
 }
 
-/// The covariance of the states (states, states), once through it an epoch.
+/// The covariance of the states (states, states), updated in one pass an epoch.
 struct Spread {
     covariance: DMatrix<f64>,
     rates: usize,
@@ -270,10 +273,12 @@ impl Filter {
 /// The directions `near` (H, directions) made orthonormal, and what `rows` (n, H) see of them (n, directions); `None`
 /// where they see more.
 fn all_seen_along(rows: &DMatrix<f64>, near: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let turned = near.transpose();
-    let factor = Factor::new(dense::gram(&turned))?;
-    let mut directions = turned;
-    factor.forward_from(&mut directions, &vec![0; near.nrows()]);
+    let mut directions = near.transpose();
+    // twice, for the first time leaves errors of the square of the condition
+    for _ in 0..2 {
+        let factor = Factor::new(dense::gram(&directions))?;
+        factor.forward_from(&mut directions, &vec![0; near.nrows()]);
+    }
     let directions = directions.transpose();
     let seen = rows * &directions;
     (rows.norm_squared() - seen.norm_squared() <= LEFT_OUT).then_some((directions, seen))

@@ -7,6 +7,7 @@
 use super::{Detection, DetectionSettings, View};
 use crate::planets::periodogram::{CircularOrbit, orbits};
 use crate::planets::velocities::VelocityQuadratic;
+use crate::posterior::expansion::Expansion;
 use crate::posterior::imaging::Imager;
 use crate::posterior::marginal::Basis;
 use crate::posterior::objective::{Parameter, ParameterValues};
@@ -45,7 +46,7 @@ pub struct WithoutNight {
     pub span_d: (f64, f64),
     /// Number of its profiles.
     pub profiles: usize,
-    /// The orbit of all others; `None` where none is bounded, or no image.
+    /// The orbit of all others; `None` where none is bounded, or there is no image or evidence.
     pub orbit: Option<CircularOrbit>,
 }
 
@@ -61,7 +62,7 @@ pub struct Robustness {
 }
 
 /// Tries the best orbit of `found` out, all else as in `values`. Where maps are integrated over there are no targets,
-/// and without a night the field, and the maps around which profiles are linear, are those of all.
+/// and without a night the field, and the maps around which profiles are linear, are those found last.
 pub fn robustness(
     imager: &Imager,
     mut values: ParameterValues,
@@ -69,11 +70,11 @@ pub fn robustness(
     found: &Detection,
 ) -> Robustness {
     let peak = &found.best;
+    let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
+    let orbit_of = |view: &View| orbit(&view.quadratic);
     values[Parameter::K] = peak.orbit.k_kms;
     values[Parameter::PorbOverProt] = peak.porb_over_prot;
     values[Parameter::Phi] = peak.orbit.phi;
-    let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
-    let orbit_of = |view: &View| orbit(&view.quadratic);
     let at = |factor: f64| {
         let chi2_target = factor * settings.chi2_target;
         let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
@@ -93,9 +94,10 @@ pub fn robustness(
     let (targets, without) = match found.last().field() {
         Some(field) => {
             let (basis, stellar) = (Basis::new(&imager.grid), &found.last().expansion.stellar);
-            let all = field.marginal.expansions_without(imager, &basis, stellar, &nights).unwrap_or_default();
-            let of_others = all.iter().map(|others| orbit(&others.velocities(&settings.nuisances)));
-            (Vec::new(), of_others.chain(std::iter::repeat(None)).take(nights.len()).collect())
+            let of_others = |others: &Expansion| orbit(&others.velocities(&settings.nuisances));
+            let all = field.marginal.without_each(imager, &basis, stellar, &nights, of_others);
+            let none = || nights.iter().map(|_| None).collect();
+            (Vec::new(), all.map_or_else(|_| none(), |all| all.into_iter().map(|of| of.ok().flatten()).collect()))
         }
         None => {
             let others = |night: &[usize]| View::new(&imager.without(night), values, settings, None).ok();

@@ -53,7 +53,7 @@ pub(super) fn limits(known: &Known) -> [(f64, f64); 4] {
     [amplitude, slope, lifetime, (JITTER_KMS.0.ln(), JITTER_KMS.1.ln())]
 }
 
-/// Where a climb ends, and minus the second derivatives of ln Z there.
+/// Where a climb ends, and what its steps tell of minus the second derivatives of ln Z.
 pub(super) struct Top {
     pub marginal: Marginal,
     pub hessian: Matrix4<f64>,
@@ -100,12 +100,10 @@ pub(super) fn climb(
     };
     let mut here = first;
     let (mut gradient, bend) = slope(&here);
-    let bend = bend.map(|bend| if bend > LEAST_BEND { bend } else { USUAL_BEND });
-    let mut hessian = Matrix4::from_diagonal(&bend);
-    if let Some(nearby) = nearby {
-        let scale = bend.component_div(&nearby.diagonal()).map(f64::sqrt);
-        hessian = nearby.component_mul(&(scale * scale.transpose()));
-    }
+    let mut hessian = nearby.unwrap_or_else(|| Matrix4::from_diagonal_element(USUAL_BEND));
+    let scale =
+        bend.zip_map(&hessian.diagonal(), |bend, was| if bend > LEAST_BEND { (bend / was).sqrt() } else { 1.0 });
+    hessian.component_mul_assign(&(scale * scale.transpose()));
     for _ in 0..STEPS {
         let from = place(&here.assumed);
         // what pushes against a bound stays there
@@ -113,10 +111,12 @@ pub(super) fn climb(
             let (low, high) = limits[i];
             (from[i] <= low + 1e-9 && gradient[i] < 0.0) || (from[i] >= high - 1e-9 && gradient[i] > 0.0)
         };
-        let inside = Vector4::from_fn(|i, _| if pushes(i) { 0.0 } else { gradient[i] });
-        let Some(factor) = hessian.cholesky() else { break };
-        let mut step = factor.solve(&inside);
-        step = Vector4::from_fn(|i, _| if pushes(i) || !free[i] { 0.0 } else { step[i] });
+        let inside = Vector4::from_fn(|i, _| if pushes(i) || !free[i] { 0.0 } else { gradient[i] });
+        let moves = |i: usize| free[i] && !pushes(i);
+        let own = |i: usize, j: usize| if i == j { hessian[(i, i)].max(LEAST_BEND) } else { 0.0 };
+        let among = Matrix4::from_fn(|i, j| if moves(i) && moves(j) { hessian[(i, j)] } else { own(i, j) });
+        let factor = among.cholesky().or_else(|| Matrix4::from_fn(own).cholesky());
+        let Some(mut step) = factor.map(|factor| factor.solve(&inside)) else { break };
         if inside.dot(&step) < 2.0 * GAIN {
             break;
         }
@@ -148,6 +148,7 @@ fn shortened(
     (limits, height): (&[(f64, f64); 4], &impl Fn(&Marginal) -> f64),
     at: &impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError>,
 ) -> Option<Marginal> {
+    // shorter ones gain less than a tenth of what was hoped for
     const TRIES: usize = 4;
     let from = place(&here.assumed);
     for _ in 0..TRIES {

@@ -24,25 +24,28 @@ impl Marginal {
         self.with_zero_points_integrated(imager, stellar, self.quadratic(imager, basis, stellar)?)
     }
 
-    /// The same without each of these groups of profiles (ascending), for what the maps are linearised around kept.
+    /// The same without each of these groups of profiles (ascending), the maps those of all: what `then` makes of the
+    /// expansion of all others.
     ///
     /// # Errors
-    /// [`FieldError`].
-    pub fn expansions_without(
+    /// [`FieldError`], of all groups or of one.
+    pub fn without_each<T: Send>(
         &self,
         imager: &Imager,
         basis: &Basis,
         stellar: &[Parameter],
         groups: &[Vec<usize>],
-    ) -> Result<Vec<Expansion>, FieldError> {
+        then: impl Fn(&Expansion) -> T + Sync,
+    ) -> Result<Vec<Result<T, FieldError>>, FieldError> {
         let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
-        let all = self.settled.evidence.without_each(&misfits, &slopes, groups)?;
-        let of_group = |(group, quadratic): (&Vec<usize>, Quadratic)| {
-            let (epochs, profiles) = (misfits.len(), self.design.response().profiles());
+        let (epochs, profiles) = (misfits.len(), self.design.response().profiles());
+        let then = |group: &[usize], quadratic: Quadratic| {
             let quadratic = summed(&quadratic, epochs - group.len(), profiles - group.len(), stellar.len());
-            self.with_zero_points_integrated(&imager.without(group), stellar, quadratic)
+            let others = self.with_zero_points_integrated(&imager.without(group), stellar, quadratic)?;
+            Ok(then(&others))
         };
-        groups.iter().zip(all).map(of_group).collect()
+        let all = self.settled.evidence.without_each(&misfits, &slopes, groups, then)?;
+        Ok(all.into_iter().map(Result::flatten).collect())
     }
 
     fn with_zero_points_integrated(
@@ -183,6 +186,9 @@ impl Design {
 /// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of the profiles, which
 /// are the first epochs, and the parameters, which are those of all epochs.
 pub(super) fn summed(of_all: &Quadratic, epochs: usize, profiles: usize, stellar: usize) -> Quadratic {
+    if stellar == 0 && epochs == profiles {
+        return of_all.clone();
+    }
     let mut sums = DMatrix::zeros(epochs * (1 + stellar), profiles + stellar);
     for k in 0..epochs {
         if k < profiles {
@@ -195,6 +201,6 @@ pub(super) fn summed(of_all: &Quadratic, epochs: usize, profiles: usize, stellar
     Quadratic {
         ln_evidence: of_all.ln_evidence,
         gradient: sums.tr_mul(&of_all.gradient),
-        information: sums.tr_mul(&(&of_all.information * &sums)),
+        information: sums.transpose() * (&of_all.information * &sums),
     }
 }

@@ -116,8 +116,10 @@ fn why(termination: Termination) -> &'static str {
             "its steps ran out, as they do where the star is not that of the profiles; star.vsini_kms, star.line or \
             star.vsys_kms may be wrong, or imaging.chi2_target too low"
         }
-        Termination::Unreachable | Termination::Converged => "imaging.chi2_target is out of reach",
-        Termination::NonFinite => "a number that is not finite appeared; data or errors are beyond sense",
+        Termination::Unreachable => "imaging.chi2_target is out of reach",
+        Termination::Converged | Termination::NonFinite => {
+            "a number in it is not finite; look for data or errors that are much too large or too small"
+        }
     }
 }
 
