@@ -12,6 +12,7 @@
 use super::compress::{Compressed, Compression, Told};
 use super::covariance::{Covariance, Numbers};
 use super::dense::{self, Factor};
+use super::maps::{inverses, scale_rows};
 use super::tilt::Tilt;
 use super::{Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};
@@ -48,11 +49,6 @@ pub(super) struct Nearby {
     pub seen: Option<DMatrix<f64>>,
 }
 
-/// Rows times numbers of their own.
-fn scaled(matrix: &DMatrix<f64>, rows: &[f64]) -> DMatrix<f64> {
-    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * rows[i])
-}
-
 impl Evidence {
     /// Of epochs that are linear around the coefficients `around` (H, epochs), for a field of harmonics of these
     /// `degrees` (H).
@@ -67,7 +63,7 @@ impl Evidence {
         around: &DMatrix<f64>,
         how: Compression,
     ) -> Result<Self, FieldError> {
-        Evidence::of(field, degrees, (epochs, around), how, &Nearby::default())
+        Evidence::of(field, degrees, (epochs, around), how, Nearby::default())
     }
 
     /// The same with what is known from the evidence of a field and a star nearby.
@@ -76,7 +72,7 @@ impl Evidence {
         degrees: &[usize],
         (epochs, around): (&[Epoch], &DMatrix<f64>),
         how: Compression,
-        Nearby { explained, seen }: &Nearby,
+        Nearby { explained, mut seen }: Nearby,
     ) -> Result<Self, FieldError> {
         field.check()?;
         assert_eq!(around.shape(), (degrees.len(), epochs.len()), "coefficients of all epochs");
@@ -95,14 +91,17 @@ impl Evidence {
         let mut numbers = Numbers::new(times_d, &rows, &common, sd.len());
         drop((rows, common));
         let mut spatial = numbers.spatial_of_few();
-        let directions = seen.as_ref().map(|seen| scaled(seen, &sd));
+        // in units of these standard deviations
+        if let Some(directions) = &mut seen {
+            scale_rows(directions, &sd);
+        }
         let factored = |numbers: &Numbers, spatial: Option<DMatrix<f64>>| {
-            Covariance::new(numbers, spatial, &field.kernel, directions.as_ref()).ok_or(FieldError::NotPositive)
+            Covariance::new(numbers, spatial, &field.kernel, seen.as_ref()).ok_or(FieldError::NotPositive)
         };
         let (mut tilt, own) = (None, OnceLock::new());
         if Tilt::is_needed(epochs) {
             let explained = match explained {
-                Some(explained) => explained.clone(),
+                Some(explained) => explained,
                 None => {
                     let found = factored(&numbers, spatial.clone())?.explained(&numbers);
                     own.get_or_init(|| found).clone()
@@ -125,8 +124,9 @@ impl Evidence {
 
     /// Directions of the coefficients that epochs see (H, directions), where that was asked for.
     pub(super) fn seen(&self) -> Option<DMatrix<f64>> {
-        let inverse: Vec<f64> = self.sd.iter().map(|sd| if *sd > 0.0 { sd.recip() } else { 0.0 }).collect();
-        Some(scaled(self.covariance.directions()?, &inverse))
+        let mut directions = self.covariance.directions()?.clone();
+        scale_rows(&mut directions, &inverses(&self.sd));
+        Some(directions)
     }
 
     /// The field that is assumed.
@@ -308,7 +308,7 @@ mod tests {
             epochs[2].divisor = DVector::repeat(8, 0.3);
             let around = DMatrix::zeros(8, 3);
             let nearby = Nearby { explained, seen: None };
-            Evidence::of(field(), &DEGREES, (&epochs, &around), Compression::default(), &nearby).unwrap()
+            Evidence::of(field(), &DEGREES, (&epochs, &around), Compression::default(), nearby).unwrap()
         };
         let (own, told) = (of(None), of(Some(vec![0.5; 3])));
         assert_ne!(own.ln_evidence(), told.ln_evidence());

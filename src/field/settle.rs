@@ -91,7 +91,7 @@ pub fn settle(
     let seen = last.as_ref().or(nearby).and_then(Evidence::seen);
     // of many profiles each is hundreds of megabytes
     drop(last);
-    let evidence = sought.evidence((&epochs, &coefficients), settings, &Nearby { explained, seen })?;
+    let evidence = sought.evidence((&epochs, &coefficients), settings, Nearby { explained, seen })?;
     Ok(Settled { coefficients, evidence, steps, change })
 }
 
@@ -138,7 +138,7 @@ pub(crate) fn approach(
                 mixing = Mixing::default();
                 changes = [f64::INFINITY; 3];
                 let known = Nearby { explained: None, seen };
-                last.insert(sought.evidence((&epochs, &coefficients), settings, &known)?)
+                last.insert(sought.evidence((&epochs, &coefficients), settings, known)?)
             }
         };
         let mut pulled = pulled(&epochs)?;
@@ -169,7 +169,7 @@ impl Sought<'_> {
         &self,
         (epochs, around): (&[Epoch], &DMatrix<f64>),
         settings: &Settling,
-        nearby: &Nearby,
+        nearby: Nearby,
     ) -> Result<Evidence, FieldError> {
         Evidence::of(self.field, self.degrees, (epochs, around), settings.compression, nearby)
     }

@@ -32,7 +32,7 @@ pub struct Fitted {
     pub ln_evidence: f64,
     /// Bounds of the search that were reached.
     pub at_bounds: Vec<&'static str>,
-    /// Roughly minus the second derivatives of ln Z in the coordinates of the search; `None` of a field without one.
+    /// Roughly minus the second derivatives of ln Z in the coordinates of the search; `None` if there was no search.
     hessian: Option<Matrix4<f64>>,
 }
 
