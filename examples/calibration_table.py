@@ -40,12 +40,16 @@ def resumed(path):
 
 
 def append(path, columns, line):
-    """One line more, with names above the first."""
-    new = not path.exists() or not path.stat().st_size
-    with open(path, "a", newline="") as file:
+    """One line more. Columns that a table of an earlier version lacks are added to it first, empty."""
+    kept = read(path)
+    head = list(kept[0]) if kept else []
+    columns = [*head, *(name for name in columns if name not in head)]
+    anew = columns != head
+    with open(path, "w" if anew else "a", newline="") as file:
         writer = csv.DictWriter(file, columns, restval="", lineterminator="\n")
-        if new:
+        if anew:
             writer.writeheader()
+            writer.writerows(kept)
         writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in line.items()})
 
 

@@ -5,6 +5,7 @@ mod imaging;
 mod light_curves;
 mod measuring;
 mod reading;
+mod seasons;
 mod truth;
 
 use crate::data::config::{
@@ -202,6 +203,7 @@ impl Scene {
         let correlated_bins = errors.iter().flatten().map(|errors| errors.correlated_bins).fold(1.0, f64::max);
         imager.data.correlated_bins = correlated_bins;
         let mut measured = Measured { light_curves: light_curves::remarks(&settings), ..Measured::default() };
+        measured.seasons = seasons::measured(&settings, &parts)?;
         settings.imaging.chi2_target = match settings.imaging.chi2_target {
             Automatic::Fixed(target) => Automatic::Fixed(target / correlated_bins),
             Automatic::Auto => {

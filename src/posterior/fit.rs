@@ -149,7 +149,7 @@ pub struct Deviation {
 impl Deviation {
     /// Of a map of brightnesses; `None` if maps hold something else.
     fn of(imager: &Imager, map: &[f64]) -> Option<Self> {
-        let mean = |part: fn(f64) -> f64| map.iter().zip(&imager.grid.area).map(|(b, a)| a * part(b - 1.0)).sum();
+        let mean = |part: fn(f64) -> f64| map.iter().zip(&imager.areas).map(|(b, a)| a * part(b - 1.0)).sum();
         match imager.entropy {
             Entropy::Spots { .. } => None,
             Entropy::BrightAndDark => {

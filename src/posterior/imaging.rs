@@ -33,8 +33,11 @@ pub struct ZeroPointPrior {
 /// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
 #[derive(Clone, Debug)]
 pub struct Imager {
-    /// Pixels of the map.
+    /// Pixels of a map.
     pub grid: SurfaceGrid,
+    /// Area of each pixel of all maps of a star that does not change, season by season, as a fraction of them; mostly
+    /// there is one season, and this is `grid.area`. Integrated maps have no seasons.
+    pub areas: Vec<f64>,
     /// The star, but for the parameters.
     pub star: StarSettings,
     /// The data sets, whose profiles follow each other: times and velocity bins, and what of the star looks different
@@ -53,8 +56,10 @@ pub struct Imager {
 impl Imager {
     /// For `observations` of `star`, on about `pixels` pixels, with maps of the given `entropy`.
     pub fn new(star: StarSettings, observations: &Observations, pixels: usize, entropy: Entropy) -> Self {
+        let grid = SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2);
         Imager {
-            grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
+            areas: grid.area.clone(),
+            grid,
             star,
             sets: vec![Sampling::of(observations).into()],
             data: Data::of(observations),
@@ -74,6 +79,30 @@ impl Imager {
         entropy: Entropy,
     ) -> Self {
         Imager { sets, ..Imager::new(star, observations, pixels, entropy) }
+    }
+
+    /// The same with as many `maps`, one a season, of which each profile sees that which `map_of` gives for its time
+    /// (d).
+    pub fn with_maps(mut self, maps: usize, map_of: impl Fn(f64) -> usize) -> Self {
+        let share = |area: &f64| area / maps as f64;
+        self.areas = std::iter::repeat_n(&self.grid.area, maps).flatten().map(share).collect();
+        for set in &mut self.sets {
+            set.map_of = set.sampling.profiles.iter().map(|profile| map_of(profile.0)).collect();
+        }
+        self
+    }
+
+    /// How many maps the star has, one a season.
+    pub fn maps(&self) -> usize {
+        self.areas.len() / self.grid.len()
+    }
+
+    /// The map that each profile sees, from 0; empty where there is only one.
+    pub fn map_of_each(&self) -> Vec<usize> {
+        match self.maps() {
+            1 => Vec::new(),
+            _ => self.sets.iter().flat_map(|set| set.map_of.iter().copied()).collect(),
+        }
     }
 
     /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard
@@ -134,6 +163,8 @@ impl Imager {
             first += all.len();
             let mut k = before..first;
             all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
+            let mut k = before..first;
+            set.map_of.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
         // a data set of which nothing is left is none
         let mut zero_points = self.zero_points.clone();
@@ -143,6 +174,19 @@ impl Imager {
         sets.retain(is_left);
         let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
         Imager { sets, zero_points, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
+    }
+
+    /// The same of each season by itself.
+    pub fn seasons(&self) -> Vec<Self> {
+        let map_of = self.map_of_each();
+        let of_season = |map: usize| {
+            let others: Vec<usize> = (0..map_of.len()).filter(|k| map_of[*k] != map).collect();
+            self.without(&others).with_maps(1, |_| 0)
+        };
+        match self.maps() {
+            1 => vec![self.clone()],
+            maps => (0..maps).map(of_season).filter(|season| season.profiles().next().is_some()).collect(),
+        }
     }
 
     /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
@@ -197,7 +241,7 @@ impl Imager {
             Entropy::BrightAndDark => Brightness::ITSELF,
         };
         let brightness = (0..response.profiles()).map(brightness).collect();
-        ImagingProblem::of_brightness(&self.grid.area, &self.data, response, brightness)
+        ImagingProblem::of_brightness(&self.areas, &self.data, response, brightness)
     }
 
     /// Rotation cycle of each profile.
@@ -251,10 +295,10 @@ impl<'a> ImagingProblem<'a> {
         ImagingProblem::of_brightness(area, data, response, brightness)
     }
 
-    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of which maps give the
-    /// brightness as each profile sees it.
+    /// The problem of `data` seen through `response` on pixels of area fraction `area`, of one map or several, which
+    /// give the brightness as each profile sees it.
     fn of_brightness(area: &'a [f64], data: &'a Data, response: Response, brightness_of: Vec<Brightness>) -> Self {
-        let (pixels, bins, profiles) = (response.pixels(), response.data_len(), response.profiles());
+        let (pixels, bins, profiles) = (area.len(), response.data_len(), response.profiles());
         ImagingProblem {
             area,
             data,

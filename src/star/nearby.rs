@@ -50,8 +50,9 @@ impl Nearby {
         let part = |(pixels, set): (&Arranged, &Seen)| {
             let star = &set.star(star).with(&state.surface);
             let observed = observed(grid, star, state, &set.sampling);
-            self.is_close(pixels, &observed)
-                .then(|| Part::shifted(Arc::new(pixels.deposit(&observed)), star, state, &set.sampling))
+            self.is_close(pixels, &observed).then(|| {
+                Part::shifted(Arc::new(pixels.deposit(&observed)), star, state, &set.sampling).with_maps(&set.map_of)
+            })
         };
         self.pixels.iter().zip(sets).map(part).collect::<Option<Vec<_>>>().map(Response::stacked)
     }

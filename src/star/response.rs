@@ -52,6 +52,8 @@ pub(super) struct Part {
     /// First bin of each profile, and the end.
     starts: Vec<usize>,
     contrast: f64,
+    /// Of each profile the number of its map; empty where there is one.
+    map_of: Vec<usize>,
 }
 
 impl Part {
@@ -65,7 +67,21 @@ impl Part {
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is
     /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        Part::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling)
+        Part::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling).with_maps(&self.map_of)
+    }
+
+    /// The same response of profiles of which each sees the map of its number.
+    pub(super) fn with_maps(self, map_of: &[usize]) -> Self {
+        Part { map_of: map_of.to_vec(), ..self }
+    }
+
+    /// Where the map that profile `k` sees stands among `all` pixels; a map that is alone is seen by all.
+    fn map(&self, k: usize, all: usize) -> std::ops::Range<usize> {
+        let pixels = self.pixels();
+        match self.map_of.get(k) {
+            Some(map) if all > pixels => map * pixels..(map + 1) * pixels,
+            _ => 0..all,
+        }
     }
 
     /// The response of deposits, which orbit and systemic velocity shift.
@@ -86,7 +102,7 @@ impl Part {
             (first_velocity - shift - deposit.origin_kms(), bins)
         });
         let convolutions = Convolutions::new(&kernel, grid, profiles);
-        Part { deposit, convolutions, starts, contrast: star.contrast }
+        Part { deposit, convolutions, starts, contrast: star.contrast, map_of: Vec::new() }
     }
 
     fn rows(&self) -> Rows {
@@ -228,7 +244,7 @@ impl Task for Apply<'_> {
         let Apply { response, x, line, continuum } = self;
         let mut pass = Pass::new(response);
         for (k, continuum) in continuum.iter_mut().enumerate() {
-            *continuum = pass.forward(instructions, k, x, &mut line[response.bins(k)]);
+            *continuum = pass.forward(instructions, k, &x[response.map(k, x.len())], &mut line[response.bins(k)]);
         }
     }
 }
@@ -270,7 +286,8 @@ impl Task for ApplyTranspose<'_> {
         let mut pass = Pass::new(response);
         out.fill(0.0);
         for (k, continuum) in continuum.iter().enumerate() {
-            pass.back(instructions, k, &line[response.bins(k)], *continuum, out);
+            let map = response.map(k, out.len());
+            pass.back(instructions, k, &line[response.bins(k)], *continuum, &mut out[map]);
         }
     }
 }
@@ -293,9 +310,10 @@ impl<N: Number, F: FnMut(usize, &mut [f64], f64) -> f64> Task for ApplyAndBack<'
         out.fill(N::default());
         for k in 0..response.profiles() {
             line.resize(response.bins(k).len(), 0.0);
-            let continuum = there.forward(instructions, k, x, &mut line);
+            let map = response.map(k, x.len());
+            let continuum = there.forward(instructions, k, &x[map.clone()], &mut line);
             let continuum = weigh(k, &mut line, continuum);
-            back.back(instructions, k, &line, continuum, out);
+            back.back(instructions, k, &line, continuum, &mut out[map]);
         }
     }
 }

@@ -18,11 +18,14 @@ pub struct Seen {
     pub contrast: Option<f64>,
     /// Times and velocity bins.
     pub sampling: Sampling,
+    /// Of each profile the number of its map, from 0, where the star has several, season by season; empty where it has
+    /// one.
+    pub map_of: Vec<usize>,
 }
 
 impl From<Sampling> for Seen {
     fn from(sampling: Sampling) -> Self {
-        Seen { line: None, contrast: None, sampling }
+        Seen { line: None, contrast: None, sampling, map_of: Vec::new() }
     }
 }
 
@@ -55,7 +58,7 @@ impl Response {
 
     /// The response of data `sets`.
     pub fn of_sets(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
-        let part = |set: &Seen| Part::new(grid, &set.star(star), state, &set.sampling);
+        let part = |set: &Seen| Part::new(grid, &set.star(star), state, &set.sampling).with_maps(&set.map_of);
         Response::stacked(sets.iter().map(part).collect())
     }
 
@@ -82,7 +85,7 @@ impl Response {
         self.parts[self.set_of[k]].contrast()
     }
 
-    /// Number of pixels.
+    /// Number of pixels of a map.
     pub fn pixels(&self) -> usize {
         self.parts[0].pixels()
     }
@@ -122,7 +125,8 @@ impl Response {
         })
     }
 
-    /// Line depth of every bin and continuum of every profile for the map `x`.
+    /// Line depth of every bin and continuum of every profile for the map `x`; or for the maps in `x`, one after the
+    /// other, of which each profile sees its own.
     pub fn apply(&self, x: &[f64], line: &mut [f64], continuum: &mut [f64]) {
         assert_eq!(continuum.len(), self.profiles());
         for (part, profiles, bins) in self.places() {

@@ -97,6 +97,68 @@ fn an_orbit_is_put_into_all_sets() {
     desk.succeed(&["plot", "injected/red"]);
 }
 
+/// Two spectrographs in two seasons, of a star that does not change in either.
+fn unchanging() -> Value {
+    let mut config = two_sets();
+    config["imaging"] = json!({ "pixels": 200, "chi2_target": 1.05 });
+    config["observations"][1]["zero_point_kms"] = json!(0.3);
+    config
+}
+
+#[test]
+fn a_star_that_does_not_change_has_a_map_a_season() {
+    let desk = Desk::new(unchanging());
+    let said = desk.succeed(&["map", CONFIG, "--out", "map"]);
+    says(&said, &["0.000 to 6.660 d: 7 profiles, with a map of their own", "249.600 to 256.260 d: 7 profiles"]);
+    let map = desk.json("map/map.json");
+    let seasons = map["seasons"].as_array().unwrap();
+    assert_eq!(seasons.len(), 2);
+    // on top their mean
+    let number = |of: &Value, key: &str| of[key].as_f64().unwrap();
+    for key in ["spottedness", "true_spottedness"] {
+        let mean = 0.5 * (number(&seasons[0], key) + number(&seasons[1], key));
+        assert!((number(&map, key) - mean).abs() < 1e-12, "{key}");
+    }
+    let pixel = |of: &Value| of["spot_filling"][17].as_f64().unwrap();
+    assert!((pixel(&map) - 0.5 * (pixel(&seasons[0]) + pixel(&seasons[1]))).abs() < 1e-12);
+    assert_ne!(seasons[0]["true_spot_filling"], seasons[1]["true_spot_filling"]);
+    for file in ["map/rv.csv", "map/profiles.csv"] {
+        let table = desk.read(file);
+        assert!(table.lines().next().unwrap().ends_with(",season,data_set"), "{file}");
+        assert!(table.lines().skip(1).all(|line| line.ends_with(",1,1") || line.ends_with(",2,2")), "{file}");
+    }
+    says(&desk.succeed(&["plot", "map"]), &["map_1.svg", "map_2.svg"]);
+    // one of them in two
+    desk.set("/imaging/seasons", json!([[-1, 3], [3.1, 100], [200, 300]]));
+    desk.succeed(&["map", CONFIG, "--out", "three"]);
+    assert_eq!(desk.json("three/fit.json")["measured"]["seasons"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn seasons_that_make_no_sense_are_refused_by_their_key() {
+    let refused = |key: &str, value: Value, parts: &[&str]| {
+        let desk = Desk::new(unchanging());
+        desk.set(&format!("/imaging/{key}"), value);
+        says(&desk.refusal(&["map", CONFIG, "--out", "map"]), parts);
+    };
+    let windows = |windows: Value, parts: &[&str]| refused("seasons", windows, parts);
+    windows(json!([[-1, 100], [90, 300]]), &["imaging.seasons[1]", "90 d", "ends (100 d)"]);
+    windows(json!([[-1, 100], [300, 200]]), &["imaging.seasons[1]", "300 must be before the end 200"]);
+    windows(json!([[1, 100], [200, 300]]), &["imaging.seasons", "profile at 0 d", "observations[0].exclude"]);
+    windows(json!([[-1, 100], [200, 300], [400, 500]]), &["imaging.seasons[2]", "no profile"]);
+    refused("season_gap_d", json!(0), &["imaging.season_gap_d", "above 0"]);
+    let mut both = unchanging();
+    both["imaging"]["season_gap_d"] = json!(30);
+    both["imaging"]["seasons"] = json!([[-1, 300]]);
+    says(&Desk::new(both).refusal(&["map", CONFIG, "--out", "map"]), &["imaging.seasons", "season_gap_d"]);
+    let mut integrated = two_sets();
+    integrated["imaging"]["season_gap_d"] = json!(30);
+    says(
+        &Desk::new(integrated).refusal(&["map", CONFIG, "--out", "map"]),
+        &["imaging.season_gap_d", "does not change"],
+    );
+}
+
 /// First moments of all profiles of a config (km/s).
 fn mean_velocities(desk: &Desk, config: &str) -> Vec<f64> {
     let scene = Scene::load(&desk.path(config)).unwrap();
@@ -143,7 +205,10 @@ fn what_makes_no_sense_is_refused_by_its_key() {
     refused(&set(1, "zero_point_kms", json!(1000)), &["observations[1].zero_point_kms", "100"]);
     refused(&set(1, "path", json!("x")), &["observations[1]", "not both"]);
     refused(&set(0, "exclude", json!([[1, 2]])), &["observations[0].exclude", "files"]);
-    refused(&|c| c["imaging"]["objective"] = json!("spottedness"), &["imaging.objective", "marginal-likelihood"]);
+    refused(
+        &|c| c["imaging"]["objective"] = json!("spottedness"),
+        &["observations[1].zero_point_kms", "give a number", "marginal-likelihood"],
+    );
     refused(&|c| c["observations"] = json!([]), &["observations", "empty"]);
     refused(
         &|c| c["observations"][1]["simulate"]["spots"] = json!([[0, 0, 10, 1]]),

@@ -1,7 +1,9 @@
 //! Several data sets of one star: each is seen as if it were alone, and zero points between them do not become spots.
 
 use dimcmc::internals::maxent::Problem;
+use dimcmc::internals::posterior::imaging::Imager;
 use dimcmc::internals::posterior::marginal::{Basis, Design, zero_points::HeldZeroPoint};
+use dimcmc::internals::posterior::objective::{Reference, ReferenceError};
 use dimcmc::internals::star::Response;
 use dimcmc::{Config, Parameter, Scene};
 use nalgebra::DMatrix;
@@ -83,14 +85,44 @@ fn each_set_is_seen_as_if_it_were_alone() {
 }
 
 #[test]
-fn the_misfit_of_a_map_has_its_gradient_where_contrasts_differ() {
+fn each_season_has_the_map_that_it_would_have_alone() {
+    let mut known = config();
+    known["observations"][1]["zero_point_kms"] = json!(OFFSET_KMS);
+    known["imaging"]["objective"] = json!("spottedness");
+    let both = scene(&known);
+    assert_eq!(both.imager.maps(), 2);
+    // so much entropy for chi2, whether that of the mean map or of one of the two
+    const LAMBDA: f64 = 1.0;
+    let image = |imager: &Imager, lambda: f64| {
+        let reference = Reference::at_lambda(imager, both.settings.values, lambda).unwrap();
+        imager.entropy.image(&reference.solution.image.coordinates)
+    };
+    let data = |imager: &Imager| imager.data.depth.len() as f64;
+    let together = image(&both.imager, LAMBDA);
+    let seasons = both.imager.seasons();
+    let alone = |season: &Imager| image(season, 2.0 * LAMBDA * data(season) / data(&both.imager));
+    let apart: Vec<f64> = seasons.iter().flat_map(alone).collect();
+    let off = together.iter().zip(&apart).fold(0.0, |off: f64, (a, b)| off.max((a - b).abs()));
+    assert!(together.len() == apart.len() && off < 1e-3, "{off}");
+    assert!(apart.iter().fold(0.0, |most: f64, s| most.max(*s)) > 0.3, "there are spots");
+    // a star that does not change from one to the other fits neither
+    known["imaging"]["season_gap_d"] = json!(1000.0);
+    let one = Config::from_json(&known.to_string()).unwrap();
+    let error = Scene::new(&one).unwrap().map().unwrap_err();
+    assert!(matches!(error, ReferenceError::TargetBelowFloor { floor, .. } if floor > 2.0), "{error}");
+}
+
+#[test]
+fn the_misfit_of_maps_has_its_gradient_where_contrasts_differ() {
     let mut known = config();
     known["observations"][1]["zero_point_kms"] = json!(0.0);
     let both = scene(&known);
     let response: Response = both.imager.response(&both.settings.values.state());
     assert_ne!(response.contrast(0), response.contrast(8));
     let mut problem = both.imager.problem(response);
-    let map: Vec<f64> = (0..both.imager.grid.len()).map(|p| 0.1 + 0.05 * (0.7 * p as f64).sin()).collect();
+    // a map of each season
+    let map: Vec<f64> = (0..both.imager.areas.len()).map(|p| 0.1 + 0.05 * (0.7 * p as f64).sin()).collect();
+    assert_eq!(map.len(), 2 * both.imager.grid.len());
     problem.linearise(&map);
     let mut gradient = vec![0.0; map.len()];
     problem.gradient(&mut gradient);

@@ -21,6 +21,7 @@ mod resolve_grid;
 mod resolve_observations;
 mod resolve_orbits;
 mod resolve_photometry;
+mod resolve_seasons;
 mod resolve_sets;
 mod resolve_simulation;
 mod resolve_star;
@@ -40,7 +41,8 @@ pub use photometry::SimulatedLight;
 pub use raw_parts::PlanSection;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{
-    DataSetSettings, GridSettings, ImagingSettings, LightCurveSettings, LightSource, ObservationSource, Settings,
+    DataSetSettings, GridSettings, ImagingSettings, LightCurveSettings, LightSource, ObservationSource, SEASON_GAP_D,
+    Settings,
 };
 pub use spots::Hyperparameter;
 pub use written::Config;

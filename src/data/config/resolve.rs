@@ -8,6 +8,7 @@ use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
 use super::resolve_orbits::{check_orbits, resolve_orbits, start_of};
 use super::resolve_photometry::resolve_photometry;
+use super::resolve_seasons::check_seasons;
 use super::resolve_sets::resolve_sets;
 use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
@@ -213,6 +214,7 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
 
 fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<(), Fault> {
     check_pixels("imaging.pixels", imaging.pixels)?;
+    check_seasons(imaging)?;
     if let Some(degree) = imaging.spot_break_degree {
         const KEY: &str = "imaging.spot_break_degree";
         if imaging.objective != ObjectiveKind::MarginalLikelihood {

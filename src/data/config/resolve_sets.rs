@@ -1,12 +1,12 @@
 //! The data sets of a config: what each says of itself, and what only one of them may say.
 
 use super::data_sets::ZeroPoint;
-use super::domain::{check_size, most};
 use super::error::Fault;
 use super::raw::{Config, Instrument};
 use super::raw_parts::ObservationsSection;
 use super::resolve::check_nuisances;
 use super::resolve_observations::resolve_observations;
+use super::resolve_seasons::check_windows;
 use super::resolve_simulation::{spots, times_d};
 use super::resolve_star::resolve_star;
 use super::{DataSetSettings, ObservationSource};
@@ -34,6 +34,7 @@ pub(super) fn resolve_sets(
         let key = raw.observations.key(s);
         let (star, equivalent_width) = star_of(raw, s, &key, star, values)?;
         let section = &mut raw.observations.sections[s];
+        check_windows(&section.exclude, &format!("{key}.exclude"))?;
         let source = resolve_observations(section, &key, &star, values, config)?;
         if let Some(priors) = &section.nuisances {
             let name = |name: &str| format!("{key}.nuisances.{name}");
@@ -53,7 +54,7 @@ pub(super) fn resolve_sets(
             nuisances: section.nuisances.or(raw.imaging.nuisances),
             zero_point: section.zero_point_kms,
             held: None,
-            exclude: exclude(section, &key)?,
+            exclude: section.exclude.clone(),
             key,
         });
     }
@@ -66,18 +67,18 @@ pub(super) fn resolve_sets(
 fn check_several(raw: &Config) -> Result<(), Fault> {
     let sections = &raw.observations.sections;
     let objective = raw.imaging.objective;
-    if sections.len() > 1 && objective != ObjectiveKind::MarginalLikelihood {
-        let problem = format!(
-            "{:?} makes one map of a star that does not change: several data sets or seasons take \
-             \"marginal-likelihood\"",
-            objective.name()
-        );
-        return Err(Fault::new("imaging.objective", problem));
-    }
     for (s, section) in sections.iter().enumerate() {
         let key = raw.observations.key(s);
         if sections.len() == 1 && section.zero_point_kms == ZeroPoint::Fitted {
             let problem = "of one data set alone the zero point is the systemic velocity: see star.vsys_kms";
+            return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
+        }
+        if section.zero_point_kms == ZeroPoint::Fitted && objective != ObjectiveKind::MarginalLikelihood {
+            let problem = format!(
+                "{:?} has one map, which would follow a wrong zero point: give a number (km/s), or take \
+                 imaging.objective \"marginal-likelihood\", which integrates it out",
+                objective.name()
+            );
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
         if section.velocity_jitter_kms != sections[0].velocity_jitter_kms {
@@ -137,18 +138,6 @@ fn star_of(
         Fault::new(format!("{key}.{name}"), fault.problem)
     })?;
     Ok((star, equivalent_width))
-}
-
-fn exclude(section: &ObservationsSection, key: &str) -> Result<Vec<[f64; 2]>, Fault> {
-    for (k, [start, end]) in section.exclude.iter().enumerate() {
-        let key = format!("{key}.exclude[{k}]");
-        check_size(&key, *start, most::TIME)?;
-        check_size(&key, *end, most::TIME)?;
-        if start >= end {
-            return Err(Fault::new(key, format!("the start {start} must be before the end {end}")));
-        }
-    }
-    Ok(section.exclude.clone())
 }
 
 /// Names are folders and files of `simulate`, and labels: of things that stand at these keys and have these names.

@@ -137,6 +137,9 @@ pub enum ObservationSource {
     Simulate(Simulation),
 }
 
+/// A longer gap between profiles (d) begins another season, unless the config has another number.
+pub const SEASON_GAP_D: f64 = 60.0;
+
 /// The Doppler image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -154,6 +157,13 @@ pub struct ImagingSettings {
     pub chi2_target: Automatic,
     /// What a reconstruction is judged by.
     pub objective: ObjectiveKind,
+    /// With objectives of a star that does not change: a longer gap between profiles (d), above 0, begins another
+    /// season, which has a map of its own. If not given, 60.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub season_gap_d: Option<f64>,
+    /// In place of `season_gap_d`: the seasons as `[start, end]` (d), one after the other.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub seasons: Vec<[f64; 2]>,
     /// With objective "marginal-likelihood": standard deviation of the spot filling factor before the data, from 0.01
     /// to 1.5.
     #[serde(skip_serializing_if = "Hyperparameter::is_default")]
@@ -187,6 +197,8 @@ impl Default for ImagingSettings {
             default_spot: 1e-4,
             chi2_target: Automatic::Fixed(0.97),
             objective: ObjectiveKind::default(),
+            season_gap_d: None,
+            seasons: Vec::new(),
             spot_amplitude: Hyperparameter::Fitted,
             spot_slope: Hyperparameter::Fitted,
             spot_break_degree: None,

@@ -9,7 +9,8 @@ pub use light::LIGHT_CURVES;
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
-use super::provenance::Provenance;
+use super::periodogram::DATA_SET;
+use super::provenance::{Provenance, Season};
 use crate::maxent::entropy::Entropy;
 use crate::posterior::fit::{Checks, Fit, FitSummary};
 use crate::posterior::imaging::Imager;
@@ -29,7 +30,8 @@ pub struct MapResult<'a> {
     pub observations: &'a Observations,
     /// The reconstruction.
     pub fit: &'a Fit,
-    /// The true map on the imager's pixels, of the same kind, for simulated data.
+    /// The true map on the imager's pixels, of the same kind, for simulated data; of several seasons one after the
+    /// other.
     pub true_map: Option<&'a [f64]>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
@@ -44,6 +46,9 @@ pub const MAP: &str = "map.json";
 
 /// Name of what says how good it is.
 pub const FIT: &str = "fit.json";
+
+/// The column of `profiles.csv` and `rv.csv` with the number of the season, from 1, where there are several.
+pub const SEASON: &str = "season";
 
 /// Names of the files, in the order in which they are written.
 pub const FILES: [&str; 4] = [MAP, "profiles.csv", "rv.csv", FIT];
@@ -86,6 +91,24 @@ pub struct MapFile {
     pub latitude_deg: Vec<f64>,
     /// Share of the surface of each pixel.
     pub area_fraction: Vec<f64>,
+    /// What the pixels hold; of several seasons the mean over them.
+    #[serde(flatten)]
+    pub map: MapColumns,
+    /// The maps of several seasons, in the order of time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seasons: Vec<SeasonMap>,
+}
+
+/// The map of one of several seasons.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeasonMap {
+    /// When it was, and how often the star was seen.
+    #[serde(flatten)]
+    pub season: Season,
+    /// As [`FitSummary::spottedness`], of this map.
+    pub spottedness: f64,
+    /// The same of the star that was simulated.
+    pub true_spottedness: Option<f64>,
     /// What the pixels hold.
     #[serde(flatten)]
     pub map: MapColumns,
@@ -150,6 +173,15 @@ pub struct TradeOffNode {
     pub entropy: f64,
 }
 
+impl MapColumns {
+    fn of(entropy: Entropy, map: Vec<f64>, true_map: Option<Vec<f64>>) -> Self {
+        match entropy {
+            Entropy::Spots { .. } => MapColumns::Spots { spot_filling: map, true_spot_filling: true_map },
+            Entropy::BrightAndDark => MapColumns::BrightAndDark { brightness: map, true_brightness: true_map },
+        }
+    }
+}
+
 impl MapResult<'_> {
     /// Writes all files into `folder`, which must exist.
     ///
@@ -167,19 +199,20 @@ impl MapResult<'_> {
         let SurfaceGrid { longitude, latitude, area, rings, .. } = &self.imager.grid;
         let degrees = |angles: &[f64]| angles.iter().map(|x| x.to_degrees()).collect();
         let (map, true_map) = (&self.fit.map[..], self.true_map);
-        let coverage = |map: &[f64]| map.iter().zip(area).map(|(s, a)| s * a).sum();
-        let entropy = self.imager.entropy;
-        let (true_spottedness, map) = match entropy {
-            Entropy::Spots { .. } => {
-                let columns =
-                    MapColumns::Spots { spot_filling: map.to_vec(), true_spot_filling: true_map.map(<[f64]>::to_vec) };
-                (true_map.map(coverage), columns)
+        let (n, entropy) = (self.imager.grid.len(), self.imager.entropy);
+        let of_season = |(k, season): (usize, &Season)| {
+            let of = |maps: &[f64]| maps[k * n..(k + 1) * n].to_vec();
+            let (map, true_map) = (of(map), true_map.map(of));
+            SeasonMap {
+                season: *season,
+                spottedness: entropy.spottedness(&map, area),
+                true_spottedness: true_map.as_ref().map(|map| entropy.spottedness(map, area)),
+                map: MapColumns::of(entropy, map, true_map),
             }
-            Entropy::BrightAndDark => {
-                let deviation = true_map.map(|map| entropy.spottedness(map, area));
-                let true_brightness = true_map.map(<[f64]>::to_vec);
-                (deviation, MapColumns::BrightAndDark { brightness: map.to_vec(), true_brightness })
-            }
+        };
+        let mean = |maps: &[f64]| {
+            let of_pixel = |p: usize| maps[p..].iter().step_by(n).sum::<f64>() / (maps.len() / n) as f64;
+            (0..n).map(of_pixel).collect()
         };
         MapFile {
             conventions: CONVENTIONS.into(),
@@ -188,26 +221,38 @@ impl MapResult<'_> {
             parameters: self.fit.summary.parameters,
             contrast: self.fit.summary.contrast,
             spottedness: self.fit.summary.spottedness,
-            true_spottedness,
+            true_spottedness: true_map.map(|map| entropy.spottedness(map, &self.imager.areas)),
             pixels: self.imager.grid.len(),
             ring_pixels: rings.iter().map(|ring| ring.pixels.len()).collect(),
             longitude_deg: degrees(longitude),
             latitude_deg: degrees(latitude),
             area_fraction: area.clone(),
-            map,
+            map: MapColumns::of(entropy, mean(map), true_map.map(mean)),
+            seasons: self.provenance.measured.seasons.iter().enumerate().map(of_season).collect(),
         }
+    }
+
+    /// Columns that profiles have beside the others where there are several seasons or data sets, each with the number
+    /// of each profile, from 1.
+    fn beside(&self) -> Vec<(&'static str, Vec<usize>)> {
+        let seasons = self.imager.map_of_each().into_iter().map(|map| map + 1).collect();
+        let columns = [(SEASON, seasons), (DATA_SET, self.imager.set_of_each())];
+        columns.into_iter().filter(|(_, numbers): &(_, Vec<usize>)| !numbers.is_empty()).collect()
     }
 
     fn profiles(&self) -> Table {
         let columns = ["profile", "time_d", "cycle", "velocity_kms", "observed", "sigma", "model", "residual"];
-        let mut table = Table::new(&columns);
+        let beside = self.beside();
+        let names = columns.into_iter().chain(beside.iter().map(|(name, _)| *name));
+        let mut table = Table::new(&names.collect::<Vec<_>>());
         for (k, (profile, model)) in self.observations.profiles.iter().zip(&self.fit.model).enumerate() {
             let cycle = self.imager.star.cycle(profile.time_d);
             for (j, model) in model.iter().enumerate() {
                 let velocity = profile.velocity_kms(j);
                 let (observed, sigma) = (profile.intensity[j], profile.sigma[j]);
                 let residual = observed - model;
-                table.row(&[k as f64, profile.time_d, cycle, velocity, observed, sigma, *model, residual]);
+                let row = [k as f64, profile.time_d, cycle, velocity, observed, sigma, *model, residual];
+                table.row(&row.into_iter().chain(beside.iter().map(|(_, of)| of[k] as f64)).collect::<Vec<_>>());
             }
         }
         table
@@ -215,11 +260,14 @@ impl MapResult<'_> {
 
     fn velocities(&self) -> Table {
         let columns = ["time_d", "cycle", "observed_kms", "sigma_kms", "modelled_kms", "orbit_kms", "filtered_kms"];
-        let mut table = Table::new(&columns);
-        for v in &self.fit.velocities {
+        let beside = self.beside();
+        let names = columns.into_iter().chain(beside.iter().map(|(name, _)| *name));
+        let mut table = Table::new(&names.collect::<Vec<_>>());
+        for (k, v) in self.fit.velocities.iter().enumerate() {
             let observed = v.observed;
             let (modelled, filtered) = (v.modelled_kms, v.filtered_kms());
-            table.row(&[v.time_d, v.cycle, observed.value_kms, observed.sigma_kms, modelled, v.orbit_kms, filtered]);
+            let row = [v.time_d, v.cycle, observed.value_kms, observed.sigma_kms, modelled, v.orbit_kms, filtered];
+            table.row(&row.into_iter().chain(beside.iter().map(|(_, of)| of[k] as f64)).collect::<Vec<_>>());
         }
         table
     }

@@ -37,12 +37,26 @@ pub struct Measured {
     /// Each of several data sets, in the order of the profiles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<MeasuredSet>,
+    /// Each of several seasons, in the order of time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seasons: Vec<Season>,
     /// What was made of the light curves, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub light_curves: Vec<String>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
+}
+
+/// A season of a star that does not change within it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Season {
+    /// Time of its first profile (d).
+    pub first_d: f64,
+    /// Time of its last one (d).
+    pub last_d: f64,
+    /// Number of them.
+    pub profiles: usize,
 }
 
 /// One of several data sets.
@@ -92,7 +106,12 @@ impl Measured {
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("velocity jitter", jitter.line()));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
+        let season = |season: &Season| {
+            let Season { first_d, last_d, profiles } = season;
+            ("season", format!("{first_d:.3} to {last_d:.3} d: {profiles} profiles, with a map of their own"))
+        };
+        let seasons = self.seasons.iter().map(season);
         let light = self.light_curves.iter().map(|remark| ("light curve", remark.clone()));
-        profiles.chain(sets).chain(light).chain(errors).chain(jitter).chain(target).collect()
+        profiles.chain(sets).chain(seasons).chain(light).chain(errors).chain(jitter).chain(target).collect()
     }
 }

@@ -2,6 +2,7 @@
 //! where they belong.
 
 use super::light_curves;
+use super::seasons::{seasons, with_seasons};
 use crate::data::config::{ConfigError, DataSetSettings, Settings, ZeroPoint};
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::posterior::imaging::{Imager, ZeroPointPrior};
@@ -24,10 +25,12 @@ pub fn imager(settings: &Settings, parts: &[Observations]) -> Result<Imager, Con
         line: Some(own.line).filter(|line| *line != star.line),
         contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast),
         sampling: Sampling::of(part),
+        map_of: Vec::new(),
     };
     let sets: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
     let all = Observations { profiles: parts.iter().flat_map(|part| part.profiles.iter().cloned()).collect() };
-    let mut imager = Imager::of_sets(star, sets, &all, settings.imaging.pixels, settings.imaging.entropy());
+    let imager = Imager::of_sets(star, sets, &all, settings.imaging.pixels, settings.imaging.entropy());
+    let mut imager = with_seasons(imager, &seasons(settings, parts)?);
     if settings.sets.iter().any(|set| set.nuisances.is_some()) {
         let priors = settings.sets.iter().map(|set| set.nuisances.unwrap_or_default());
         imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());

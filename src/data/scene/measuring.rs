@@ -54,16 +54,17 @@ pub(super) fn measured_errors(
     if !wanted.measured || settings.imaging.objective == ObjectiveKind::MarginalLikelihood {
         return Ok(continuum);
     }
+    let alone = &Settings { sets: vec![set.clone()], ..settings.clone() };
     let before = scaled(&continuum);
     let chi2_target = settings.imaging.chi2_target.value() / continuum.correlated_bins;
     let mut measured = continuum.clone();
     for _ in 0..SETTLED.0 {
         // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
-        let (zero_points, _) = zero_points(settings, &imager(settings, &[scaled(&measured)])?, chi2_target)?;
+        let (zero_points, _) = zero_points(alone, &imager(alone, &[scaled(&measured)])?, chi2_target)?;
         let with_factor = |factor: f64| {
             let mut observations = before.clone();
             observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
-            let imager = imager(settings, &[observations])?;
+            let imager = imager(alone, &[observations])?;
             Ok(zero_points.iter().fold(imager, |imager, zero_points| zero_points.counted_in(imager)))
         };
         let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);

@@ -17,10 +17,15 @@ impl Scene {
     }
 
     /// What the image should hold on its pixels, if the observations are simulated; of a star that changes, in the
-    /// middle of the data.
+    /// middle of the data. The maps of several seasons, each in its middle, stand one after the other.
     #[doc(hidden)]
     pub fn true_map(&self) -> Option<Vec<f64>> {
-        self.true_map_at(self.simulation()?.mid_time_d())
+        let times = match &self.measured.seasons[..] {
+            [] => vec![self.simulation()?.mid_time_d()],
+            seasons => seasons.iter().map(|season| 0.5 * (season.first_d + season.last_d)).collect(),
+        };
+        let maps: Option<Vec<_>> = times.into_iter().map(|time| self.true_map_at(time)).collect();
+        Some(maps?.concat())
     }
 
     /// The same at a time (d).

@@ -140,7 +140,7 @@ pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotErr
 
 fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
     let changes = origin::read::<MapKind>(folder, MAP)?.is_changing();
-    let mut figures = vec![if changes { maps::figure(folder)? } else { star_map::figure(folder)? }];
+    let mut figures = if changes { vec![maps::figure(folder)?] } else { star_map::figures(folder)? };
     if folder.join(profiles::FILE).is_file() {
         let profiles = profiles::read(folder)?;
         figures.extend(changes::figure(&profiles));

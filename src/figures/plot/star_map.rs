@@ -6,7 +6,8 @@ use super::projection::Projection;
 use super::surface::{PixelMap, Scale, graticule, outline, paint_discs, photosphere};
 use super::{PlotError, velocities};
 use crate::data::io::csv::Columns;
-use crate::data::io::map::{MAP, MapColumns, MapFile};
+use crate::data::io::map::{MAP, MapColumns, MapFile, SEASON, SeasonMap};
+use crate::data::io::provenance::Season;
 use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, VERMILION, WHITE};
 use crate::figures::drawing::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, Stroke, open, width_pt};
@@ -30,9 +31,25 @@ enum Surface {
     Discs(Vec<(Disc, f64)>),
 }
 
-/// The map in `folder`.
-pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
+/// The map in `folder`; of several seasons a map each.
+pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let map: MapFile = origin::read(folder, MAP)?;
+    if map.seasons.is_empty() {
+        return Ok(vec![figure(folder, map, None)?]);
+    }
+    let seasons = map.seasons.len();
+    let of_season = |k: usize| {
+        let SeasonMap { season, spottedness, true_spottedness, map: pixels } = map.seasons[k].clone();
+        let Season { first_d, last_d, .. } = season;
+        let text = format!(" Season {} of {seasons}, {first_d:.2} to {last_d:.2} d.", k + 1);
+        let own = MapFile { spottedness, true_spottedness, map: pixels, seasons: Vec::new(), ..map.clone() };
+        figure(folder, own, Some((k + 1, text)))
+    };
+    (0..seasons).map(of_season).collect()
+}
+
+/// One `map`; of a season with its number and what is said of it.
+fn figure(folder: &Path, map: MapFile, season: Option<(usize, String)>) -> Result<Figure, PlotError> {
     let (content, values) = match map.map {
         MapColumns::BrightAndDark { brightness, .. } => {
             (Content::Brightness(Brightness::of_spots(map.contrast)), brightness)
@@ -45,9 +62,20 @@ pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
         let problem = format!("ring_pixels and {what} do not belong together");
         return Err(PlotError::Content { path: folder.join(MAP), problem });
     }
-    let known = Injected::of(folder)?;
+    // spots that change are drawn as they are in the middle of all data
+    let known = Injected::of(folder)?.filter(|injected| season.is_none() || !injected.is_changing);
     let cycles = match folder.join(velocities::FILE) {
-        table if table.is_file() => Columns::read(&table)?.column("cycle")?.to_vec(),
+        table if table.is_file() => {
+            let table = Columns::read(&table)?;
+            let cycles = table.column("cycle")?;
+            match &season {
+                None => cycles.to_vec(),
+                Some((number, _)) => {
+                    let of_season = |(_, season): &(&f64, &f64)| **season == *number as f64;
+                    cycles.iter().zip(table.column(SEASON)?).filter(of_season).map(|(cycle, _)| *cycle).collect()
+                }
+            }
+        }
         _ => Vec::new(),
     };
     let title = content.title("reconstructed", Some(map.spottedness));
@@ -66,7 +94,11 @@ pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
         stars[0].rims = injected;
     }
     let what = if content == Content::Spots { "spots" } else { "brightness" };
-    Ok(draw(&stars, content, &cycles, format!("Map of the {what} at cycle 0{compared}. {HOW_TO_READ}")))
+    let (name, when) = season.map_or(("map".into(), String::new()), |(k, text)| (format!("map_{k}"), text));
+    let caption = format!("Map of the {what} at cycle 0{compared}.{when} {HOW_TO_READ}");
+    let mut figure = draw(&stars, content, &cycles, caption);
+    figure.name = name;
+    Ok(figure)
 }
 
 /// The injected map of the simulation in `folder`.

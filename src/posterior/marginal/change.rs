@@ -41,11 +41,12 @@ pub struct Change {
 }
 
 impl Change {
-    /// Compares both for the profiles of `imager`, all but the orbit as in `values`, the `nuisances` integrated out. Of
-    /// many profiles a share is asked first, which shows most changes at a small part of the work.
+    /// Compares both for the profiles of `imager`, all but the orbit as in `values`, the `nuisances` integrated out: of
+    /// the season in which the star changes most. Of many profiles a share is asked first, which shows most changes at
+    /// a small part of the work.
     ///
     /// # Errors
-    /// [`NoFit`] where the field that does not change cannot be fitted.
+    /// [`NoFit`] where the field that does not change cannot be fitted in any season.
     pub fn of(
         imager: &Imager,
         values: ParameterValues,
@@ -54,8 +55,13 @@ impl Change {
         known: Known,
     ) -> Result<Self, NoFit> {
         let among = |imager: &Imager| Change::among(imager, values, frequencies, nuisances, known);
-        let by_a_share = share_of(imager).and_then(|share| among(&share).ok()).filter(Change::is_changing);
-        by_a_share.map_or_else(|| among(imager), Ok)
+        let of_season = |imager: &Imager| {
+            let by_a_share = share_of(imager).and_then(|share| among(&share).ok()).filter(Change::is_changing);
+            by_a_share.map_or_else(|| among(imager), Ok)
+        };
+        let gain = |change: &Result<Self, NoFit>| change.as_ref().map_or(f64::NEG_INFINITY, |c| c.ln_evidence_gain);
+        let of_each = imager.seasons().into_iter().map(|season| of_season(&season));
+        of_each.max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("profiles are of some season")
     }
 
     fn among(

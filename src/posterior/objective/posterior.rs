@@ -280,7 +280,7 @@ impl Posterior {
             // beyond the reach of the target: the leading term of its misfit
             _ if unreachable => (-0.5, None),
             _ => {
-                let (entropy, area) = (self.imager.entropy, &self.imager.grid.area);
+                let (entropy, area) = (self.imager.entropy, &self.imager.areas);
                 let image = entropy.image(&solution.image.coordinates);
                 let scale = entropy.metric(&image, area);
                 let preconditioner = &self.nearest(theta).preconditioner;

@@ -92,7 +92,7 @@ impl Prediction {
         let settings = SolverSettings { cg_tolerance: 0.01, ..SolverSettings::patient() };
         let solver = Solver { entropy: imager.entropy, preconditioner, settings };
         let map = imager.entropy.image(&solution.image.coordinates);
-        let scale = imager.entropy.metric(&map, &imager.grid.area);
+        let scale = imager.entropy.metric(&map, &imager.areas);
         let n = map.len();
         let mut problem = imager.problem(solved.response.clone());
         problem.linearise(&map);
@@ -103,7 +103,7 @@ impl Prediction {
                 Vec::new()
             }
             ObjectiveKind::Spottedness => {
-                let weights = imager.entropy.spottedness_gradient(&map, &imager.grid.area);
+                let weights = imager.entropy.spottedness_gradient(&map, &imager.areas);
                 let inverse = solver.apply_inverse(&mut problem, &solution.image, &weights);
                 let along_path = 2.0 * solution.spottedness_slope / (solution.chi2_slope * solution.image.lambda);
                 let adjoint = inverse.iter().zip(&scale).zip(&solution.path);

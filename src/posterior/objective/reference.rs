@@ -13,7 +13,7 @@ use crate::posterior::imaging::Imager;
 use crate::star::Response;
 use std::sync::Arc;
 
-/// Rank of the preconditioner; directions beyond it have lambda x curvature below 1 on the paper's setup.
+/// Rank of the preconditioner of one map; directions beyond it have lambda x curvature below 1 on the paper's setup.
 const PRECONDITIONER_RANK: usize = 112;
 
 /// Directions with lambda x curvature below this need no preconditioning.
@@ -229,7 +229,7 @@ impl Reference {
             preconditioner: &none,
             settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::patient() },
         };
-        let blank = Start::blank(&imager.entropy, imager.grid.len(), unit * BLANK_LAMBDA / data);
+        let blank = Start::blank(&imager.entropy, imager.areas.len(), unit * BLANK_LAMBDA / data);
         let blank_chi2 = problem.linearise(&imager.entropy.image(&blank.image.coordinates));
         if blank_chi2 <= chi2_target {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
@@ -270,7 +270,7 @@ impl Reference {
     /// A blank star, where an evaluation far from the reference starts.
     pub fn blank(&self, imager: &Imager) -> Start {
         let lambda = imager.entropy.lambda_unit() * BLANK_LAMBDA / imager.data.depth.len() as f64;
-        Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.grid.len(), lambda) }
+        Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.areas.len(), lambda) }
     }
 
     /// Where an evaluation at the reference starts.
@@ -297,7 +297,7 @@ pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Sol
     let scale = imager.entropy.metric(&s, problem.area());
     let (n, mut scaled, mut curved) = (s.len(), vec![0.0f32; s.len()], vec![0.0f32; s.len()]);
     problem.linearise(&s);
-    Preconditioner::build(n, PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
+    Preconditioner::build(n, imager.maps() * PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = *v as f32 * d);
         problem.curvature(Curvature::Exact, &scaled, &mut curved);
         out.iter_mut().zip(&curved).zip(&scale).for_each(|((out, x), d)| *out = f64::from(*x * d));
