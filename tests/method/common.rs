@@ -68,6 +68,7 @@ pub fn oracle() -> Oracle {
 /// The oracle's data on these pixels.
 pub fn imager(oracle: &Oracle, grid: SurfaceGrid) -> Imager {
     Imager {
+        areas: grid.area.clone(),
         grid,
         star: oracle.star.clone(),
         sets: vec![oracle.sampling.clone().into()],

@@ -109,7 +109,7 @@ fn each_season_has_the_map_that_it_would_have_alone() {
     known["imaging"]["season_gap_d"] = json!(1000.0);
     let one = Config::from_json(&known.to_string()).unwrap();
     let error = Scene::new(&one).unwrap().map().unwrap_err();
-    assert!(matches!(error, ReferenceError::TargetBelowFloor { floor, .. } if floor > 2.0), "{error}");
+    assert!(matches!(error, ReferenceError::TargetBelowFloor { floor, .. } if floor > 1.1), "{error}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Truths about the objectives: gradients, agreement near the optimum, precision, and a monotone fall far from it.
 
-use crate::common::{oracle, values, whole_truth};
+use crate::common::{imager, oracle, values, whole_truth};
 use dimcmc::internals::maxent::SolverSettings;
 use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::posterior::imaging::Imager;
@@ -17,15 +17,9 @@ const KINDS: [ObjectiveKind; 3] =
 /// entropy.
 fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
     let oracle = oracle();
-    let imager = Imager {
-        grid: SurfaceGrid::equal_area(1200, Quadrature::Gauss2x2),
-        star: oracle.star.clone(),
-        sets: vec![oracle.sampling.clone().into()],
-        zero_points: Vec::new(),
-        light_curves: Vec::new(),
-        data: oracle.data.clone(),
-        entropy: entropy.unwrap_or(Entropy::new(oracle.default_spot)),
-    };
+    let grid = SurfaceGrid::equal_area(1200, Quadrature::Gauss2x2);
+    let entropy = entropy.unwrap_or(Entropy::new(oracle.default_spot));
+    let imager = Imager { entropy, ..imager(&oracle, grid) };
     let mut values = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
     (values[Parameter::K], values[Parameter::PorbOverProt], values[Parameter::Phi]) = (0.088, 1.763, 0.486);
     let uniform = |parameter, min, max| FreeParameter { parameter, prior: Prior::Uniform { min, max } };

@@ -1,8 +1,6 @@
 //! Moment-matched pixels: the star's parameters do not depend on how many there are.
 
-use crate::common::{oracle, values};
-use dimcmc::internals::maxent::entropy::Entropy;
-use dimcmc::internals::posterior::imaging::Imager;
+use crate::common::{imager, oracle, values};
 use dimcmc::internals::posterior::objective::{
     FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
 };
@@ -12,15 +10,7 @@ use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 /// Best vsini and its standard deviation, the rest fixed at the injected values.
 fn vsini(pixels: usize) -> (f64, f64) {
     let oracle = oracle();
-    let imager = Imager {
-        grid: SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2),
-        star: oracle.star.clone(),
-        sets: vec![oracle.sampling.clone().into()],
-        zero_points: Vec::new(),
-        light_curves: Vec::new(),
-        data: oracle.data.clone(),
-        entropy: Entropy::new(oracle.default_spot),
-    };
+    let imager = imager(&oracle, SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2));
     let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
     let prior = Prior::Uniform { min: 35.0, max: 45.0 };
     let free = vec![FreeParameter { parameter: Parameter::Vsini, prior }];

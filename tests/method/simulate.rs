@@ -2,6 +2,7 @@
 
 use crate::common::{self, numbers, oracle};
 use dimcmc::internals::data::config::{self, Config};
+use dimcmc::internals::data::io::provenance::Season;
 use dimcmc::internals::data::scene::{Scene, fingerprint};
 use dimcmc::internals::posterior::objective::Parameter;
 use dimcmc::internals::posterior::simulate::{RandomSpots, SIGMA_WITHOUT_NOISE, Simulation};
@@ -377,9 +378,14 @@ fn random_spots_are_a_function_of_their_seed() {
     assert!(truth.coverage.iter().all(|c| (0.0..0.5).contains(c)), "{:?}", truth.coverage);
     let mean = truth.coverage.iter().sum::<f64>() / truth.coverage.len() as f64;
     assert!((truth.spottedness - mean).abs() < 1e-15);
-    // the map in the middle of the data is that of one time
-    let middle = simulation_of(&first).mid_time_d();
-    assert_eq!(first.true_map(), first.true_map_at(middle));
+    // maps are those in the middle of each season
+    let middle = |season: &Season| first.true_map_at(0.5 * (season.first_d + season.last_d)).unwrap();
+    let maps = first.measured.seasons.iter().map(middle).collect::<Vec<_>>();
+    assert!(maps.len() == 3 && first.true_map().unwrap() == maps.concat());
+    // of a star that may change there is one
+    let changing = of_config(|json| json["imaging"]["objective"] = json!("marginal-likelihood"));
+    let middle = simulation_of(&changing).mid_time_d();
+    assert!(changing.true_map() == changing.true_map_at(middle));
 }
 
 /// As many at a time as asked for, where the star is seen, and evenly in time.

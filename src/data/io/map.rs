@@ -10,7 +10,7 @@ pub use light::LIGHT_CURVES;
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::periodogram::DATA_SET;
-use super::provenance::{Provenance, Season};
+use super::provenance::{MeasuredSet, Provenance, Season};
 use crate::maxent::entropy::Entropy;
 use crate::posterior::fit::{Checks, Fit, FitSummary};
 use crate::posterior::imaging::Imager;
@@ -77,6 +77,9 @@ pub struct MapFile {
     pub parameters: ParameterValues,
     /// Brightness of a spot over that of the photosphere.
     pub contrast: f64,
+    /// Each of several data sets, in the order of the profiles.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub data_sets: Vec<MeasuredSet>,
     /// As [`FitSummary::spottedness`].
     pub spottedness: f64,
     /// The same of the star that was simulated.
@@ -220,6 +223,7 @@ impl MapResult<'_> {
             epoch_d: self.imager.star.epoch_d,
             parameters: self.fit.summary.parameters,
             contrast: self.fit.summary.contrast,
+            data_sets: self.provenance.measured.sets.clone(),
             spottedness: self.fit.summary.spottedness,
             true_spottedness: true_map.map(|map| entropy.spottedness(map, &self.imager.areas)),
             pixels: self.imager.grid.len(),
