@@ -200,7 +200,7 @@ impl Scene {
             Ephemeris::check(&settings, [first.0, first.1])?;
         }
         let mut imager = imager(&settings, &parts)?;
-        let correlated_bins = errors.iter().flatten().map(|errors| errors.correlated_bins).fold(1.0, f64::max);
+        let correlated_bins = correlated_bins(&parts, &errors);
         imager.data.correlated_bins = correlated_bins;
         let mut measured = Measured { light_curves: light_curves::remarks(&settings), ..Measured::default() };
         measured.seasons = seasons::measured(&settings, &parts)?;
@@ -291,7 +291,8 @@ impl Scene {
             Spots::Integrated(known) | Spots::OneMap(Some(known)) => known,
             Spots::OneMap(None) => Known::default(),
         };
-        ChangingFit::new(&self.imager, &self.observations, self.settings.values, known, times_d)
+        let imager = self.imager.clone().with_one_map();
+        ChangingFit::new(&imager, &self.observations, self.settings.values, known, times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.
@@ -414,11 +415,25 @@ impl Scene {
     }
 }
 
+/// Bins of which noise is correlated: number of data over that of independent ones.
+fn correlated_bins(parts: &[Observations], errors: &[Option<MeasuredErrors>]) -> f64 {
+    let of_each: Vec<f64> = errors.iter().map(|e| e.as_ref().map_or(1.0, |e| e.correlated_bins)).collect();
+    match &of_each[..] {
+        [one] => *one,
+        several => {
+            let data = |part: &Observations| part.len() as f64;
+            let independent: f64 = parts.iter().zip(several).map(|(part, bins)| data(part) / bins).sum();
+            parts.iter().map(data).sum::<f64>() / independent
+        }
+    }
+}
+
 fn space(free: &[FreeParameter], settings: &Settings, imager: &Imager) -> ParameterSpace {
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
     let star = &imager.star;
     ParameterSpace::new(free.to_vec(), settings.values, mid, base, star.rotation_period_d)
         .of_star(star.epoch_d, settings.mass_msun)
+        .of_seasons(imager.longest_season_cycles())
 }
 
 /// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of

@@ -13,10 +13,19 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rows::Rows;
+use std::ops::Range;
 
-/// `(1 + lambda M)^-1` on the span of M's largest eigenvectors, the identity elsewhere.
+/// `(1 + lambda M)^-1` of one map or of several, one after the other, that M does not mix.
 #[derive(Clone, Debug, Default)]
 pub struct Preconditioner {
+    maps: Vec<Basis>,
+}
+
+/// `(1 + lambda M)^-1` on the span of M's largest eigenvectors, the identity elsewhere.
+#[derive(Clone, Debug)]
+struct Basis {
+    /// Pixels of the map.
+    pixels: usize,
     /// Largest eigenvalues of M.
     eigenvalues: Vec<f64>,
     /// The eigenvectors where most of them is, ...
@@ -56,20 +65,52 @@ impl Preconditioner {
         Preconditioner::default()
     }
 
-    /// From the operator M (`apply(v, out)`) on vectors of length `n`: at most `rank` eigenvectors, those with
-    /// eigenvalues above `smallest`.
-    pub fn build(n: usize, rank: usize, smallest: f64, apply: impl FnMut(&[f64], &mut [f64])) -> Self {
-        let (basis, image) = krylov(n, rank + OVERSAMPLING, apply);
-        let projected = basis.transpose() * image;
-        let eigen = SymmetricEigen::new(0.5 * (&projected + projected.transpose()));
-        let mut order: Vec<usize> = (0..basis.ncols()).filter(|&i| eigen.eigenvalues[i] > smallest).collect();
-        order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
-        order.truncate(rank);
-        let vectors = basis * eigen.eigenvectors.select_columns(&order);
-        let eigenvalues: Vec<f64> = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
-        Preconditioner::on_active_pixels(eigenvalues, &vectors)
+    /// From the operator M (`apply(v, out)`) on vectors that hold so many `maps` of so many `pixels`: for each map at most
+    /// `rank` eigenvectors, those with eigenvalues above `smallest`. M is applied as often as for one map.
+    pub fn build(
+        maps: usize,
+        pixels: usize,
+        rank: usize,
+        smallest: f64,
+        apply: impl FnMut(&[f64], &mut [f64]),
+    ) -> Self {
+        let of_map = |krylov: Krylov| krylov.largest(rank, smallest);
+        Preconditioner { maps: krylov(maps, pixels, rank + OVERSAMPLING, apply).into_iter().map(of_map).collect() }
     }
 
+    /// Bytes that it takes in memory, all but a few.
+    pub fn bytes(&self) -> usize {
+        self.maps.iter().map(|basis| basis.spotted.bytes() + basis.faint.bytes()).sum()
+    }
+
+    /// Approximates `out = (1 + lambda M)^-1 r`.
+    pub fn apply<N: Number>(&self, lambda: f64, r: &[N], out: &mut [N]) {
+        out.copy_from_slice(r);
+        for (basis, map) in self.places() {
+            basis.apply(lambda, &r[map.clone()], &mut out[map]);
+        }
+    }
+
+    /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
+    pub fn norms(&self, lambda: f64, r: &[f32]) -> (f64, f64) {
+        if self.maps.is_empty() {
+            return (0.0, dot(r, r));
+        }
+        let of_map = |(basis, map): (&Basis, Range<usize>)| basis.norms(lambda, &r[map]);
+        self.places().map(of_map).fold((0.0, 0.0), |sum, of| (sum.0 + of.0, sum.1 + of.1))
+    }
+
+    /// Each map's, and where the map stands.
+    fn places(&self) -> impl Iterator<Item = (&Basis, Range<usize>)> {
+        self.maps.iter().scan(0, |first, basis| {
+            let map = *first..*first + basis.pixels;
+            *first = map.end;
+            Some((basis, map))
+        })
+    }
+}
+
+impl Basis {
     fn on_active_pixels(eigenvalues: Vec<f64>, vectors: &DMatrix<f64>) -> Self {
         let energy: Vec<f64> = vectors.row_iter().map(|row| row.norm_squared()).collect();
         let mut by_energy: Vec<u32> = (0..energy.len() as u32).collect();
@@ -86,27 +127,12 @@ impl Preconditioner {
         let spotted = Rows::new(vectors, by_energy.split_off(faint));
         let faint = Rows::new(vectors, by_energy.split_off(dropped));
         let longest = largest_eigenvalue(spotted.products() + faint.products());
-        Preconditioner { eigenvalues, spotted, faint, most_subtracted: MOST_SUBTRACTED / longest.max(1.0) }
+        let (pixels, most_subtracted) = (energy.len(), MOST_SUBTRACTED / longest.max(1.0));
+        Basis { pixels, eigenvalues, spotted, faint, most_subtracted }
     }
 
-    /// Number of eigenvectors.
-    pub fn rank(&self) -> usize {
-        self.eigenvalues.len()
-    }
-
-    /// Bytes that it takes in memory, all but a few.
-    pub fn bytes(&self) -> usize {
-        self.spotted.bytes() + self.faint.bytes()
-    }
-
-    /// Eigenvalues of M, largest first.
-    pub fn eigenvalues(&self) -> &[f64] {
-        &self.eigenvalues
-    }
-
-    /// Approximates `out = (1 + lambda M)^-1 r`.
-    pub fn apply<N: Number>(&self, lambda: f64, r: &[N], out: &mut [N]) {
-        out.copy_from_slice(r);
+    /// As [`Preconditioner::apply`], where `out` holds r already.
+    fn apply<N: Number>(&self, lambda: f64, r: &[N], out: &mut [N]) {
         let mut components = self.components(r);
         for (c, e) in components.iter_mut().zip(&self.eigenvalues) {
             *c *= (lambda * e / (1.0 + lambda * e)).min(self.most_subtracted) as f32;
@@ -114,8 +140,8 @@ impl Preconditioner {
         self.subtract(&components, out);
     }
 
-    /// Approximates `r (1 + lambda M)^-1 r`, in two parts: of what the eigenvectors span of r, and of the rest.
-    pub fn norms(&self, lambda: f64, r: &[f32]) -> (f64, f64) {
+    /// As [`Preconditioner::norms`].
+    fn norms(&self, lambda: f64, r: &[f32]) -> (f64, f64) {
         let components = self.components(r);
         let spanned = components.iter().zip(&self.eigenvalues).map(|(c, e)| f64::from(*c).powi(2) / (1.0 + lambda * e));
         let mut rest = r.to_vec();
@@ -144,32 +170,66 @@ fn largest_eigenvalue(matrix: DMatrix<f64>) -> f64 {
     if is_one { matrix.symmetric_eigenvalues().max() } else { 0.0 }
 }
 
-/// An orthonormal basis of the block Krylov space of an operator from a fixed random start, with about so many columns,
-/// and what the operator makes of it.
-fn krylov(n: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -> (DMatrix<f64>, DMatrix<f64>) {
-    let width = BLOCK.min(n);
-    let columns = width * columns.div_ceil(width).min(n / width);
+/// An orthonormal basis of the block Krylov space of an operator, and what the operator makes of it.
+struct Krylov {
+    basis: DMatrix<f64>,
+    image: DMatrix<f64>,
+}
+
+impl Krylov {
+    /// The largest eigenvectors of the operator on its span.
+    fn largest(self, rank: usize, smallest: f64) -> Basis {
+        let Krylov { basis, image } = self;
+        let projected = basis.transpose() * image;
+        let eigen = SymmetricEigen::new(0.5 * (&projected + projected.transpose()));
+        let mut order: Vec<usize> = (0..basis.ncols()).filter(|&i| eigen.eigenvalues[i] > smallest).collect();
+        order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+        order.truncate(rank);
+        let vectors = basis * eigen.eigenvectors.select_columns(&order);
+        let eigenvalues: Vec<f64> = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
+        Basis::on_active_pixels(eigenvalues, &vectors)
+    }
+}
+
+/// The space of each map from a fixed random start, with about so many columns. The operator does not mix the maps, so
+/// that it is applied to a vector of each at once.
+fn krylov(maps: usize, pixels: usize, columns: usize, mut apply: impl FnMut(&[f64], &mut [f64])) -> Vec<Krylov> {
+    let width = BLOCK.min(pixels);
+    let columns = width * columns.div_ceil(width).min(pixels / width);
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(0x5eed);
-    let (mut basis, mut image) = (DMatrix::zeros(n, columns), DMatrix::zeros(n, columns));
-    let mut block = DMatrix::from_fn(n, width, |_, _| -> f64 { StandardNormal.sample(&mut rng) });
+    let empty = || Krylov { basis: DMatrix::zeros(pixels, columns), image: DMatrix::zeros(pixels, columns) };
+    let mut spaces: Vec<Krylov> = (0..maps).map(|_| empty()).collect();
+    let mut start = || DMatrix::from_fn(pixels, width, |_, _| -> f64 { StandardNormal.sample(&mut rng) });
+    let mut blocks: Vec<DMatrix<f64>> = (0..maps).map(|_| start()).collect();
+    let (mut all, mut applied) = (vec![0.0; maps * pixels], vec![0.0; maps * pixels]);
     for first in (0..columns).step_by(width) {
-        let known = basis.columns(0, first);
-        // until nothing of the known ones is left: what is nearly spanned by them is mostly rounding errors at first
-        for _ in 0..MOST_PROJECTIONS {
-            block = block.qr().q();
-            block -= known * (known.transpose() * &block);
-            if block.column_iter().all(|column| column.norm() > NOT_SPANNED) {
-                break;
+        for (block, space) in blocks.iter_mut().zip(&mut spaces) {
+            let known = space.basis.columns(0, first);
+            // until nothing of the known ones is left: what is nearly spanned by them is mostly rounding errors at first
+            for _ in 0..MOST_PROJECTIONS {
+                *block = std::mem::take(block).qr().q();
+                *block -= known * (known.transpose() * &*block);
+                if block.column_iter().all(|column| column.norm() > NOT_SPANNED) {
+                    break;
+                }
+            }
+            *block = std::mem::take(block).qr().q();
+        }
+        for j in 0..width {
+            for (block, all) in blocks.iter().zip(all.chunks_exact_mut(pixels)) {
+                all.copy_from_slice(block.column(j).as_slice());
+            }
+            apply(&all, &mut applied);
+            for (space, applied) in spaces.iter_mut().zip(applied.chunks_exact(pixels)) {
+                space.image.column_mut(first + j).copy_from_slice(applied);
             }
         }
-        block = block.qr().q();
-        for j in 0..width {
-            apply(block.column(j).as_slice(), image.column_mut(first + j).as_mut_slice());
+        for (block, space) in blocks.iter_mut().zip(&mut spaces) {
+            space.basis.columns_mut(first, width).copy_from(block);
+            block.copy_from(&space.image.columns(first, width));
         }
-        basis.columns_mut(first, width).copy_from(&block);
-        block.copy_from(&image.columns(first, width));
     }
-    (basis, image)
+    spaces
 }
 
 #[cfg(test)]
@@ -187,9 +247,9 @@ mod tests {
             out[10] = 8.0 * c;
             out[20] = 8.0 * c;
         };
-        let preconditioner = Preconditioner::build(n, 10, 1e-6, apply);
-        assert_eq!(preconditioner.rank(), 2);
-        assert_eq!(active_pixels(&preconditioner), 3);
+        let preconditioner = Preconditioner::build(1, n, 10, 1e-6, apply);
+        assert_eq!(preconditioner.maps[0].eigenvalues.len(), 2);
+        assert_eq!(active_pixels(&preconditioner.maps[0]), 3);
         let x: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
         let (mut mx, mut back) = (vec![0.0; n], vec![0.0; n]);
         apply(&x, &mut mx);
@@ -201,6 +261,35 @@ mod tests {
     }
 
     #[test]
+    fn maps_that_are_not_mixed_are_inverted_each_by_itself() {
+        let n = 60;
+        // of the second map everything is three times as strong
+        let of_map = |v: &[f64], out: &mut [f64], times: f64| {
+            out.iter_mut().zip(v).enumerate().for_each(|(p, (out, v))| *out = times * (-0.1 * p as f64).exp() * v);
+        };
+        let both = |v: &[f64], out: &mut [f64]| {
+            for (times, (v, out)) in [1.0, 3.0].into_iter().zip(v.chunks(n).zip(out.chunks_mut(n))) {
+                of_map(v, out, times);
+            }
+        };
+        let together = Preconditioner::build(2, n, 40, 1e-3, both);
+        let r: Vec<f64> = (0..2 * n).map(|p| (0.4 * p as f64).cos()).collect();
+        let (mut out, mut single) = (vec![0.0; 2 * n], vec![0.0; n]);
+        together.apply(50.0, &r, &mut out);
+        let mut norms = (0.0, 0.0);
+        for (k, times) in [1.0, 3.0].into_iter().enumerate() {
+            let alone = Preconditioner::build(1, n, 40, 1e-3, |v: &[f64], out: &mut [f64]| of_map(v, out, times));
+            alone.apply(50.0, &r[k * n..(k + 1) * n], &mut single);
+            assert!(out[k * n..(k + 1) * n].iter().zip(&single).all(|(a, b)| (a - b).abs() < 1e-3));
+            let rounded: Vec<f32> = r[k * n..(k + 1) * n].iter().map(|x| *x as f32).collect();
+            let (spanned, rest) = alone.norms(50.0, &rounded);
+            norms = (norms.0 + spanned, norms.1 + rest);
+        }
+        let (spanned, rest) = together.norms(50.0, &r.iter().map(|x| *x as f32).collect::<Vec<_>>());
+        assert!((spanned + rest - norms.0 - norms.1).abs() < 1e-2 * (norms.0 + norms.1));
+    }
+
+    #[test]
     fn the_basis_is_orthonormal_whatever_the_operator() {
         // eigenvalues over so many decades, down to those that rounding errors drown
         for decades in [1.0, 5.0, 20.0, 60.0] {
@@ -209,7 +298,7 @@ mod tests {
                     *out = 1e3 * 10f64.powf(-decades * i as f64 / 150.0) * v;
                 }
             };
-            let (basis, image) = krylov(150, 130, apply);
+            let Krylov { basis, image } = krylov(1, 150, 130, apply).remove(0);
             assert_eq!((basis.ncols(), image.ncols()), (140, 140));
             let error = (basis.transpose() * &basis - DMatrix::identity(140, 140)).amax();
             assert!(error < 1e-13, "{decades} decades: {error:e}");
@@ -227,7 +316,8 @@ mod tests {
         let vectors = noise.qr().q();
         for strongest in [1e3, 1e5, 1e7, 1e12] {
             let eigenvalues: Vec<f64> = (0..rank).map(|k| strongest * 10f64.powf(-0.02 * k as f64)).collect();
-            let preconditioner = Preconditioner::on_active_pixels(eigenvalues, &vectors);
+            let basis = Basis::on_active_pixels(eigenvalues, &vectors);
+            let preconditioner = Preconditioner { maps: vec![basis] };
             let mut applied = DMatrix::zeros(n, n);
             for k in 0..n {
                 let unit: Vec<f32> = (0..n).map(|p| f32::from(p == k)).collect();
@@ -246,17 +336,17 @@ mod tests {
             let vectors = orthonormal(n, rank);
             let r: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
             let eigenvalues: Vec<f64> = (0..rank).map(|k| 100.0 / (1.0 + k as f64)).collect();
-            let (preconditioner, lambda) = (Preconditioner::on_active_pixels(eigenvalues, &vectors), 0.4);
-            assert!(active_pixels(&preconditioner) == n && preconditioner.rank() == rank);
-            let (wanted, mut out) = (inverse_by_the_rounded(&preconditioner, lambda, &r), vec![0.0; n]);
-            preconditioner.apply(lambda, &r, &mut out);
+            let (basis, lambda) = (Basis::on_active_pixels(eigenvalues, &vectors), 0.4);
+            assert!(active_pixels(&basis) == n && basis.eigenvalues.len() == rank);
+            let (wanted, mut out) = (inverse_by_the_rounded(&basis, lambda, &r), vec![0.0; n]);
+            Preconditioner { maps: vec![basis] }.apply(lambda, &r, &mut out);
             assert!(out.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-6), "{n} {rank}: {out:?} {wanted:?}");
         }
     }
 
     /// Number of pixels on which the eigenvectors live.
-    fn active_pixels(preconditioner: &Preconditioner) -> usize {
-        preconditioner.spotted.active + preconditioner.faint.active
+    fn active_pixels(basis: &Basis) -> usize {
+        basis.spotted.active + basis.faint.active
     }
 
     /// Orthonormal columns that live on all pixels.
@@ -264,8 +354,8 @@ mod tests {
         DMatrix::from_fn(n, rank, |i, k| (0.7 + 12.9898 * (i * i + 31 * k) as f64).sin()).qr().q()
     }
 
-    fn inverse_by_the_rounded(preconditioner: &Preconditioner, lambda: f64, r: &[f64]) -> Vec<f64> {
-        let Preconditioner { eigenvalues, spotted, faint, .. } = preconditioner;
+    fn inverse_by_the_rounded(basis: &Basis, lambda: f64, r: &[f64]) -> Vec<f64> {
+        let Basis { eigenvalues, spotted, faint, .. } = basis;
         let vectors = spotted.on_all(r.len()) + faint.on_all(r.len());
         let mut kept = vectors.transpose() * nalgebra::DVector::from_column_slice(r);
         kept.iter_mut().zip(eigenvalues).for_each(|(c, e)| *c *= lambda * e / (1.0 + lambda * e));

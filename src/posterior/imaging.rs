@@ -14,7 +14,9 @@ use crate::numerics::vector::{self, Number};
 use crate::posterior::nuisances::{LineAndContinuum, Nuisances};
 use crate::posterior::photometry::LightCurve;
 use crate::star::observation::Observations;
-use crate::star::{Brightness, Nearby, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid};
+use crate::star::{
+    Brightness, Nearby, OwnMap, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid,
+};
 use profile::{Bend, Misfit, Pull};
 
 pub use data::Data;
@@ -81,14 +83,21 @@ impl Imager {
         Imager { sets, ..Imager::new(star, observations, pixels, entropy) }
     }
 
-    /// The same with as many `maps`, one a season, of which each profile sees that which `map_of` gives for its time
+    /// The same with as many `maps`, one a season, of which each profile sees that which `own_map` gives for its time
     /// (d).
-    pub fn with_maps(mut self, maps: usize, map_of: impl Fn(f64) -> usize) -> Self {
+    pub fn with_maps(mut self, maps: usize, own_map: impl Fn(f64) -> OwnMap) -> Self {
         let share = |area: &f64| area / maps as f64;
         self.areas = std::iter::repeat_n(&self.grid.area, maps).flatten().map(share).collect();
         for set in &mut self.sets {
-            set.map_of = set.sampling.profiles.iter().map(|profile| map_of(profile.0)).collect();
+            set.own_maps = set.sampling.profiles.iter().map(|profile| own_map(profile.0)).collect();
         }
+        self
+    }
+
+    /// The same with one map of all seasons.
+    pub fn with_one_map(mut self) -> Self {
+        self.areas = self.grid.area.clone();
+        self.sets.iter_mut().for_each(|set| set.own_maps.clear());
         self
     }
 
@@ -97,11 +106,23 @@ impl Imager {
         self.areas.len() / self.grid.len()
     }
 
+    /// Number of data, as far as weights of the entropy over it are concerned: of several maps, whose entropy is a mean,
+    /// that of the best observed season times the number of seasons. So no map gets more weight than it would alone.
+    pub fn data_as_of_one_map(&self) -> f64 {
+        let mut data = vec![0; self.maps()];
+        for set in &self.sets {
+            for (k, profile) in set.sampling.profiles.iter().enumerate() {
+                data[set.own_maps.get(k).map_or(0, |own| own.number)] += profile.2;
+            }
+        }
+        (data.len() * data.iter().max().copied().unwrap_or(0)) as f64
+    }
+
     /// The map that each profile sees, from 0; empty where there is only one.
     pub fn map_of_each(&self) -> Vec<usize> {
         match self.maps() {
             1 => Vec::new(),
-            _ => self.sets.iter().flat_map(|set| set.map_of.iter().copied()).collect(),
+            _ => self.sets.iter().flat_map(|set| set.own_maps.iter().map(|own| own.number)).collect(),
         }
     }
 
@@ -164,7 +185,7 @@ impl Imager {
             let mut k = before..first;
             all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
             let mut k = before..first;
-            set.map_of.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
+            set.own_maps.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
         }
         // a data set of which nothing is left is none
         let mut zero_points = self.zero_points.clone();
@@ -181,7 +202,7 @@ impl Imager {
         let map_of = self.map_of_each();
         let of_season = |map: usize| {
             let others: Vec<usize> = (0..map_of.len()).filter(|k| map_of[*k] != map).collect();
-            self.without(&others).with_maps(1, |_| 0)
+            self.without(&others).with_one_map()
         };
         match self.maps() {
             1 => vec![self.clone()],
@@ -259,6 +280,14 @@ impl Imager {
     pub fn time_base_cycles(&self) -> f64 {
         let (first, last) = self.span();
         last - first
+    }
+
+    /// Length of the longest season in rotation cycles: as far as rotation turns a map.
+    pub fn longest_season_cycles(&self) -> f64 {
+        match self.maps() {
+            1 => self.time_base_cycles(),
+            _ => self.seasons().iter().map(Imager::time_base_cycles).fold(0.0, f64::max),
+        }
     }
 
     /// First and last rotation cycle.

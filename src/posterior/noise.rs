@@ -216,8 +216,7 @@ impl MeasuredErrors {
             Some(misfit) => format!("maps leave {misfit:.1} times the scatter of the continuum"),
             None => format!("maps leave {:.1} times the quoted errors", self.residual?),
         };
-        let more = "the model of star or line is not right; `dimcmc map` tries out why";
-        self.is_misfit().then(|| format!("{text}: {more}"))
+        self.is_misfit().then(|| format!("{text}: the model of star or line is not right"))
     }
 
     /// Multiplies the errors of `observations` by all that was measured.

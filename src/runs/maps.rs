@@ -7,7 +7,6 @@ use crate::data::io::map::{ChangingMapResult, FILES, LIGHT_CURVES, MapResult};
 use crate::data::io::periodogram::FieldRecord;
 use crate::data::scene::Scene;
 use crate::posterior::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
-use crate::posterior::noise::MeasuredErrors;
 use crate::posterior::objective::{ObjectiveKind, Parameter, ReferenceError};
 use std::path::{Path, PathBuf};
 
@@ -106,6 +105,9 @@ impl<'a> Maps<'a> {
                 let misfit = diagnosis.as_ref().map(|Diagnosis { text, .. }| {
                     ("warning", format!("the model does not fit as well as the continuum promises: {text}"))
                 });
+                // of several data sets the reason is not looked for
+                let of_set = self.scene.measured.misfit_text().filter(|_| diagnosis.is_none());
+                let misfit = misfit.or(of_set.map(|text| ("warning", text)));
                 (of_one(fit), fit.checks.warnings.iter().map(warning).chain(misfit).collect())
             }
             Found::Changing(fit, reason) => {
@@ -126,7 +128,7 @@ fn unchanging(scene: &Scene, report: &dyn Fn(&'static str)) -> Result<Found, Map
         let reason = diagnosis(scene).map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text));
         MapError::Reference { config: scene.settings.path.clone(), error, reason }
     })?;
-    let misfits = scene.measured.errors.as_ref().is_some_and(MeasuredErrors::is_misfit);
+    let misfits = scene.measured.misfit_text().is_some();
     Ok(Found::One(Box::new(fit), if misfits { diagnosis(scene) } else { None }))
 }
 

@@ -53,7 +53,7 @@ pub use photometry::Band;
 pub use response::Sampling;
 pub use rotation::Rotation;
 pub use spots::{Disc, Facula, Life, Spot};
-pub use stacked::{Response, Seen};
+pub use stacked::{OwnMap, Response, Seen};
 
 /// The star. [`Surface`] may have other values for some of it.
 #[derive(Clone, Debug, PartialEq)]

@@ -33,7 +33,7 @@ impl Nearby {
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
         let arranged = |set: &Seen| {
             let star = set.star(star).with(&state.surface);
-            Arranged::new(&observed(grid, &star, state, &set.sampling), MARGIN)
+            Arranged::new(&observed(grid, &star, state, set), MARGIN)
         };
         Nearby { state: *state, pixels: sets.iter().map(arranged).collect() }
     }
@@ -49,10 +49,9 @@ impl Nearby {
     ) -> Option<Response> {
         let part = |(pixels, set): (&Arranged, &Seen)| {
             let star = &set.star(star).with(&state.surface);
-            let observed = observed(grid, star, state, &set.sampling);
-            self.is_close(pixels, &observed).then(|| {
-                Part::shifted(Arc::new(pixels.deposit(&observed)), star, state, &set.sampling).with_maps(&set.map_of)
-            })
+            let observed = observed(grid, star, state, set);
+            self.is_close(pixels, &observed)
+                .then(|| Part::shifted(Arc::new(pixels.deposit(&observed)), star, state, set))
         };
         self.pixels.iter().zip(sets).map(part).collect::<Option<Vec<_>>>().map(Response::stacked)
     }

@@ -7,7 +7,7 @@ use super::convolution::{Convolutions, Rows, VelocityGrid};
 use super::deposit::{Deposit, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
-use super::{StarSettings, StarState};
+use super::{Seen, StarSettings, StarState};
 use crate::numerics::vector::{self, Instructions, Number, Task};
 use crate::star::observation::Observations;
 use nalgebra::DMatrixView;
@@ -58,21 +58,16 @@ pub(super) struct Part {
 
 impl Part {
     /// The response at one state of star and planet.
-    pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+    pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
         let star = &star.with(&state.surface);
-        let deposit = Deposit::new(&observed(grid, star, state, sampling));
-        Part::shifted(Arc::new(deposit), star, state, sampling)
+        let deposit = Deposit::new(&observed(grid, star, state, seen));
+        Part::shifted(Arc::new(deposit), star, state, seen)
     }
 
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the line is
     /// shifted.
-    pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        Part::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, sampling).with_maps(&self.map_of)
-    }
-
-    /// The same response of profiles of which each sees the map of its number.
-    pub(super) fn with_maps(self, map_of: &[usize]) -> Self {
-        Part { map_of: map_of.to_vec(), ..self }
+    pub fn with_velocities(&self, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
+        Part::shifted(Arc::clone(&self.deposit), &star.with(&state.surface), state, seen)
     }
 
     /// Where the map that profile `k` sees stands among `all` pixels; a map that is alone is seen by all.
@@ -85,7 +80,8 @@ impl Part {
     }
 
     /// The response of deposits, which orbit and systemic velocity shift.
-    pub(super) fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
+    pub(super) fn shifted(deposit: Arc<Deposit>, star: &StarSettings, state: &StarState, seen: &Seen) -> Self {
+        let sampling = &seen.sampling;
         let kernel = LineKernel::new(star.line, deposit.step_kms);
         let grid = VelocityGrid {
             nodes: deposit.nodes,
@@ -101,8 +97,9 @@ impl Part {
             let shift = state.vsys_kms + state.motion.velocity_kms(star.cycle(time));
             (first_velocity - shift - deposit.origin_kms(), bins)
         });
+        let map_of = seen.own_maps.iter().map(|own| own.number).collect();
         let convolutions = Convolutions::new(&kernel, grid, profiles);
-        Part { deposit, convolutions, starts, contrast: star.contrast, map_of: Vec::new() }
+        Part { deposit, convolutions, starts, contrast: star.contrast, map_of }
     }
 
     fn rows(&self) -> Rows {
@@ -186,9 +183,11 @@ pub(super) fn observed<'a>(
     grid: &'a SurfaceGrid,
     star: &StarSettings,
     state: &'a StarState,
-    sampling: &Sampling,
+    seen: &Seen,
 ) -> Observed<'a> {
-    let since_epoch_d = sampling.profiles.iter().map(|p| p.0 - star.epoch_d).collect();
+    let sampling = &seen.sampling;
+    let epoch_d = |k: usize| seen.own_maps.get(k).map_or(star.epoch_d, |own| own.epoch_d);
+    let since_epoch_d = sampling.profiles.iter().enumerate().map(|(k, p)| p.0 - epoch_d(k)).collect();
     let step_kms = sampling.step_kms / LineKernel::steps_per_bin(star.line, sampling.step_kms) as f64;
     Observed { grid, state, limb: star.limb_darkening, since_epoch_d, step_kms }
 }
@@ -364,7 +363,7 @@ mod tests {
         let sampling = Sampling { step_kms: 1.8, profiles: (0..5).map(|k| (0.7 * k as f64, -50.0, 57)).collect() };
         let grid = SurfaceGrid::equal_area(700, Quadrature::Gauss2x2);
         // built and shifted by this processor's instructions: both see the same pairs
-        let response = &Part::new(&grid, &star, &state, &sampling);
+        let response = &Part::new(&grid, &star, &state, &sampling.into());
         let (x, y, z) = (noise(grid.len()), noise(response.data_len()), noise(response.profiles()));
         let profiles = || (vec![f64::NAN; y.len()], vec![f64::NAN; z.len()], vec![f64::NAN; x.len()]);
         let (mut line, mut continuum, mut map) = profiles();

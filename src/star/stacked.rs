@@ -18,14 +18,22 @@ pub struct Seen {
     pub contrast: Option<f64>,
     /// Times and velocity bins.
     pub sampling: Sampling,
-    /// Of each profile the number of its map, from 0, where the star has several, season by season; empty where it has
-    /// one.
-    pub map_of: Vec<usize>,
+    /// The map that each profile sees, where the star has several; empty where it has one.
+    pub own_maps: Vec<OwnMap>,
+}
+
+/// One of several maps of a star, as one profile sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OwnMap {
+    /// Its number, from 0.
+    pub number: usize,
+    /// The time (d) from which rotation turns it, in place of the star's.
+    pub epoch_d: f64,
 }
 
 impl From<Sampling> for Seen {
     fn from(sampling: Sampling) -> Self {
-        Seen { line: None, contrast: None, sampling, map_of: Vec::new() }
+        Seen { line: None, contrast: None, sampling, own_maps: Vec::new() }
     }
 }
 
@@ -53,12 +61,12 @@ pub struct Response {
 impl Response {
     /// The response of one data set at one state of star and planet.
     pub fn new(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sampling: &Sampling) -> Self {
-        Response::stacked(vec![Part::new(grid, star, state, sampling)])
+        Response::of_sets(grid, star, state, &[sampling.clone().into()])
     }
 
     /// The response of data `sets`.
     pub fn of_sets(grid: &SurfaceGrid, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
-        let part = |set: &Seen| Part::new(grid, &set.star(star), state, &set.sampling).with_maps(&set.map_of);
+        let part = |set: &Seen| Part::new(grid, &set.star(star), state, set);
         Response::stacked(sets.iter().map(part).collect())
     }
 
@@ -76,7 +84,7 @@ impl Response {
     /// The response at a state that differs from this one's by orbit and systemic velocity alone: only the lines are
     /// shifted.
     pub fn with_velocities(&self, star: &StarSettings, state: &StarState, sets: &[Seen]) -> Self {
-        let shifted = |(part, set): (&Part, &Seen)| part.with_velocities(&set.star(star), state, &set.sampling);
+        let shifted = |(part, set): (&Part, &Seen)| part.with_velocities(&set.star(star), state, set);
         Response::stacked(self.parts.iter().zip(sets).map(shifted).collect())
     }
 

@@ -142,15 +142,18 @@ fn seasons_that_make_no_sense_are_refused_by_their_key() {
         says(&desk.refusal(&["map", CONFIG, "--out", "map"]), parts);
     };
     let windows = |windows: Value, parts: &[&str]| refused("seasons", windows, parts);
-    windows(json!([[-1, 100], [90, 300]]), &["imaging.seasons[1]", "90 d", "ends (100 d)"]);
+    windows(json!([[-1, 100], [90, 300]]), &["imaging.seasons[1]", "90 d", "imaging.seasons[0] ends only at 100 d"]);
     windows(json!([[-1, 100], [300, 200]]), &["imaging.seasons[1]", "300 must be before the end 200"]);
-    windows(json!([[1, 100], [200, 300]]), &["imaging.seasons", "profile at 0 d", "observations[0].exclude"]);
+    windows(json!([[1, 100], [200, 300]]), &["imaging.seasons", "profile at 0 d (observations[0])"]);
     windows(json!([[-1, 100], [200, 300], [400, 500]]), &["imaging.seasons[2]", "no profile"]);
     refused("season_gap_d", json!(0), &["imaging.season_gap_d", "above 0"]);
     let mut both = unchanging();
     both["imaging"]["season_gap_d"] = json!(30);
     both["imaging"]["seasons"] = json!([[-1, 300]]);
     says(&Desk::new(both).refusal(&["map", CONFIG, "--out", "map"]), &["imaging.seasons", "season_gap_d"]);
+    let mut bright = unchanging();
+    bright["imaging"]["brightness"] = json!("bright-and-dark");
+    says(&Desk::new(bright).refusal(&["map", CONFIG, "--out", "map"]), &["observations[1].contrast", "bright"]);
     let mut integrated = two_sets();
     integrated["imaging"]["season_gap_d"] = json!(30);
     says(

@@ -44,6 +44,13 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
+fn a_config_of_a_star_that_does_not_change_has_a_plan_too() {
+    let mut config = config(6);
+    config["imaging"] = json!({ "pixels": 300, "seasons": [[-1, 100]] });
+    plan(&Desk::new(config), &["--out", "plan"]);
+}
+
+#[test]
 fn more_nights_show_smaller_planets_and_the_best_schedule_is_said() {
     let desk = Desk::new(config(10));
     let said = plan(&desk, &["--nights", "6,12", "--out", "a"]);

@@ -4,7 +4,7 @@ use dimcmc::internals::maxent::Problem;
 use dimcmc::internals::posterior::imaging::Imager;
 use dimcmc::internals::posterior::marginal::{Basis, Design, zero_points::HeldZeroPoint};
 use dimcmc::internals::posterior::objective::{Reference, ReferenceError};
-use dimcmc::internals::star::Response;
+use dimcmc::internals::star::{Response, StarSettings};
 use dimcmc::{Config, Parameter, Scene};
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
@@ -91,7 +91,8 @@ fn each_season_has_the_map_that_it_would_have_alone() {
     known["imaging"]["objective"] = json!("spottedness");
     let both = scene(&known);
     assert_eq!(both.imager.maps(), 2);
-    // so much entropy for chi2, whether that of the mean map or of one of the two
+    // so much entropy for chi2, whether that of the mean map or of one of the two: the season with more data has as much
+    // as alone, the other less
     const LAMBDA: f64 = 1.0;
     let image = |imager: &Imager, lambda: f64| {
         let reference = Reference::at_lambda(imager, both.settings.values, lambda).unwrap();
@@ -100,7 +101,8 @@ fn each_season_has_the_map_that_it_would_have_alone() {
     let data = |imager: &Imager| imager.data.depth.len() as f64;
     let together = image(&both.imager, LAMBDA);
     let seasons = both.imager.seasons();
-    let alone = |season: &Imager| image(season, 2.0 * LAMBDA * data(season) / data(&both.imager));
+    let most = seasons.iter().map(data).fold(0.0, f64::max);
+    let alone = |season: &Imager| image(season, LAMBDA * data(season) / most);
     let apart: Vec<f64> = seasons.iter().flat_map(alone).collect();
     let off = together.iter().zip(&apart).fold(0.0, |off: f64, (a, b)| off.max((a - b).abs()));
     assert!(together.len() == apart.len() && off < 1e-3, "{off}");
@@ -113,9 +115,37 @@ fn each_season_has_the_map_that_it_would_have_alone() {
 }
 
 #[test]
+fn rotation_turns_the_map_of_a_season_from_its_own_middle() {
+    let mut known = config();
+    known["observations"][1]["zero_point_kms"] = json!(OFFSET_KMS);
+    known["imaging"]["objective"] = json!("entropy");
+    let both = scene(&known);
+    let mut values = both.settings.values;
+    (values[Parameter::K], values[Parameter::DOmega]) = (0.0, 0.08);
+    let state = values.state();
+    let n = both.imager.grid.len();
+    let map: Vec<f64> = (0..n).map(|p| 0.9 + 0.1 * (0.3 * p as f64).sin()).collect();
+    let response = both.imager.response(&state);
+    let together = response.depths(&[map.clone(), map.clone()].concat());
+    // 83.1 to 85.4 cycles of 3 d
+    let epochs: Vec<f64> = both.measured.seasons.iter().map(|season| season.epoch_d).collect();
+    assert_eq!(epochs, [3.0, 252.0]);
+    let alone = |epoch_d: f64| {
+        let star = StarSettings { epoch_d, ..both.imager.star.clone() };
+        Imager { star, ..both.imager.clone().with_one_map() }.response(&state).depths(&map)
+    };
+    let second = response.bins(8).start;
+    let apart = [&alone(epochs[0])[..second], &alone(epochs[1])[second..]].concat();
+    assert_eq!(together, apart);
+    // integrated maps have one epoch
+    assert_eq!(scene(&config()).imager.maps(), 1);
+}
+
+#[test]
 fn the_misfit_of_maps_has_its_gradient_where_contrasts_differ() {
     let mut known = config();
     known["observations"][1]["zero_point_kms"] = json!(0.0);
+    known["imaging"]["objective"] = json!("spottedness");
     let both = scene(&known);
     let response: Response = both.imager.response(&both.settings.values.state());
     assert_ne!(response.contrast(0), response.contrast(8));

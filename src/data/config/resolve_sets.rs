@@ -9,9 +9,9 @@ use super::resolve_observations::resolve_observations;
 use super::resolve_seasons::check_windows;
 use super::resolve_simulation::{spots, times_d};
 use super::resolve_star::resolve_star;
-use super::{DataSetSettings, ObservationSource};
+use super::{Automatic, DataSetSettings, ObservationSource};
 use crate::posterior::objective::{ObjectiveKind, Parameter, ParameterValues};
-use crate::star::StarSettings;
+use crate::star::{BrightnessModel, StarSettings};
 use std::path::Path;
 
 /// Zero points beyond it (km/s) are a mistake.
@@ -75,11 +75,21 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
         }
         if section.zero_point_kms == ZeroPoint::Fitted && objective != ObjectiveKind::MarginalLikelihood {
             let problem = format!(
-                "{:?} has one map, which would follow a wrong zero point: give a number (km/s), or take \
+                "with {:?} a map would follow a wrong zero point: give a number (km/s), or take \
                  imaging.objective \"marginal-likelihood\", which integrates it out",
                 objective.name()
             );
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
+        }
+        if section.nuisances.is_some() && raw.imaging.chi2_target == Automatic::Auto {
+            let problem = format!("auto goes by velocities that {key}.nuisances take up: give a number, such as 0.97");
+            return Err(Fault::new("imaging.chi2_target", problem));
+        }
+        let spots = raw.imaging.brightness != BrightnessModel::BrightAndDark;
+        let own = [("contrast", section.contrast.is_some()), ("wavelength_nm", section.wavelength_nm.is_some())];
+        if let Some((name, _)) = own.into_iter().find(|(_, given)| *given && sections.len() > 1 && !spots) {
+            let problem = "an image of bright and dark pixels is as bright in every data set";
+            return Err(Fault::new(format!("{key}.{name}"), problem));
         }
         if section.velocity_jitter_kms != sections[0].velocity_jitter_kms {
             let problem = format!("must be as in {}: the jitter is one of all data sets", raw.observations.key(0));

@@ -57,6 +57,8 @@ pub struct Season {
     pub last_d: f64,
     /// Number of them.
     pub profiles: usize,
+    /// Where longitudes of its map count from, in place of the star's `epoch_d`: whole cycles later (d).
+    pub epoch_d: f64,
 }
 
 /// One of several data sets.
@@ -95,8 +97,11 @@ impl Measured {
 
     /// That the model does not fit as well as the continuum promises, where the errors say so.
     pub fn misfit_text(&self) -> Option<String> {
-        let of_sets = self.sets.iter().filter_map(|set| set.errors.as_ref());
-        self.errors.iter().chain(of_sets).find_map(MeasuredErrors::misfit_text)
+        let of_set = |set: &MeasuredSet| Some(format!("{}: {}", set.name, set.errors.as_ref()?.misfit_text()?));
+        match &self.errors {
+            Some(errors) => Some(format!("{}; `dimcmc map` tries out why", errors.misfit_text()?)),
+            None => self.sets.iter().find_map(of_set),
+        }
     }
 
     /// It in words, label and text a line.
@@ -107,7 +112,7 @@ impl Measured {
         let jitter = self.velocity_jitter.as_ref().map(|jitter| ("velocity jitter", jitter.line()));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
         let season = |season: &Season| {
-            let Season { first_d, last_d, profiles } = season;
+            let Season { first_d, last_d, profiles, .. } = season;
             ("season", format!("{first_d:.3} to {last_d:.3} d: {profiles} profiles, with a map of their own"))
         };
         let seasons = self.seasons.iter().map(season);

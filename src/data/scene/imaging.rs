@@ -25,7 +25,7 @@ pub fn imager(settings: &Settings, parts: &[Observations]) -> Result<Imager, Con
         line: Some(own.line).filter(|line| *line != star.line),
         contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast),
         sampling: Sampling::of(part),
-        map_of: Vec::new(),
+        own_maps: Vec::new(),
     };
     let sets: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
     let all = Observations { profiles: parts.iter().flat_map(|part| part.profiles.iter().cloned()).collect() };

@@ -2,11 +2,13 @@
 
 use super::Scene;
 use crate::data::config::ObservationSource;
+use crate::data::io::provenance::Season;
 use crate::data::io::truth::Truth;
 use crate::posterior::objective::Parameter;
 use crate::posterior::simulate::Simulation;
 use crate::star::{BrightnessModel, Quadrature, Spot, SurfaceGrid};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 impl Scene {
     /// The true spot map on the pixels of the image, if the observations are simulated; of a star that changes, in the
@@ -20,12 +22,32 @@ impl Scene {
     /// middle of the data. The maps of several seasons, each in its middle, stand one after the other.
     #[doc(hidden)]
     pub fn true_map(&self) -> Option<Vec<f64>> {
-        let times = match &self.measured.seasons[..] {
-            [] => vec![self.simulation()?.mid_time_d()],
-            seasons => seasons.iter().map(|season| 0.5 * (season.first_d + season.last_d)).collect(),
+        let of_season = |season: &Season| {
+            let map = self.true_map_at(0.5 * (season.first_d + season.last_d))?;
+            Some(self.turned(&map, season.epoch_d - self.imager.star.epoch_d))
         };
-        let maps: Option<Vec<_>> = times.into_iter().map(|time| self.true_map_at(time)).collect();
-        Some(maps?.concat())
+        match &self.measured.seasons[..] {
+            [] => self.true_map_at(self.simulation()?.mid_time_d()),
+            seasons => Some(seasons.iter().map(of_season).collect::<Option<Vec<_>>>()?.concat()),
+        }
+    }
+
+    /// A map of which longitudes count from so many days later, between pixels linearly.
+    fn turned(&self, map: &[f64], days: f64) -> Vec<f64> {
+        let rotation = self.truth.unwrap_or(self.settings.values).state().rotation;
+        let (mut turned, mut first) = (vec![0.0; map.len()], 0);
+        for ring in &self.imager.grid.rings {
+            let (ring, n) = (&map[ring.pixels.clone()], ring.pixels.len());
+            let angle = rotation.angular_velocity(self.imager.grid.latitude[first].sin()) * days;
+            let behind = angle.rem_euclid(TAU) / TAU * n as f64;
+            let (whole, share) = (behind.floor() as usize, behind.fract());
+            for (j, pixel) in turned[first..first + n].iter_mut().enumerate() {
+                let there = j + 2 * n - whole;
+                *pixel = (1.0 - share) * ring[there % n] + share * ring[(there - 1) % n];
+            }
+            first += n;
+        }
+        turned
     }
 
     /// The same at a time (d).

@@ -40,8 +40,8 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
     let seasons = map.seasons.len();
     let of_season = |k: usize| {
         let SeasonMap { season, spottedness, true_spottedness, map: pixels } = map.seasons[k].clone();
-        let Season { first_d, last_d, .. } = season;
-        let text = format!(" Season {} of {seasons}, {first_d:.2} to {last_d:.2} d.", k + 1);
+        let Season { first_d, last_d, epoch_d, .. } = season;
+        let text = format!("in season {} of {seasons}, {first_d:.2} to {last_d:.2} d, at {epoch_d:.2} d", k + 1);
         let own = MapFile { spottedness, true_spottedness, map: pixels, seasons: Vec::new(), ..map.clone() };
         figure(folder, own, Some((k + 1, text)))
     };
@@ -62,8 +62,8 @@ fn figure(folder: &Path, map: MapFile, season: Option<(usize, String)>) -> Resul
         let problem = format!("ring_pixels and {what} do not belong together");
         return Err(PlotError::Content { path: folder.join(MAP), problem });
     }
-    // spots that change are drawn as they are in the middle of all data
-    let known = Injected::of(folder)?.filter(|injected| season.is_none() || !injected.is_changing);
+    // what was injected is known at cycle 0 alone, or in the middle of all data
+    let known = Injected::of(folder)?.filter(|_| season.is_none());
     let cycles = match folder.join(velocities::FILE) {
         table if table.is_file() => {
             let table = Columns::read(&table)?;
@@ -94,8 +94,8 @@ fn figure(folder: &Path, map: MapFile, season: Option<(usize, String)>) -> Resul
         stars[0].rims = injected;
     }
     let what = if content == Content::Spots { "spots" } else { "brightness" };
-    let (name, when) = season.map_or(("map".into(), String::new()), |(k, text)| (format!("map_{k}"), text));
-    let caption = format!("Map of the {what} at cycle 0{compared}.{when} {HOW_TO_READ}");
+    let (name, when) = season.map_or(("map".into(), "at cycle 0".into()), |(k, text)| (format!("map_{k}"), text));
+    let caption = format!("Map of the {what} {when}{compared}. {HOW_TO_READ}");
     let mut figure = draw(&stars, content, &cycles, caption);
     figure.name = name;
     Ok(figure)

@@ -49,7 +49,7 @@ pub(super) struct DisplacedModel<'a> {
 impl<'a> DisplacedModel<'a> {
     pub fn new(imager: &'a Imager, reference: &'a Reference, stellar: &[Parameter]) -> Self {
         let map = imager.entropy.image(&reference.solution.image.coordinates);
-        let base = imager.time_base_cycles() * imager.star.rotation_period_d;
+        let base = imager.longest_season_cycles() * imager.star.rotation_period_d;
         let steps: Vec<f64> = stellar.iter().map(|&p| stellar_step(p, &reference.values, base)).collect();
         let at = |response: Response| displaced(imager, response, &map);
         let here = at(reference.response.clone());

@@ -31,6 +31,12 @@ const NOTHING: f64 = 0.5;
 /// Shorter lifetimes are tried no further where ln Z is so far below the best.
 const FAR_BELOW: f64 = 10.0;
 
+/// Whether a season has profiles enough to show a change.
+fn tells(season: &Imager) -> bool {
+    const FEWEST: usize = 4;
+    season.profiles().count() >= FEWEST
+}
+
 /// The comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
@@ -46,7 +52,7 @@ impl Change {
     /// a small part of the work.
     ///
     /// # Errors
-    /// [`NoFit`] where the field that does not change cannot be fitted in any season.
+    /// [`NoFit`] where the field that does not change cannot be fitted in some season, and no other one shows a change.
     pub fn of(
         imager: &Imager,
         values: ParameterValues,
@@ -59,9 +65,20 @@ impl Change {
             let by_a_share = share_of(imager).and_then(|share| among(&share).ok()).filter(Change::is_changing);
             by_a_share.map_or_else(|| among(imager), Ok)
         };
-        let gain = |change: &Result<Self, NoFit>| change.as_ref().map_or(f64::NEG_INFINITY, |c| c.ln_evidence_gain);
-        let of_each = imager.seasons().into_iter().map(|season| of_season(&season));
-        of_each.max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("profiles are of some season")
+        let mut seasons = imager.seasons();
+        if seasons.iter().any(tells) {
+            seasons.retain(tells);
+        }
+        let of_each: Vec<Result<Self, NoFit>> = seasons.iter().map(of_season).collect();
+        let most = |a: &Self, b: &Self| a.ln_evidence_gain.total_cmp(&b.ln_evidence_gain);
+        let largest = of_each.iter().flatten().copied().max_by(most);
+        let failed = of_each.into_iter().find_map(Result::err);
+        match (largest, failed) {
+            (Some(change), None) => Ok(change),
+            (Some(change), Some(_)) if change.is_changing() => Ok(change),
+            (_, Some(error)) => Err(error),
+            (None, None) => unreachable!("profiles are of some season"),
+        }
     }
 
     fn among(

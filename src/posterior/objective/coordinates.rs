@@ -30,6 +30,8 @@ pub struct ParameterSpace {
     /// Rotation cycle in the middle of the time base, and its length.
     mid_cycle: f64,
     time_base_cycles: f64,
+    /// Rotation cycles of the longest season, each having a map of its own.
+    season_cycles: f64,
     /// What ephemerides are counted with.
     clock: Clock,
     /// Mass of the star (solar masses), where it is known: two planets must be stable.
@@ -97,6 +99,7 @@ impl ParameterSpace {
             values,
             mid_cycle,
             time_base_cycles,
+            season_cycles: time_base_cycles,
         }
     }
 
@@ -106,6 +109,11 @@ impl ParameterSpace {
         self.clock.epoch_d = epoch_d;
         self.mass_msun = mass_msun;
         self
+    }
+
+    /// The same where the longest season, each of which has a map of its own, is of so many rotation cycles.
+    pub fn of_seasons(self, season_cycles: f64) -> Self {
+        ParameterSpace { season_cycles, ..self }
     }
 
     /// What ephemerides are counted with.
@@ -286,9 +294,9 @@ impl ParameterSpace {
     /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what
     /// numerical derivatives and a first trust region are scaled with.
     pub fn scales(&self) -> Vec<f64> {
-        // a change of angular velocity that turns the star by this angle (rad) in half the time base
+        // a change of angular velocity that turns a map by this angle (rad) in half the time that it is seen
         let turn = 0.01;
-        let omega = turn / (0.5 * self.time_base_cycles.max(0.1) * self.clock.rotation_period_d);
+        let omega = turn / (0.5 * self.season_cycles.max(0.1) * self.clock.rotation_period_d);
         let ratio = |of: Parameter| {
             let period = self.values[of];
             0.02 * period * period / (0.5 * self.time_base_cycles).max(0.1)

@@ -219,8 +219,8 @@ impl Reference {
         largest_lambda: f64,
     ) -> Result<Self, ReferenceError> {
         let data = imager.data.depth.len() as f64;
-        let unit = imager.entropy.lambda_unit();
-        let (chi2_target, largest_lambda) = (chi2_per_datum * data, unit * largest_lambda / data);
+        let (unit, over) = (imager.entropy.lambda_unit(), imager.data_as_of_one_map());
+        let (chi2_target, largest_lambda) = (chi2_per_datum * data, unit * largest_lambda / over);
         let response = imager.response(&values.state());
         let mut problem = imager.problem(response.clone());
         let none = Preconditioner::identity();
@@ -229,7 +229,7 @@ impl Reference {
             preconditioner: &none,
             settings: SolverSettings { tolerance: 5.0, cg_tolerance: 0.1, ..SolverSettings::patient() },
         };
-        let blank = Start::blank(&imager.entropy, imager.areas.len(), unit * BLANK_LAMBDA / data);
+        let blank = Start::blank(&imager.entropy, imager.areas.len(), unit * BLANK_LAMBDA / over);
         let blank_chi2 = problem.linearise(&imager.entropy.image(&blank.image.coordinates));
         if blank_chi2 <= chi2_target {
             return Err(ReferenceError::NothingToFit { target: chi2_per_datum, blank: blank_chi2 / data });
@@ -269,7 +269,7 @@ impl Reference {
 
     /// A blank star, where an evaluation far from the reference starts.
     pub fn blank(&self, imager: &Imager) -> Start {
-        let lambda = imager.entropy.lambda_unit() * BLANK_LAMBDA / imager.data.depth.len() as f64;
+        let lambda = imager.entropy.lambda_unit() * BLANK_LAMBDA / imager.data_as_of_one_map();
         Start { best: Some(self.best()), ..Start::blank(&imager.entropy, imager.areas.len(), lambda) }
     }
 
@@ -295,9 +295,11 @@ pub(super) fn start(solution: &Solution) -> Start {
 pub(super) fn precondition(imager: &Imager, problem: &mut impl Problem, at: &Solution) -> Preconditioner {
     let s = imager.entropy.image(&at.image.coordinates);
     let scale = imager.entropy.metric(&s, problem.area());
-    let (n, mut scaled, mut curved) = (s.len(), vec![0.0f32; s.len()], vec![0.0f32; s.len()]);
+    let (mut scaled, mut curved) = (vec![0.0f32; s.len()], vec![0.0f32; s.len()]);
     problem.linearise(&s);
-    Preconditioner::build(n, imager.maps() * PRECONDITIONER_RANK, SMALLEST_CURVATURE / at.image.lambda, |v, out| {
+    let (maps, pixels) = (imager.maps(), imager.grid.len());
+    let smallest = SMALLEST_CURVATURE / at.image.lambda;
+    Preconditioner::build(maps, pixels, PRECONDITIONER_RANK, smallest, |v, out| {
         scaled.iter_mut().zip(v).zip(&scale).for_each(|((x, v), d)| *x = *v as f32 * d);
         problem.curvature(Curvature::Exact, &scaled, &mut curved);
         out.iter_mut().zip(&curved).zip(&scale).for_each(|((out, x), d)| *out = f64::from(*x * d));

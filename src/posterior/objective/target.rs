@@ -113,13 +113,13 @@ fn path(imager: &Imager, values: ParameterValues, last_lambda: f64) -> Result<Ve
         Place { chi2: solution.chi2 / data, rms_kms: scatter(&filtered) }
     };
     // the last image is at the last lambda, and a doubling beyond it
-    let unit = imager.entropy.lambda_unit();
+    let (unit, over) = (imager.entropy.lambda_unit(), imager.data_as_of_one_map());
     let steps = (IMAGES as f64 * (last_lambda / FIRST).log2()).floor();
     let mut at = first.solution.clone();
     let mut places = Vec::new();
     let mut work = imager.problem(first.response.clone());
     for k in -(steps as i32)..=IMAGES as i32 {
-        let lambda = unit * last_lambda / data * (f64::from(k) / IMAGES as f64).exp2();
+        let lambda = unit * last_lambda / over * (f64::from(k) / IMAGES as f64).exp2();
         let start =
             Start { image: at.image.clone(), path: Vec::new(), chi2_slope: 0.0, adjoint: Vec::new(), best: None };
         at = solver.solve(&mut work, Goal::Lambda(lambda), start);

@@ -11,6 +11,7 @@ use crate::posterior::marginal::{Assumed, Basis, Known, Marginal, NoFit, fit};
 use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::star::observation::{Observations, Profile};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -114,7 +115,11 @@ impl Campaign {
     pub fn of(config: &Config, nights: &[usize]) -> Result<Vec<Self>, CampaignError> {
         let own = config.settings()?;
         // whatever the config's own objective: a plan integrates maps out
-        let config = &config.clone().with("imaging.objective", "marginal-likelihood");
+        let config = &config
+            .clone()
+            .with("imaging.objective", "marginal-likelihood")
+            .with("imaging.season_gap_d", Value::Null)
+            .with("imaging.seasons", json!([]));
         let settings = config.settings()?;
         let [set] = &settings.sets[..] else {
             return Err(own.fault("observations", "a list of data sets: a plan is of a single one").into());
