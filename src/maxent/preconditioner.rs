@@ -65,8 +65,8 @@ impl Preconditioner {
         Preconditioner::default()
     }
 
-    /// From the operator M (`apply(v, out)`) on vectors that hold so many `maps` of so many `pixels`: for each map at most
-    /// `rank` eigenvectors, those with eigenvalues above `smallest`. M is applied as often as for one map.
+    /// From the operator M (`apply(v, out)`) on vectors that hold so many `maps` of so many `pixels`: for each map at
+    /// most `rank` eigenvectors, those with eigenvalues above `smallest`. M is applied as often as for one map.
     pub fn build(
         maps: usize,
         pixels: usize,
@@ -205,7 +205,8 @@ fn krylov(maps: usize, pixels: usize, columns: usize, mut apply: impl FnMut(&[f6
     for first in (0..columns).step_by(width) {
         for (block, space) in blocks.iter_mut().zip(&mut spaces) {
             let known = space.basis.columns(0, first);
-            // until nothing of the known ones is left: what is nearly spanned by them is mostly rounding errors at first
+            // until nothing of the known ones is left: what is nearly spanned by them is mostly rounding errors at
+            // first
             for _ in 0..MOST_PROJECTIONS {
                 *block = std::mem::take(block).qr().q();
                 *block -= known * (known.transpose() * &*block);

@@ -106,8 +106,9 @@ impl Imager {
         self.areas.len() / self.grid.len()
     }
 
-    /// Number of data, as far as weights of the entropy over it are concerned: of several maps, whose entropy is a mean,
-    /// that of the best observed season times the number of seasons. So no map gets more weight than it would alone.
+    /// Number of data, as far as weights of the entropy over it are concerned: of several maps, whose entropy is a
+    /// mean, that of the best observed season times the number of seasons. So no map gets more weight than it would
+    /// alone.
     pub fn data_as_of_one_map(&self) -> f64 {
         let mut data = vec![0; self.maps()];
         for set in &self.sets {

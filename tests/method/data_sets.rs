@@ -91,8 +91,8 @@ fn each_season_has_the_map_that_it_would_have_alone() {
     known["imaging"]["objective"] = json!("spottedness");
     let both = scene(&known);
     assert_eq!(both.imager.maps(), 2);
-    // so much entropy for chi2, whether that of the mean map or of one of the two: the season with more data has as much
-    // as alone, the other less
+    // so much entropy for chi2, whether that of the mean map or of one of the two: the season with more data has as
+    // much as alone, the other less
     const LAMBDA: f64 = 1.0;
     let image = |imager: &Imager, lambda: f64| {
         let reference = Reference::at_lambda(imager, both.settings.values, lambda).unwrap();
