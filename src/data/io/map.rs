@@ -176,6 +176,14 @@ pub struct TradeOffNode {
     pub entropy: f64,
 }
 
+/// Columns that profiles have beside the others where there are several seasons or data sets, each with the number of
+/// each profile, from 1.
+fn beside(imager: &Imager) -> Vec<(&'static str, Vec<usize>)> {
+    let seasons = imager.map_of_each().into_iter().map(|map| map + 1).collect();
+    let columns: [(_, Vec<usize>); 2] = [(SEASON, seasons), (DATA_SET, imager.set_of_each())];
+    columns.into_iter().filter(|(_, numbers)| !numbers.is_empty()).collect()
+}
+
 impl MapColumns {
     fn of(entropy: Entropy, map: Vec<f64>, true_map: Option<Vec<f64>>) -> Self {
         match entropy {
@@ -236,17 +244,9 @@ impl MapResult<'_> {
         }
     }
 
-    /// Columns that profiles have beside the others where there are several seasons or data sets, each with the number
-    /// of each profile, from 1.
-    fn beside(&self) -> Vec<(&'static str, Vec<usize>)> {
-        let seasons = self.imager.map_of_each().into_iter().map(|map| map + 1).collect();
-        let columns = [(SEASON, seasons), (DATA_SET, self.imager.set_of_each())];
-        columns.into_iter().filter(|(_, numbers): &(_, Vec<usize>)| !numbers.is_empty()).collect()
-    }
-
     fn profiles(&self) -> Table {
         let columns = ["profile", "time_d", "cycle", "velocity_kms", "observed", "sigma", "model", "residual"];
-        let beside = self.beside();
+        let beside = beside(self.imager);
         let names = columns.into_iter().chain(beside.iter().map(|(name, _)| *name));
         let mut table = Table::new(&names.collect::<Vec<_>>());
         for (k, (profile, model)) in self.observations.profiles.iter().zip(&self.fit.model).enumerate() {
@@ -264,7 +264,7 @@ impl MapResult<'_> {
 
     fn velocities(&self) -> Table {
         let columns = ["time_d", "cycle", "observed_kms", "sigma_kms", "modelled_kms", "orbit_kms", "filtered_kms"];
-        let beside = self.beside();
+        let beside = beside(self.imager);
         let names = columns.into_iter().chain(beside.iter().map(|(name, _)| *name));
         let mut table = Table::new(&names.collect::<Vec<_>>());
         for (k, v) in self.fit.velocities.iter().enumerate() {

@@ -35,17 +35,17 @@ impl Scene {
     /// A map of which longitudes count from so many days later, between pixels linearly.
     fn turned(&self, map: &[f64], days: f64) -> Vec<f64> {
         let rotation = self.truth.unwrap_or(self.settings.values).state().rotation;
-        let (mut turned, mut first) = (vec![0.0; map.len()], 0);
-        for ring in &self.imager.grid.rings {
-            let (ring, n) = (&map[ring.pixels.clone()], ring.pixels.len());
-            let angle = rotation.angular_velocity(self.imager.grid.latitude[first].sin()) * days;
+        let SurfaceGrid { rings, latitude, .. } = &self.imager.grid;
+        let mut turned = vec![0.0; map.len()];
+        for pixels in rings.iter().map(|ring| ring.pixels.clone()) {
+            let (ring, n) = (&map[pixels.clone()], pixels.len());
+            let angle = rotation.angular_velocity(latitude[pixels.start].sin()) * days;
             let behind = angle.rem_euclid(TAU) / TAU * n as f64;
             let (whole, share) = (behind.floor() as usize, behind.fract());
-            for (j, pixel) in turned[first..first + n].iter_mut().enumerate() {
+            for (j, pixel) in turned[pixels].iter_mut().enumerate() {
                 let there = j + 2 * n - whole;
                 *pixel = (1.0 - share) * ring[there % n] + share * ring[(there - 1) % n];
             }
-            first += n;
         }
         turned
     }

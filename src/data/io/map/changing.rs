@@ -2,10 +2,10 @@
 //! `profiles.csv`, `rv.csv` and `fit.json`; where there are light curves `lightcurve.csv`, too.
 
 use super::light::{LIGHT_CURVES, table};
-use super::{CONVENTIONS, FILES};
+use super::{CONVENTIONS, FILES, beside};
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
-use crate::data::io::periodogram::{DATA_SET, FieldRecord};
+use crate::data::io::periodogram::FieldRecord;
 use crate::data::io::provenance::{MeasuredSet, Provenance};
 use crate::posterior::fit::{ChangingFit, ChangingSummary, Checks, MapAt};
 use crate::posterior::imaging::Imager;
@@ -150,10 +150,9 @@ impl ChangingMapResult<'_> {
     fn profiles(&self) -> Table {
         let columns = ["profile", "time_d", "cycle", "velocity_kms", "observed", "sigma", "model", "residual"];
         let unchanging = self.fit.unchanging_model.as_ref();
-        let set_of = self.imager.set_of_each();
-        let beside: Vec<&str> =
-            unchanging.map(|_| UNCHANGING).into_iter().chain((!set_of.is_empty()).then_some(DATA_SET)).collect();
-        let mut table = Table::new(&[&columns[..], &beside].concat());
+        let beside = beside(self.imager);
+        let more = unchanging.map(|_| UNCHANGING).into_iter().chain(beside.iter().map(|(name, _)| *name));
+        let mut table = Table::new(&columns.into_iter().chain(more).collect::<Vec<_>>());
         for (k, (profile, model)) in self.observations.profiles.iter().zip(&self.fit.model).enumerate() {
             let cycle = self.imager.star.cycle(profile.time_d);
             for (j, model) in model.iter().enumerate() {
@@ -162,7 +161,7 @@ impl ChangingMapResult<'_> {
                 let mut row =
                     vec![k as f64, profile.time_d, cycle, velocity, observed, sigma, *model, observed - model];
                 row.extend(unchanging.map(|unchanging| unchanging[k][j]));
-                row.extend(set_of.get(k).map(|s| *s as f64));
+                row.extend(beside.iter().map(|(_, of)| of[k] as f64));
                 table.row(&row);
             }
         }
@@ -172,13 +171,13 @@ impl ChangingMapResult<'_> {
     fn velocities(&self) -> Table {
         let columns =
             ["time_d", "cycle", "observed_kms", "sigma_kms", "modelled_kms", "orbit_kms", "rv_kms", "rv_sigma_kms"];
-        let set_of = self.imager.set_of_each();
-        let beside: &[&str] = if set_of.is_empty() { &[] } else { &[DATA_SET] };
-        let mut table = Table::new(&[&columns[..], beside].concat());
+        let beside = beside(self.imager);
+        let names = columns.into_iter().chain(beside.iter().map(|(name, _)| *name));
+        let mut table = Table::new(&names.collect::<Vec<_>>());
         for (k, v) in self.fit.velocities.iter().enumerate() {
             let (value_kms, sigma_kms) = (v.observed.value_kms, v.observed.sigma_kms);
             let free = [v.modelled_kms, v.orbit_kms, v.rv_kms, v.rv_sigma_kms];
-            let own: Vec<f64> = set_of.get(k).map(|s| *s as f64).into_iter().collect();
+            let own: Vec<f64> = beside.iter().map(|(_, of)| of[k] as f64).collect();
             table.row(&[&[v.time_d, v.cycle, value_kms, sigma_kms][..], &free, &own].concat());
         }
         table
