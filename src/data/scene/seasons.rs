@@ -30,7 +30,7 @@ pub(super) fn seasons(settings: &Settings, parts: &[Observations]) -> Result<Vec
                 ObservationSource::Files { .. } => format!("; {}.exclude leaves profiles out", set.key),
                 ObservationSource::Simulate(_) => String::new(),
             };
-            let problem = format!("the profile at {time} d ({}) is in none of them{cure}", set.key);
+            let problem = format!("the profile at {time} d ({}) is in none of the seasons{cure}", set.key);
             return Err(settings.fault("imaging.seasons", &problem));
         }
     }
