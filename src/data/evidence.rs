@@ -120,9 +120,10 @@ impl Assumed {
     fn with<T>(&self, run: impl FnOnce(&PlanetPrior) -> T) -> T {
         let (k, period) = (self.k, self.period);
         let (ln_k, ln_period) = (move |x: f64| k.0.log_density(x), move |x: f64| period.0.log_density(x));
+        let uniform = |prior: Prior| matches!(prior, Prior::Uniform { .. });
         run(&PlanetPrior {
-            k: Density { ln: &ln_k, bounds: k.1 },
-            period: Density { ln: &ln_period, bounds: period.1 },
+            k: Density { ln: &ln_k, bounds: k.1, uniform: uniform(k.0) },
+            period: Density { ln: &ln_period, bounds: period.1, uniform: uniform(period.0) },
             largest_e: self.largest_e,
         })
     }

@@ -14,11 +14,25 @@ fn with_priors<T>(periods: [[f64; 2]; 2], largest_e: f64, run: impl FnOnce([&Pla
     };
     let of = periods.map(ln_period);
     let prior = |i: usize| PlanetPrior {
-        k: Density { ln: &ln_k, bounds: [0.0, K_MAX] },
-        period: Density { ln: &of[i], bounds: periods[i] },
+        k: Density { ln: &ln_k, bounds: [0.0, K_MAX], uniform: true },
+        period: Density { ln: &of[i], bounds: periods[i], uniform: true },
         largest_e,
     };
     run([&prior(0), &prior(1)])
+}
+
+/// Shares of a normal distribution are what panels sum to, wherever the bounds are.
+#[test]
+fn a_uniform_prior_of_k_has_a_closed_form() {
+    with_priors([[1.0, 2.0]; 2], 0.0, |[prior, _]| {
+        for sigma in [1e-3, 0.02, 0.4, 30.0, 1e3] {
+            for top in [-30.0, -3.0, 0.0, 0.5, 2.0, 30.0].map(|errors| errors * sigma) {
+                let a = 1.0 / (sigma * sigma);
+                let (closed, panels) = (ln_along_ray(a, top * a, &prior.k), ln_by_panels(a, top * a, &prior.k));
+                assert!((closed - panels).abs() < 1e-4, "sigma {sigma}, top {top}: {closed} {panels}");
+            }
+        }
+    });
 }
 
 /// Middles of cells.
