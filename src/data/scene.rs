@@ -132,7 +132,13 @@ impl Scene {
     /// Reads or simulates the observations of `settings`.
     fn read(mut settings: Settings) -> Result<Self, SceneError> {
         light_curves::read(&mut settings)?;
-        let parts = settings.sets.iter().map(|set| Part::read(&settings, set)).collect::<Result<Vec<_>, _>>()?;
+        let mut parts = settings.sets.iter().map(|set| Part::read(&settings, set)).collect::<Result<Vec<_>, _>>()?;
+        // errors are what maps leave over, and a map is of a season of all sets
+        let mut in_seasons = settings.clone();
+        in_seasons.imaging.seasons = seasons::windows(&settings, parts.iter().map(|part| &part.observations))?;
+        for (set, part) in settings.sets.iter().zip(&mut parts) {
+            part.measure_errors(&in_seasons, set)?;
+        }
         let several = parts.len() > 1;
         let mut remarks = Vec::new();
         for (set, part) in settings.sets.iter().zip(&parts) {

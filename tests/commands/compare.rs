@@ -189,6 +189,14 @@ fn what_does_not_belong_together_is_refused() {
     }
     // what only steers the chain does not matter
     other_grid(&desk, "/sampler/seed", json!(5));
+    let as_it_was = desk.read("other/landscape.json");
+    // several maps where the same profiles have one in the run
+    let mut header = desk.json("other/landscape.json");
+    let season = json!({ "first_d": 0.0, "last_d": 1.0, "profiles": 10, "epoch_d": 0.0 });
+    header["measured"]["seasons"] = json!([season, season]);
+    desk.write("other/landscape.json", &header.to_string());
+    refused(&["maps of the star: 1 in the run, 2 in the landscape"]);
+    desk.write("other/landscape.json", &as_it_was);
     compared(&desk, "other");
 }
 

@@ -134,6 +134,29 @@ fn a_star_that_does_not_change_has_a_map_a_season() {
     assert_eq!(desk.json("three/fit.json")["measured"]["seasons"].as_array().unwrap().len(), 3);
 }
 
+/// A profile of one spectrograph every 63 d between those of the other: a map of each alone would leave nothing over.
+#[test]
+fn errors_are_measured_with_maps_of_the_seasons_of_all_sets() {
+    let mut config = unchanging();
+    let few = (0..7).map(|k| 0.3 + 21.13 * f64::from(k));
+    let many = (0..21).map(|k| 6.97 * f64::from(k));
+    for (k, cycles) in [many.collect::<Vec<f64>>(), few.collect()].into_iter().enumerate() {
+        config["observations"][k]["simulate"]["cycles"] = json!(cycles);
+    }
+    config["observations"][0]["simulate"]["random_spots"]["lifetime_d"] = json!(1e6);
+    let desk = Desk::new(config.clone());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let mut config = from_files(&config);
+    config["observations"][1]["sigma_scale"] = json!("auto");
+    desk.write("star.json", &config.to_string());
+    desk.succeed(&["map", "star.json", "--out", "map"]);
+    let map = desk.json("map/map.json");
+    assert_eq!(map.get("seasons"), None);
+    let scale = map["data_sets"][1]["errors"]["sigma_scale"].as_f64().unwrap();
+    // a map of each of its profiles: 0.795
+    assert!((scale - 1.0).abs() < 0.16, "{scale}");
+}
+
 #[test]
 fn seasons_that_make_no_sense_are_refused_by_their_key() {
     let refused = |key: &str, value: Value, parts: &[&str]| {

@@ -19,32 +19,20 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Reads or simulates a `set` of `settings`.
+    /// Reads or simulates a `set` of `settings`, with errors as they are quoted.
     pub fn read(settings: &Settings, set: &DataSetSettings) -> Result<Self, SceneError> {
         match &set.source {
-            ObservationSource::Files { path, options, continuum_level, errors: wanted } => {
+            ObservationSource::Files { path, options, continuum_level, .. } => {
                 let data = lsd::read(path, options)?;
                 let (mut observations, mut remarks) = (data.observations, data.remarks);
                 let left_out = leave_out(settings, set, &mut observations)?;
                 remarks.extend(remark(left_out));
-                let as_quoted = *wanted == ErrorSettings::default();
-                if as_quoted && *continuum_level == 1.0 {
+                if *continuum_level == 1.0 {
                     return Ok(Part { observations, sha256: data.sha256, errors: None, remarks });
                 }
-                let mut observations = observations.over_continuum(*continuum_level);
-                let errors = match as_quoted {
-                    true => None,
-                    false => {
-                        let mut whole = lsd::read(path, &ReadOptions::default())?.observations;
-                        leave_out(settings, set, &mut whole)?;
-                        let whole = whole.over_continuum(*continuum_level);
-                        let measured = measured_errors(settings, set, *wanted, &whole, &observations)?;
-                        measured.apply(&mut observations);
-                        Some(measured)
-                    }
-                };
+                let observations = observations.over_continuum(*continuum_level);
                 let sha256 = fingerprint(&observations);
-                Ok(Part { observations, sha256, errors, remarks })
+                Ok(Part { observations, sha256, errors: None, remarks })
             }
             ObservationSource::Simulate(simulation) => {
                 settings.check_velocity_grid(&set.star, &simulation.truth, simulation.step_kms)?;
@@ -53,6 +41,22 @@ impl Part {
                 Ok(Part { observations, sha256, errors: None, remarks: Vec::new() })
             }
         }
+    }
+
+    /// Measures the errors that the config leaves to the profiles of this `set`.
+    pub fn measure_errors(&mut self, settings: &Settings, set: &DataSetSettings) -> Result<(), SceneError> {
+        let ObservationSource::Files { path, continuum_level, errors: wanted, .. } = &set.source else { return Ok(()) };
+        if *wanted == ErrorSettings::default() {
+            return Ok(());
+        }
+        let mut whole = lsd::read(path, &ReadOptions::default())?.observations;
+        leave_out(settings, set, &mut whole)?;
+        let whole = whole.over_continuum(*continuum_level);
+        let measured = measured_errors(settings, set, *wanted, &whole, &self.observations)?;
+        measured.apply(&mut self.observations);
+        self.sha256 = fingerprint(&self.observations);
+        self.errors = Some(measured);
+        Ok(())
     }
 }
 

@@ -53,6 +53,18 @@ fn season(settings: &Settings, times: &[f64]) -> Season {
     Season { first_d, last_d, profiles: times.len(), epoch_d: star.epoch_d + cycles * star.rotation_period_d }
 }
 
+/// First and last time (d) of each season of the data sets' profiles.
+///
+/// # Errors
+/// As [`seasons`].
+pub(super) fn windows<'a>(
+    settings: &Settings,
+    parts: impl Iterator<Item = &'a Observations>,
+) -> Result<Vec<[f64; 2]>, ConfigError> {
+    let found = seasons(settings, &parts.cloned().collect::<Vec<_>>())?;
+    Ok(found.iter().map(|season| [season.first_d, season.last_d]).collect())
+}
+
 /// What results say of the seasons of all profiles; nothing of one.
 ///
 /// # Errors

@@ -135,10 +135,17 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
         let (first, second) = (settings.values[p], grid_settings.values[p]);
         return Some(format!("{} is fixed at {first} in the run and at {second} in the landscape", p.name()));
     }
-    (run.data_sha256 != grid.data_sha256).then(|| {
+    if run.data_sha256 != grid.data_sha256 {
         let key = config::section_difference("observations", &run.config, &grid.config).map(both);
         let why = key.or_else(|| injected(run, grid)).map_or_else(String::new, |why| format!(": {why}"));
-        format!("the observations are not the same{why}")
+        return Some(format!("the observations are not the same{why}"));
+    }
+    let maps = [run, grid].map(|origin| origin.measured.seasons.len().max(1));
+    (same_method && maps[0] != maps[1]).then(|| {
+        let [first, second] = maps;
+        format!(
+            "maps of the star: {first} in the run, {second} in the landscape (one is by an older program: repeat it)"
+        )
     })
 }
 
