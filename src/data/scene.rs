@@ -33,7 +33,7 @@ use crate::star::injection::inject;
 use crate::star::observation::Observations;
 use imaging::hold_zero_points;
 use measuring::{measured_errors, zero_points};
-use reading::Part;
+use reading::{Part, one_day_count};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -133,6 +133,7 @@ impl Scene {
     fn read(mut settings: Settings) -> Result<Self, SceneError> {
         light_curves::read(&mut settings)?;
         let mut parts = settings.sets.iter().map(|set| Part::read(&settings, set)).collect::<Result<Vec<_>, _>>()?;
+        one_day_count(&settings, &parts)?;
         // errors are what maps leave over, and a map is of a season of all sets
         let mut in_seasons = settings.clone();
         in_seasons.imaging.seasons = seasons::windows(&settings, parts.iter().map(|part| &part.observations))?;

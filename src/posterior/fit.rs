@@ -183,7 +183,7 @@ impl Fit {
         let residuals = residuals(observations, &depths);
         let summary =
             FitSummary { test, deviation, ..summarise(imager, observations, reference, &residuals, &velocities) };
-        let checks = Checks::of(&residuals, imager.data.correlated_bins);
+        let checks = Checks::of(&residuals, &imager.profiles_of_sets(), imager.data.correlated_bins);
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
         let tradeoff = reference.tradeoff.nodes().to_vec();
         Fit { map, model, nuisances, zero_points_kms, velocities, tradeoff, summary, checks }

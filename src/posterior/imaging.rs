@@ -164,6 +164,11 @@ impl Imager {
         count(&self.sets[..set])..count(&self.sets[..=set])
     }
 
+    /// The same of each data set.
+    pub fn profiles_of_sets(&self) -> Vec<std::ops::Range<usize>> {
+        (0..self.sets.len()).map(|set| self.profiles_of(set)).collect()
+    }
+
     /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
     /// depths change with velocity by `slopes`; in place of those that there were.
     pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64]) -> Self {

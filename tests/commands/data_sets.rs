@@ -134,6 +134,23 @@ fn a_star_that_does_not_change_has_a_map_a_season() {
     assert_eq!(desk.json("three/fit.json")["measured"]["seasons"].as_array().unwrap().len(), 3);
 }
 
+#[test]
+fn sets_that_count_other_days_are_refused() {
+    let desk = Desk::new(two_sets());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    desk.write("star.json", &from_files(&two_sets()).to_string());
+    let list = desk.read("data/red/observations.txt");
+    let in_jd = |line: &str| match line.rsplit_once(' ') {
+        Some((file, time)) if !line.starts_with('#') => {
+            format!("{file} {}", time.parse::<f64>().unwrap() + 2_459_000.0)
+        }
+        _ => line.to_owned(),
+    };
+    desk.write("data/red/observations.txt", &list.lines().map(in_jd).collect::<Vec<_>>().join("\n"));
+    let message = desk.refusal(&["map", "star.json", "--out", "map"]);
+    says(&message, &["observations[1]", "another zero point", "MJD is JD - 2400000.5"]);
+}
+
 /// A profile of one spectrograph every 63 d between those of the other: a map of each alone would leave nothing over.
 #[test]
 fn errors_are_measured_with_maps_of_the_seasons_of_all_sets() {

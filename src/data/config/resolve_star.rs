@@ -78,7 +78,11 @@ pub(super) fn contrast(star: &Star) -> Result<f64, Fault> {
     let contrast = planck_contrast(spot, photosphere, star.wavelength_nm);
     match (0.0..1.0).contains(&contrast) {
         true => Ok(contrast),
-        false => Err(Fault::new("star.spot_k", format!("{spot} gives a contrast of {contrast}, not in [0, 1)"))),
+        false => {
+            let nm = star.wavelength_nm;
+            let problem = format!("{nm} nm gives spots of {spot} K no contrast that is a number: it is in nanometres");
+            Err(Fault::new("star.wavelength_nm", problem))
+        }
     }
 }
 

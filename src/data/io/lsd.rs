@@ -14,6 +14,7 @@ mod times;
 mod writing;
 
 pub use error::LsdError;
+pub use times::LONGEST_D;
 pub use writing::{is_written, write, write_as, write_numbers};
 
 use crate::star::observation::{Observations, Profile};

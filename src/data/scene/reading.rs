@@ -60,6 +60,24 @@ impl Part {
     }
 }
 
+/// That days of all data sets are of one count.
+pub(super) fn one_day_count(settings: &Settings, parts: &[Part]) -> Result<(), ConfigError> {
+    let firsts = || parts.iter().filter_map(|part| part.observations.times_d().into_iter().reduce(f64::min));
+    let Some(first) = firsts().next() else { return Ok(()) };
+    let far = |(_, time): &(&DataSetSettings, f64)| (time - first).abs() > lsd::LONGEST_D;
+    match settings.sets.iter().zip(firsts()).find(far) {
+        None => Ok(()),
+        Some((set, time)) => {
+            let problem = format!(
+                "its times begin at {time} d, those of {} at {first} d: another zero point? Days of all data sets are \
+                 of one count (MJD is JD - 2400000.5)",
+                settings.sets[0].key
+            );
+            Err(settings.fault(&set.key, &problem))
+        }
+    }
+}
+
 /// The profiles of a `set` in their whole width, as they are in their files, with what the list says of each.
 pub(super) fn whole(settings: &Settings, set: &DataSetSettings) -> Result<(Observations, Vec<Label>), LsdError> {
     match &set.source {

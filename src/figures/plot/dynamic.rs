@@ -15,17 +15,17 @@ const RESIDUAL: f64 = 4.0;
 /// The figure of profiles with a model, which are in the order of their phase.
 pub(super) fn figure(lines: &[Line]) -> Figure {
     let mut figure = Figure::new("residuals", PAGE_MM, 92.0);
-    figure.caption = "Dynamic spectra: observed and modelled profiles minus the mean observed profile, and observed \
+    figure.caption = "Dynamic spectra: observed and modelled profiles minus the mean observed profile (of its data set), and observed \
     minus \
                       modelled in units of the standard error. Rows are profiles, at their rotation phases; phases \
                       that were \
                       not observed are grey."
         .into();
-    let mean = mean(lines);
-    let deviation = |values: &[f64], k: usize| mean.get(k).map_or(f64::NAN, |mean| 100.0 * (values[k] - mean));
+    let means: Vec<Vec<f64>> = lines.iter().map(|line| mean(lines, line)).collect();
     let largest = lines
         .iter()
-        .flat_map(|line| (0..line.observed.len()).map(|k| deviation(&line.observed, k).abs()))
+        .zip(&means)
+        .flat_map(|(line, mean)| line.observed.iter().zip(mean).map(|(x, mean)| 100.0 * (x - mean).abs()))
         .filter(|x| x.is_finite())
         .fold(0.0, f64::max);
     // of profiles that are all alike, too, zero is in the middle
@@ -35,13 +35,13 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     let velocities = extent(lines, |line| &line.velocity_kms);
     let (left, gap, bar) = (36.0, 12.0, 52.0);
     let width = (figure.width - left - gap - 2.0 * bar) / 3.0;
-    type Value<'a> = &'a dyn Fn(&Line, usize) -> f64;
+    type Value<'a> = &'a dyn Fn(&Line, &[f64], usize) -> f64;
     let panels: [(&str, Value, Shade, f64); 3] = [
-        ("observed − mean", &|line, k| deviation(&line.observed, k), change, left),
-        ("model − mean", &|line, k| deviation(&line.model, k), change, left + width + gap),
+        ("observed − mean", &|line, mean, k| 100.0 * (line.observed[k] - mean[k]), change, left),
+        ("model − mean", &|line, mean, k| 100.0 * (line.model[k] - mean[k]), change, left + width + gap),
         (
             "observed − model",
-            &|line, k| (line.observed[k] - line.model[k]) / line.sigma[k],
+            &|line, _, k| (line.observed[k] - line.model[k]) / line.sigma[k],
             left_over,
             left + 2.0 * width + gap + bar,
         ),
@@ -50,14 +50,14 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
         let frame = Rect { left, top: 16.0, width, height: figure.height - 46.0 };
         let y = Axis::linear(if k == 0 { "rotation phase" } else { "" }, [0.0, 1.0]);
         let panel = Panel { frame, x: Axis::linear("velocity (km/s)", velocities), y };
-        let tiles = lines.iter().zip(rows(lines)).flat_map(|(line, rows)| {
+        let tiles = lines.iter().zip(&means).zip(rows(lines)).flat_map(|((line, mean), rows)| {
             let edges = edges(&line.velocity_kms);
             rows.into_iter().flat_map(move |y| {
                 let edges = edges.clone();
                 (0..line.velocity_kms.len()).map(move |k| Tile {
                     x: [edges[k], edges[k + 1]],
                     y,
-                    value: value(line, k),
+                    value: value(line, mean, k),
                 })
             })
         });
@@ -74,13 +74,11 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     figure
 }
 
-/// Mean observed profile; empty if the profiles are not on the same bins.
-fn mean(lines: &[Line]) -> Vec<f64> {
-    let bins = lines[0].observed.len();
-    if lines.iter().any(|line| line.observed.len() != bins) {
-        return Vec::new();
-    }
-    (0..bins).map(|k| lines.iter().map(|line| line.observed[k]).sum::<f64>() / lines.len() as f64).collect()
+/// Mean observed profile of those on the bins of `own`.
+fn mean(lines: &[Line], own: &Line) -> Vec<f64> {
+    let alike: Vec<&Line> = lines.iter().filter(|line| line.velocity_kms == own.velocity_kms).collect();
+    let mean = |k: usize| alike.iter().map(|line| line.observed[k]).sum::<f64>() / alike.len() as f64;
+    (0..own.observed.len()).map(mean).collect()
 }
 
 /// Borders of bins around their centres.

@@ -3,6 +3,7 @@
 use super::median;
 use crate::star::observation::{Observations, Profile};
 use nalgebra::{DMatrix, DVector};
+use std::cmp::Ordering;
 
 /// Fewest bins of continuum, in all profiles together, whose scatter means something.
 const FEWEST_BINS: usize = 30;
@@ -69,27 +70,35 @@ impl Scatter {
     pub fn correlated_bins(&self, sigma_bins: f64) -> f64 {
         let overlap = |lag: usize| (-0.25 * (lag as f64 / sigma_bins).powi(2)).exp();
         const CHANCE: f64 = 2.5;
-        let chance = CHANCE / (self.freedom.max(1) as f64).sqrt();
         let mut bins = 1.0;
         for lags in 1..=LAGS {
-            let Some(correlation) = self.correlation(lags).filter(|rho| rho[lags - 1] > chance) else { break };
+            let Some((correlation, sd)) = self.correlation(lags) else { break };
+            // lines through a few bins leave little of what is so far apart: NaN breaks off, too
+            if !matches!(correlation[lags - 1].partial_cmp(&(CHANCE * sd)), Some(Ordering::Greater)) {
+                break;
+            }
             bins = 1.0 + 2.0 * correlation.iter().enumerate().map(|(k, rho)| rho * overlap(k + 1)).sum::<f64>();
         }
         bins
     }
 
-    /// Correlations of bins 1, ..., `lags` apart, none beyond. The lines take up some of what is correlated; what the
-    /// products of their residuals are on average is linear in the covariances, and is solved for these.
-    fn correlation(&self, lags: usize) -> Option<Vec<f64>> {
+    /// Correlations of bins 1, ..., `lags` apart, none beyond, and the standard deviation of the last in white noise. The
+    /// lines take up some of what is correlated; what the products of their residuals are on average is linear in the
+    /// covariances, and is solved for these.
+    fn correlation(&self, lags: usize) -> Option<(Vec<f64>, f64)> {
         let mut lengths = self.lengths.clone();
         lengths.sort_unstable();
-        let mut mean = DMatrix::zeros(lags + 1, lags + 1);
+        let (mut mean, mut scatter) = (DMatrix::zeros(lags + 1, lags + 1), DMatrix::zeros(lags + 1, lags + 1));
         for same in lengths.chunk_by(|a, b| a == b) {
-            mean += same.len() as f64 * mean_products(same[0], lags);
+            let [mean_of_one, scatter_of_one] = products(same[0], lags);
+            mean += same.len() as f64 * mean_of_one;
+            scatter += same.len() as f64 * scatter_of_one;
         }
-        let covariance = mean.lu().solve(&DVector::from_column_slice(&self.products[..=lags]))?;
+        let inverse = mean.try_inverse()?;
+        let covariance = &inverse * DVector::from_column_slice(&self.products[..=lags]);
         let correlation: Vec<f64> = covariance.iter().skip(1).map(|c| c / covariance[0]).collect();
-        (covariance[0] > 0.0 && correlation.iter().all(|rho| rho.is_finite())).then_some(correlation)
+        let sd = (&inverse * scatter * inverse.transpose())[(lags, lags)].sqrt();
+        (covariance[0] > 0.0 && correlation.iter().all(|rho| rho.is_finite())).then_some((correlation, sd))
     }
 
     /// Scatter over quoted errors; `None` of fewer than `least` degrees of freedom, and of none at all.
@@ -113,21 +122,20 @@ fn about_a_line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> Scatte
     Scatter { chi2: products(0), freedom: count - 2, products: std::array::from_fn(products), lengths: vec![count] }
 }
 
-/// Mean of the sum of products of residuals that are so many bins apart (row) from a straight line through `bins`, for
-/// noise that has a covariance of 1 at one distance (column).
-fn mean_products(bins: usize, lags: usize) -> DMatrix<f64> {
+/// Of the sums of products of residuals that are so many bins apart (row) from a straight line through `bins`: their
+/// mean for noise that has a covariance of 1 at one distance (column), and their covariance in white noise.
+fn products(bins: usize, lags: usize) -> [DMatrix<f64>; 2] {
     let line = DMatrix::from_fn(bins, 2, |j, power| (j as f64 - 0.5 * (bins - 1) as f64).powi(power as i32));
     let unit = DMatrix::from_fn(bins, 2, |j, k| line[(j, k)] / line.column(k).norm());
     let left = DMatrix::identity(bins, bins) - &unit * unit.transpose();
-    let mut mean = DMatrix::zeros(lags + 1, lags + 1);
-    for column in 0..=lags {
-        let noise = DMatrix::from_fn(bins, bins, |a, b| f64::from(u8::from(a.abs_diff(b) == column)));
-        let residuals = &left * noise * &left;
-        for row in 0..=lags {
-            mean[(row, column)] = (row..bins).map(|j| residuals[(j, j - row)]).sum();
-        }
-    }
-    mean
+    let apart = |lag: usize| DMatrix::from_fn(bins, bins, |a, b| f64::from(u8::from(a.abs_diff(b) == lag)));
+    let residuals: Vec<DMatrix<f64>> = (0..=lags).map(|lag| &left * apart(lag) * &left).collect();
+    let mean = |row: usize, column: usize| (row..bins).map(|j| residuals[column][(j, j - row)]).sum();
+    // a product counts each pair once
+    let share = |lag: usize| if lag == 0 { 1.0 } else { 0.5 };
+    let covariance =
+        |row: usize, column: usize| 2.0 * share(row) * share(column) * residuals[row].dot(&residuals[column]);
+    [DMatrix::from_fn(lags + 1, lags + 1, mean), DMatrix::from_fn(lags + 1, lags + 1, covariance)]
 }
 
 impl Noise {
@@ -181,9 +189,9 @@ mod tests {
     #[test]
     fn noise_that_goes_together_is_seen() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let mut side = |rho: f64| {
+        let mut side = |rho: f64, bins: usize| {
             let mut x = 0.0;
-            let noise: Vec<f64> = (0..40)
+            let noise: Vec<f64> = (0..bins)
                 .map(|_| {
                     x = rho * x + (1.0 - rho * rho).sqrt() * rng.sample::<f64, _>(StandardNormal);
                     x
@@ -191,14 +199,18 @@ mod tests {
                 .collect();
             about_a_line(noise.into_iter().enumerate().map(|(j, y)| (j as f64, y, 1.0)))
         };
-        let white: Scatter = (0..100).map(|_| side(0.0)).sum();
+        let white: Scatter = (0..100).map(|_| side(0.0, 40)).sum();
         assert_eq!(white.correlated_bins(9.0), 1.0);
-        let together: Scatter = (0..100).map(|_| side(0.5)).sum();
+        let together: Scatter = (0..100).map(|_| side(0.5, 40)).sum();
         // what is cut off at the end is a little
         assert!(
             (together.correlated_bins(f64::INFINITY) / 3.0 - 1.0).abs() < 0.15,
             "{}",
             together.correlated_bins(f64::INFINITY)
         );
+        // a few bins of continuum beside the line show no correlation, and 2.5 standard deviations once in 160 times
+        let mut few = |bins: usize| -> Scatter { (0..80).map(|_| side(0.0, bins)).sum() };
+        let seen = (0..100).map(|k| few(3 + k % 4).correlated_bins(9.0)).filter(|bins| *bins > 1.0).count();
+        assert!(seen <= 5, "{seen}");
     }
 }

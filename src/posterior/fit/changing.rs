@@ -219,7 +219,7 @@ impl ChangingFit {
             model: modelled.intensities(),
             unchanging_model: unchanging.map(|modelled| modelled.intensities()),
             velocities,
-            checks: Checks::of_flexible(&residuals, imager.data.correlated_bins),
+            checks: Checks::of_flexible(&residuals, &imager.profiles_of_sets(), imager.data.correlated_bins),
             warnings,
             summary,
             fitted,
@@ -246,7 +246,7 @@ pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &F
     Explained {
         velocities: observations.profiles.iter().zip(modelled.depths()).map(velocity).collect(),
         chi2_per_datum: chi2(&residuals).0,
-        misfit: Checks::of_flexible(&residuals, imager.data.correlated_bins).warnings,
+        misfit: Checks::of_flexible(&residuals, &imager.profiles_of_sets(), imager.data.correlated_bins).warnings,
     }
 }
 

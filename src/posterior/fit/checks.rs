@@ -3,7 +3,7 @@
 //!
 //! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the
 //! profiles, between the core of the line and what lies outside, and whether neighbouring bins are correlated. In
-//! replicated data every profile has the same chi2 per datum, but for the scatter of a chi2 distribution, and
+//! replicated data every profile of a data set has the same chi2 per datum, but for the scatter of a chi2 distribution, and
 //! neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many fewer.
 //! What the map itself takes up is spread evenly here.
 
@@ -11,6 +11,7 @@ use super::Residual;
 use crate::numerics::json::number_or_null;
 use crate::numerics::normal::cumulative;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// A profile is worth a warning when chance makes one so bad among all of them as rarely as this.
 const RARE: f64 = 0.01;
@@ -58,21 +59,27 @@ pub struct ProfileCheck {
 
 impl Checks {
     /// Of the `residuals` of every profile at its time, where noise is correlated over so many bins: they count for
-    /// one.
-    pub(super) fn of(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64) -> Self {
-        Checks::with(profiles, correlated_bins, false)
+    /// one. Profiles are held against those of their own set of `sets`.
+    pub(super) fn of(profiles: &[(f64, Vec<Residual>)], sets: &[Range<usize>], correlated_bins: f64) -> Self {
+        Checks::with(profiles, sets, correlated_bins, false)
     }
 
     /// The same of maps that take up much of the noise in the core of the line, one a profile: what they leave over is
     /// smaller there, and neighbours have opposite signs. Only the reverse of it is worth a warning.
-    pub(super) fn of_flexible(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64) -> Self {
-        Checks::with(profiles, correlated_bins, true)
+    pub(super) fn of_flexible(profiles: &[(f64, Vec<Residual>)], sets: &[Range<usize>], correlated_bins: f64) -> Self {
+        Checks::with(profiles, sets, correlated_bins, true)
     }
 
-    fn with(profiles: &[(f64, Vec<Residual>)], correlated_bins: f64, flexible: bool) -> Self {
-        let all = || profiles.iter().flat_map(|(_, residuals)| residuals);
-        let per_datum = mean(all().map(|r| r.scaled * r.scaled));
-        let profile = |(time_d, residuals): &(f64, Vec<Residual>)| {
+    fn with(profiles: &[(f64, Vec<Residual>)], sets: &[Range<usize>], correlated_bins: f64, flexible: bool) -> Self {
+        fn in_all(profiles: &[(f64, Vec<Residual>)]) -> impl Iterator<Item = &Residual> {
+            profiles.iter().flat_map(|(_, residuals)| residuals)
+        }
+        let all = || in_all(profiles);
+        let of = |profiles| mean(in_all(profiles).map(|r| r.scaled * r.scaled));
+        let per_datum = of(profiles);
+        let in_set: Vec<f64> =
+            sets.iter().flat_map(|set| std::iter::repeat_n(of(&profiles[set.clone()]), set.len())).collect();
+        let profile = |((time_d, residuals), per_datum): (&(f64, Vec<Residual>), f64)| {
             let chi2: f64 = residuals.iter().map(|r| r.scaled * r.scaled).sum();
             let data = residuals.len();
             ProfileCheck {
@@ -90,7 +97,7 @@ impl Checks {
         let ((core, inside), (outside, beyond)) = (share(true), share(false));
         let pairs = || profiles.iter().flat_map(|(_, residuals)| residuals.windows(2));
         let mut checks = Checks {
-            profiles: profiles.iter().map(profile).collect(),
+            profiles: profiles.iter().zip(in_set).map(profile).collect(),
             chi2_per_datum_core: core,
             chi2_per_datum_outside: outside,
             core_excess_sigma: (core - outside) / (per_datum * (2.0 / inside + 2.0 / beyond).sqrt()),
@@ -165,6 +172,10 @@ mod tests {
     }
 
     fn noise(change: impl Fn(usize, usize, f64) -> f64) -> Checks {
+        noise_of(&[0..40], change)
+    }
+
+    fn noise_of(sets: &[Range<usize>], change: impl Fn(usize, usize, f64) -> f64) -> Checks {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut profile = |k: usize| {
             let residual = |j: usize, noise: f64| {
@@ -174,7 +185,7 @@ mod tests {
             let residuals = (0..60).map(|j| residual(j, rng.sample(StandardNormal))).collect();
             (k as f64, residuals)
         };
-        Checks::of(&(0..40).map(&mut profile).collect::<Vec<_>>(), 1.0)
+        Checks::of(&(0..40).map(&mut profile).collect::<Vec<_>>(), sets, 1.0)
     }
 
     #[test]
@@ -188,10 +199,10 @@ mod tests {
             (0..40).map(|k| (f64::from(k), (0..60).map(|j| residual(j, scaled(j))).collect())).collect()
         };
         let taken_up = profiles(|j| (-1.0_f64).powi(j as i32) * if (20..40).contains(&j) { 0.5 } else { 1.0 });
-        assert_eq!(Checks::of(&taken_up, 1.0).warnings.len(), 2);
-        assert!(Checks::of_flexible(&taken_up, 1.0).warnings.is_empty());
+        assert_eq!(Checks::of(&taken_up, &[0..40], 1.0).warnings.len(), 2);
+        assert!(Checks::of_flexible(&taken_up, &[0..40], 1.0).warnings.is_empty());
         let left_over = profiles(|j| if (20..40).contains(&j) { 2.0 } else { 1.0 });
-        assert_eq!(Checks::of_flexible(&left_over, 1.0).warnings.len(), 2);
+        assert_eq!(Checks::of_flexible(&left_over, &[0..40], 1.0).warnings.len(), 2);
     }
 
     #[test]
@@ -207,5 +218,15 @@ mod tests {
         assert!(core.warnings.iter().any(|w| w.contains("core of the line")), "{:?}", core.warnings);
         let wave = noise(|_, j, noise| noise + (0.5 * j as f64).sin());
         assert!(wave.warnings.iter().any(|w| w.contains("neighbouring bins")), "{:?}", wave.warnings);
+    }
+
+    /// Errors of one set that are too large make no profile of another look bad.
+    #[test]
+    fn sets_are_held_against_themselves() {
+        let errors = |k: usize, _: usize, noise: f64| if k < 30 { 0.6 * noise } else { noise };
+        let pooled = noise(errors);
+        assert!(pooled.warnings.len() > 1, "{:?}", pooled.warnings);
+        let apart = noise_of(&[0..30, 30..40], errors);
+        assert!(apart.warnings.is_empty(), "{:?}", apart.warnings);
     }
 }

@@ -15,7 +15,7 @@ const MJD_ZERO_D: f64 = 2_400_000.5;
 const OUR_TIME_D: f64 = 200_000.0;
 
 /// Longer than profiles like these have been observed (d): 50 years.
-const LONGEST_D: f64 = 18_262.5;
+pub const LONGEST_D: f64 = 18_262.5;
 
 /// Nobody observes a rotating star with at least this between any two of its profiles (d).
 const SPARSEST_D: f64 = 100.0;
