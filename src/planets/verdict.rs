@@ -178,9 +178,9 @@ fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Kno
     };
     let against = if against.is_empty() { String::new() } else { format!(" Against it: {}.", against.join("; ")) };
     format!(
-        "{head}: {period_d:.4} d, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s; against no planet {significance:.1} sigma \
-         (one-sided; false-alarm probability of this one period {}); K is below {k_upper95_kms:.digits$} km/s (95 %).\
-         {against}",
+        "{head}: {period_d:.4} d, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s; against no planet \
+         {significance:.1} sigma (one-sided; false-alarm probability of this one period {}); K is below \
+         {k_upper95_kms:.digits$} km/s (95 %).{against}",
         probability(chance)
     )
 }

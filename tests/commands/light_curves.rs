@@ -48,6 +48,21 @@ fn a_light_curve_from_its_table_to_a_figure() {
     desk.write("star.json", &from_files().to_string());
     let said = desk.succeed(&["map", "star.json", "--out", "map"]);
     says(&said, &["light curve", "tess: ", "in 2 segments", "flux", "per bin", "lightcurve.csv"]);
+    // a transit, which no spot explains
+    let deep = |line: &str| match line.split(',').map(str::parse::<f64>).collect::<Result<Vec<_>, _>>() {
+        Ok(row) if (4.9..5.1).contains(&row[0]) => format!("{},{},{}", row[0], 0.9 * row[1], row[2]),
+        _ => line.to_owned(),
+    };
+    let whole = desk.read("data/tess.csv");
+    desk.write("data/tess.csv", &whole.lines().map(deep).collect::<Vec<_>>().join("\n"));
+    let mut config = from_files();
+    config["photometry"]["exclude"] = json!([[4.9, 5.1]]);
+    desk.write("cut.json", &config.to_string());
+    says(&desk.succeed(&["map", "cut.json", "--out", "cut"]), &["in 2 segments", "4 measurements left out"]);
+    let times = desk.read("cut/lightcurve.csv");
+    let times = times.lines().skip(1).map(|line| line.split(',').next().unwrap().parse::<f64>().unwrap());
+    assert!(times.clone().all(|time| !(4.9..5.1).contains(&time)) && times.count() > 20);
+    desk.write("data/tess.csv", &whole);
     let table = desk.read("map/lightcurve.csv");
     let mut lines = table.lines();
     assert_eq!(lines.next(), Some("time_d,flux,sigma,model,residual,segment,band"));
@@ -78,6 +93,8 @@ fn what_is_no_light_curve_is_refused_by_key_file_or_line() {
     refused(&set("wavelength_nm", json!(-5)), &["photometry.wavelength_nm", "above 0"]);
     refused(&set("sigma_scale", json!(0)), &["photometry.sigma_scale", "above 0"]);
     refused(&set("segment_gap_d", json!(-1)), &["photometry.segment_gap_d", "0 to 1000"]);
+    refused(&set("exclude", json!([[2, 1]])), &["photometry.exclude[0]", "before the end"]);
+    refused(&set("exclude", json!([[-1, 100]])), &["photometry.exclude", "leaves 0 of 134 measurements"]);
     refused(&set("path", json!("tess.csv")), &["photometry", "not both"]);
     refused(
         &set("limb_darkening", json!({ "law": "linear", "coefficients": [2.0] })),

@@ -16,7 +16,8 @@ pub(super) struct PhotometrySection {
     pub name: Option<String>,
     /// A table of comma-separated numbers, relative to the folder of this config, whose first line has the names of the
     /// columns, `time`, `flux` and `sigma` among them. Times are days, counted as those of the profiles; flux and its
-    /// standard error are in any unit of brightness (not magnitudes). Flares and transits must be cut out.
+    /// standard error are in any unit of brightness (not magnitudes). Flares and transits must be cut out, here or by
+    /// `exclude`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
     /// Brightness of a spot over that of the photosphere in this band, from 0 and below 1; that of the star if not
@@ -37,6 +38,9 @@ pub(super) struct PhotometrySection {
     /// Factor on the standard errors, above 0.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub sigma_scale: f64,
+    /// Windows of time `[start, end]` (d) whose measurements are left out: transits, flares.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exclude: Vec<[f64; 2]>,
     /// A simulated light curve of the star that `observations.simulate` has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulatedLight>,

@@ -4,6 +4,7 @@
 use super::domain::{check_value, key};
 use super::error::Fault;
 use super::raw::{Config, DEFAULT_PORB_OVER_PROT};
+use super::resolve::positive;
 use crate::posterior::objective::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{StarSettings, stability};
 
@@ -108,6 +109,7 @@ fn resolve_orbit(
         return Err(Fault::new(format!("parameters.{}", here.name()), problem));
     }
     if let Some(period_d) = period {
+        positive(&key(of.period), period_d)?;
         of.set_period(values, period_d, clock);
         check_value(of.ratio, values[of.ratio], &key(of.period))?;
     }

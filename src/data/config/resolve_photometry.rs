@@ -5,6 +5,7 @@ use super::error::Fault;
 use super::photometry::{PhotometrySection, SimulatedLight};
 use super::raw::Config;
 use super::resolve::positive;
+use super::resolve_seasons::check_windows;
 use super::resolve_sets::names;
 use super::resolve_star::{contrast, limb_darkening};
 use super::{LightCurveSettings, LightSource};
@@ -35,6 +36,7 @@ pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<Ligh
             let problem = format!("{} must be from 0 to {LONGEST_GAP_D} d", section.segment_gap_d);
             return Err(Fault::new(at("segment_gap_d"), problem));
         }
+        check_windows(&section.exclude, &at("exclude"))?;
         let usual_name = match sections.len() {
             1 => "photometry".to_owned(),
             _ => format!("photometry{}", s + 1),
@@ -45,6 +47,8 @@ pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<Ligh
             source: source(raw, section, &key, config)?,
             segment_gap_d: section.segment_gap_d,
             sigma_scale: section.sigma_scale,
+            exclude: section.exclude.clone(),
+            left_out: 0,
             binned: None,
             key,
         });

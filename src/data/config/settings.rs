@@ -104,6 +104,10 @@ pub struct LightCurveSettings {
     pub segment_gap_d: f64,
     /// Factor on the standard errors.
     pub sigma_scale: f64,
+    /// Windows `[start, end]` (d) whose measurements are left out.
+    pub exclude: Vec<[f64; 2]>,
+    /// How many these are, once it is read.
+    pub left_out: usize,
     /// The bins, once it is read.
     pub binned: Option<LightCurve>,
 }

@@ -17,6 +17,9 @@ const MOST_SIMULATED: f64 = 50_000.0;
 /// Spots know nothing of themselves after so many lifetimes.
 const FORGOTTEN: f64 = 5.0;
 
+/// Fewest measurements of a light curve.
+const FEWEST: usize = 3;
+
 /// Reads or simulates the light curves of `settings`, and brings them to bins.
 ///
 /// # Errors
@@ -27,6 +30,15 @@ pub(super) fn read(settings: &mut Settings) -> Result<(), SceneError> {
     let times_d: Vec<Vec<f64>> = all.iter().map(|one| one.iter().map(|flux| flux.time_d).collect()).collect();
     let width_d = bin_width_d(&times_d, settings.star.rotation_period_d);
     for (curve, mut measured) in settings.light_curves.iter_mut().zip(all) {
+        let before = measured.len();
+        let is_in = |time_d: f64, [start, end]: &[f64; 2]| (*start..=*end).contains(&time_d);
+        measured.retain(|one| !curve.exclude.iter().any(|window| is_in(one.time_d, window)));
+        if measured.len() < FEWEST.min(before) {
+            let problem = format!("leaves {} of {before} measurements, at least {FEWEST} are needed", measured.len());
+            let key = format!("{}.exclude", curve.key);
+            return Err(ConfigError::Key { path: settings.path.clone(), key, problem }.into());
+        }
+        curve.left_out = before - measured.len();
         measured.iter_mut().for_each(|one| one.sigma *= curve.sigma_scale);
         curve.binned = Some(LightCurve::new(&curve.name, curve.band, &measured, width_d, curve.segment_gap_d));
     }
@@ -93,14 +105,18 @@ pub(super) fn near(settings: &Settings, observations: &Observations) -> Result<V
 
 /// What was made of the light curves, a line each.
 pub(super) fn remarks(settings: &Settings) -> Vec<String> {
-    let binned = settings.light_curves.iter().filter_map(|curve| curve.binned.as_ref());
-    let said = |curve: &LightCurve| {
-        let LightCurve { name, bins, segments, .. } = curve;
+    let said = |curve: &LightCurveSettings| {
+        let LightCurve { name, bins, segments, .. } = curve.binned.as_ref()?;
         let sigma = bins.iter().map(|bin| bin.sigma).sum::<f64>() / bins.len() as f64;
         let parted = if *segments == 1 { "segment" } else { "segments" };
-        format!("{name}: {} bins in {segments} {parted}, error {sigma:.1e} of the flux in the mean", bins.len())
+        let left_out = match curve.left_out {
+            0 => String::new(),
+            some => format!(", {some} measurements left out"),
+        };
+        let bins = bins.len();
+        Some(format!("{name}: {bins} bins in {segments} {parted}, error {sigma:.1e} of the flux in the mean{left_out}"))
     };
-    binned.map(said).collect()
+    settings.light_curves.iter().filter_map(said).collect()
 }
 
 /// The fingerprint of the observations with that of the light curves, where there are any.

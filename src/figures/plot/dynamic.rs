@@ -15,12 +15,11 @@ const RESIDUAL: f64 = 4.0;
 /// The figure of profiles with a model, which are in the order of their phase.
 pub(super) fn figure(lines: &[Line]) -> Figure {
     let mut figure = Figure::new("residuals", PAGE_MM, 92.0);
-    figure.caption = "Dynamic spectra: observed and modelled profiles minus the mean observed profile (of its data set), and observed \
-    minus \
-                      modelled in units of the standard error. Rows are profiles, at their rotation phases; phases \
-                      that were \
-                      not observed are grey."
-        .into();
+    figure.caption =
+        "Dynamic spectra: observed and modelled profiles minus the mean observed profile (of its data set), \
+                      and observed minus modelled in units of the standard error. Rows are profiles, at their rotation \
+                      phases; phases that were not observed are grey."
+            .into();
     let means: Vec<Vec<f64>> = lines.iter().map(|line| mean(lines, line)).collect();
     let largest = lines
         .iter()

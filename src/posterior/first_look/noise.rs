@@ -82,9 +82,9 @@ impl Scatter {
         bins
     }
 
-    /// Correlations of bins 1, ..., `lags` apart, none beyond, and the standard deviation of the last in white noise. The
-    /// lines take up some of what is correlated; what the products of their residuals are on average is linear in the
-    /// covariances, and is solved for these.
+    /// Correlations of bins 1, ..., `lags` apart, none beyond, and the standard deviation of the last in white noise.
+    /// The lines take up some of what is correlated; what the products of their residuals are on average is linear in
+    /// the covariances, and is solved for these.
     fn correlation(&self, lags: usize) -> Option<(Vec<f64>, f64)> {
         let mut lengths = self.lengths.clone();
         lengths.sort_unstable();

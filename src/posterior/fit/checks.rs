@@ -3,9 +3,9 @@
 //!
 //! The chi2 of all of them says nothing, for it is the target that was asked for. How it is shared does: among the
 //! profiles, between the core of the line and what lies outside, and whether neighbouring bins are correlated. In
-//! replicated data every profile of a data set has the same chi2 per datum, but for the scatter of a chi2 distribution, and
-//! neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many fewer.
-//! What the map itself takes up is spread evenly here.
+//! replicated data every profile of a data set has the same chi2 per datum, but for the scatter of a chi2 distribution,
+//! and neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many
+//! fewer. What the map itself takes up is spread evenly here.
 
 use super::Residual;
 use crate::numerics::json::number_or_null;

@@ -114,8 +114,8 @@ impl<'a> Shortcut<'a> {
     }
 }
 
-/// Share of ln L that is lost half way between two trial frequencies, at most: with all profiles at both ends of the time
-/// base 3 %. A neighbouring season's peak has 99 % of the right one's.
+/// Share of ln L that is lost half way between two trial frequencies, at most: with all profiles at both ends of the
+/// time base 3 %. A neighbouring season's peak has 99 % of the right one's.
 const LOST: f64 = 0.05;
 
 /// The frequencies between those of `trials` at which peaks are highest, of all that may be the highest.
