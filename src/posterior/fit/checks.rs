@@ -171,8 +171,12 @@ mod tests {
         }
     }
 
+    fn one_set() -> Vec<Range<usize>> {
+        std::iter::once(0..40).collect()
+    }
+
     fn noise(change: impl Fn(usize, usize, f64) -> f64) -> Checks {
-        noise_of(&[0..40], change)
+        noise_of(&one_set(), change)
     }
 
     fn noise_of(sets: &[Range<usize>], change: impl Fn(usize, usize, f64) -> f64) -> Checks {
@@ -199,10 +203,10 @@ mod tests {
             (0..40).map(|k| (f64::from(k), (0..60).map(|j| residual(j, scaled(j))).collect())).collect()
         };
         let taken_up = profiles(|j| (-1.0_f64).powi(j as i32) * if (20..40).contains(&j) { 0.5 } else { 1.0 });
-        assert_eq!(Checks::of(&taken_up, &[0..40], 1.0).warnings.len(), 2);
-        assert!(Checks::of_flexible(&taken_up, &[0..40], 1.0).warnings.is_empty());
+        assert_eq!(Checks::of(&taken_up, &one_set(), 1.0).warnings.len(), 2);
+        assert!(Checks::of_flexible(&taken_up, &one_set(), 1.0).warnings.is_empty());
         let left_over = profiles(|j| if (20..40).contains(&j) { 2.0 } else { 1.0 });
-        assert_eq!(Checks::of_flexible(&left_over, &[0..40], 1.0).warnings.len(), 2);
+        assert_eq!(Checks::of_flexible(&left_over, &one_set(), 1.0).warnings.len(), 2);
     }
 
     #[test]
