@@ -184,11 +184,15 @@ def share(hits, of):
     """A share in per cent with its binomial error; where it is none or all, the 68 % limit."""
     if not of:
         return "-"
+
+    def digits(x):
+        return f"{x:.0f}" if x >= 1 else f"{x:.1f}"
+
     if hits in (0, of):
         limit = 100 * (1 - 0.32 ** (1 / of))
-        return f"below {limit:.0f}" if not hits else f"above {100 - limit:.0f}"
+        return f"below {digits(limit)}" if not hits else f"above {100 - limit:.0f}"
     p = hits / of
-    return f"{100 * p:.0f} +- {100 * math.sqrt(p * (1 - p) / of):.0f}"
+    return f"{digits(100 * p)} +- {digits(100 * math.sqrt(p * (1 - p) / of))}"
 
 
 def sigma_there(row, how):
