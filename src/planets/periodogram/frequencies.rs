@@ -3,13 +3,17 @@
 //! A peak is about `1/T` wide, T the time base; ten frequencies to each of these lose less than 1 % of its height. The
 //! longest period is 2 T, of which the data show half an orbit. Unevenly spaced data have no Nyquist frequency, but one
 //! searches no further than some multiple of its average `N / (2 T)`: 5 of them, the custom of Lomb-Scargle codes
-//! (VanderPlas 2018, ApJS 236, 16, section 7.1). Where the profiles stand at about even distances the periods shorter
+//! (VanderPlas 2018, ApJS 236, 16, section 7.1); of a gap between seasons 60 d count. Where the profiles stand at about even distances the periods shorter
 //! than twice the median spacing are mere reflections, and the search ends there.
 
 use serde::{Deserialize, Serialize};
 
 /// The shortest period is that of this many average Nyquist frequencies.
 const NYQUIST_FACTOR: f64 = 5.0;
+
+/// A gap between seasons counts for at most so much (d) of the time in which profiles stand: two short seasons far
+/// apart tell of short periods what each of them tells.
+const LONGEST_GAP_D: f64 = 60.0;
 
 /// Trial frequencies to each `1/T`.
 const OVERSAMPLING: f64 = 10.0;
@@ -92,8 +96,9 @@ impl Frequencies {
                 return Err(FrequencyError::NotPositive { name, value });
             }
         }
-        let Sampling { time_base, median_spacing, profiles } = Sampling::of(cycles)?;
-        let nyquist = NYQUIST_FACTOR * profiles / (2.0 * time_base);
+        let longest_gap = LONGEST_GAP_D / rotation_period_d;
+        let Sampling { time_base, without_gaps, median_spacing, profiles } = Sampling::of(cycles, longest_gap)?;
+        let nyquist = NYQUIST_FACTOR * profiles / (2.0 * without_gaps);
         let shortest = (1.0 / nyquist).max(2.0 * median_spacing);
         let min_d = min_period_d.unwrap_or(shortest * rotation_period_d);
         let max_d = max_period_d.unwrap_or(LONGEST_PERIOD * time_base * rotation_period_d);
@@ -127,12 +132,13 @@ impl Frequencies {
 /// How the profiles are spread in time.
 struct Sampling {
     time_base: f64,
+    without_gaps: f64,
     median_spacing: f64,
     profiles: f64,
 }
 
 impl Sampling {
-    fn of(cycles: &[f64]) -> Result<Self, FrequencyError> {
+    fn of(cycles: &[f64], longest_gap: f64) -> Result<Self, FrequencyError> {
         let mut times = cycles.to_vec();
         times.sort_by(f64::total_cmp);
         times.dedup();
@@ -142,7 +148,10 @@ impl Sampling {
         let mut spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         spacings.sort_by(f64::total_cmp);
         let time_base = times[times.len() - 1] - times[0];
-        Ok(Sampling { time_base, median_spacing: spacings[spacings.len() / 2], profiles: times.len() as f64 })
+        let beyond: f64 = spacings.iter().map(|spacing| (spacing - longest_gap).max(0.0)).sum();
+        let without_gaps = time_base - beyond;
+        let median_spacing = spacings[spacings.len() / 2];
+        Ok(Sampling { time_base, without_gaps, median_spacing, profiles: times.len() as f64 })
     }
 }
 
@@ -170,6 +179,15 @@ mod tests {
         let cycles: Vec<f64> = (0..60).map(|k| (k / 10) as f64 + 0.01 * (k % 10) as f64).collect();
         let (_, hi) = Frequencies::new(&cycles, 1.0, FrequencySettings::default()).unwrap().range();
         assert!((hi - 5.0 * 60.0 / (2.0 * 5.09)).abs() < 1e-9, "{hi}");
+    }
+
+    /// Half a year between two seasons is 60 d, and the time base is what it is.
+    #[test]
+    fn seasons_far_apart_are_searched_as_far_as_near_ones() {
+        let seasons = |apart: f64| [even(20, 0.5), even(20, 0.5).iter().map(|x| x + apart).collect()].concat();
+        let of = |apart| Frequencies::new(&seasons(apart), 3.0, FrequencySettings::default()).unwrap();
+        let (near, far) = (of(9.5 + 20.0), of(9.5 + 60.0));
+        assert!((near.range().1 - far.range().1).abs() < 1e-9 && far.range().0 < 0.5 * near.range().0);
     }
 
     #[test]
