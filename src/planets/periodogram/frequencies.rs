@@ -3,9 +3,8 @@
 //! A peak is about `1/T` wide, T the time base; ten frequencies to each of these lose less than 1 % of its height. The
 //! longest period is 2 T, of which the data show half an orbit. Unevenly spaced data have no Nyquist frequency, but one
 //! searches no further than some multiple of its average `N / (2 T)`: 5 of them, the custom of Lomb-Scargle codes
-//! (VanderPlas 2018, ApJS 236, 16, section 7.1). Of a gap between seasons 60 d count in that T. Where the profiles stand
-//! at about even distances the periods shorter than twice the median spacing are mere reflections, and the search ends
-//! there.
+//! (VanderPlas 2018, ApJS 236, 16, section 7.1). Of a gap between seasons 60 d count in that T. Where profiles stand at
+//! about even distances the periods shorter than twice the median spacing are mere reflections: the search ends there.
 
 use serde::{Deserialize, Serialize};
 
