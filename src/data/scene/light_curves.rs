@@ -1,6 +1,7 @@
 //! The light curves of a config: read or simulated, and brought to bins.
 
 use super::SceneError;
+use super::seasons::is_within;
 use crate::data::config::{ConfigError, LightCurveSettings, LightSource, ObservationSource, Settings};
 use crate::data::io::light_curve;
 use crate::field::Lifetime;
@@ -26,23 +27,29 @@ const FEWEST: usize = 3;
 /// Tables that cannot be read or are no light curves.
 pub(super) fn read(settings: &mut Settings) -> Result<(), SceneError> {
     let of = |curve: &LightCurveSettings| measured(settings, curve);
-    let all: Vec<Vec<Flux>> = settings.light_curves.iter().map(of).collect::<Result<_, _>>()?;
+    let mut all: Vec<Vec<Flux>> = settings.light_curves.iter().map(of).collect::<Result<_, _>>()?;
+    for (k, measured) in all.iter_mut().enumerate() {
+        settings.light_curves[k].left_out = leave_out(settings, k, measured)?;
+    }
     let times_d: Vec<Vec<f64>> = all.iter().map(|one| one.iter().map(|flux| flux.time_d).collect()).collect();
     let width_d = bin_width_d(&times_d, settings.star.rotation_period_d);
     for (curve, mut measured) in settings.light_curves.iter_mut().zip(all) {
-        let before = measured.len();
-        let is_in = |time_d: f64, [start, end]: &[f64; 2]| (*start..=*end).contains(&time_d);
-        measured.retain(|one| !curve.exclude.iter().any(|window| is_in(one.time_d, window)));
-        if measured.len() < FEWEST.min(before) {
-            let problem = format!("leaves {} of {before} measurements, at least {FEWEST} are needed", measured.len());
-            let key = format!("{}.exclude", curve.key);
-            return Err(ConfigError::Key { path: settings.path.clone(), key, problem }.into());
-        }
-        curve.left_out = before - measured.len();
         measured.iter_mut().for_each(|one| one.sigma *= curve.sigma_scale);
         curve.binned = Some(LightCurve::new(&curve.name, curve.band, &measured, width_d, curve.segment_gap_d));
     }
     Ok(())
+}
+
+/// Leaves out what lies within the excluded windows of light curve `k`; how many measurements that were.
+fn leave_out(settings: &Settings, k: usize, measured: &mut Vec<Flux>) -> Result<usize, ConfigError> {
+    let (curve, before) = (&settings.light_curves[k], measured.len());
+    measured.retain(|one| !curve.exclude.iter().any(|window| is_within(window, one.time_d)));
+    let left = measured.len();
+    if left < FEWEST.min(before) {
+        let problem = format!("leaves {left} of {before} measurements, at least {FEWEST} are needed");
+        return Err(settings.fault(&format!("{}.exclude", curve.key), &problem));
+    }
+    Ok(before - left)
 }
 
 /// The measurements of a light curve, in the order of time; errors as quoted.

@@ -2,6 +2,7 @@
 //! asked for.
 
 use super::measuring::measured_errors;
+use super::seasons::is_within;
 use super::{SceneError, fingerprint};
 use crate::data::config::{ConfigError, DataSetSettings, ObservationSource, Settings};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
@@ -100,7 +101,7 @@ pub(super) fn whole(settings: &Settings, set: &DataSetSettings) -> Result<(Obser
 }
 
 fn is_excluded(set: &DataSetSettings, time_d: f64) -> bool {
-    set.exclude.iter().any(|[start, end]| (*start..=*end).contains(&time_d))
+    set.exclude.iter().any(|window| is_within(window, time_d))
 }
 
 /// Leaves out the profiles of excluded times; says how many they are, of how many.

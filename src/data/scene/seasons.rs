@@ -41,7 +41,8 @@ pub(super) fn seasons(settings: &Settings, parts: &[Observations]) -> Result<Vec
     Ok(windows.iter().filter_map(of_window).collect())
 }
 
-fn is_within([start, end]: &[f64; 2], time: f64) -> bool {
+/// Whether a time (d) lies in a window.
+pub(super) fn is_within([start, end]: &[f64; 2], time: f64) -> bool {
     *start <= time && time <= *end
 }
 
