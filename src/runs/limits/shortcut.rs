@@ -105,12 +105,16 @@ impl<'a> Shortcut<'a> {
         let Some(quadratic) = counted(&moved, &self.settings.detection) else { return Outcome::default() };
         let trials = scan(&quadratic, &frequencies.per_cycle);
         let summits = scan(&quadratic, &summits(&trials));
-        let peaks = trials.into_iter().chain(summits).filter_map(|trial| Some((trial.frequency, trial.orbit?)));
-        let highest = peaks.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
-        highest.map_or_else(Outcome::default, |(frequency, found)| {
-            let peak = (frequency, found.delta_ln_l, found.k_kms);
-            Outcome::of(peak, self.level, orbit, frequencies.time_base_cycles)
-        })
+        let highest = |trials: &[Trial]| {
+            let orbits = trials.iter().filter_map(|trial| Some((trial.frequency, trial.orbit?)));
+            orbits.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))
+        };
+        let Some(trial) = highest(&trials) else { return Outcome::default() };
+        // at an end of the search there is no summit
+        let summit = highest(&summits).filter(|summit| summit.1.delta_ln_l >= trial.1.delta_ln_l).unwrap_or(trial);
+        // the level is of draws at the trial periods, and so is what is held against it
+        let peak = (summit.0, trial.1.delta_ln_l, summit.1.k_kms);
+        Outcome::of(peak, self.level, orbit, frequencies.time_base_cycles)
     }
 }
 
