@@ -5,8 +5,8 @@ mod common;
 
 use common::stopwatch::{fastest, seconds};
 use common::table::{Table, Target};
-use dimcmc::internals::posterior::marginal::{Basis, Held, Known, MarginalPosterior, fit};
-use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, Prior};
+use dimcmc::internals::model::{FreeParameter, Parameter, Prior};
+use dimcmc::internals::surface::evolving_map::{Basis, Held, Known, MarginalPosterior, fit};
 use dimcmc::{Config, LogDensity as _, Scene};
 use serde_json::json;
 

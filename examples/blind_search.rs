@@ -8,11 +8,11 @@
 
 use dimcmc::internals::data::io::periodogram::PeriodogramResult;
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings};
-use dimcmc::internals::posterior::detection::{
+use dimcmc::internals::inference::detection::{
     Detection, DetectionSettings, Evidence, Robustness, Spots, View, robustness,
 };
-use dimcmc::internals::posterior::fit::Explained;
+use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings};
+use dimcmc::internals::surface::fit::Explained;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -11,11 +11,12 @@
 use dimcmc::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
+use dimcmc::internals::inference::detection::Spots;
+use dimcmc::internals::planets::periodogram::FrequencySettings;
 use dimcmc::internals::planets::periodogram::orbits::scan;
-use dimcmc::internals::posterior::detection::Spots;
-use dimcmc::internals::posterior::marginal::{Assumed, Basis, Known, fit};
 use dimcmc::internals::runs::plan::{Campaign, Outlook, PlanSettings, compared_d, outlook, range_d};
-use dimcmc::internals::{planets::periodogram::FrequencySettings, posterior::expansion::nuisances};
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Known, fit};
+use dimcmc::internals::surface::expansion::nuisances;
 use serde_json::json;
 use std::time::Instant;
 

@@ -103,13 +103,15 @@ mod cli;
 mod data;
 mod field;
 mod figures;
+mod inference;
 mod maxent;
+mod model;
 mod numerics;
 mod planets;
-mod posterior;
 mod runs;
 mod sampling;
 mod star;
+mod surface;
 
 /// All rooms, for tests and benchmarks. Not part of the public interface: anything here may change without notice.
 #[doc(hidden)]
@@ -133,8 +135,14 @@ pub mod internals {
     pub mod planets {
         pub use crate::planets::*;
     }
-    pub mod posterior {
-        pub use crate::posterior::*;
+    pub mod model {
+        pub use crate::model::*;
+    }
+    pub mod inference {
+        pub use crate::inference::*;
+    }
+    pub mod surface {
+        pub use crate::surface::*;
     }
     pub mod runs {
         pub use crate::runs::*;
@@ -151,13 +159,12 @@ pub use cli::{Failure, main as command_line};
 pub use data::config::{Config, ConfigError};
 pub use data::io::lsd::{LsdError, write_numbers as write_observations};
 pub use data::scene::{Scene, SceneError};
-pub use data::search::{Found, Progress};
 pub use figures::drawing::Figure;
 pub use figures::plot::{PlotError, figures};
+pub use inference::search::{Found, Progress};
+pub use model::{Parameter, Prior};
 pub use planets::periodogram::FrequencySettings;
 pub use planets::verdict::{Finding, Remark, Signal, Verdict};
-pub use posterior::fit::{ChangingFit, ChangingSummary, Fit, FitSummary, MapAt, NoField, VelocityWithoutSpots};
-pub use posterior::objective::{Parameter, Posterior, Prior};
 pub use runs::blind_search::BlindSearch;
 pub use runs::export::{ExportError, Format, export};
 pub use runs::log_posterior::LogPosterior;
@@ -174,3 +181,5 @@ pub use sampling::log_density::{Evaluation, LogDensity, Status};
 pub use sampling::optimise::Optimum;
 pub use star::Orbit;
 pub use star::observation::{Observations, Profile};
+pub use surface::fit::{ChangingFit, ChangingSummary, Fit, FitSummary, MapAt, NoField, VelocityWithoutSpots};
+pub use surface::static_map::Posterior;

@@ -3,11 +3,12 @@
 
 use dimcmc::internals::data::config::{self, ObservationSource};
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::data::search::{self, SearchSettings};
-use dimcmc::internals::posterior::objective::Posterior;
+use dimcmc::internals::inference::search;
+use dimcmc::internals::inference::search::SearchSettings;
 use dimcmc::internals::runs::pool::Target as Density;
 use dimcmc::internals::sampling::ensemble::{StartDraw, draw_start};
 use dimcmc::internals::star::{Response, StarState};
+use dimcmc::internals::surface::static_map::Posterior;
 use serde_json::{Value, json};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};

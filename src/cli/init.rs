@@ -7,8 +7,8 @@ use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
 use crate::data::io::{atomic, lsd};
 use crate::numerics::text::shown;
-use crate::posterior::objective::ObjectiveKind;
 use crate::star::BrightnessModel;
+use crate::surface::objective::ObjectiveKind;
 use std::path::{Path, PathBuf};
 
 /// Write a first config for observed profiles

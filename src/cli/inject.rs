@@ -7,7 +7,7 @@ use crate::data::config::{self, DataSetSettings, Settings};
 use crate::data::io::truth::InjectedTruth;
 use crate::data::io::{atomic, lsd, truth};
 use crate::data::scene::Scene;
-use crate::posterior::objective::Parameter;
+use crate::model::Parameter;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::{Observations, Profile};

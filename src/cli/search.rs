@@ -2,8 +2,8 @@
 
 use super::{Failure, Global, progress};
 use crate::data::scene::Scene;
-use crate::data::search::{Found, Progress, SearchSettings, find};
-use crate::posterior::objective::ParameterSpace;
+use crate::inference::search::{Found, Progress, SearchSettings, find};
+use crate::model::ParameterSpace;
 use std::path::Path;
 use std::time::Instant;
 

@@ -9,8 +9,8 @@
 mod change;
 
 use crate::data::scene::{self, Scene};
-use crate::posterior::noise::{FITTED, chi2_at, factor_to_fit};
 use crate::star::observation::Observations;
+use crate::surface::static_map::noise::{FITTED, chi2_at, factor_to_fit};
 use change::{Change, Patient};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! Planets whose ephemeris is known: a period and the time of a conjunction, each with its error or fixed.
 
 use crate::data::config::{ConfigError, Settings};
-use crate::posterior::objective::{Clock, Elements, Parameter, Prior, period_prior};
+use crate::model::{Clock, Elements, Parameter, Prior, period_prior};
 
 /// Largest error of the phase at the time of the data (orbital cycles).
 pub const LARGEST_PHASE_ERROR: f64 = 0.1;

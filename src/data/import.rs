@@ -8,8 +8,8 @@ use crate::data::config::EquivalentWidth;
 use crate::data::init::{Given, Known};
 use crate::data::io::zdipy::{BrightnessEntropy, Field, Input, LocalLineFile, Target};
 use crate::numerics::text::{Align, columns};
-use crate::posterior::objective::ObjectiveKind;
 use crate::star::BrightnessModel;
+use crate::surface::objective::ObjectiveKind;
 use std::fmt::Write as _;
 use std::path::Path;
 

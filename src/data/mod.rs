@@ -1,7 +1,7 @@
 //! What comes from files, and a first config.
 //!
 //! The path of a profile: [`config`] names its file and says how it is used, [`io`] reads it, [`scene`] joins both with
-//! what is measured from the profiles themselves. [`search`] finds the point where a scene's commands start.
+//! what is measured from the profiles themselves.
 //!
 //! [`init`] and [`import`] write a first config, [`diagnosis`] tries out why a model does not fit. `io` also holds the
 //! formats of what is written, a file each.
@@ -9,9 +9,8 @@
 pub mod config;
 pub mod diagnosis;
 pub mod ephemeris;
-pub mod evidence;
 pub mod import;
 pub mod init;
 pub mod io;
 pub mod scene;
-pub mod search;
+pub mod simulate;

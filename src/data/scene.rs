@@ -13,24 +13,25 @@ use crate::data::config::{
     VelocityJitter,
 };
 use crate::data::ephemeris::Ephemeris;
-use crate::data::evidence::EvidenceRecord;
 use crate::data::io::FileError;
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
-use crate::data::search::{self, Found, Progress, SearchError, SearchSettings};
+use crate::inference::detection::Spots;
+use crate::inference::evidence::EvidenceRecord;
+use crate::inference::search;
+use crate::inference::search::{Found, Progress, SearchError, SearchSettings};
+use crate::model::{FreeParameter, ParameterSpace, ParameterValues};
 use crate::planets::velocities::VelocityQuadratic;
-use crate::posterior::detection::Spots;
-use crate::posterior::fit::{ChangingFit, Fit, NoField};
-use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::Known;
-use crate::posterior::noise::{ErrorSettings, MeasuredErrors};
-use crate::posterior::objective::{
-    FreeParameter, ObjectiveKind, ParameterSpace, ParameterValues, Reference, ReferenceError, target,
-};
-use crate::posterior::photometry::Flux;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
+use crate::surface::evolving_map::Known;
+use crate::surface::fit::{ChangingFit, Fit, NoField};
+use crate::surface::imaging::Imager;
+use crate::surface::objective::ObjectiveKind;
+use crate::surface::photometry::Flux;
+use crate::surface::static_map::noise::{ErrorSettings, MeasuredErrors};
+use crate::surface::static_map::{Reference, ReferenceError, target};
 use imaging::hold_zero_points;
 use measuring::{measured_errors, zero_points};
 use reading::{Part, one_day_count};

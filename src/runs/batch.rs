@@ -5,7 +5,8 @@
 use crate::data::io::FileError;
 use crate::data::io::atomic::write_json;
 use crate::data::scene::Scene;
-use crate::data::search::{self, SearchSettings};
+use crate::inference::search;
+use crate::inference::search::SearchSettings;
 use crate::planets::verdict::Verdict;
 use crate::runs::manifest::{self, Manifest};
 #[cfg(feature = "mpi")]

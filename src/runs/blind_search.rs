@@ -5,16 +5,16 @@
 //! without a planet show as much. So their results hold the search beside them, and its verdict heads them.
 
 use super::known_planet::{KnownPlanet, known_planets};
-use crate::data::evidence::EvidenceRecord;
 use crate::data::scene::Scene;
+use crate::inference::detection::{Detection, DetectionError, DetectionSettings, Evidence, Robustness, robustness};
+use crate::inference::evidence::EvidenceRecord;
+use crate::model::{Elements, Parameter, ParameterValues, Prior, for_blind_search, period_prior};
 use crate::planets::periodogram::{
     CircularOrbit, Frequencies, FrequencyError, FrequencySettings, Imitation, RotationPeriods, Row,
 };
 use crate::planets::verdict::{Finding, Remark, Signal, Verdict};
-use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Evidence, Robustness, robustness};
-use crate::posterior::expansion::nuisances;
-use crate::posterior::fit::Explained;
-use crate::posterior::objective::{Elements, Parameter, ParameterValues, Prior, for_blind_search, period_prior};
+use crate::surface::expansion::nuisances;
+use crate::surface::fit::Explained;
 use serde::{Deserialize, Serialize};
 
 /// Frequencies closer than this many inverse time bases are the same.

@@ -9,12 +9,12 @@ use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::io::landscape;
 use crate::data::io::lines::{self, JournalError, LineFile};
 use crate::data::scene::Scene;
-use crate::data::search::Found;
-use crate::posterior::density::Density;
-use crate::posterior::objective::LIKELIHOOD_NUMBERS;
+use crate::inference::search::Found;
 use crate::runs::origin::{self, Origin, OriginError};
 use crate::runs::pool::{Asked, Brief, Pool, Task};
 use crate::sampling::landscape::{Grid, Landscape, LandscapeError, Node};
+use crate::surface::density::Density;
+use crate::surface::static_map::LIKELIHOOD_NUMBERS;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -8,11 +8,11 @@
 
 use crate::data::ephemeris::Ephemeris;
 use crate::data::scene::Scene;
+use crate::inference::detection::{Detection, DetectionSettings, View};
+use crate::model::{Clock, Elements, ParameterValues, for_blind_search};
 use crate::planets::mixture::{Mixture, Part};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::{Remark, Signal, UNBOUNDED, Verdict};
-use crate::posterior::detection::{Detection, DetectionSettings, View};
-use crate::posterior::objective::{Clock, Elements, ParameterValues, for_blind_search};
 use nalgebra::DVector;
 
 /// Ephemerides are tried within so many standard errors.
@@ -127,7 +127,7 @@ fn amplitude(quadratic: &VelocityQuadratic, values: &ParameterValues) -> [f64; 2
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::posterior::objective::Parameter;
+    use crate::model::Parameter;
     use nalgebra::DMatrix;
 
     /// 30 velocities with errors of 0.05 km/s of a planet of 0.1 km/s, whose conjunction comes two standard errors

@@ -1,8 +1,8 @@
 //! The density that a chain samples, by itself: for samplers other than this program's.
 
 use crate::data::scene::Scene;
-use crate::data::search::Found;
-use crate::posterior::objective::{Elements, Parameter, ParameterSpace, Prior};
+use crate::inference::search::Found;
+use crate::model::{Elements, Parameter, ParameterSpace, Prior};
 use crate::runs::origin::{Origin, OriginError};
 use crate::runs::pool::Target;
 use crate::runs::run::RunError;

@@ -7,14 +7,14 @@ mod conclusions;
 
 use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
-use crate::posterior::objective::{
-    CHI2, Elements, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, Quoted, SPOTTEDNESS, definition,
-    in_earths,
+use crate::model::{
+    Elements, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, Quoted, definition, in_earths,
 };
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
 use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
 use crate::sampling::ensemble::Positions;
+use crate::surface::static_map::{CHI2, SPOTTEDNESS};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

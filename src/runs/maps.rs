@@ -6,8 +6,10 @@ use crate::data::io::atomic::WriteError;
 use crate::data::io::map::{ChangingMapResult, FILES, LIGHT_CURVES, MapResult};
 use crate::data::io::periodogram::FieldRecord;
 use crate::data::scene::Scene;
-use crate::posterior::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
-use crate::posterior::objective::{ObjectiveKind, Parameter, ReferenceError};
+use crate::model::Parameter;
+use crate::surface::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
+use crate::surface::objective::ObjectiveKind;
+use crate::surface::static_map::ReferenceError;
 use std::path::{Path, PathBuf};
 
 /// The star of a [`Scene`] reconstructed at the values of its config.

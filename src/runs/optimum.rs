@@ -3,11 +3,11 @@
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::io::provenance::Provenance;
 use crate::data::scene::Scene;
-use crate::data::search::{Attempt, Found};
-use crate::numerics::text::listed;
-use crate::posterior::objective::{
+use crate::inference::search::{Attempt, Found};
+use crate::model::{
     Elements, Estimate, OrbitQuantities, OrbitQuantity, Parameter, Quoted, definition, in_earths, quoted_definition,
 };
+use crate::numerics::text::listed;
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{OptimumRecord, ReferenceRecord};
 use crate::sampling::log_density::LogDensity as _;

@@ -6,12 +6,13 @@
 use crate::data::config::{self, ConfigError};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
-use crate::data::search::Found;
 use crate::field::FieldError;
-use crate::posterior::density::Density;
-use crate::posterior::marginal::{Held, MarginalPosterior, bounds};
-use crate::posterior::objective::{Parameter, ParameterSpace, ParameterValues, Posterior, Reference, ReferenceError};
+use crate::inference::search::Found;
+use crate::model::{Parameter, ParameterSpace, ParameterValues};
 use crate::sampling::optimise::Optimum;
+use crate::surface::density::Density;
+use crate::surface::evolving_map::{Held, MarginalPosterior, bounds};
+use crate::surface::static_map::{Posterior, Reference, ReferenceError};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;

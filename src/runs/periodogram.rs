@@ -1,18 +1,18 @@
 //! The blind search as `periodogram` makes it: with its options, how far it depends on choices, and all files.
 
-use crate::data::evidence::EvidenceRecord;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::periodogram::PeriodogramResult;
 use crate::data::io::provenance::Provenance;
 use crate::data::scene::Scene;
+use crate::inference::detection::{Detection, DetectionError, DetectionSettings, Robustness, Stage, robustness};
+use crate::inference::evidence::EvidenceRecord;
+use crate::model::for_blind_search;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
 use crate::planets::verdict::{Remark, Verdict};
-use crate::posterior::detection::{Detection, DetectionError, DetectionSettings, Robustness, Stage, robustness};
-use crate::posterior::expansion::nuisances;
-use crate::posterior::fit::Explained;
-use crate::posterior::objective::for_blind_search;
 use crate::runs::blind_search::{Judged, with_known};
 use crate::runs::known_planet::known_planets;
+use crate::surface::expansion::nuisances;
+use crate::surface::fit::Explained;
 use std::path::{Path, PathBuf};
 
 /// What to search for, and how.

@@ -6,9 +6,9 @@ use crate::data::io::light_curve;
 use crate::data::io::lsd::{self, LsdError};
 use crate::data::io::truth::{self, Truth};
 use crate::data::scene::{Scene, SceneError};
-use crate::posterior::photometry::Flux;
-use crate::posterior::simulate::Simulation;
+use crate::data::simulate::Simulation;
 use crate::star::observation::Observations;
+use crate::surface::photometry::Flux;
 use std::path::{Path, PathBuf};
 
 /// The simulation that a config describes under `observations.simulate`, carried out.

@@ -5,9 +5,10 @@
 use crate::desk::interrupt;
 use crate::desk::{Desk, dimcmc, kill, says, text, two_spots};
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::data::search::{SearchSettings, find};
-use dimcmc::internals::posterior::objective::{Parameter, Posterior, Reference};
+use dimcmc::internals::inference::search::{SearchSettings, find};
+use dimcmc::internals::model::Parameter;
 use dimcmc::internals::sampling::log_density::{LogDensity, Status};
+use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use serde_json::{Value, json};
 use std::path::Path;
 

@@ -3,10 +3,11 @@
 use crate::desk::{Desk, dimcmc, says, star, text};
 use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::posterior::expansion::Expansion;
-use dimcmc::internals::posterior::imaging::Imager;
-use dimcmc::internals::posterior::objective::{Parameter, Reference};
-use dimcmc::internals::posterior::zero_points::ZeroPoints;
+use dimcmc::internals::model::Parameter;
+use dimcmc::internals::surface::expansion::Expansion;
+use dimcmc::internals::surface::imaging::Imager;
+use dimcmc::internals::surface::static_map::Reference;
+use dimcmc::internals::surface::static_map::jitter::ZeroPoints;
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;

@@ -2,7 +2,7 @@
 //! key.
 
 use dimcmc::internals::data::config::{self, EquivalentWidth, ObservationSource, Settings};
-use dimcmc::internals::posterior::objective::{Parameter, Prior};
+use dimcmc::internals::model::{Parameter, Prior};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

@@ -420,7 +420,7 @@ impl Described {
             self.faults.insert(format!("{name} is not described"));
             return;
         };
-        let free = dimcmc::internals::posterior::objective::Parameter::ALL.map(|parameter| parameter.name());
+        let free = dimcmc::internals::model::Parameter::ALL.map(|parameter| parameter.name());
         for key in keys(&name, path) {
             let is_known = |key: &str| [section, &self.common].iter().any(|text| text.contains(&format!("`{key}`")));
             // the error of a number that is described

@@ -3,10 +3,10 @@
 
 use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::maxent::{Curvature, Problem};
+use dimcmc::internals::model::{Parameter, ParameterValues};
 use dimcmc::internals::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use dimcmc::internals::posterior::imaging::{Data, Imager, ImagingProblem};
-use dimcmc::internals::posterior::objective::{Parameter, ParameterValues};
 use dimcmc::internals::star::{LimbDarkening, LocalLine, Sampling, StarSettings, SurfaceGrid};
+use dimcmc::internals::surface::imaging::{Data, Imager, ImagingProblem};
 use serde_json::Value;
 use std::f64::consts::TAU;
 use std::path::PathBuf;

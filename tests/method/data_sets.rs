@@ -1,10 +1,11 @@
 //! Several data sets of one star: each is seen as if it were alone, and zero points between them do not become spots.
 
 use dimcmc::internals::maxent::Problem;
-use dimcmc::internals::posterior::imaging::Imager;
-use dimcmc::internals::posterior::marginal::{Basis, Design, zero_points::HeldZeroPoint};
-use dimcmc::internals::posterior::objective::{Reference, ReferenceError};
 use dimcmc::internals::star::{Response, StarSettings};
+use dimcmc::internals::surface::evolving_map::zero_points::HeldZeroPoint;
+use dimcmc::internals::surface::evolving_map::{Basis, Design};
+use dimcmc::internals::surface::imaging::Imager;
+use dimcmc::internals::surface::static_map::{Reference, ReferenceError};
 use dimcmc::{Config, Parameter, Scene};
 use nalgebra::DMatrix;
 use serde_json::{Value, json};

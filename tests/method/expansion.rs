@@ -1,15 +1,16 @@
 //! The quadratic against full reconstructions and against the independent posterior, on the oracle's data and pixels.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
+use dimcmc::internals::inference::surrogate::Surrogate;
 use dimcmc::internals::maxent::SolverSettings;
 use dimcmc::internals::maxent::entropy::Entropy;
-use dimcmc::internals::posterior::expansion::{Expansion, Nuisance, STELLAR, SpotsCounted};
-use dimcmc::internals::posterior::imaging::Imager;
-use dimcmc::internals::posterior::objective::{
-    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
-};
-use dimcmc::internals::posterior::surrogate::Surrogate;
+use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::surface::expansion::{Expansion, Nuisance, STELLAR};
+use dimcmc::internals::surface::imaging::Imager;
+use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::static_map::SpotsCounted;
+use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

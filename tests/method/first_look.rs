@@ -1,9 +1,9 @@
 //! The first look at simulated stars: vsini and centre within the errors that it gives, lines found where they are, and
 //! every reason to see nothing.
 
-use dimcmc::internals::posterior::first_look::{FirstLook, LineModel, LookError, MeanProfile};
-use dimcmc::internals::posterior::objective::{Parameter, ParameterValues};
-use dimcmc::internals::posterior::simulate::Simulation;
+use dimcmc::internals::data::simulate::Simulation;
+use dimcmc::internals::inference::first_look::{FirstLook, LineModel, LookError, MeanProfile};
+use dimcmc::internals::model::{Parameter, ParameterValues};
 use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{LimbDarkening, LocalLine, Spot, StarSettings};
 use rand::{Rng, SeedableRng};

@@ -5,10 +5,11 @@ use crate::common::{self, Oracle, dot, hold_derivatives, oracle, values, wave};
 use dimcmc::internals::maxent::{
     Curvature, Goal, Image, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination,
 };
-use dimcmc::internals::posterior::imaging::{Data, Imager, ImagingProblem};
-use dimcmc::internals::posterior::objective::{Parameter, Reference};
+use dimcmc::internals::model::Parameter;
 use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::surface::imaging::{Data, Imager, ImagingProblem};
+use dimcmc::internals::surface::static_map::Reference;
 
 fn imager(oracle: &Oracle) -> Imager {
     common::imager(oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2))

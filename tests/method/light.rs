@@ -1,8 +1,8 @@
 //! Light curves beside profiles: dense algebra on a small star, and what they tell of spots.
 
 use dimcmc::internals::field::{Compression, Epoch, Evidence, Field, Kernel, Lifetime, Spectrum};
-use dimcmc::internals::posterior::marginal::{Assumed, Basis, Design, Known, LEVEL, Marginal, fit};
-use dimcmc::internals::posterior::objective::Parameter;
+use dimcmc::internals::model::Parameter;
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Design, Known, LEVEL, Marginal, fit};
 use dimcmc::{Config, Scene};
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};

@@ -1,10 +1,10 @@
 //! The marginal likelihood of stars that change, against an independent implementation (`tests/data/evolving`).
 
 use dimcmc::internals::field::Lifetime;
+use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence};
+use dimcmc::internals::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings, orbits};
-use dimcmc::internals::posterior::detection::{Detection, DetectionSettings, Evidence};
-use dimcmc::internals::posterior::marginal::{Basis, Change, Held, Known, MarginalPosterior, fit};
-use dimcmc::internals::posterior::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use dimcmc::internals::surface::evolving_map::{Basis, Change, Held, Known, MarginalPosterior, fit};
 use dimcmc::{Config, Scene};
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -4,15 +4,15 @@ use crate::common::{dot, hold_derivatives, imager, oracle, truth};
 use dimcmc::internals::data::config::{Config, ObservationSource};
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::maxent::{Problem, SolverSettings};
-use dimcmc::internals::posterior::expansion::{Expansion, STELLAR};
-use dimcmc::internals::posterior::fit::Fit;
-use dimcmc::internals::posterior::imaging::Imager;
-use dimcmc::internals::posterior::nuisances::LineAndContinuum;
-use dimcmc::internals::posterior::objective::{
-    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, ParameterValues, Posterior, Prior, Reference,
-};
+use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
 use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::surface::expansion::{Expansion, STELLAR};
+use dimcmc::internals::surface::fit::Fit;
+use dimcmc::internals::surface::imaging::Imager;
+use dimcmc::internals::surface::nuisances::LineAndContinuum;
+use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 use std::path::Path;

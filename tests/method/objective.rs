@@ -3,12 +3,12 @@
 use crate::common::{imager, oracle, values, whole_truth};
 use dimcmc::internals::maxent::SolverSettings;
 use dimcmc::internals::maxent::entropy::Entropy;
-use dimcmc::internals::posterior::imaging::Imager;
-use dimcmc::internals::posterior::objective::{
-    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
-};
+use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::log_density::{Gradient, LogDensity, Status};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::surface::imaging::Imager;
+use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::static_map::{Posterior, Reference};
 
 const KINDS: [ObjectiveKind; 3] =
     [ObjectiveKind::Spottedness, ObjectiveKind::Entropy, ObjectiveKind::RegularisedLikelihood];

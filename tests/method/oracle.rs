@@ -3,9 +3,9 @@
 use crate::common::{json, numbers, oracle, values};
 use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::maxent::{Goal, Preconditioner, Problem, Solution, Solver, SolverSettings, Start, Termination};
-use dimcmc::internals::posterior::imaging::ImagingProblem;
 use dimcmc::internals::star::spots::filling_at;
 use dimcmc::internals::star::{Quadrature, Response, Sampling, Spot, SurfaceGrid};
+use dimcmc::internals::surface::imaging::ImagingProblem;
 use serde_json::Value;
 
 /// Relative accuracy asked for against the oracle's numbers.

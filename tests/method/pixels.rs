@@ -1,11 +1,11 @@
 //! Moment-matched pixels: the star's parameters do not depend on how many there are.
 
 use crate::common::{imager, oracle, values};
-use dimcmc::internals::posterior::objective::{
-    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
-};
+use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::optimise::climb;
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::static_map::{Posterior, Reference};
 
 /// Best vsini and its standard deviation, the rest fixed at the injected values.
 fn vsini(pixels: usize) -> (f64, f64) {

@@ -1,8 +1,8 @@
 //! The information of planned profiles against dense algebra with numerical derivatives.
 
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
-use dimcmc::internals::posterior::marginal::{Assumed, Basis, MEAN_FILLING, Planned};
-use dimcmc::internals::posterior::objective::Parameter;
+use dimcmc::internals::model::Parameter;
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, MEAN_FILLING, Planned};
 use dimcmc::{Config, Scene};
 use nalgebra::{DMatrix, DVector};
 use serde_json::json;

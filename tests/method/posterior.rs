@@ -6,10 +6,8 @@
 //! for is three times that on the same pixels, and twice as much again on another grid of pixels.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth};
-use dimcmc::internals::posterior::objective::{
-    FreeParameter, ObjectiveKind, Parameter, ParameterSpace, Posterior, Prior, Reference,
-};
-use dimcmc::internals::posterior::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::inference::surrogate::{Surrogate, SurrogateMove};
+use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::chain::{Chain, Goals, ParameterKind, Shape, Summary, summarise};
 use dimcmc::internals::sampling::ensemble::{
     self, Sampler, SamplerSettings, StartDraw, StopPolicy, StopReason, draw_start,
@@ -17,6 +15,8 @@ use dimcmc::internals::sampling::ensemble::{
 use dimcmc::internals::sampling::log_density::Threads;
 use dimcmc::internals::sampling::optimise::climb;
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use std::sync::atomic::AtomicBool;
 
 const KINDS: [ParameterKind; 3] = [ParameterKind::Amplitude, ParameterKind::Linear, ParameterKind::Periodic];

@@ -3,8 +3,11 @@
 
 use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::data::search::{self, SearchSettings};
-use dimcmc::internals::posterior::objective::{ObjectiveKind, Parameter, Posterior, Reference};
+use dimcmc::internals::inference::search;
+use dimcmc::internals::inference::search::SearchSettings;
+use dimcmc::internals::model::Parameter;
+use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use serde_json::{Value, json};
 use std::path::Path;
 

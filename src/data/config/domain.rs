@@ -2,8 +2,8 @@
 
 use super::error::Fault;
 use super::raw_parts::{PriorKind, PriorSection};
-use crate::posterior::marginal;
-use crate::posterior::objective::{Parameter, Prior};
+use crate::model::{Parameter, Prior};
+use crate::surface::evolving_map;
 
 /// Where a value of the parameter stands in the config.
 pub(super) fn key(parameter: Parameter) -> String {
@@ -55,7 +55,7 @@ pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result
         Parameter::Inclination => (value > 0.0 && value <= 90.0, "above 0 and up to 90"),
         Parameter::Phi | Parameter::Phi2 | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
         Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => {
-            let (low, high) = marginal::bounds(parameter);
+            let (low, high) = evolving_map::bounds(parameter);
             return match (low..=high).contains(&value) {
                 true => Ok(()),
                 false => Err(Fault::new(key, format!("{value} must be from {low} to {high}"))),
@@ -89,7 +89,7 @@ fn domain(parameter: Parameter, phi_free: bool) -> (f64, f64) {
         Parameter::Phi | Parameter::Phi2 | Parameter::LimbDarkening | Parameter::Contrast => (0.0, 1.0),
         Parameter::Inclination => (0.0, 90.0),
         Parameter::DOmega | Parameter::Vsys => (f64::NEG_INFINITY, f64::INFINITY),
-        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => marginal::bounds(parameter),
+        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => evolving_map::bounds(parameter),
     }
 }
 

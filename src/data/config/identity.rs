@@ -1,7 +1,7 @@
 //! The fingerprint of a config: what must be the same for a chain to be resumed; and what two configs that belong
 //! together share.
 
-use crate::posterior::objective::{Elements, Parameter};
+use crate::model::{Elements, Parameter};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 

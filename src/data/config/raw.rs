@@ -8,7 +8,7 @@ use super::listed::Listed;
 use super::photometry::PhotometrySection;
 use super::raw_parts::{Grid, PerParameter, PlanSection, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
-use crate::posterior::objective::Parameter;
+use crate::model::Parameter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

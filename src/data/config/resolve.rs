@@ -13,10 +13,11 @@ use super::resolve_sets::resolve_sets;
 use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, Settings, VelocityJitter};
-use crate::posterior::marginal;
-use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::{Clock, Elements, FreeParameter, ObjectiveKind, Parameter, ParameterValues, Prior};
+use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
+use crate::surface::evolving_map;
+use crate::surface::nuisances::LineAndContinuum;
+use crate::surface::objective::ObjectiveKind;
 use std::path::Path;
 
 /// Largest degree of a break: harmonics go to 36.
@@ -200,11 +201,11 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
                 values[parameter] = value;
             }
             Hyperparameter::Fitted => {
-                values[parameter] = marginal::usual_value(parameter);
+                values[parameter] = evolving_map::usual_value(parameter);
                 if something_is_free && !prior {
                     let kind =
                         if parameter == Parameter::SpotSlope { PriorKind::Uniform } else { PriorKind::LogUniform };
-                    *raw.parameters.slot(parameter) = Some(PriorSection::even(kind, marginal::bounds(parameter)));
+                    *raw.parameters.slot(parameter) = Some(PriorSection::even(kind, evolving_map::bounds(parameter)));
                 }
             }
         }

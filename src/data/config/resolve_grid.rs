@@ -5,7 +5,7 @@ use super::domain::check_value;
 use super::error::Fault;
 use super::raw_parts::Grid as GridSection;
 use super::resolve::without_planet;
-use crate::posterior::objective::{FreeParameter, Parameter, ParameterValues, Prior};
+use crate::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use crate::sampling::landscape::{Axis, Grid};
 
 /// Most nodes of a landscape: a day or so of reconstructions.

@@ -7,11 +7,11 @@ use super::resolve::{automatic, check_nuisances, check_pixels, positive};
 use super::resolve_simulation::{facula, spots, times_d};
 use super::{Automatic, ObservationSource, VelocityJitter};
 use crate::data::io::lsd::ReadOptions;
-use crate::posterior::noise::ErrorSettings;
-use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::{Clock, Elements, ParameterValues};
-use crate::posterior::simulate::Simulation;
+use crate::data::simulate::Simulation;
+use crate::model::{Clock, Elements, ParameterValues};
 use crate::star::StarSettings;
+use crate::surface::nuisances::LineAndContinuum;
+use crate::surface::static_map::noise::ErrorSettings;
 use std::path::Path;
 
 /// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.

@@ -5,7 +5,7 @@ use super::domain::{check_value, key};
 use super::error::Fault;
 use super::raw::{Config, DEFAULT_PORB_OVER_PROT};
 use super::resolve::positive;
-use crate::posterior::objective::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
+use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{StarSettings, stability};
 
 /// Fills the orbits into `values`, where K, period and phase of the planet are as in the config: eccentricities, the

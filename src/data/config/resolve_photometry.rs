@@ -9,8 +9,8 @@ use super::resolve_seasons::check_windows;
 use super::resolve_sets::names;
 use super::resolve_star::{contrast, limb_darkening};
 use super::{LightCurveSettings, LightSource};
-use crate::posterior::objective::ObjectiveKind;
 use crate::star::Band;
+use crate::surface::objective::ObjectiveKind;
 use std::path::Path;
 
 /// Longest gap within a segment (d): level and slope do not hold for longer.

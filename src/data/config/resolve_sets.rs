@@ -10,8 +10,9 @@ use super::resolve_seasons::check_windows;
 use super::resolve_simulation::{spots, times_d};
 use super::resolve_star::resolve_star;
 use super::{Automatic, DataSetSettings, ObservationSource};
-use crate::posterior::objective::{ObjectiveKind, Parameter, ParameterValues};
+use crate::model::{Parameter, ParameterValues};
 use crate::star::{BrightnessModel, StarSettings};
+use crate::surface::objective::ObjectiveKind;
 use std::path::Path;
 
 /// Zero points beyond it (km/s) are a mistake.

@@ -4,8 +4,8 @@ use super::domain::{check_size, most};
 use super::error::Fault;
 use super::raw_parts::{PlanSection, SimulateSection};
 use super::resolve::positive;
-use crate::posterior::objective::{Parameter, ParameterValues};
-use crate::posterior::simulate::{RandomSpots, Schedule};
+use crate::data::simulate::{RandomSpots, Schedule};
+use crate::model::{Parameter, ParameterValues};
 use crate::star::{Disc, Facula, Life, Spot, StarSettings};
 
 /// More drawn at random are a mistake: nights times profiles, and spots.

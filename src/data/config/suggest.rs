@@ -17,7 +17,7 @@ mod tests {
 
     #[test]
     fn near_names_are_found_and_far_ones_not() {
-        let names = crate::posterior::objective::Parameter::ALL.map(|p| p.name());
+        let names = crate::model::Parameter::ALL.map(|p| p.name());
         for (given, expected) in [
             ("vsinni_kms", Some("vsini_kms")),
             ("K_kms", Some("k_kms")),

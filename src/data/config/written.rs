@@ -1,7 +1,7 @@
 //! A config before it is checked: read from JSON, or built in code key by key.
 
 use super::{ConfigError, Settings, from_json, to_text, without_mark};
-use crate::posterior::objective::{Parameter, Prior};
+use crate::model::{Parameter, Prior};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 

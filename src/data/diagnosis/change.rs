@@ -2,10 +2,10 @@
 
 use super::Reason;
 use crate::data::config::{EquivalentWidth, Settings};
-use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::Parameter;
+use crate::model::Parameter;
 use crate::star::BrightnessModel;
 use crate::star::observation::{Observations, Profile};
+use crate::surface::nuisances::LineAndContinuum;
 
 /// Factors on vsini, the width of the local line and the rotation period.
 const VSINI: [f64; 8] = [0.7, 0.8, 0.9, 0.97, 1.03, 1.1, 1.25, 1.4];

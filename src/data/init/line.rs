@@ -5,7 +5,7 @@ use super::Known;
 use super::digits::rounded;
 use super::ledger::{Ledger, Source};
 use super::values::origin;
-use crate::posterior::first_look::{FirstLook, LineModel};
+use crate::inference::first_look::{FirstLook, LineModel};
 
 /// The velocity range reaches so many bins, and so many widths of the line as the spectrograph shows it, into the
 /// continuum on either side.

@@ -15,10 +15,10 @@ pub use ledger::{Entry, Source};
 
 use crate::data::config::{ConfigError, Draft, EquivalentWidth};
 use crate::data::io::lsd::{self, DataSet, LsdError, ReadOptions};
+use crate::inference::first_look::LookError;
 use crate::numerics::units::gaussian_as_wide_as_voigt;
-use crate::posterior::first_look::LookError;
-use crate::posterior::objective::ObjectiveKind;
 use crate::star::BrightnessModel;
+use crate::surface::objective::ObjectiveKind;
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
 use trial::Profiles;

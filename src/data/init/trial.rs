@@ -7,14 +7,17 @@ use super::{Known, Place, ProposalError, to_json};
 use crate::data::config::{self, Automatic, ConfigError, Draft, ImagingSettings, VelocityJitter};
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::scene::Scene;
-use crate::data::search::{self, SearchError, SearchSettings};
+use crate::inference::search;
+use crate::inference::search::{SearchError, SearchSettings};
+use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
-use crate::posterior::expansion::nuisances;
-use crate::posterior::marginal::Change;
-use crate::posterior::noise::MeasuredErrors;
-use crate::posterior::objective::{ObjectiveKind, Parameter, Reference, ReferenceError};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
+use crate::surface::evolving_map::Change;
+use crate::surface::expansion::nuisances;
+use crate::surface::objective::ObjectiveKind;
+use crate::surface::static_map::noise::MeasuredErrors;
+use crate::surface::static_map::{Reference, ReferenceError};
 use std::path::Path;
 
 /// Stands in for a rotation period that is still to be given, so that everything else is checked (d).

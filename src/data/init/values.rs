@@ -4,14 +4,14 @@ use super::digits::{rounded, significant};
 use super::ledger::{Ledger, Source};
 use super::{Given, Known, line};
 use crate::data::config::{Automatic, Draft, EquivalentWidth, ImagingSettings, VelocityJitter};
+use crate::inference::first_look::{Continuum, FirstLook, LineModel, LookError};
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
-use crate::posterior::first_look::{Continuum, FirstLook, LineModel, LookError};
-use crate::posterior::marginal::Change;
-use crate::posterior::noise::MeasuredErrors;
-use crate::posterior::nuisances::LineAndContinuum;
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
+use crate::surface::evolving_map::Change;
+use crate::surface::nuisances::LineAndContinuum;
+use crate::surface::static_map::noise::MeasuredErrors;
 
 /// What is assumed where nobody says otherwise.
 mod assumed {

@@ -3,7 +3,7 @@
 use super::FileError;
 use super::atomic::{WriteError, write};
 use super::csv::{Columns, Table};
-use crate::posterior::photometry::Flux;
+use crate::surface::photometry::Flux;
 use std::path::Path;
 
 /// Columns of the table.

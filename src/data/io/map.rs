@@ -12,12 +12,12 @@ use super::csv::Table;
 use super::periodogram::DATA_SET;
 use super::provenance::{MeasuredSet, Provenance, Season};
 use crate::maxent::entropy::Entropy;
-use crate::posterior::fit::{Checks, Fit, FitSummary};
-use crate::posterior::imaging::Imager;
-use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::ParameterValues;
+use crate::model::ParameterValues;
 use crate::star::SurfaceGrid;
 use crate::star::observation::Observations;
+use crate::surface::fit::{Checks, Fit, FitSummary};
+use crate::surface::imaging::Imager;
+use crate::surface::nuisances::LineAndContinuum;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -277,7 +277,7 @@ impl MapResult<'_> {
     }
 
     fn fit(&self) -> FitFile {
-        let node = |n: &crate::posterior::objective::tradeoff::Node| TradeOffNode {
+        let node = |n: &crate::surface::static_map::tradeoff::Node| TradeOffNode {
             lambda: n.lambda,
             chi2: n.chi2,
             spottedness: n.spottedness,

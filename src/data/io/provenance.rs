@@ -1,9 +1,9 @@
 //! What every result says of where it came from.
 
-use crate::posterior::marginal::zero_points::HeldZeroPoint;
-use crate::posterior::noise::MeasuredErrors;
-use crate::posterior::objective::target::ChosenTarget;
-use crate::posterior::zero_points::MeasuredJitter;
+use crate::surface::evolving_map::zero_points::HeldZeroPoint;
+use crate::surface::static_map::jitter::MeasuredJitter;
+use crate::surface::static_map::noise::MeasuredErrors;
+use crate::surface::static_map::target::ChosenTarget;
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.

@@ -2,9 +2,9 @@
 
 use super::atomic::{WriteError, write_json};
 use super::provenance::Provenance;
-use crate::posterior::nuisances::LineAndContinuum;
-use crate::posterior::objective::ParameterValues;
+use crate::model::ParameterValues;
 use crate::star::Orbit;
+use crate::surface::nuisances::LineAndContinuum;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -5,10 +5,10 @@ use super::light_curves;
 use super::seasons::{seasons, with_seasons};
 use crate::data::config::{ConfigError, DataSetSettings, Settings, ZeroPoint};
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
-use crate::posterior::imaging::{Imager, ZeroPointPrior};
-use crate::posterior::marginal::zero_points;
 use crate::star::observation::Observations;
 use crate::star::{Sampling, Seen, StarSettings};
+use crate::surface::evolving_map::zero_points;
+use crate::surface::imaging::{Imager, ZeroPointPrior};
 
 /// What the observations of all data sets are imaged with.
 ///

@@ -4,12 +4,12 @@ use super::SceneError;
 use super::seasons::is_within;
 use crate::data::config::{ConfigError, LightCurveSettings, LightSource, ObservationSource, Settings};
 use crate::data::io::light_curve;
+use crate::data::simulate::Simulation;
 use crate::field::Lifetime;
-use crate::posterior::marginal::usual_value;
-use crate::posterior::objective::Parameter;
-use crate::posterior::photometry::{Flux, FluxBin, LightCurve, bin_width_d};
-use crate::posterior::simulate::Simulation;
+use crate::model::Parameter;
 use crate::star::observation::Observations;
+use crate::surface::evolving_map::usual_value;
+use crate::surface::photometry::{Flux, FluxBin, LightCurve, bin_width_d};
 use sha2::{Digest, Sha256};
 
 /// More measurements are not simulated.

@@ -6,8 +6,8 @@ use super::seasons::is_within;
 use super::{SceneError, fingerprint};
 use crate::data::config::{ConfigError, DataSetSettings, ObservationSource, Settings};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
-use crate::posterior::noise::{ErrorSettings, MeasuredErrors};
 use crate::star::observation::{Observations, Profile};
+use crate::surface::static_map::noise::{ErrorSettings, MeasuredErrors};
 
 /// What became of a data set.
 pub(super) struct Part {

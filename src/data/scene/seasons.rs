@@ -2,10 +2,10 @@
 
 use crate::data::config::{ConfigError, ImagingSettings, ObservationSource, SEASON_GAP_D, Settings};
 use crate::data::io::provenance::Season;
-use crate::posterior::imaging::Imager;
-use crate::posterior::objective::ObjectiveKind;
 use crate::star::OwnMap;
 use crate::star::observation::Observations;
+use crate::surface::imaging::Imager;
+use crate::surface::objective::ObjectiveKind;
 
 /// The seasons of profiles, in the order of time: as the config has them, or parted by gaps. Integrated maps, which
 /// change, have one.

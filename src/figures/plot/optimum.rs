@@ -6,7 +6,7 @@ use super::symbols::{Title, decimals, nearest_turn};
 use super::trace::TRUTH;
 use crate::figures::drawing::colour::BLUE;
 use crate::figures::drawing::{Axis, Figure, Key, Legend, Paint, Panel, Rect, Scale, Stroke, panel::gaussian_contour};
-use crate::posterior::objective::Parameter;
+use crate::model::Parameter;
 use crate::runs::optimum::{FILE, OptimumFile};
 use crate::runs::origin;
 use std::path::Path;

@@ -11,7 +11,7 @@ use crate::figures::drawing::{
     Align, Axis, Colour, Figure, Font, Key, Legend, Marker, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of,
     width_pt,
 };
-use crate::posterior::objective::Parameter;
+use crate::model::Parameter;
 use crate::runs::origin;
 use crate::star::Orbit;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! The symbols of astronomers for parameters.
 
-use crate::posterior::objective::Parameter;
+use crate::model::Parameter;
 
 /// Decimals of a period in days, in figures and tables alike.
 pub const PERIOD_DIGITS: usize = 4;

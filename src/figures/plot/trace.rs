@@ -6,7 +6,7 @@ use crate::data::io::journal;
 use crate::figures::drawing::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Align, Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
-use crate::posterior::objective::Prior;
+use crate::model::Prior;
 use crate::runs::manifest::{Manifest, kinds_and_goals};
 use crate::runs::run::CHAIN;
 use crate::sampling::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};

@@ -7,10 +7,8 @@ use crate::data::io::periodogram::{self, PeakRecord, PeriodogramFile};
 use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
+use crate::model::{Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition, quoted_definition};
 use crate::planets::verdict::probability;
-use crate::posterior::objective::{
-    Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition, quoted_definition,
-};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
 use crate::runs::optimum::{self, OptimumFile};

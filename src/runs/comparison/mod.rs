@@ -15,11 +15,12 @@ pub use cost::{ChainCost, Cost, LandscapeCost};
 pub use draws::Distance;
 pub use pair::{Pair, PairError};
 
+use crate::model::Parameter;
 use crate::numerics::json::number_or_null;
-use crate::posterior::objective::{ObjectiveKind, Parameter, UnresolvedSpots};
 use crate::sampling::chain::statistics::wrap;
 use crate::sampling::chain::{ChainError, Summary};
 use crate::sampling::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
+use crate::surface::objective::{ObjectiveKind, UnresolvedSpots};
 use draws::Draws;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -6,13 +6,14 @@ use crate::data::io::effort::Effort;
 use crate::data::io::journal;
 use crate::data::io::landscape;
 use crate::data::io::lines::JournalError;
-use crate::posterior::objective::{ObjectiveKind, Parameter};
+use crate::model::Parameter;
 use crate::runs::grid_scan::{HEADER, Header, NODES};
 use crate::runs::manifest::Manifest;
 use crate::runs::origin::{Origin, OriginError};
 use crate::runs::run::CHAIN;
 use crate::sampling::chain::Chain;
 use crate::sampling::landscape::Landscape;
+use crate::surface::objective::ObjectiveKind;
 use std::path::{Path, PathBuf};
 
 /// A run and a landscape, read and found to belong together.

@@ -10,7 +10,7 @@ use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
 use crate::data::config::Config;
 use crate::data::scene::Scene;
-use crate::posterior::objective::Reference;
+use crate::surface::static_map::Reference;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};

@@ -5,8 +5,8 @@ use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
 use crate::data::config::Config;
 use crate::data::scene::Scene;
-use crate::posterior::fit::Fit;
-use crate::posterior::objective::Reference;
+use crate::surface::fit::Fit;
+use crate::surface::static_map::Reference;
 use serde_json::{Value, json};
 
 /// Signal-to-noise ratio of the profiles.
@@ -103,7 +103,7 @@ pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         if columns.is_empty() {
             columns.push(("cycle".to_owned(), cycles(&scene)));
         }
-        let of = |f: &dyn Fn(&crate::posterior::fit::FilteredVelocity) -> f64| {
+        let of = |f: &dyn Fn(&crate::surface::fit::FilteredVelocity) -> f64| {
             fit.velocities.iter().map(f).collect::<Vec<f64>>()
         };
         columns.push((format!("{name}_observed_kms"), of(&|v| v.observed.value_kms)));

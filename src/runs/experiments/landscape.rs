@@ -4,10 +4,12 @@ use super::case;
 use super::laboratory::{ExperimentError, Laboratory};
 use super::report::{Drawn, Report};
 use super::star::{paper, with};
-use crate::data::search::{self, SearchSettings};
-use crate::posterior::objective::{CHI2, Parameter, SPOTTEDNESS};
+use crate::inference::search;
+use crate::inference::search::SearchSettings;
+use crate::model::Parameter;
 use crate::runs::comparison::{Comparison, Pair};
 use crate::sampling::landscape::{Axis, Grid, Node, Rule};
+use crate::surface::static_map::{CHI2, SPOTTEDNESS};
 use serde_json::{Value, json};
 
 /// Ends of the axes: K (km/s), Porb/Prot, phi.

@@ -7,7 +7,7 @@ use super::case;
 use super::laboratory::{ExperimentError, Laboratory};
 use super::report::{Drawn, Report};
 use super::star::{paper, with};
-use crate::posterior::objective::Parameter;
+use crate::model::Parameter;
 use crate::runs::comparison::{Comparison, Pair};
 use crate::sampling::landscape::Rule;
 use serde_json::{Value, json};

@@ -4,7 +4,7 @@
 
 use super::ExportError;
 use crate::data::io::journal;
-use crate::posterior::objective::{FreeParameter, Prior, Quoted};
+use crate::model::{FreeParameter, Prior, Quoted};
 use crate::runs::manifest::{Manifest, kinds_and_goals};
 use crate::runs::run::CHAIN;
 use crate::sampling::chain::{Chain, Settled, Summary, statistics::unwrap_around};

@@ -14,9 +14,9 @@ use super::draws::Draws;
 use super::{Contents, DerivedQuantity, Quantity};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::zarr::{self, Array, Attributes, Group, Values};
-use crate::posterior::objective::{CHI2, SPOTTEDNESS};
 use crate::sampling::chain::{MoveKind, Record};
 use crate::sampling::log_density::Status;
+use crate::surface::static_map::{CHI2, SPOTTEDNESS};
 use serde_json::{Value, json};
 use std::path::Path;
 

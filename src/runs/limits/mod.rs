@@ -15,8 +15,8 @@ pub use file::{CSV, ComparisonRecord, JSON, LimitRecord, LimitsFile};
 pub use full::{Comparison, WholeWay, WholeWayError, drawn};
 pub use shortcut::{Outcome, Shortcut};
 
+use crate::inference::detection::DetectionSettings;
 use crate::planets::periodogram::Frequencies;
-use crate::posterior::detection::DetectionSettings;
 use crate::star::Orbit;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -1,16 +1,16 @@
 //! The blind search after an orbit has been put in, to second order around the image without a planet.
 
+use crate::inference::detection::{DetectionError, DetectionSettings, Spots, View};
+use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::orbits::{Trial, scan};
 use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
-use crate::posterior::detection::{DetectionError, DetectionSettings, Spots, View};
-use crate::posterior::expansion::Expansion;
-use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::{Change, NoFit};
-use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::runs::limits::LimitSettings;
 use crate::star::Orbit;
+use crate::surface::evolving_map::{Change, NoFit};
+use crate::surface::expansion::Expansion;
+use crate::surface::imaging::Imager;
 
 /// A period is right when its frequency is off by less than this many inverse time bases.
 const RIGHT: f64 = 0.5;

@@ -6,9 +6,9 @@
 
 use super::Manifest;
 use crate::data::config::Settings;
+use crate::model::{Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
 use crate::planets::periodogram::RotationPeriods;
 use crate::planets::verdict::{Finding, Remark, Verdict};
-use crate::posterior::objective::{Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
 use crate::sampling::chain::modes::period_modes;
 use crate::sampling::chain::statistics::quantile;
 use crate::sampling::chain::{Chain, ParameterSummary, PeriodMode, Summary};

@@ -4,12 +4,12 @@ use crate::data::config::{Config, ConfigError, ObservationSource, PlanSection, S
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::{Scene, SceneError, fingerprint, imager};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
+use crate::inference::detection::{Spots, nights};
+use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
-use crate::posterior::detection::{Spots, nights};
-use crate::posterior::imaging::Imager;
-use crate::posterior::marginal::{Assumed, Basis, Known, Marginal, NoFit, fit};
-use crate::posterior::objective::{Parameter, ParameterValues};
 use crate::star::observation::{Observations, Profile};
+use crate::surface::evolving_map::{Assumed, Basis, Known, Marginal, NoFit, fit};
+use crate::surface::imaging::Imager;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::PathBuf;

@@ -1,10 +1,10 @@
 //! What a run samples: the posterior, with unresolved spots counted as noise or not where one map counts.
 
-use crate::posterior::density::Density;
-use crate::posterior::expansion::SpotsCounted;
-use crate::posterior::objective::UnresolvedSpots;
-use crate::posterior::surrogate::Surrogate;
+use crate::inference::surrogate::Surrogate;
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
+use crate::surface::density::Density;
+use crate::surface::objective::UnresolvedSpots;
+use crate::surface::static_map::SpotsCounted;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

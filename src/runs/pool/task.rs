@@ -6,7 +6,7 @@ use super::message::{Answer as _, numbers_from_bytes};
 use super::target::{Target, UnresolvedSpotsError};
 use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
-use crate::posterior::objective::FreeParameter;
+use crate::model::FreeParameter;
 use crate::runs::limits::{WholeWay, WholeWayError};
 use crate::runs::origin::{Origin, OriginError};
 use crate::sampling::log_density::LogDensity as _;

@@ -4,7 +4,7 @@ use super::start;
 use crate::data::config::ConfigError;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::JournalError;
-use crate::data::search::SearchError;
+use crate::inference::search::SearchError;
 use crate::runs::origin::OriginError;
 use crate::runs::pool::UnresolvedSpotsError;
 use crate::sampling::chain::ChainError;

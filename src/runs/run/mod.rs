@@ -16,8 +16,8 @@ use crate::data::io::effort::Effort;
 use crate::data::io::journal::{self, Journal, JournalError};
 use crate::data::io::lines;
 use crate::data::scene::Scene;
-use crate::data::search::Found;
-use crate::posterior::surrogate::{Surrogate, SurrogateMove};
+use crate::inference::search::Found;
+use crate::inference::surrogate::{Surrogate, SurrogateMove};
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::manifest::{self, Manifest, kinds_and_goals};
 use crate::runs::origin::Origin;
@@ -286,7 +286,7 @@ fn new_manifest(
     blind_search: Option<BlindSearch>,
     start: Positions,
 ) -> Manifest {
-    let prior = |f: &crate::posterior::objective::FreeParameter| {
+    let prior = |f: &crate::model::FreeParameter| {
         (f.parameter.name().to_string(), serde_json::to_value(f.prior).expect("a prior is plain data"))
     };
     Manifest {

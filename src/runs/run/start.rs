@@ -3,8 +3,8 @@
 
 use super::RunError;
 use crate::data::scene::Scene;
-use crate::data::search::Found;
-use crate::posterior::surrogate::Surrogate;
+use crate::inference::search::Found;
+use crate::inference::surrogate::Surrogate;
 use crate::runs::pool::Target;
 use crate::sampling::ensemble::{EnsembleError, Positions, StartDraw, draw_start, start_numbers};
 use crate::sampling::log_density::{Evaluator, LogDensity as _};

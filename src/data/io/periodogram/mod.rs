@@ -14,14 +14,14 @@ pub use record::{AliasRecord, FieldRecord, OrbitRecord, PeakRecord, PeriodogramF
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
 use super::provenance::Provenance;
-use crate::data::evidence::EvidenceRecord;
+use crate::inference::detection::{Detection, DetectionSettings, Robustness};
+use crate::inference::evidence::EvidenceRecord;
+use crate::model::ParameterValues;
 use crate::planets::periodogram::Search;
 use crate::planets::periodogram::orbits::scan;
 use crate::planets::verdict::{Remark, Verdict};
-use crate::posterior::detection::{Detection, DetectionSettings, Robustness};
-use crate::posterior::fit::Explained;
-use crate::posterior::imaging::Imager;
-use crate::posterior::objective::ParameterValues;
+use crate::surface::fit::Explained;
+use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
 

@@ -4,9 +4,9 @@
 //! Errors are to first order in K, period and phase; where the period has none, at that period.
 
 use super::PeriodogramResult;
+use crate::model::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 use crate::planets::periodogram::KeplerianOrbit;
 use crate::planets::periodogram::peaks::Peak;
-use crate::posterior::objective::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 use crate::star::Orbit;
 use crate::star::planet::minimum_mass;
 use serde::{Deserialize, Serialize};

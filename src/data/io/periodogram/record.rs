@@ -5,15 +5,15 @@ use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::quantities::QuantitiesRecord;
 use super::robustness::RobustnessRecord;
-use crate::data::evidence::EvidenceRecord;
 use crate::field::Field;
+use crate::inference::evidence::EvidenceRecord;
+use crate::model::ParameterValues;
 use crate::numerics::json::number_or_null;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::posterior::marginal::{Assumed, Change, Fitted};
-use crate::posterior::objective::ParameterValues;
+use crate::surface::evolving_map::{Assumed, Change, Fitted};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

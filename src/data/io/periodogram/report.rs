@@ -4,9 +4,9 @@
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::record::{FieldRecord, OrbitRecord, PeakRecord};
+use crate::model::{OrbitQuantity, Parameter};
 use crate::numerics::text::{Align, aligned, columns};
 use crate::planets::verdict::probability;
-use crate::posterior::objective::{OrbitQuantity, Parameter};
 
 /// Peaks shown; the file has the others.
 const SHOWN: usize = 6;

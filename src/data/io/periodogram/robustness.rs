@@ -1,9 +1,9 @@
 //! Whether the best orbit hangs on a choice, in `periodogram.json` and as text.
 
 use super::PeriodogramResult;
+use crate::inference::detection::{AtTarget, WithoutNight};
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::CircularOrbit;
-use crate::posterior::detection::{AtTarget, WithoutNight};
 use serde::{Deserialize, Serialize};
 
 /// Whether the best orbit hangs on a choice.

@@ -1,0 +1,270 @@
+//! What is to be said of a blind search in words: what speaks against a planet, what else has to be known, and the
+//! verdict.
+
+use super::{Detection, DetectionSettings, Image, Robustness, Seen};
+use crate::model::Parameter;
+use crate::planets::periodogram::Peak;
+use crate::planets::periodogram::offset::Offset;
+use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict};
+use crate::surface::evolving_map::Fitted;
+use crate::surface::imaging::Imager;
+use crate::surface::static_map::UNRESOLVED_SPOTS;
+
+/// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
+const FAR: f64 = 5.0;
+
+/// A target is missed by more than this factor; errors that were measured are such that it is just reached.
+const MISSED: f64 = 1.02;
+
+/// Fewer profiles than this hardly tell how large the unresolved spots are.
+const FEW: usize = 12;
+
+/// The systemic velocity may be wrong when another one gains that much ln L: 5 standard deviations.
+const OFFSET_GAIN: f64 = 12.5;
+
+/// Other peaks that may be the true one, as many as are named.
+const RIVALS_NAMED: usize = 3;
+
+/// What a search is judged by beside itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence<'a> {
+    /// What the data were imaged with.
+    pub imager: &'a Imager,
+    /// How it was asked for.
+    pub settings: &'a DetectionSettings,
+    /// Whether the best orbit depends on target or nights, where that was tried.
+    pub robustness: Option<&'a Robustness>,
+    /// What is not like noise in the residuals of the last image.
+    pub misfit: &'a [String],
+}
+
+/// What has to be known of the field that was integrated over.
+fn of_the_field(field: &Fitted) -> Vec<Remark> {
+    let faint = field.too_faint();
+    let reached = |name: &&str| {
+        Remark::note(match faint {
+            Some(amplitude) if *name == Parameter::SpotAmplitude.name() => format!(
+                "the profiles show no spots: their amplitude falls to the lower bound of its search, {amplitude:.2}"
+            ),
+            _ => format!("{name} lies on the bound of its search: the profiles do not tell it, or it is wrong"),
+        })
+    };
+    field.at_bounds.iter().map(reached).collect()
+}
+
+/// Whether the image fits as it should.
+fn of_the_image(image: &Image, evidence: &Evidence) -> Vec<Remark> {
+    let Evidence { imager, settings, .. } = *evidence;
+    let mut remarks = Vec::new();
+    let correlated_bins = imager.data.correlated_bins;
+    let data = imager.data.depth.len() as f64;
+    let chi2 = image.reference.solution.chi2 / data;
+    let far = (chi2 * correlated_bins - 1.0) / (2.0 * correlated_bins / data).sqrt();
+    let target = settings.chi2_target;
+    if !image.on_target && chi2 > MISSED * target {
+        remarks.push(Remark::against(
+            "no map fits to the target chi2",
+            format!(
+                "no map reaches the target chi2 of {target:.3} per datum without turning noise into spots \
+                ({chi2:.3} was reached): the target may be too low, or the model of the star wrong"
+            ),
+        ));
+    } else if far.abs() > FAR {
+        remarks.push(Remark::against(
+            "chi2 is far from 1",
+            format!(
+                "chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles or \
+                the model of the star may be wrong, and all errors here with them"
+            ),
+        ));
+    }
+    if image.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
+        remarks.push(Remark::against(
+            "the model of the star is wrong",
+            "the profiles have nothing to do with the model of the star: what the map leaves over is without bounds",
+        ));
+    }
+    remarks
+}
+
+impl Detection {
+    /// The verdict on the best orbit, given the [`Detection::remarks`].
+    pub fn verdict(&self, remarks: &[Remark]) -> Verdict {
+        let signal = Signal {
+            period_d: self.frequencies.rotation_period_d * self.best.porb_over_prot,
+            k_kms: self.best.orbit.k_kms,
+            sigma_k_kms: self.best.orbit.sigma_k_kms,
+        };
+        match self.changes() {
+            Some(sentence) => Verdict::not_judged(sentence),
+            None => Verdict::new(self.false_alarm_probability(), signal, remarks),
+        }
+    }
+
+    /// What an orbit at the rotation period is up against.
+    pub fn co_rotation(&self) -> String {
+        match self.co_rotation_penalty {
+            Some(ratio) if ratio > 1.1 => {
+                format!(
+                    "at Porb = Prot spots imitate an orbit: sigma_K is {ratio:.1} times its median at other periods"
+                )
+            }
+            Some(ratio) => format!("at Porb = Prot sigma_K is {ratio:.2} times its median at other periods"),
+            None => "at Porb = Prot spots imitate an orbit, and the data do not bound K there".to_owned(),
+        }
+    }
+
+    /// All that has to be said, what speaks against a planet with the rest.
+    pub fn remarks(&self, evidence: &Evidence) -> Vec<Remark> {
+        let mut remarks = match &self.last().seen {
+            Seen::Integrated(field) => of_the_field(field),
+            Seen::OneMap(image) => of_the_image(image, evidence),
+        };
+        let misfit = |text: &String| Remark::against("the residuals are not like noise", text);
+        remarks.extend(evidence.misfit.iter().map(misfit));
+        remarks.extend(self.of_the_data(evidence));
+        remarks.extend(self.of_the_change());
+        if self.is_candidate() {
+            remarks.extend(self.of_the_period());
+        }
+        remarks.extend(self.of_choices(evidence.robustness));
+        if self.best.on_edge {
+            remarks.push(Remark::against(
+                "the period lies on the edge of the search",
+                "the best period lies on the edge of the search: look beyond it before believing it",
+            ));
+        } else if !self.closed {
+            let rounds = self.rounds;
+            remarks.push(Remark::against(
+                "K is not settled",
+                format!("K still moves after {rounds} images at the best orbit: its value is not settled"),
+            ));
+        }
+        let shortest = self.frequencies.rotation_period_d / self.frequencies.range().1;
+        if shortest > self.frequencies.rotation_period_d {
+            remarks.push(Remark::note(format!(
+                "the search begins at {shortest:.3} d, above the rotation period of {:.3} d: signals of the spots at \
+                Prot and its \
+                 fractions can only appear as their aliases; --min-period-d searches further",
+                self.frequencies.rotation_period_d
+            )));
+        }
+        if self.last().quadratic.radial_velocities().is_err() {
+            remarks
+                .push(Remark::note("the data do not bound all velocities: rv.csv and covariance.csv hold no numbers"));
+        }
+        remarks
+    }
+
+    /// What the profiles lack.
+    fn of_the_data(&self, evidence: &Evidence) -> Vec<Remark> {
+        let Evidence { imager, settings, .. } = *evidence;
+        let mut remarks = Vec::new();
+        let fixed = settings.nuisances.iter().all(|nuisance| nuisance.parameter != Parameter::Vsys);
+        if let Some(offset) = self.offset.filter(|offset| fixed && offset.gain > OFFSET_GAIN) {
+            let Offset { velocity_kms, sigma_kms, gain } = offset;
+            remarks.push(Remark::against(
+                "the systemic velocity may be wrong",
+                format!(
+                    "with a constant velocity of {velocity_kms:+.3} +- {sigma_kms:.3} km/s beside an orbit ln L is \
+                    {gain:.0} \
+                     higher: star.vsys_kms may be wrong, which makes false peaks; make it free under parameters"
+                ),
+            ));
+        }
+        let profiles = imager.profiles().count();
+        if profiles < FEW {
+            remarks.push(Remark::against(
+                "there are few profiles",
+                format!(
+                    "{profiles} profiles hardly tell how large the spots are that the map does not resolve: planets \
+                    are missed, \
+                     and errors are rough"
+                ),
+            ));
+        }
+        remarks
+    }
+
+    /// Whether the star changes though it is taken for one that does not.
+    fn of_the_change(&self) -> Option<Remark> {
+        match self.change.as_ref()? {
+            Ok(change) => change.is_changing().then(|| Remark::against("the star changes", change.sentence())),
+            Err(error) => Some(Remark::against(
+                "whether the star changes is not known",
+                format!("whether the star changes while it is observed is not known: {error}"),
+            )),
+        }
+    }
+
+    /// Whether the best period is the one of the planet.
+    pub fn of_the_period(&self) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        if let Some(imitation) = self.best.imitation {
+            let words = imitation.words(self.frequencies.rotation_period_d);
+            let what = match imitation.alias {
+                None => format!("the best period is not told from {}", imitation.period()),
+                Some(_) => {
+                    format!("with this sampling the best period is not told from {} ({words})", imitation.period())
+                }
+            };
+            let text = format!("{what}, where spots imitate orbits: look at the other peaks before believing it");
+            remarks.push(match imitation.is_likely() {
+                true => Remark::against(format!("the period is {words}"), text),
+                false => Remark::note(text),
+            });
+        }
+        let rivals = self.rivals();
+        if !rivals.is_empty() {
+            let mut named: Vec<String> = rivals.iter().take(RIVALS_NAMED).map(|peak| self.rival(peak)).collect();
+            if rivals.len() > RIVALS_NAMED {
+                named.push(format!("one of {} more", rivals.len() - RIVALS_NAMED));
+            }
+            remarks.push(Remark::against(
+                "the period is ambiguous",
+                format!("the period is ambiguous: it may as well be {}", named.join(", or ")),
+            ));
+        }
+        remarks
+    }
+
+    /// Peaks that may as well be the true one.
+    fn rivals(&self) -> Vec<&Peak> {
+        let height = |peak: &Peak| peak.orbit.delta_ln_l;
+        let highest = height(self.blind.best());
+        self.blind.peaks[1..].iter().filter(|peak| highest - height(peak) < AMBIGUOUS).collect()
+    }
+
+    fn rival(&self, peak: &Peak) -> String {
+        let period_d = self.frequencies.rotation_period_d * peak.porb_over_prot;
+        let below = self.blind.best().orbit.delta_ln_l - peak.orbit.delta_ln_l;
+        let alias = if peak.alias.is_some() { ", an alias by the sampling" } else { "" };
+        format!("{period_d:.4} d{alias} (ln L lower by {below:.1})")
+    }
+
+    /// Whether the result depends on a choice.
+    fn of_choices(&self, robustness: Option<&Robustness>) -> Vec<Remark> {
+        let Some(robustness) = robustness else { return Vec::new() };
+        let mut remarks = Vec::new();
+        if let Some(errors) = robustness.target_matters() {
+            remarks.push(Remark::against(
+                "K depends on the target chi2",
+                format!(
+                    "K moves by {errors:.1} of its errors when the target chi2 is changed by 3 %: it depends on \
+                     imaging.chi2_target"
+                ),
+            ));
+        }
+        let level = self.blind.false_alarm.level(CANDIDATE_FAP);
+        for night in robustness.decisive_nights(level) {
+            remarks.push(Remark::against(
+                "one night decides",
+                format!(
+                    "the night of {:.2} ({} profiles) makes the result: see K without it",
+                    night.span_d.0, night.profiles
+                ),
+            ));
+        }
+        remarks
+    }
+}

@@ -1,0 +1,184 @@
+//! Whether the best orbit hangs on a choice: K at a target chi2 3 % lower and higher, and without the profiles of each
+//! night.
+//!
+//! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other
+//! target, or of the profiles that remain. Where maps are integrated over, profiles are taken out of the evidence.
+
+use super::{Detection, DetectionSettings, View};
+use crate::model::{Parameter, ParameterValues};
+use crate::planets::periodogram::{CircularOrbit, orbits};
+use crate::planets::velocities::VelocityQuadratic;
+use crate::surface::evolving_map::Basis;
+use crate::surface::expansion::Expansion;
+use crate::surface::imaging::Imager;
+use rayon::prelude::*;
+
+/// Targets relative to the one asked for.
+const TARGETS: [f64; 3] = [0.97, 1.0, 1.03];
+
+/// Profiles further apart than this (d) belong to different nights.
+const NIGHT_GAP_D: f64 = 0.3;
+
+/// Fewest profiles that must remain without a night.
+const FEWEST: usize = 5;
+
+/// More than this part of an error bar between targets is worth a warning.
+const MOVES: f64 = 0.5;
+
+/// K changes by more than that many times what leaving out so many profiles does by chance.
+const SURPRISE: f64 = 3.0;
+
+/// The orbit at one target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtTarget {
+    /// chi2 per datum asked for.
+    pub chi2_target: f64,
+    /// Whether the image reaches it before noise is turned into spots.
+    pub on_target: bool,
+    /// The orbit; `None` where none is bounded, or no image.
+    pub orbit: Option<CircularOrbit>,
+}
+
+/// The orbit without one night.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WithoutNight {
+    /// Time of its first and last profile (d).
+    pub span_d: (f64, f64),
+    /// Number of its profiles.
+    pub profiles: usize,
+    /// The orbit of all others; `None` where none is bounded, or there is no image or evidence.
+    pub orbit: Option<CircularOrbit>,
+}
+
+/// The best orbit under other choices, its period kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robustness {
+    /// At the target asked for, and all nights.
+    pub all: Option<CircularOrbit>,
+    /// With the target a little lower, as it is, and a little higher.
+    pub targets: Vec<AtTarget>,
+    /// Without each night, in order of time; empty if the profiles are of one night, or too few.
+    pub nights: Vec<WithoutNight>,
+}
+
+/// Tries the best orbit of `found` out, all else as in `values`. Where maps are integrated over there are no targets,
+/// and without a night the field, and the maps around which profiles are linear, are those found last.
+pub fn robustness(
+    imager: &Imager,
+    mut values: ParameterValues,
+    settings: &DetectionSettings,
+    found: &Detection,
+) -> Robustness {
+    let peak = &found.best;
+    let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
+    let orbit_of = |view: &View| orbit(&view.quadratic);
+    values[Parameter::K] = peak.orbit.k_kms;
+    values[Parameter::PorbOverProt] = peak.porb_over_prot;
+    values[Parameter::Phi] = peak.orbit.phi;
+    let at = |factor: f64| {
+        let chi2_target = factor * settings.chi2_target;
+        let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
+        AtTarget {
+            chi2_target,
+            on_target: view.as_ref().is_ok_and(|view| view.image().is_none_or(|image| image.on_target)),
+            orbit: view.ok().as_ref().and_then(orbit_of),
+        }
+    };
+    let times_d = imager.times_d();
+    let mut nights = nights(&times_d, NIGHT_GAP_D);
+    nights.retain(|night| times_d.len() - night.len() >= FEWEST);
+    if nights.len() < 2 {
+        nights.clear();
+    }
+    nights.iter_mut().for_each(|night| night.sort_unstable());
+    let (targets, without) = match found.last().field() {
+        Some(field) => {
+            let (basis, stellar) = (Basis::new(&imager.grid), &found.last().expansion.stellar);
+            let of_others = |others: &Expansion| orbit(&others.velocities(&settings.nuisances));
+            let all = field.marginal.without_each(imager, &basis, stellar, &nights, of_others);
+            let none = || nights.iter().map(|_| None).collect();
+            (Vec::new(), all.map_or_else(|_| none(), |all| all.into_iter().map(|of| of.ok().flatten()).collect()))
+        }
+        None => {
+            let others = |night: &[usize]| View::new(&imager.without(night), values, settings, None).ok();
+            let orbit = |night: &Vec<usize>| others(night).as_ref().and_then(orbit_of);
+            (TARGETS.map(at).to_vec(), nights.par_iter().map(orbit).collect::<Vec<_>>())
+        }
+    };
+    let without = nights.iter().zip(without).map(|(night, orbit)| {
+        let times = || night.iter().map(|&k| times_d[k]);
+        WithoutNight {
+            span_d: (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)),
+            profiles: night.len(),
+            orbit,
+        }
+    });
+    Robustness { all: orbit_of(found.last()), targets, nights: without.collect() }
+}
+
+/// Profiles night by night, in order of time; nights are more than `gap_d` apart.
+pub fn nights(times_d: &[f64], gap_d: f64) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..times_d.len()).collect();
+    order.sort_by(|a, b| times_d[*a].total_cmp(&times_d[*b]));
+    order.chunk_by(|a, b| times_d[*b] - times_d[*a] <= gap_d).map(<[usize]>::to_vec).collect()
+}
+
+impl Robustness {
+    /// By how many of its errors K differs between targets, where that is worth a warning.
+    pub fn target_matters(&self) -> Option<f64> {
+        let orbits: Vec<CircularOrbit> = self.targets.iter().filter_map(|at| at.orbit).collect();
+        let middle = self.all?;
+        let apart = |orbit: &CircularOrbit| (orbit.k_kms - middle.k_kms).abs() / middle.sigma_k_kms;
+        let largest = orbits.iter().map(apart).fold(0.0, f64::max);
+        (largest > MOVES).then_some(largest)
+    }
+
+    /// Nights that make the result: without them ln L of the orbit falls below `level`, where it was above, or K moves
+    /// by more than the profiles left out explain.
+    pub fn decisive_nights(&self, level: f64) -> Vec<&WithoutNight> {
+        let Some(all) = self.all else { return Vec::new() };
+        let decides = |night: &&WithoutNight| {
+            night.orbit.is_none_or(|orbit| {
+                // of nested data, the variance of the difference is that of the variances
+                let by_chance = (orbit.sigma_k_kms.powi(2) - all.sigma_k_kms.powi(2)).max(0.0).sqrt();
+                let moved = (orbit.k_kms - all.k_kms).abs();
+                let lost = all.delta_ln_l > level && orbit.delta_ln_l <= level;
+                lost || moved > SURPRISE * by_chance.max(0.3 * all.sigma_k_kms)
+            })
+        };
+        self.nights.iter().filter(decides).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nights_end_with_gaps() {
+        let found = nights(&[5.01, 3.2, 3.0, 5.2, 3.45, 9.0], NIGHT_GAP_D);
+        assert_eq!(found, vec![vec![2, 1, 4], vec![0, 3], vec![5]]);
+    }
+
+    fn orbit(k_kms: f64, sigma_k_kms: f64, delta_ln_l: f64) -> Option<CircularOrbit> {
+        Some(CircularOrbit { k_kms, sigma_k_kms, phi: 0.0, sigma_phi: 0.1, delta_ln_l })
+    }
+
+    #[test]
+    fn what_hangs_on_a_choice_is_named() {
+        let at = |k| AtTarget { chi2_target: 1.0, on_target: true, orbit: orbit(k, 0.02, 20.0) };
+        let night = |orbit| WithoutNight { span_d: (0.0, 0.2), profiles: 4, orbit };
+        let nights = vec![
+            night(orbit(0.21, 0.025, 15.0)),
+            night(orbit(0.2, 0.03, 7.0)),
+            night(orbit(0.27, 0.0225, 15.0)),
+            night(None),
+        ];
+        let steady = Robustness { all: orbit(0.2, 0.02, 20.0), targets: vec![at(0.205), at(0.2), at(0.192)], nights };
+        assert_eq!(steady.target_matters(), None);
+        let decisive: Vec<Option<CircularOrbit>> = steady.decisive_nights(8.0).iter().map(|n| n.orbit).collect();
+        assert_eq!(decisive, vec![orbit(0.2, 0.03, 7.0), orbit(0.27, 0.0225, 15.0), None]);
+        let shaky = Robustness { targets: vec![at(0.18), at(0.2), at(0.2)], ..steady };
+        assert!((shaky.target_matters().unwrap() - 1.0).abs() < 1e-12);
+    }
+}

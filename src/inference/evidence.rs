@@ -1,0 +1,155 @@
+//! The evidence for planets under the priors of a config: what is said of it beside a blind search.
+
+use crate::model::{Clock, Elements, FreeParameter, Parameter, Prior, period_prior};
+use crate::planets::evidence::{Density, Evidence, Inclusion, LnBayes, PlanetPrior, evidence};
+use crate::planets::periodogram::eccentric::LARGEST_ECCENTRICITY;
+use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::probability;
+use serde::{Deserialize, Serialize};
+
+/// A prior of K that reaches so many times farther than the error of K is said to be wide.
+const WIDE: f64 = 100.0;
+
+/// Standard deviations of a normal prior that are followed.
+const FOLLOWED: f64 = 8.0;
+
+/// Where the prior of a period holds 0 it is followed from this share of the longest.
+const SHORTEST: f64 = 0.01;
+
+/// What profiles say of no, one and two planets, of the star's spots as they are fitted without a planet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EvidenceRecord {
+    /// ln of the Bayes factor of one planet on a circle over none.
+    pub circle: LnBayes,
+    /// The same on an ellipse.
+    pub ellipse: LnBayes,
+    /// The same of two planets on circles.
+    pub two_circles: LnBayes,
+    /// Intervals of frequency, one over the time base wide, of least false inclusion probability.
+    pub inclusion: Vec<InclusionRecord>,
+    /// Priors that all of this is under, in words.
+    pub priors: String,
+    /// All of it in a sentence.
+    pub sentence: String,
+}
+
+/// An interval of frequencies.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InclusionRecord {
+    /// Period in its middle (d).
+    pub period_d: f64,
+    /// Probability that no planet has its frequency there.
+    pub false_inclusion_probability: f64,
+}
+
+/// What is assumed of a planet.
+#[derive(Clone, Copy)]
+struct Assumed {
+    k: (Prior, [f64; 2]),
+    period: (Prior, [f64; 2]),
+    largest_e: f64,
+}
+
+impl EvidenceRecord {
+    /// Under the priors of `free` parameters, from a star's `quadratic` without a planet. `None` where K or the period
+    /// of the planet has no prior, or the profiles bound no orbit.
+    pub fn of(free: &[FreeParameter], clock: Clock, seed: u64, quadratic: &VelocityQuadratic) -> Option<Self> {
+        let [first, second] = &Elements::PLANETS;
+        let one = Assumed::of(free, first, clock)?;
+        // of a second planet nothing else is assumed unless the config says so
+        let two = Assumed::of(free, second, clock).unwrap_or(one);
+        let found = one.with(|one| two.with(|two| evidence(quadratic, [one, two], seed)))?;
+        let error_kms = quadratic.information.trace().sqrt().recip() * 2f64.sqrt();
+        Some(EvidenceRecord::new(found, [one, two], error_kms, clock.rotation_period_d))
+    }
+
+    fn new(found: Evidence, [one, two]: [Assumed; 2], error_kms: f64, rotation_period_d: f64) -> Self {
+        let record = |inclusion: &Inclusion| InclusionRecord {
+            period_d: rotation_period_d * inclusion.porb_over_prot,
+            false_inclusion_probability: inclusion.false_inclusion_probability,
+        };
+        let inclusion: Vec<InclusionRecord> = found.inclusion.iter().map(record).collect();
+        let same = one.words(rotation_period_d) == two.words(rotation_period_d);
+        let second = if same { String::new() } else { format!("; second planet: {}", two.words(rotation_period_d)) };
+        let priors = format!("{}{second}", one.words(rotation_period_d));
+        let number = |bayes: &LnBayes| match bayes.sd {
+            Some(sd) => format!("{:.2} +- {sd:.2}", bayes.ln_bayes),
+            None => format!("{:.2}", bayes.ln_bayes),
+        };
+        let Evidence { circle, ellipse, two_circles, .. } = found;
+        let at = inclusion.first().map(|best| {
+            let chance = probability(best.false_inclusion_probability);
+            format!("; false inclusion probability {chance} at {:.4} d", best.period_d)
+        });
+        let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
+            let most = one.k.1[1];
+            format!(
+                "; the prior of K, up to {most} km/s, reaches far beyond what the profiles measure (some \
+                 {error_kms:.3} km/s), and Bayes factors fall in proportion"
+            )
+        });
+        let sentence = format!(
+            "ln of the Bayes factor over no planet: one on a circle {}, one on an ellipse {}, two on circles {} \
+             (priors: {priors}; spots as fitted without a planet){}{}",
+            number(&circle),
+            number(&ellipse),
+            number(&two_circles),
+            at.unwrap_or_default(),
+            wide.unwrap_or_default()
+        );
+        EvidenceRecord { circle, ellipse, two_circles, inclusion, priors, sentence }
+    }
+}
+
+impl Assumed {
+    fn of(free: &[FreeParameter], of: &Elements, clock: Clock) -> Option<Self> {
+        let prior = |p: Parameter| free.iter().find(|f| f.parameter == p).map(|f| f.prior);
+        // of a known ephemeris there is nothing to choose
+        prior(of.phi)?;
+        let (k, period) = (prior(of.k)?, period_prior(free, of, clock)?);
+        let largest_e = match prior(of.shape[0]) {
+            Some(Prior::Disc { max_eccentricity }) => max_eccentricity,
+            _ => LARGEST_ECCENTRICITY,
+        };
+        let [low, high] = followed(&period);
+        let period = (period, [low.max(SHORTEST * high), high]);
+        let [low, high] = followed(&k);
+        Some(Assumed { k: (k, [low.max(0.0), high]), period, largest_e })
+    }
+
+    fn with<T>(&self, run: impl FnOnce(&PlanetPrior) -> T) -> T {
+        let (k, period) = (self.k, self.period);
+        let (ln_k, ln_period) = (move |x: f64| k.0.log_density(x), move |x: f64| period.0.log_density(x));
+        let uniform = |prior: Prior| matches!(prior, Prior::Uniform { .. });
+        run(&PlanetPrior {
+            k: Density { ln: &ln_k, bounds: k.1, uniform: uniform(k.0) },
+            period: Density { ln: &ln_period, bounds: period.1, uniform: uniform(period.0) },
+            largest_e: self.largest_e,
+        })
+    }
+
+    fn words(&self, rotation_period_d: f64) -> String {
+        let days = self.period.0.in_units_of(rotation_period_d.recip());
+        let (k, period) = (words(&self.k.0), words(&days));
+        format!("K {k} km/s, period {period} d, e uniform up to {}", self.largest_e)
+    }
+}
+
+/// The bounds of a prior, or where it is all but nothing.
+fn followed(prior: &Prior) -> [f64; 2] {
+    let (low, high) = prior.bounds();
+    match *prior {
+        Prior::Normal { mean, sd, .. } => [low.max(mean - FOLLOWED * sd), high.min(mean + FOLLOWED * sd)],
+        _ => [low, high],
+    }
+}
+
+fn words(prior: &Prior) -> String {
+    match *prior {
+        Prior::Uniform { min, max } => format!("uniform from {min:.4} to {max:.4}"),
+        Prior::LogUniform { min, max } => format!("log-uniform from {min:.4} to {max:.4}"),
+        Prior::Normal { mean, sd, .. } => format!("normal, {mean:.4} +- {sd:.4}"),
+        Prior::Isotropic { .. } => "isotropic".to_owned(),
+        Prior::Disc { .. } | Prior::Periodic => "uniform".to_owned(),
+    }
+}

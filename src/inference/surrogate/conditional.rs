@@ -1,0 +1,242 @@
+//! The quadratic at one period (or two, with the shapes of the orbits): a Gaussian in all other coordinates.
+//!
+//! With `x = T y + o` the coordinates of the expansion, y the linear ones (K cos, K sin, systemic velocity, stellar
+//! parameters) and T's first columns the velocities of unit orbits (`planet`): of a circle the cosine and sine of its
+//! angle. Then `ln L = c + b y - y A y / 2`.
+
+use super::planet::{Nonlinear, Planet};
+use crate::model::{Elements, Parameter, ParameterSpace, Prior};
+use crate::surface::expansion::Expansion;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rand::{Rng, RngCore};
+use rand_distr::{ChiSquared, StandardNormal};
+
+/// Degrees of freedom of the distribution that the linear coordinates are drawn from.
+const DEGREES: f64 = 8.0;
+
+/// What the quadratics of all periods have in common.
+#[derive(Clone, Debug)]
+pub(super) struct LinearModel {
+    /// Rotation cycles from mid-time.
+    cycles: Vec<f64>,
+    information: DMatrix<f64>,
+    /// Gradient of ln L and ln L itself at `y = 0`.
+    gradient: DVector<f64>,
+    constant: f64,
+    /// Columns of T but for those of orbits, and the information times these.
+    columns: DMatrix<f64>,
+    informed: DMatrix<f64>,
+    /// The planets, whose columns come first, in this order.
+    planets: Vec<Planet>,
+    /// Positions of the other linear coordinates in a vector of internal ones: those of `columns`.
+    others: Vec<usize>,
+    dimension: usize,
+    correction: Option<Correction>,
+    /// Precision and pull of the normal priors of linear coordinates.
+    prior_precision: DVector<f64>,
+    prior_pull: DVector<f64>,
+}
+
+/// What is added to ln L at every period: `constant + gradient (y - centre) - (y - centre) information (y - centre) /
+/// 2`.
+#[derive(Clone, Debug)]
+pub(super) struct Correction {
+    pub centre: DVector<f64>,
+    pub constant: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+/// The quadratic at one period.
+pub(super) struct Conditional {
+    information: DMatrix<f64>,
+    gradient: DVector<f64>,
+    constant: f64,
+    /// Of what is drawn from: with the normal priors, at the temperature.
+    factor: Cholesky<f64, Dyn>,
+    mode: DVector<f64>,
+    log_determinant: f64,
+}
+
+impl LinearModel {
+    /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where no planet's
+    /// velocities are linear in some of its free parameters.
+    pub fn new(expansion: &Expansion, space: &ParameterSpace, mid_cycle: f64) -> Option<Self> {
+        let (n, all) = (expansion.profiles(), expansion.centre.len());
+        let is_free = |of: &Elements| space.free().iter().any(|f| of.all().contains(&f.parameter));
+        let free = Elements::PLANETS.iter().filter(|of| is_free(of));
+        let planets: Vec<Planet> = free.map(|of| Planet::new(space, of, mid_cycle)).collect::<Option<_>>()?;
+        if planets.is_empty() {
+            return None;
+        }
+        let fixed = space.values_at(&space.start());
+        let of_planets: Vec<usize> = planets.iter().flat_map(Planet::positions).collect();
+        let others: Vec<usize> = (0..space.dimension()).filter(|i| !of_planets.contains(i)).collect();
+        let mut columns = DMatrix::zeros(all, others.len());
+        let mut offset = -&expansion.centre;
+        for (mut column, &i) in columns.column_iter_mut().zip(&others) {
+            column.copy_from(&expansion.direction(space.free()[i].parameter));
+        }
+        if !space.free().iter().any(|f| f.parameter == Parameter::Vsys) {
+            offset.rows_mut(0, n).add_scalar_mut(fixed[Parameter::Vsys]);
+        }
+        for of in Elements::PLANETS.iter().filter(|of| !is_free(of) && fixed.given(of.k).is_some_and(|k| k != 0.0)) {
+            let planet = of.orbit(&fixed);
+            offset.iter_mut().zip(&expansion.cycles).for_each(|(v, cycle)| *v += planet.velocity_kms(*cycle));
+        }
+        let normal = |i: Option<usize>| match i.map(|i| space.free()[i]) {
+            Some(f) => match f.prior {
+                Prior::Normal { mean, sd, .. } => {
+                    // in the coordinate that is sampled, to first order
+                    let p = f.parameter;
+                    let sd = sd * (-p.log_jacobian(mean)).exp();
+                    (sd.powi(-2), p.to_sampling(mean) * sd.powi(-2))
+                }
+                _ => (0.0, 0.0),
+            },
+            None => (0.0, 0.0),
+        };
+        let of_orbits = planets.iter().flat_map(|planet| vec![planet.ray(); planet.columns()]);
+        let normals: Vec<(f64, f64)> = of_orbits.chain(others.iter().copied().map(Some)).map(normal).collect();
+        let pushed = &expansion.information * &offset;
+        Some(LinearModel {
+            cycles: expansion.cycles.iter().map(|e| e - mid_cycle).collect(),
+            gradient: &expansion.gradient - &pushed,
+            constant: expansion.log_likelihood + expansion.gradient.dot(&offset) - 0.5 * offset.dot(&pushed),
+            informed: &expansion.information * &columns,
+            information: expansion.information.clone(),
+            columns,
+            dimension: space.dimension(),
+            correction: None,
+            prior_precision: DVector::from_iterator(normals.len(), normals.iter().map(|n| n.0)),
+            prior_pull: DVector::from_iterator(normals.len(), normals.iter().map(|n| n.1)),
+            planets,
+            others,
+        })
+    }
+
+    /// With a correction to ln L in place of the one that there is.
+    pub fn with_correction(self, correction: Correction) -> Self {
+        LinearModel { correction: Some(correction), ..self }
+    }
+
+    /// Number of linear coordinates.
+    pub fn linear_count(&self) -> usize {
+        self.orbit_count() + self.others.len()
+    }
+
+    fn orbit_count(&self) -> usize {
+        self.planets.iter().map(Planet::columns).sum()
+    }
+
+    /// The planets.
+    pub fn planets(&self) -> &[Planet] {
+        &self.planets
+    }
+
+    /// The first column of a planet.
+    pub fn column_of(&self, planet: usize) -> usize {
+        self.planets[..planet].iter().map(Planet::columns).sum()
+    }
+
+    /// What of a position is not linear, planet by planet, and what is.
+    pub fn split(&self, position: &[f64]) -> (Vec<Nonlinear>, DVector<f64>) {
+        let (nonlinear, linear): (Vec<_>, Vec<_>) = self.planets.iter().map(|planet| planet.split(position)).unzip();
+        let linear = linear.into_iter().flatten().chain(self.others.iter().map(|&i| position[i]));
+        (nonlinear, DVector::from_vec(linear.collect()))
+    }
+
+    /// Internal coordinates of both.
+    pub fn position(&self, nonlinear: &[Nonlinear], linear: &DVector<f64>) -> Vec<f64> {
+        let mut position = vec![0.0; self.dimension];
+        let mut first = 0;
+        for (planet, at) in self.planets.iter().zip(nonlinear) {
+            planet.write(at, &linear.as_slice()[first..first + planet.columns()], &mut position);
+            first += planet.columns();
+        }
+        self.others.iter().zip(linear.iter().skip(first)).for_each(|(&i, x)| position[i] = *x);
+        position
+    }
+
+    /// The quadratic at these periods and shapes, drawn from as if ln L were divided by `temperature`; `None` where it
+    /// has no maximum.
+    pub fn at(&self, nonlinear: &[Nonlinear], temperature: f64) -> Option<Conditional> {
+        let (all, count, orbits) = (self.gradient.len(), self.linear_count(), self.orbit_count());
+        let mut orbit = DMatrix::zeros(all, orbits);
+        let mut first = 0;
+        for (planet, at) in self.planets.iter().zip(nonlinear) {
+            planet.fill(at, &self.cycles, &mut orbit, first);
+            first += planet.columns();
+        }
+        let informed_orbit = &self.information * &orbit;
+        let mut information = DMatrix::zeros(count, count);
+        information.view_mut((0, 0), (orbits, orbits)).copy_from(&orbit.tr_mul(&informed_orbit));
+        let across = orbit.tr_mul(&self.informed);
+        information.view_mut((0, orbits), (orbits, count - orbits)).copy_from(&across);
+        information.view_mut((orbits, 0), (count - orbits, orbits)).copy_from(&across.transpose());
+        information
+            .view_mut((orbits, orbits), (count - orbits, count - orbits))
+            .copy_from(&self.columns.tr_mul(&self.informed));
+        let mut gradient = DVector::zeros(count);
+        gradient.rows_mut(0, orbits).copy_from(&orbit.tr_mul(&self.gradient));
+        gradient.rows_mut(orbits, count - orbits).copy_from(&self.columns.tr_mul(&self.gradient));
+        let mut constant = self.constant;
+        if let Some(Correction { centre, constant: at_centre, gradient: slope, information: bend }) = &self.correction {
+            let bent = bend * centre;
+            constant += at_centre - slope.dot(centre) - 0.5 * centre.dot(&bent);
+            gradient += slope + bent;
+            information += bend;
+        }
+        let mut drawn = &information / temperature;
+        drawn.set_diagonal(&(drawn.diagonal() + &self.prior_precision));
+        let factor = drawn.cholesky()?;
+        let mode = factor.solve(&(&gradient / temperature + &self.prior_pull));
+        let log_determinant = 2.0 * factor.l_dirty().diagonal().iter().map(|l| l.ln()).sum::<f64>();
+        Some(Conditional { information, gradient, constant, factor, mode, log_determinant })
+    }
+}
+
+impl Conditional {
+    /// ln L at the linear coordinates `y`.
+    pub fn log_likelihood(&self, y: &DVector<f64>) -> f64 {
+        self.constant + self.gradient.dot(y) - 0.5 * y.dot(&(&self.information * y))
+    }
+
+    /// Where the drawn distribution is densest.
+    pub fn mode(&self) -> DVector<f64> {
+        self.mode.clone()
+    }
+
+    /// K at the mode, or its standard error if that is larger, all else known, of a planet whose columns begin at
+    /// `first`.
+    pub fn amplitude(&self, first: usize) -> f64 {
+        let error = (2.0 / (self.information[(first, first)] + self.information[(first + 1, first + 1)])).sqrt();
+        self.mode[first].hypot(self.mode[first + 1]).max(error)
+    }
+
+    /// ln of the determinant of its information.
+    pub fn log_determinant(&self) -> f64 {
+        self.log_determinant
+    }
+
+    /// Linear coordinates drawn from a t distribution around the mode, and ln of the density there.
+    pub fn draw(&self, rng: &mut dyn RngCore) -> (DVector<f64>, f64) {
+        let normal = DVector::from_fn(self.mode.len(), |_, _| rng.sample::<f64, _>(StandardNormal));
+        let chi2: f64 = rng.sample(ChiSquared::new(DEGREES).expect("positive"));
+        let scaled = normal * (DEGREES / chi2).sqrt();
+        let log_density = self.log_t(scaled.norm_squared());
+        let step =
+            self.factor.l_dirty().tr_solve_lower_triangular(&scaled).expect("a factor has no zero on its diagonal");
+        (&self.mode + step, log_density)
+    }
+
+    /// ln of the density with which [`Conditional::draw`] gives `y`.
+    pub fn log_density(&self, y: &DVector<f64>) -> f64 {
+        self.log_t((self.factor.l_dirty().lower_triangle().tr_mul(&(y - &self.mode))).norm_squared())
+    }
+
+    fn log_t(&self, distance_squared: f64) -> f64 {
+        let degrees = DEGREES + self.mode.len() as f64;
+        0.5 * self.log_determinant - 0.5 * degrees * (distance_squared / DEGREES).ln_1p()
+    }
+}

@@ -1,0 +1,192 @@
+//! The star's side of the marginal likelihood: what profiles each harmonic makes.
+
+use super::condense::Condensed;
+use super::light::Light;
+use super::{DEGREE, MEAN_FILLING};
+use crate::field::{Compression, Epoch, Harmonics, Jacobian, Settling};
+use crate::star::{Response, StarState, SurfaceGrid};
+use crate::surface::imaging::Imager;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Pixels at which changes of the maps are watched, about.
+const WATCHED: usize = 150;
+
+/// The harmonics on the pixels of a map.
+#[derive(Clone, Debug)]
+pub struct Basis {
+    /// Degree of each harmonic (H).
+    pub degrees: Vec<usize>,
+    /// The harmonics (pixels, H).
+    pub on_pixels: DMatrix<f64>,
+    /// The harmonics (points, H) where changes of the maps are watched.
+    pub(super) watched: DMatrix<f64>,
+    /// How exactly maps are found.
+    pub(super) settling: Settling,
+    /// Times that maps are found with a jitter, along their slopes from time to time.
+    pub(super) jittered: usize,
+}
+
+impl Basis {
+    /// On the pixels of `grid`, maps exact enough for ln Z to some 0.03.
+    pub fn new(grid: &SurfaceGrid) -> Self {
+        let harmonics = Harmonics::new(DEGREE);
+        let on_pixels = harmonics.at(&grid.longitude, &grid.latitude);
+        let each = (grid.len() / WATCHED).max(1);
+        let watched: Vec<usize> = (0..grid.len()).step_by(each).collect();
+        Basis {
+            degrees: harmonics.degrees(),
+            watched: on_pixels.select_columns(&watched).transpose(),
+            on_pixels: on_pixels.transpose(),
+            settling: Settling { tolerance: 1e-3, ..Settling::default() },
+            jittered: 1,
+        }
+    }
+
+    /// The same where ln Z is compared with that of neighbours: maps exact enough for ln Z to some 0.003.
+    pub fn exact(grid: &SurfaceGrid) -> Self {
+        let settling = Settling { tolerance: 2e-4, ..Settling::default() };
+        Basis { settling, jittered: 2, ..Basis::new(grid) }
+    }
+
+    /// The same where differences of ln Z need be good to a few tenths only.
+    pub fn rough(grid: &SurfaceGrid) -> Self {
+        Basis::new(grid).roughly()
+    }
+
+    /// These harmonics, differences of ln Z good to a few tenths.
+    #[must_use]
+    pub(super) fn roughly(&self) -> Self {
+        let compression = Compression { left_out: 0.03 };
+        Basis { settling: Settling { tolerance: 5e-3, compression, ..Settling::default() }, ..self.clone() }
+    }
+
+    /// Spot filling factors (pixels, columns) of maps with these `coefficients` (H, columns).
+    pub fn filling(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
+        (&self.on_pixels * coefficients).add_scalar(MEAN_FILLING)
+    }
+}
+
+/// Line depth and continuum of every profile for each harmonic, before the division of one by the other; depths in the
+/// few numbers that hold them.
+#[derive(Clone, Debug)]
+pub struct Design {
+    response: Response,
+    condensed: Arc<Condensed>,
+    /// Of each profile (numbers, H).
+    line: Vec<Arc<DMatrix<f64>>>,
+    /// (H, profiles).
+    continuum: DMatrix<f64>,
+    /// The same of a star without spots.
+    bare_line: Vec<DVector<f64>>,
+    bare_continuum: Vec<f64>,
+    light: Light,
+}
+
+impl Design {
+    /// Of the star in `imager` at `state`. A model application a harmonic.
+    pub fn new(imager: &Imager, basis: &Basis, state: &StarState) -> Self {
+        Design::of(imager, basis, (imager.response(state), state), None)
+    }
+
+    /// Seen through a response at a state, in the numbers of a design that is `like` this one, of a star near by.
+    pub fn of(
+        imager: &Imager,
+        basis: &Basis,
+        (response, state): (Response, &StarState),
+        like: Option<&Design>,
+    ) -> Self {
+        let apply = |map: &[f64]| {
+            let (mut line, mut continuum) = (vec![0.0; response.data_len()], vec![0.0; response.profiles()]);
+            response.apply(map, &mut line, &mut continuum);
+            (line, continuum)
+        };
+        let columns: Vec<(Vec<f64>, Vec<f64>)> =
+            (0..basis.degrees.len()).into_par_iter().map(|h| apply(basis.on_pixels.column(h).as_slice())).collect();
+        let of_profile = |k: usize| {
+            let bins = response.bins(k);
+            let mut line = DMatrix::zeros(bins.len(), columns.len());
+            for (mut to, (from, _)) in line.column_iter_mut().zip(&columns) {
+                to.copy_from_slice(&from[bins.clone()]);
+            }
+            line
+        };
+        let lines: Vec<DMatrix<f64>> = (0..response.profiles()).map(of_profile).collect();
+        let continuum = DMatrix::from_fn(columns.len(), response.profiles(), |h, k| columns[h].1[k]);
+        // of many profiles it is hundreds of megabytes
+        drop(columns);
+        let (bare, bare_continuum) = apply(&vec![1.0; response.pixels()]);
+        let condensed = match like {
+            Some(like) => Arc::clone(&like.condensed),
+            None => Arc::new(Condensed::new(imager, basis, (&response, state), &lines, &bare)),
+        };
+        let line = lines.par_iter().enumerate().map(|(k, line)| Arc::new(condensed.tell(k, line))).collect();
+        let bare = |k: usize| {
+            let bins = DMatrix::from_column_slice(response.bins(k).len(), 1, &bare[response.bins(k)]);
+            condensed.tell(k, &bins).column(0).into_owned()
+        };
+        let bare_line = (0..response.profiles()).map(bare).collect();
+        let light = Light::new(imager, basis, state);
+        Design { response, condensed, line, continuum, bare_line, bare_continuum, light }
+    }
+
+    /// Columns over the bins of each profile in its numbers.
+    pub fn condensed(&self, columns: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+        columns.iter().enumerate().map(|(k, columns)| self.condensed.tell(k, columns)).collect()
+    }
+
+    /// Brightness over that of the photosphere (pixels, profiles) of maps with these `coefficients` (H, epochs), as
+    /// each profile sees it.
+    pub fn brightness(&self, basis: &Basis, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut brightness = basis.filling(&coefficients.columns(0, self.response.profiles()).into_owned());
+        for (k, mut map) in brightness.column_iter_mut().enumerate() {
+            let contrast = self.response.contrast(k);
+            map.apply(|filling| *filling = 1.0 - (1.0 - contrast) * *filling);
+        }
+        brightness
+    }
+
+    /// The response that it was made with.
+    pub fn response(&self) -> &Response {
+        &self.response
+    }
+
+    /// Model depths of profile `k` for a map of these coefficients, and its continuum.
+    fn depths(&self, k: usize, coefficients: &DVector<f64>) -> (DVector<f64>, f64) {
+        let q = 1.0 - self.response.contrast(k);
+        let bare = 1.0 - q * MEAN_FILLING;
+        let continuum = bare * self.bare_continuum[k] - q * self.continuum.column(k).dot(coefficients);
+        let line = &self.bare_line[k] * bare;
+        ((line - &*self.line[k] * coefficients * q) / continuum, continuum)
+    }
+
+    /// The profiles, then the bins of light curves, linearised around maps of these coefficients (H, epochs), without
+    /// slopes.
+    pub fn epochs(&self, imager: &Imager, maps: &DMatrix<f64>) -> Vec<Epoch> {
+        let times_d = imager.times_d();
+        let profiles = self.response.profiles();
+        let mut epochs: Vec<Epoch> =
+            (0..profiles).into_par_iter().map(|k| self.epoch(times_d[k], k, &maps.column(k).into_owned())).collect();
+        epochs.extend(self.light.epochs(imager, maps.columns_range(profiles..)));
+        epochs
+    }
+
+    fn epoch(&self, time_d: f64, k: usize, coefficients: &DVector<f64>) -> Epoch {
+        let (model, continuum) = self.depths(k, coefficients);
+        let scale = -(1.0 - self.response.contrast(k)) / continuum;
+        let divisor = self.continuum.column(k) * scale;
+        let jacobian = Jacobian::new(Arc::clone(&self.line[k]), scale, (-&model, divisor.clone()));
+        Epoch {
+            time_d,
+            jacobian,
+            variance: DVector::repeat(model.len(), 1.0),
+            slopes: DMatrix::zeros(model.len(), 0),
+            common: DMatrix::zeros(model.len(), 0),
+            divisor,
+            misfit: &self.condensed.data[k] - model,
+            nuisances: self.condensed.nuisances[k].clone(),
+            beside: self.condensed.beside[k],
+        }
+    }
+}

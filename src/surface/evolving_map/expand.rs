@@ -1,0 +1,206 @@
+//! ln Z to second order in the velocities of the profiles and in the star's own parameters.
+
+use super::{Basis, Design, Marginal, zero_points};
+use crate::field::{FieldError, Quadratic};
+use crate::model::{Parameter, ParameterValues};
+use crate::star::Response;
+use crate::surface::expansion::{Expansion, VELOCITY_STEP_KMS, coordinates, stellar_step};
+use crate::surface::imaging::{Imager, ZeroPointPrior};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+impl Marginal {
+    /// ln Z, the jitter counted, those zero points held that are otherwise integrated out.
+    pub fn ln_evidence(&self) -> f64 {
+        self.settled.evidence.ln_evidence()
+    }
+
+    /// ln Z around the values, at the most probable maps. As the maps are fixed in the derivatives, the information is
+    /// that of the model linearised there; the covariance of the gradient over data of the model is the same matrix.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn expansion(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Expansion, FieldError> {
+        self.with_zero_points_integrated(imager, stellar, self.quadratic(imager, basis, stellar)?)
+    }
+
+    /// The same without each of these groups of profiles (ascending), the maps those of all: what `then` makes of the
+    /// expansion of all others.
+    ///
+    /// # Errors
+    /// [`FieldError`], of all groups or of one.
+    pub fn without_each<T: Send>(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+        groups: &[Vec<usize>],
+        then: impl Fn(&Expansion) -> T + Sync,
+    ) -> Result<Vec<Result<T, FieldError>>, FieldError> {
+        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
+        let (epochs, profiles) = (misfits.len(), self.design.response().profiles());
+        let then = |group: &[usize], quadratic: Quadratic| {
+            let quadratic = summed(&quadratic, epochs - group.len(), profiles - group.len(), stellar.len());
+            let others = self.with_zero_points_integrated(&imager.without(group), stellar, quadratic)?;
+            Ok(then(&others))
+        };
+        let all = self.settled.evidence.without_each(&misfits, &slopes, groups, then)?;
+        Ok(all.into_iter().map(Result::flatten).collect())
+    }
+
+    fn with_zero_points_integrated(
+        &self,
+        imager: &Imager,
+        stellar: &[Parameter],
+        quadratic: Quadratic,
+    ) -> Result<Expansion, FieldError> {
+        if imager.zero_points.is_empty() {
+            return Ok(self.expanded(imager, stellar, quadratic));
+        }
+        let of_each = |number: &dyn Fn(&ZeroPointPrior) -> f64| {
+            DVector::from_iterator(imager.zero_points.len(), imager.zero_points.iter().map(number))
+        };
+        let (mean, sd) = (of_each(&|prior| prior.mean_kms), of_each(&|prior| prior.sd_kms));
+        let columns = zero_points::columns(imager, quadratic.gradient.len());
+        let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
+        Ok(self.expanded(imager, stellar, quadratic))
+    }
+
+    /// The same, those zero points of data sets held that are otherwise integrated out.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn known_zero_points(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> Result<Expansion, FieldError> {
+        Ok(self.expanded(imager, stellar, self.quadratic(imager, basis, stellar)?))
+    }
+
+    /// ln Z, the jitter counted and zero points of data sets integrated out.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn ln_evidence_of_sets(&self, imager: &Imager, basis: &Basis) -> Result<f64, FieldError> {
+        match imager.zero_points.is_empty() {
+            true => Ok(self.ln_evidence()),
+            false => Ok(self.expansion(imager, basis, &[])?.log_likelihood),
+        }
+    }
+
+    fn expanded(&self, imager: &Imager, stellar: &[Parameter], quadratic: Quadratic) -> Expansion {
+        let Quadratic { ln_evidence, gradient, information } = quadratic;
+        let cycles = imager.cycles();
+        Expansion {
+            values: self.values,
+            centre: coordinates(&self.values, &cycles, stellar),
+            cycles,
+            stellar: stellar.to_vec(),
+            log_likelihood: ln_evidence,
+            gradient,
+            noise: information.clone(),
+            information,
+        }
+    }
+
+    fn quadratic(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Result<Quadratic, FieldError> {
+        let (misfits, slopes) = self.misfits_and_slopes(imager, basis, stellar);
+        let of_all = self.settled.evidence.with(&misfits, &slopes)?;
+        Ok(summed(&of_all, misfits.len(), self.design.response().profiles(), stellar.len()))
+    }
+
+    fn misfits_and_slopes(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> (Vec<DVector<f64>>, Vec<DMatrix<f64>>) {
+        let epochs = self.design.epochs(imager, &self.settled.coefficients);
+        (epochs.into_iter().map(|epoch| epoch.misfit).collect(), self.slopes_of_epochs(imager, basis, stellar))
+    }
+
+    /// How the numbers of each epoch change with a velocity and with the star's parameters, at the most probable maps
+    /// (numbers, 1 + parameters).
+    pub(super) fn slopes_of_epochs(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+        if stellar.is_empty() {
+            return self.velocity_slopes(imager, basis).to_vec();
+        }
+        let mut slopes = self.design.condensed(&self.slopes(imager, basis, stellar));
+        slopes.extend(self.flux_slopes(imager, basis, stellar));
+        slopes
+    }
+
+    /// How the depths of each profile change with its velocity and with the star's parameters, at the most probable
+    /// maps (bins, 1 + parameters).
+    pub(in crate::surface) fn slopes(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> Vec<DMatrix<f64>> {
+        self.design.slopes(imager, &self.values, &self.brightness(basis), stellar)
+    }
+}
+
+impl Design {
+    /// How the depths of each profile change with its velocity and with the star's parameters (bins, 1 + parameters)
+    /// at `values`, for maps of this `brightness` (pixels, profiles).
+    pub(super) fn slopes(
+        &self,
+        imager: &Imager,
+        values: &ParameterValues,
+        brightness: &DMatrix<f64>,
+        stellar: &[Parameter],
+    ) -> Vec<DMatrix<f64>> {
+        let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
+        let derivative = |parameter: Option<Parameter>| {
+            let h = parameter.map_or(VELOCITY_STEP_KMS, |p| stellar_step(p, values, time_base_d));
+            let at = |h: f64| {
+                let mut values = *values;
+                values[parameter.unwrap_or(Parameter::Vsys)] += h;
+                self.displaced(imager, parameter, &values).depths_of_each(brightness)
+            };
+            let (above, below) = (at(h), at(-h));
+            above.iter().zip(below).map(|(above, below)| (above - below) / (2.0 * h)).collect::<Vec<f64>>()
+        };
+        let all: Vec<Option<Parameter>> = std::iter::once(None).chain(stellar.iter().map(|p| Some(*p))).collect();
+        let columns: Vec<Vec<f64>> = all.into_par_iter().map(derivative).collect();
+        let response = self.response();
+        let of_profile = |k: usize| {
+            let bins = response.bins(k);
+            DMatrix::from_fn(bins.len(), columns.len(), |j, column| columns[column][bins.start + j])
+        };
+        (0..response.profiles()).map(of_profile).collect()
+    }
+
+    fn displaced(&self, imager: &Imager, moved: Option<Parameter>, values: &ParameterValues) -> Response {
+        match moved {
+            None => imager.with_velocities(self.response(), &values.state()),
+            Some(_) => imager.response(&values.state()),
+        }
+    }
+}
+
+/// From numbers of each epoch, velocity first and then the star's parameters, to the velocities of the profiles, which
+/// are the first epochs, and the parameters, which are those of all epochs.
+pub(super) fn summed(of_all: &Quadratic, epochs: usize, profiles: usize, stellar: usize) -> Quadratic {
+    if stellar == 0 && epochs == profiles {
+        return of_all.clone();
+    }
+    let mut sums = DMatrix::zeros(epochs * (1 + stellar), profiles + stellar);
+    for k in 0..epochs {
+        if k < profiles {
+            sums[(k * (1 + stellar), k)] = 1.0;
+        }
+        for s in 0..stellar {
+            sums[(k * (1 + stellar) + 1 + s, profiles + s)] = 1.0;
+        }
+    }
+    Quadratic {
+        ln_evidence: of_all.ln_evidence,
+        gradient: sums.tr_mul(&of_all.gradient),
+        information: sums.transpose() * (&of_all.information * &sums),
+    }
+}

@@ -1,0 +1,261 @@
+//! What the profiles say of the field itself: the amplitude, slope and lifetime for which ln Z is largest, and the
+//! jitter.
+
+use super::climb::{GAIN, Top, climb, limits, place};
+use super::known::{BOUNDS, Known, USUAL};
+use super::{Assumed, Basis, Design, Marginal};
+use crate::field::{Field, FieldError, Kernel, Lifetime};
+use crate::model::{Parameter, ParameterValues};
+use crate::surface::imaging::Imager;
+use nalgebra::Matrix4;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Amplitude and slope of a spectrum without a break over those of one with it that is as good.
+const WITHOUT_BREAK: (f64, f64) = (1.2, 0.47);
+
+/// From so much lower in ln Z no climb makes good.
+const FAR_BELOW: f64 = 5.0;
+
+const LIFETIMES_D: [f64; 5] = [4.0, 12.0, 36.0, 108.0, 400.0];
+const USUAL_JITTER_KMS: f64 = 0.1;
+
+/// A fit of so many profiles starts from that of a share of them, at most half as many.
+const MANY: usize = 160;
+
+/// The most probable field.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The profiles with it.
+    pub marginal: Marginal,
+    /// ln Z, the jitter counted.
+    pub ln_evidence: f64,
+    /// Bounds of the search that were reached.
+    pub at_bounds: Vec<&'static str>,
+    /// Roughly minus the second derivatives of ln Z in the coordinates of the search; `None` if there was no search.
+    hessian: Option<Matrix4<f64>>,
+}
+
+/// Why there is no most probable field.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoFit {
+    /// The field cannot be integrated over.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// No spots are like that.
+    #[error(
+        "the amplitude of the spots grows to the upper bound of its search, {0:.2}: spots stand in for something else; \
+        star.vsini_kms, star.line, star.vsys_kms or observations.sigma_scale may be wrong"
+    )]
+    TooLarge(f64),
+    /// The density of the data is no number.
+    #[error("the evidence of the most probable field is not finite; data or errors are beyond sense")]
+    NotFinite,
+}
+
+impl NoFit {
+    /// A name for it.
+    pub fn status(&self) -> &'static str {
+        match self {
+            NoFit::Field(FieldError::NoSuchField { .. }) => "no-such-field",
+            NoFit::Field(FieldError::NotFinite { .. }) | NoFit::NotFinite => "non-finite",
+            NoFit::Field(FieldError::NotPositive) => "not-positive",
+            NoFit::Field(FieldError::NotSettled { .. }) => "not-settled",
+            NoFit::TooLarge(_) => "amplitude-at-bound",
+        }
+    }
+}
+
+impl Fitted {
+    /// What a fit may start from.
+    pub(super) fn near(marginal: Marginal) -> Self {
+        Fitted { ln_evidence: marginal.ln_evidence(), marginal, at_bounds: Vec::new(), hessian: None }
+    }
+
+    /// The amplitude, where it lies on the lower bound: the profiles show no spots.
+    pub fn too_faint(&self) -> Option<f64> {
+        let amplitude = self.marginal.assumed.field.spectrum.amplitude;
+        (self.at_bounds.contains(&Parameter::SpotAmplitude.name()) && amplitude < USUAL[0]).then_some(amplitude)
+    }
+
+    /// That spots are like that.
+    fn checked(self) -> Result<Self, NoFit> {
+        let amplitude = self.marginal.assumed.field.spectrum.amplitude;
+        match self.at_bounds.contains(&Parameter::SpotAmplitude.name()) {
+            true if amplitude > BOUNDS[0].1 - 1e-9 => Err(NoFit::TooLarge(amplitude)),
+            _ if !self.ln_evidence.is_finite() => Err(NoFit::NotFinite),
+            _ => Ok(self),
+        }
+    }
+}
+
+/// The profiles with a usual field, but for what is known: one that does not change, if the lifetime is not. Maps are
+/// found from those `near` by.
+pub(super) fn usual(
+    imager: &Imager,
+    basis: &Basis,
+    values: ParameterValues,
+    known: Known,
+    near: Option<&Marginal>,
+) -> Result<Fitted, FieldError> {
+    let spectrum = known.spectrum();
+    let kernel = Kernel::of(known.lifetime.unwrap_or(Lifetime::Static));
+    let assumed = Assumed { field: Field { spectrum, kernel }, jitter_kms: known.jitter_kms.unwrap_or(0.0) };
+    let design = Arc::new(Design::new(imager, basis, &values.state()));
+    Ok(Fitted::near(Marginal::new(imager, basis, design, values, assumed, near)?))
+}
+
+/// Fits the field to the profiles at `values`, from the result of a fit `near` by, or else from several lifetimes; of
+/// many profiles from what a share of them says, whether the spectrum has a break included.
+///
+/// # Errors
+/// [`NoFit`]: of the last attempt, where none succeeds.
+pub fn fit(
+    imager: &Imager,
+    basis: &Basis,
+    values: ParameterValues,
+    known: Known,
+    near: Option<&Fitted>,
+) -> Result<Fitted, NoFit> {
+    let design = Arc::new(Design::new(imager, basis, &values.state()));
+    let at = |assumed: Assumed, nearby: Option<&Marginal>| {
+        Marginal::new(imager, basis, Arc::clone(&design), values, assumed, nearby)
+    };
+    let share = near.is_none().then(|| by_a_share(imager, basis, values, known)).flatten();
+    let (first, hessian) = match (near, share) {
+        (Some(Fitted { marginal, hessian, .. }), _) => {
+            // maps of another orbit may be too far away
+            let first = at(marginal.assumed, Some(marginal)).or_else(|_| at(marginal.assumed, None));
+            (first?, *hessian)
+        }
+        (None, Some((assumed, hessian))) => (at(assumed, None)?, hessian),
+        (None, None) => {
+            let rough = basis.roughly();
+            // of many profiles each is hundreds of megabytes: only the best so far is kept
+            let higher = |best, next| higher(best, next, &known);
+            let start = |of_field: Vec<Assumed>| {
+                of_field.into_iter().fold(None, |best: Option<Found>, assumed| {
+                    // with a jitter from the maps without one
+                    let before = best.as_ref().and_then(|before| before.as_ref().ok());
+                    let next = Marginal::new(imager, &rough, Arc::clone(&design), values, assumed, before);
+                    Some(higher(best, next))
+                })
+            };
+            let tried = starts(&known).into_par_iter().with_max_len(1).filter_map(start);
+            let best = tried.reduce_with(|best, next| higher(Some(best), next));
+            let best = best.expect("a start at least")?;
+            (at(best.assumed, Some(&best))?, None)
+        }
+    };
+    let mut top = climb(first, &known, hessian, &at)?;
+    if near.is_none() && share.is_none() && known.break_degree.is_none() && known.slope.is_none() {
+        top = with_or_without_break(top, &known, &at)?;
+    }
+    if known.jitter_kms.is_none() {
+        top = with_or_without_jitter(top, &known, &at)?;
+    }
+    let Top { marginal, hessian } = top;
+    let ln_evidence = marginal.ln_evidence();
+    let at_bounds = reached(&marginal.assumed, &known);
+    Fitted { marginal, ln_evidence, at_bounds, hessian: Some(hessian) }.checked()
+}
+
+/// The field of a share of the profiles: nearly that of all of them, at a small part of the work; with its Hessian.
+/// `None` where there are few, the share does not tell it, or nothing is left to tell.
+fn by_a_share(
+    imager: &Imager,
+    basis: &Basis,
+    values: ParameterValues,
+    known: Known,
+) -> Option<(Assumed, Option<Matrix4<f64>>)> {
+    let share = share_of(imager).filter(|_| known.is_open())?;
+    let Fitted { marginal, hessian, .. } = fit(&share, basis, values, known, None).ok()?;
+    Some((marginal.assumed, hessian))
+}
+
+/// Every n-th profile, where there are [`MANY`]: at most half as many as that.
+pub(super) fn share_of(imager: &Imager) -> Option<Imager> {
+    let profiles = imager.profiles().count();
+    let every = profiles.div_ceil(MANY / 2);
+    let others = || (0..profiles).filter(|k| k % every != 0).collect::<Vec<_>>();
+    (profiles >= MANY).then(|| imager.without(&others()))
+}
+
+/// Where a fit may start: several lifetimes, each with and without a jitter, as far as they are not known.
+fn starts(known: &Known) -> Vec<Vec<Assumed>> {
+    let lifetimes: Vec<Lifetime> = match known.lifetime {
+        Some(lifetime) => vec![lifetime],
+        None => {
+            let mut all = LIFETIMES_D.map(|days| known.within(2, days)).to_vec();
+            all.dedup();
+            all.into_iter().map(Lifetime::Days).collect()
+        }
+    };
+    let jitters = known.jitter_kms.map_or(vec![0.0, USUAL_JITTER_KMS], |kms| vec![kms]);
+    let spectrum = known.spectrum();
+    let field = |lifetime: &Lifetime| Field { spectrum, kernel: Kernel::of(*lifetime) };
+    let assumed = |lifetime: &Lifetime| {
+        let field = field(lifetime);
+        jitters.iter().map(|jitter_kms| Assumed { field, jitter_kms: *jitter_kms }).collect()
+    };
+    lifetimes.iter().map(assumed).collect()
+}
+
+/// The profiles with one of the fields that a fit may start from.
+type Found = Result<Marginal, FieldError>;
+
+/// The one with the higher ln Z, the first of equals; or the last error.
+fn higher(best: Option<Found>, next: Found, known: &Known) -> Found {
+    match (best, next) {
+        (Some(Ok(best)), Ok(next)) if known.height(&next) > known.height(&best) => Ok(next),
+        (Some(Ok(best)), _) => Ok(best),
+        (_, next) => next,
+    }
+}
+
+/// The fit with a spectrum that is a power law all the way in place of one with a break, where that is better.
+fn with_or_without_break(
+    fitted: Top,
+    known: &Known,
+    at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
+) -> Result<Top, FieldError> {
+    let mut assumed = fitted.marginal.assumed;
+    let spectrum = &mut assumed.field.spectrum;
+    spectrum.break_degree = 0.0;
+    if known.amplitude.is_none() {
+        spectrum.amplitude = known.within(0, WITHOUT_BREAK.0 * spectrum.amplitude);
+    }
+    spectrum.slope = known.within(1, WITHOUT_BREAK.1 * spectrum.slope);
+    let height = known.height(&fitted.marginal);
+    match at(assumed, Some(&fitted.marginal)) {
+        Ok(other) if known.height(&other) > height - FAR_BELOW => {
+            let other = climb(other, known, None, at)?;
+            Ok(if known.height(&other.marginal) > height { other } else { fitted })
+        }
+        _ => Ok(fitted),
+    }
+}
+
+/// The fit with a jitter in place of one without, or the other way round, where that is better.
+fn with_or_without_jitter(
+    fitted: Top,
+    known: &Known,
+    at: &(impl Fn(Assumed, Option<&Marginal>) -> Result<Marginal, FieldError> + Sync),
+) -> Result<Top, FieldError> {
+    let assumed = fitted.marginal.assumed;
+    let jitter_kms = if assumed.jitter_kms == 0.0 { USUAL_JITTER_KMS / 2.0 } else { 0.0 };
+    let Ok(other) = at(Assumed { jitter_kms, ..assumed }, Some(&fitted.marginal)) else { return Ok(fitted) };
+    // without one it is simpler
+    let needed = if jitter_kms == 0.0 { -GAIN } else { GAIN };
+    if other.ln_evidence() < fitted.marginal.ln_evidence() + needed {
+        return Ok(fitted);
+    }
+    climb(other, known, None, at)
+}
+
+/// Which of the fitted numbers lie on a bound.
+fn reached(assumed: &Assumed, known: &Known) -> Vec<&'static str> {
+    let (place, free, limits) = (place(assumed), known.free(assumed), limits(known));
+    let on = |i: &usize| free[*i] && (place[*i] <= limits[*i].0 + 1e-9 || place[*i] >= limits[*i].1 - 1e-9);
+    (0..3).filter(on).map(|i| Parameter::FIELD[i].name()).collect()
+}

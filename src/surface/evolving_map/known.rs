@@ -1,0 +1,125 @@
+//! What is known of the field before the data are asked, and the bounds of what is not.
+
+use super::{Assumed, Marginal};
+use crate::field::{Field, Lifetime, Spectrum};
+use crate::model::{Parameter, Prior};
+use serde::{Deserialize, Serialize};
+
+/// Bounds of amplitude, slope and lifetime (d).
+pub(super) const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.0, 3.0), (0.3, 3000.0)];
+
+/// Where searches start: usual ones.
+pub(super) const USUAL: [f64; 3] = [0.2, 1.5, 36.0];
+
+/// Degree below which the spectrum of spots is flat: those of 10 to 25 deg, here and there.
+const BREAK_DEGREE: f64 = 7.0;
+
+/// Bounds of a parameter of the field, in the units of its name.
+pub fn bounds(parameter: Parameter) -> (f64, f64) {
+    BOUNDS[place_of(parameter)]
+}
+
+/// A usual value of a parameter of the field.
+pub fn usual_value(parameter: Parameter) -> f64 {
+    USUAL[place_of(parameter)]
+}
+
+fn place_of(parameter: Parameter) -> usize {
+    Parameter::FIELD.iter().position(|p| *p == parameter).expect("a parameter of the field")
+}
+
+/// What is known of the field beforehand; what is `None` is fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Known {
+    /// Standard deviation of the filling factor.
+    pub amplitude: Option<f64>,
+    /// Slope of the spectrum.
+    pub slope: Option<f64>,
+    /// Degree below which the spectrum is flat; if neither it nor the slope is known, a fit takes the better one of 0
+    /// and 7.
+    pub break_degree: Option<f64>,
+    /// Lifetime.
+    pub lifetime: Option<Lifetime>,
+    /// Velocity jitter (km/s).
+    pub jitter_kms: Option<f64>,
+    /// Priors of amplitude, slope and lifetime (d) where they are fitted; without one they are even between the bounds
+    /// in ln amplitude, slope and ln lifetime.
+    pub priors: [Option<Prior>; 3],
+}
+
+impl Known {
+    /// All as it was fitted.
+    pub fn of(marginal: &Marginal) -> Self {
+        let Assumed { field, jitter_kms } = marginal.assumed;
+        Known {
+            amplitude: Some(field.spectrum.amplitude),
+            slope: Some(field.spectrum.slope),
+            break_degree: Some(field.spectrum.break_degree),
+            lifetime: Some(field.kernel.lifetime),
+            jitter_kms: Some(jitter_kms),
+            priors: [None; 3],
+        }
+    }
+
+    /// Degree below which the spectrum is flat where a search starts: a slope that is given is that of a power law all
+    /// the way, unless a break is given, too.
+    pub fn break_degree(&self) -> f64 {
+        self.break_degree.unwrap_or(if self.slope.is_some() { 0.0 } else { BREAK_DEGREE })
+    }
+
+    /// The spectrum where a search starts.
+    pub(super) fn spectrum(&self) -> Spectrum {
+        let usual = |i: usize| self.within(i, USUAL[i]);
+        Spectrum {
+            amplitude: self.amplitude.unwrap_or(usual(0)),
+            slope: self.slope.unwrap_or(usual(1)),
+            break_degree: self.break_degree(),
+        }
+    }
+
+    /// Bounds of amplitude, slope or lifetime: those of their prior, where there is one.
+    pub(super) fn bounds(&self, i: usize) -> (f64, f64) {
+        let (low, high) = BOUNDS[i];
+        let (least, most) = self.priors[i].map_or(BOUNDS[i], |prior| prior.bounds());
+        (low.max(least), high.min(most))
+    }
+
+    pub(super) fn within(&self, i: usize, x: f64) -> f64 {
+        let (low, high) = self.bounds(i);
+        x.clamp(low, high)
+    }
+
+    /// ln of the prior density in the coordinates of [`place`].
+    fn log_prior(&self, assumed: &Assumed) -> f64 {
+        let Field { spectrum, kernel } = assumed.field;
+        let numbers = [Some(spectrum.amplitude), Some(spectrum.slope), kernel.lifetime.days()];
+        let of = |i: usize| {
+            let (prior, x) = (self.priors[i]?, numbers[i]?);
+            self.free(assumed)[i].then(|| prior.log_density(x) + Parameter::FIELD[i].log_jacobian(x))
+        };
+        (0..3).filter_map(of).sum()
+    }
+
+    /// What is maximised: ln Z, and what is known of the field beforehand.
+    pub(super) fn height(&self, of: &Marginal) -> f64 {
+        of.ln_evidence() + self.log_prior(&of.assumed)
+    }
+
+    /// The same of a star that does not change.
+    pub fn unchanging(self) -> Self {
+        Known { lifetime: Some(Lifetime::Static), ..self }
+    }
+
+    /// Whether anything is left to fit.
+    pub(super) fn is_open(&self) -> bool {
+        let open = [self.amplitude.is_none(), self.slope.is_none(), self.lifetime.is_none(), self.jitter_kms.is_none()];
+        open.contains(&true)
+    }
+
+    /// Which of amplitude, slope, lifetime and jitter are fitted.
+    pub(super) fn free(&self, assumed: &Assumed) -> [bool; 4] {
+        let lives = self.lifetime.is_none() && assumed.field.kernel.lifetime != Lifetime::Static;
+        let jitters = self.jitter_kms.is_none() && assumed.jitter_kms > 0.0;
+        [self.amplitude.is_none(), self.slope.is_none(), lives, jitters]
+    }
+}

@@ -1,0 +1,144 @@
+//! Light curves in the marginal likelihood: each bin is an epoch with one number and no velocity
+//! (`docs/method.md` section 9).
+//!
+//! The flux of a map over that of a star of mean filling factor is linear in the map, `1 + J c`. What is measured is
+//! that times a level and a slope of the segment, to first order `1 + J c + level + slope place`: two numbers that all
+//! bins of a segment have in common, integrated out.
+
+use super::{Basis, MEAN_FILLING, Marginal};
+use crate::field::Epoch;
+use crate::model::Parameter;
+use crate::star::StarState;
+use crate::surface::expansion::stellar_step;
+use crate::surface::imaging::Imager;
+use crate::surface::photometry::{FluxBin, LightCurve};
+use nalgebra::{DMatrix, DMatrixView, DVector};
+use rayon::prelude::*;
+
+/// Standard deviation of the prior of a segment's level, and of the change from its middle to its end by its slope, in
+/// units of its mean flux: what spots that no profile knows of may take away, and instruments drift by.
+pub const LEVEL: f64 = 0.1;
+
+/// Light curves of each harmonic, for one star.
+#[derive(Clone, Debug)]
+pub(super) struct Light {
+    /// J (bins, H), those of all light curves one after the other.
+    jacobian: DMatrix<f64>,
+}
+
+/// A bin of a light curve and what the most probable maps make of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FluxFit {
+    /// Number of the light curve, from 0.
+    pub curve: usize,
+    /// The bin.
+    pub bin: FluxBin,
+    /// Flux of the most probable map, level and slope of the segment included.
+    pub model: f64,
+}
+
+impl Light {
+    /// Of the star in `imager` at `state`. Within a bin the star turns: the mean of two times that are a standard
+    /// deviation before and after its middle is good to the third order in the width.
+    pub fn new(imager: &Imager, basis: &Basis, state: &StarState) -> Self {
+        let bins: Vec<(&LightCurve, &FluxBin)> =
+            imager.light_curves.iter().flat_map(|curve| curve.bins.iter().map(move |bin| (curve, bin))).collect();
+        let shares = |(curve, bin): &(&LightCurve, &FluxBin)| {
+            let times_d = [bin.time_d - bin.spread_d, bin.time_d + bin.spread_d];
+            let mut shares = curve.band.shares(&imager.grid, &imager.star, state, &times_d);
+            let q = 1.0 - curve.band.contrast(&imager.star, state);
+            let scale = -q / (1.0 - q * MEAN_FILLING);
+            shares.iter_mut().for_each(|share| *share *= scale);
+            shares
+        };
+        let rows: Vec<Vec<f64>> = bins.par_iter().map(shares).collect();
+        let rows = DMatrix::from_iterator(imager.grid.len(), bins.len(), rows.into_iter().flatten());
+        Light { jacobian: rows.transpose() * &basis.on_pixels }
+    }
+
+    /// Number of bins.
+    pub fn len(&self) -> usize {
+        self.jacobian.nrows()
+    }
+
+    /// The bins around maps of these coefficients (H, bins), without slopes.
+    pub fn epochs(&self, imager: &Imager, maps: DMatrixView<f64>) -> Vec<Epoch> {
+        let numbers = 2 * imager.light_curves.iter().map(|curve| curve.segments).sum::<usize>();
+        let fluxes = self.fluxes(maps);
+        let mut epochs = Vec::with_capacity(self.len());
+        let mut first = 0;
+        for curve in &imager.light_curves {
+            for bin in &curve.bins {
+                let k = epochs.len();
+                let mut common = DMatrix::zeros(1, numbers);
+                common[first + 2 * bin.segment] = LEVEL;
+                common[first + 2 * bin.segment + 1] = LEVEL * bin.place;
+                epochs.push(Epoch {
+                    time_d: bin.time_d,
+                    jacobian: self.jacobian.rows(k, 1).into_owned().into(),
+                    misfit: DVector::from_element(1, bin.flux - fluxes[k]),
+                    variance: DVector::from_element(1, bin.sigma * bin.sigma),
+                    nuisances: DMatrix::zeros(1, 0),
+                    beside: 0.0,
+                    slopes: DMatrix::zeros(1, 0),
+                    common,
+                    divisor: DVector::zeros(0),
+                });
+            }
+            first += 2 * curve.segments;
+        }
+        epochs
+    }
+
+    /// Flux of each bin, before level and slope.
+    fn fluxes(&self, maps: DMatrixView<f64>) -> DVector<f64> {
+        DVector::from_fn(self.len(), |k, _| 1.0 + self.jacobian.row(k).transpose().dot(&maps.column(k)))
+    }
+}
+
+impl Marginal {
+    /// How the flux of each bin changes with a velocity, which is not at all, and with the star's parameters, at the
+    /// most probable maps (1, 1 + parameters).
+    pub(super) fn flux_slopes(&self, imager: &Imager, basis: &Basis, stellar: &[Parameter]) -> Vec<DMatrix<f64>> {
+        let profiles = self.design.response().profiles();
+        let maps = self.settled.coefficients.columns_range(profiles..);
+        let mut slopes = vec![DMatrix::zeros(1, 1 + stellar.len()); maps.ncols()];
+        if slopes.is_empty() {
+            return slopes;
+        }
+        let time_base_d = imager.time_base_cycles() * imager.star.rotation_period_d;
+        for (s, parameter) in stellar.iter().enumerate() {
+            let h = stellar_step(*parameter, &self.values, time_base_d);
+            let [above, below] = [h, -h].map(|h| {
+                let mut values = self.values;
+                values[*parameter] += h;
+                Light::new(imager, basis, &values.state()).fluxes(maps.as_view())
+            });
+            slopes.iter_mut().enumerate().for_each(|(k, own)| own[1 + s] = (above[k] - below[k]) / (2.0 * h));
+        }
+        slopes
+    }
+
+    /// The light curves as the most probable maps explain them, level and slope of each segment where they are most
+    /// probable given these maps.
+    pub fn light_curves(&self, imager: &Imager) -> Vec<FluxFit> {
+        let epochs = self.design.epochs(imager, &self.settled.coefficients);
+        let of_light = &epochs[self.design.response().profiles()..];
+        let numbers = of_light.first().map_or(0, |epoch| epoch.common.ncols());
+        let (mut inner, mut along) = (DMatrix::identity(numbers, numbers), DVector::zeros(numbers));
+        for Epoch { common, misfit, variance, .. } in of_light {
+            inner += common.tr_mul(common) / variance[0];
+            along += common.tr_mul(misfit) / variance[0];
+        }
+        // a sum of squares and 1 is positive definite
+        let levels = inner.cholesky().map_or(DVector::zeros(numbers), |factor| factor.solve(&along));
+        let curves = imager.light_curves.iter().enumerate();
+        let bins = curves.flat_map(|(c, curve)| curve.bins.iter().map(move |bin| (c, *bin)));
+        let fit = |((curve, bin), epoch): ((usize, FluxBin), &Epoch)| FluxFit {
+            curve,
+            bin,
+            model: bin.flux - epoch.misfit[0] + (&epoch.common * &levels)[0],
+        };
+        bins.zip(of_light).map(fit).collect()
+    }
+}

@@ -1,0 +1,106 @@
+//! The most probable maps of a fitted field at any times, with their errors (`docs/method.md` section 9).
+
+use super::{Assumed, Basis, Design, Marginal};
+use crate::field::{Epoch, Evidence, FieldError, Settled, Sought, approach, settle};
+use crate::model::ParameterValues;
+use crate::surface::imaging::Imager;
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Maps at some times.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Maps {
+    /// Most probable spot filling factor (pixels, times). Below 0 it is brighter than the photosphere.
+    pub filling: DMatrix<f64>,
+    /// Its standard deviation (pixels, times), what is assumed of the field held.
+    pub sd: DMatrix<f64>,
+}
+
+impl Maps {
+    /// At any times (d), on the pixels of `basis`, from the most probable maps of the profiles.
+    pub fn at(settled: &Settled, basis: &Basis, times_d: &[f64]) -> Self {
+        let filling = basis.filling(&settled.evidence.coefficients_at(times_d));
+        let sd = settled.evidence.standard_deviations(&basis.on_pixels.transpose(), times_d);
+        Maps { filling, sd }
+    }
+}
+
+impl Marginal {
+    /// The same maps, the jitter no noise of the profiles.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn without_jitter(&self, imager: &Imager, basis: &Basis) -> Result<Self, FieldError> {
+        let Settled { coefficients, .. } = &self.settled;
+        let epochs = self.design.epochs(imager, coefficients);
+        let compression = basis.settling.compression;
+        let evidence = Evidence::new(self.assumed.field, &basis.degrees, &epochs, coefficients, compression)?;
+        let settled = Settled { evidence, ..self.settled.clone() };
+        Ok(Marginal { assumed: Assumed { jitter_kms: 0.0, ..self.assumed }, settled, ..self.clone() })
+    }
+
+    /// At `values`, from maps `nearby`, where the jitter is noise of the profiles, along their slopes at the most
+    /// probable maps. Maps that know nothing of it explain zero points by spots, so slopes and maps are found in turn,
+    /// so many times: slopes of other maps than these would seem to tell the velocities of the profiles from their
+    /// zero points.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub(super) fn with_jitter(
+        (imager, basis): (&Imager, &Basis),
+        design: Arc<Design>,
+        values: ParameterValues,
+        assumed: Assumed,
+        (nearby, times): (&Marginal, usize),
+    ) -> Result<Self, FieldError> {
+        let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
+        let mut coefficients = nearby.settled.coefficients.clone();
+        let same = Arc::ptr_eq(&design, &nearby.design) && values.state() == nearby.values.state();
+        let mut slopes = match same {
+            true => nearby.velocity_slopes(imager, basis).to_vec(),
+            false => design.velocity_slopes((imager, basis), &values, &coefficients),
+        };
+        let mut last: Option<Evidence> = None;
+        for _ in 1..times {
+            // no evidence, as slopes are found anew
+            let linearise = |maps: &DMatrix<f64>| design.jittered(imager, maps, &slopes, assumed.jitter_kms);
+            let by = Some(last.as_ref().unwrap_or(&nearby.settled.evidence));
+            let way = approach(linearise, sought, coefficients, by, &basis.settling)?;
+            coefficients = way.coefficients;
+            last = way.last.or(last);
+            slopes = design.velocity_slopes((imager, basis), &values, &coefficients);
+        }
+        let linearise = |maps: &DMatrix<f64>| design.jittered(imager, maps, &slopes, assumed.jitter_kms);
+        let by = Some(last.as_ref().unwrap_or(&nearby.settled.evidence));
+        let settled = settle(linearise, sought, coefficients, by, &basis.settling)?;
+        Ok(Marginal::settled_at(design, values, assumed, settled))
+    }
+
+    /// How the numbers of each epoch change with a velocity, at the most probable maps (numbers, 1).
+    pub(super) fn velocity_slopes(&self, imager: &Imager, basis: &Basis) -> &[DMatrix<f64>] {
+        let found = || self.design.velocity_slopes((imager, basis), &self.values, &self.settled.coefficients);
+        self.velocity_slopes.get_or_init(found)
+    }
+}
+
+impl Design {
+    /// The same at `values`, for maps of these coefficients (H, epochs). Light curves know of no velocity.
+    fn velocity_slopes(
+        &self,
+        (imager, basis): (&Imager, &Basis),
+        values: &ParameterValues,
+        coefficients: &DMatrix<f64>,
+    ) -> Vec<DMatrix<f64>> {
+        let of_profiles = self.slopes(imager, values, &self.brightness(basis, coefficients), &[]);
+        let mut slopes = self.condensed(&of_profiles);
+        slopes.resize(coefficients.ncols(), DMatrix::zeros(1, 1));
+        slopes
+    }
+
+    /// The epochs around maps of these coefficients (H, epochs), a jitter along these slopes among their noise.
+    fn jittered(&self, imager: &Imager, maps: &DMatrix<f64>, slopes: &[DMatrix<f64>], jitter_kms: f64) -> Vec<Epoch> {
+        let jittered =
+            |(epoch, slopes): (Epoch, &DMatrix<f64>)| Epoch { slopes: slopes.clone(), ..epoch }.jittered(&[jitter_kms]);
+        self.epochs(imager, maps).into_iter().zip(slopes).map(jittered).collect()
+    }
+}

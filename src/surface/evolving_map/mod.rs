@@ -1,0 +1,161 @@
+//! The marginal likelihood: spots as a Gaussian field on the sphere and in time (room `field`), integrated out of the
+//! profiles (`docs/method.md` section 9).
+//!
+//! In: what the star is imaged with ([`Imager`]), values of all parameters, what is assumed of the field
+//! ([`Assumed`]). Out: ln Z, and its gradient and information in the velocities of the profiles and in the star's own
+//! parameters, as an expansion like that of maximum entropy. The order:
+//! 1. [`Basis`]: the harmonics on the pixels of the map, once.
+//! 2. [`Design`]: the profiles of each harmonic, for one star, a model application a harmonic; and its light curves.
+//!    Both are epochs of the field, profiles first.
+//! 3. [`Marginal`]: the most probable maps, one a profile, and ln Z linearised there.
+//! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
+//! 5. [`Maps`]: the most probable maps at any times, with their errors.
+//! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
+//! 7. [`zero_points`]: the velocity zero points of data sets, before anything else.
+//! 8. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 9. [`Planned`]: what profiles that are not yet taken will say of velocities.
+
+pub mod change;
+mod climb;
+mod condense;
+mod design;
+mod expand;
+mod fit;
+mod forecast;
+mod known;
+mod light;
+mod maps;
+mod planned;
+mod posterior;
+pub mod zero_points;
+
+pub use change::Change;
+pub use design::{Basis, Design};
+pub use fit::{Fitted, NoFit, fit};
+pub use forecast::Forecast;
+pub use known::{Known, bounds, usual_value};
+pub use light::{FluxFit, LEVEL};
+pub use maps::Maps;
+pub use planned::Planned;
+pub use posterior::{LN_EVIDENCE, MarginalPosterior};
+
+use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};
+use crate::model::{Parameter, ParameterValues};
+use crate::surface::imaging::Imager;
+use nalgebra::DMatrix;
+use std::sync::{Arc, OnceLock};
+
+/// Mean of the field: the spot filling factor of a star of which nothing else is known. Profiles do not tell it.
+pub const MEAN_FILLING: f64 = 0.06;
+
+/// Largest degree of the harmonics: finer than the line resolves. With 18, what is left over of a star of 40 km/s at
+/// S/N 1000 is taken for spots that change.
+pub const DEGREE: usize = 36;
+
+/// Times that maps are found with a jitter, along the slopes of those before, from maps without one.
+const JITTERED: usize = 2;
+
+/// What is assumed before the data, beside the parameters of star and orbit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Assumed {
+    /// The spots.
+    pub field: Field,
+    /// Scatter of the profiles' velocity zero points (km/s).
+    pub jitter_kms: f64,
+}
+
+/// What is assumed and is no parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Held {
+    /// Degree below which the spectrum of the spots is flat.
+    pub break_degree: f64,
+    /// Scatter of the profiles' velocity zero points (km/s).
+    pub jitter_kms: f64,
+}
+
+impl Assumed {
+    /// The field among the parameters, beside what is no parameter.
+    pub fn of(values: &ParameterValues, Held { break_degree, jitter_kms }: Held) -> Self {
+        let (amplitude, slope) = (values[Parameter::SpotAmplitude], values[Parameter::SpotSlope]);
+        let spectrum = Spectrum { amplitude, slope, break_degree };
+        let lifetime = values.given(Parameter::SpotLifetime).map_or(Lifetime::Static, Lifetime::Days);
+        Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms }
+    }
+
+    /// What of it is no parameter.
+    pub fn held(&self) -> Held {
+        Held { break_degree: self.field.spectrum.break_degree, jitter_kms: self.jitter_kms }
+    }
+
+    /// `values` with this field among them.
+    fn among(&self, mut values: ParameterValues) -> ParameterValues {
+        let Field { spectrum, kernel } = self.field;
+        values[Parameter::SpotAmplitude] = spectrum.amplitude;
+        values[Parameter::SpotSlope] = spectrum.slope;
+        values[Parameter::SpotLifetime] = kernel.lifetime.days().unwrap_or(f64::NAN);
+        values
+    }
+}
+
+/// The profiles with all maps integrated out, linearised around the most probable ones.
+#[derive(Clone, Debug)]
+pub struct Marginal {
+    /// The parameters, those of the field as assumed.
+    pub values: ParameterValues,
+    /// What is assumed.
+    pub assumed: Assumed,
+    /// The star's response.
+    pub design: Arc<Design>,
+    /// The most probable maps (their coefficients, a column a profile and then a bin of light curves), and the evidence
+    /// there.
+    pub settled: Settled,
+    /// How the numbers of each epoch change with a velocity, once it is asked for.
+    velocity_slopes: OnceLock<Vec<DMatrix<f64>>>,
+}
+
+impl Marginal {
+    /// At `values`, whose design is given. Maps are found from those of a star and field `nearby`, or else from
+    /// uniform ones; with a jitter then from those without.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn new(
+        imager: &Imager,
+        basis: &Basis,
+        design: Arc<Design>,
+        values: ParameterValues,
+        assumed: Assumed,
+        nearby: Option<&Marginal>,
+    ) -> Result<Self, FieldError> {
+        let sought = Sought { field: assumed.field, degrees: &basis.degrees, watched: &basis.watched };
+        let start = match nearby {
+            Some(nearby) => nearby.settled.coefficients.clone(),
+            None => DMatrix::zeros(basis.degrees.len(), imager.epochs()),
+        };
+        let values = assumed.among(values);
+        if let Some(nearby) = nearby.filter(|_| assumed.jitter_kms > 0.0) {
+            let times = if nearby.assumed.jitter_kms > 0.0 { basis.jittered } else { JITTERED };
+            return Marginal::with_jitter((imager, basis), design, values, assumed, (nearby, times));
+        }
+        let linearise = |maps: &DMatrix<f64>| design.epochs(imager, maps);
+        let by = nearby.map(|nearby| &nearby.settled.evidence);
+        let settled = settle(linearise, sought, start, by, &basis.settling)?;
+        let marginal = Marginal::settled_at(design, values, assumed, settled);
+        match assumed.jitter_kms {
+            0.0 => Ok(marginal),
+            _ => {
+                let design = Arc::clone(&marginal.design);
+                Marginal::with_jitter((imager, basis), design, values, assumed, (&marginal, JITTERED))
+            }
+        }
+    }
+
+    fn settled_at(design: Arc<Design>, values: ParameterValues, assumed: Assumed, settled: Settled) -> Self {
+        Marginal { values, assumed, design, settled, velocity_slopes: OnceLock::new() }
+    }
+
+    /// The brightness of each pixel (rows) in the most probable map of each profile (columns).
+    pub fn brightness(&self, basis: &Basis) -> DMatrix<f64> {
+        self.design.brightness(basis, &self.settled.coefficients)
+    }
+}

@@ -1,0 +1,195 @@
+//! The log-probability of a parameter vector where all maps are integrated over: ln Z (`docs/method.md` section 9)
+//! times the prior.
+//!
+//! Every evaluation begins from the maps of one reference, so that it is a function of the vector alone. Where only the
+//! orbit is free ln Z is the quadratic of the reference. Where the field is free the maps are found anew, and the orbit
+//! is that of the quadratic around them. Where the star is free its profiles are made anew as well.
+
+use super::{Assumed, Basis, Design, Held, Marginal};
+use crate::field::FieldError;
+use crate::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues};
+use crate::sampling::log_density::{Evaluation, LogDensity, Status};
+use crate::star::Nearby;
+use crate::surface::expansion::{Expansion, STELLAR, free_stellar};
+use crate::surface::imaging::Imager;
+use crate::surface::static_map::is_physical;
+use std::sync::{Arc, OnceLock};
+
+/// Name of ln Z beside a log-probability.
+pub const LN_EVIDENCE: &str = "ln_evidence";
+
+/// Applications of the model that velocities and misfits of maps take.
+const SLOPES: u32 = 3;
+
+/// The posterior of the free parameters, all maps integrated out.
+#[derive(Clone, Debug)]
+pub struct MarginalPosterior {
+    pub(super) imager: Imager,
+    pub(super) space: ParameterSpace,
+    pub(super) basis: Arc<Basis>,
+    pub(super) reference: Arc<Marginal>,
+    /// ln Z of the reference in the velocities of the profiles.
+    velocities: Arc<Expansion>,
+    anew: Anew,
+    nearby: Arc<Nearby>,
+    /// To second order in all that is free, once it is asked for.
+    pub(super) expansion: Arc<OnceLock<Result<Expansion, FieldError>>>,
+}
+
+/// What an evaluation makes anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Anew {
+    /// Nothing: the orbit alone is free.
+    Nothing,
+    /// The maps.
+    Maps,
+    /// The profiles of the star, and the maps.
+    Star,
+}
+
+impl MarginalPosterior {
+    /// The posterior of `space` around `values`, those of the field among them. Maps are found from uniform ones: the
+    /// same values give the same bytes.
+    ///
+    /// # Errors
+    /// [`FieldError`], where there is no reference.
+    pub fn new(
+        imager: Imager,
+        space: &ParameterSpace,
+        values: ParameterValues,
+        held: Held,
+    ) -> Result<Self, FieldError> {
+        let basis = Arc::new(Basis::exact(&imager.grid));
+        let design = Arc::new(Design::new(&imager, &basis, &values.state()));
+        let assumed = Assumed::of(&values, held);
+        let reference = Arc::new(Marginal::new(&imager, &basis, design, values, assumed, None)?);
+        let velocities = Arc::new(reference.expansion(&imager, &basis, &[])?);
+        let is_free = |what: &dyn Fn(Parameter) -> bool| space.free().iter().any(|f| what(f.parameter));
+        let anew = match () {
+            _ if is_free(&|p| STELLAR.contains(&p)) => Anew::Star,
+            _ if is_free(&Parameter::is_of_field) => Anew::Maps,
+            _ => Anew::Nothing,
+        };
+        let nearby = Arc::new(imager.nearby(&values.state()));
+        let space = space.clone().with_field_of(&reference.values);
+        let expansion = Arc::default();
+        Ok(MarginalPosterior { imager, space, basis, reference, velocities, anew, nearby, expansion })
+    }
+
+    /// ln Z of the reference.
+    pub fn reference_ln_evidence(&self) -> f64 {
+        self.velocities.log_likelihood
+    }
+
+    /// Where evaluations begin.
+    pub fn reference(&self) -> &Marginal {
+        &self.reference
+    }
+
+    /// The parameter space; what is fixed of the field is as in the reference.
+    pub fn space(&self) -> &ParameterSpace {
+        &self.space
+    }
+
+    /// What the data are imaged with.
+    pub fn imager(&self) -> &Imager {
+        &self.imager
+    }
+
+    /// The free parameters that an expansion holds beside the velocities: of the star, then of the field.
+    pub(super) fn coordinates(&self) -> Vec<Parameter> {
+        let is_free = |p: &Parameter| self.space.free().iter().any(|f: &FreeParameter| f.parameter == *p);
+        free_stellar(self.space.free()).into_iter().chain(Parameter::FIELD.into_iter().filter(is_free)).collect()
+    }
+
+    /// The maps at `values`, found from those of the reference; profiles of the star made anew if `star`.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub(super) fn marginal_at(&self, values: ParameterValues, star: bool) -> Result<Marginal, FieldError> {
+        let MarginalPosterior { imager, basis, reference, nearby, .. } = self;
+        let design = match star {
+            true => {
+                let state = values.state();
+                let response = imager.response_near(nearby, &state);
+                Arc::new(Design::of(imager, basis, (response, &state), Some(&reference.design)))
+            }
+            false => Arc::clone(&reference.design),
+        };
+        let assumed = Assumed::of(&values, reference.assumed.held());
+        Marginal::new(imager, basis, design, values, assumed, Some(reference))
+    }
+
+    /// `values` with the orbit and systemic velocity of the reference.
+    pub(super) fn at_reference_velocities(&self, mut values: ParameterValues) -> ParameterValues {
+        for p in Parameter::ALL.into_iter().filter(|p| p.only_shifts()) {
+            values[p] = self.reference.values[p];
+        }
+        values
+    }
+
+    /// ln Z at `theta` (physical coordinates), whatever the prior says, with itself beside it.
+    pub fn likelihood(&self, theta: &[f64]) -> Evaluation {
+        let values = self.space.values_at(theta);
+        if !is_physical(&self.imager, &values, theta) {
+            return Evaluation::rejected(Status::NonFinite);
+        }
+        let harmonics = self.basis.degrees.len() as u32;
+        let (ln_evidence, model_applications) = match self.anew {
+            Anew::Nothing => (Ok(self.velocities.log_likelihood_at(&values)), 0),
+            Anew::Maps => (self.with_maps_anew(&values), SLOPES),
+            Anew::Star => {
+                let here = self.marginal_at(values, true);
+                (here.and_then(|here| here.ln_evidence_of_sets(&self.imager, &self.basis)), harmonics)
+            }
+        };
+        match ln_evidence {
+            Ok(x) if x.is_finite() => {
+                Evaluation { log_prob: x, numbers: vec![x], model_applications, status: Status::Converged }
+            }
+            Ok(_) | Err(FieldError::NotFinite { .. }) => {
+                Evaluation { model_applications, ..Evaluation::rejected(Status::NonFinite) }
+            }
+            Err(_) => Evaluation { model_applications, ..Evaluation::rejected(Status::StoppedShort) },
+        }
+    }
+
+    fn with_maps_anew(&self, values: &ParameterValues) -> Result<f64, FieldError> {
+        let here = self.marginal_at(self.at_reference_velocities(*values), false)?;
+        Ok(here.expansion(&self.imager, &self.basis, &[])?.log_likelihood_at(values))
+    }
+}
+
+impl LogDensity for MarginalPosterior {
+    fn names(&self) -> &[String] {
+        self.space.names()
+    }
+
+    fn number_names(&self) -> &[&str] {
+        &[LN_EVIDENCE]
+    }
+
+    fn evaluate(&self, theta: &[f64]) -> Evaluation {
+        let log_prior = self.space.log_prior(theta);
+        if log_prior == f64::NEG_INFINITY {
+            return Evaluation::rejected(Status::OutsidePrior);
+        }
+        if !log_prior.is_finite() {
+            return Evaluation::rejected(Status::NonFinite);
+        }
+        let likelihood = self.likelihood(theta);
+        Evaluation { log_prob: likelihood.log_prob + log_prior, ..likelihood }
+    }
+
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
+        self.space.to_sampling(theta)
+    }
+
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
+        self.space.to_physical(internal)
+    }
+
+    fn log_jacobian(&self, theta: &[f64]) -> f64 {
+        self.space.log_jacobian(theta)
+    }
+}

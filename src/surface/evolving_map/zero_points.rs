@@ -1,0 +1,107 @@
+//! Velocity zero points of data sets that are not known: one number a set, integrated out of velocities within a
+//! Gaussian prior; in maps they are held where they are most probable, so that no spot stands in for them
+//! (`docs/method.md` section 9).
+
+use super::fit::usual;
+use super::{Basis, Known, usual_value};
+use crate::field::{FieldError, Lifetime};
+use crate::model::{Parameter, ParameterValues};
+use crate::planets::periodogram::{Frequencies, orbits};
+use crate::surface::imaging::{Imager, ZeroPointPrior};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// Standard deviation of the prior (km/s), around 0.
+pub const PRIOR_KMS: f64 = 3.0;
+
+/// Times that maps, orbit and zero points are found in turn.
+const ROUNDS: usize = 3;
+
+/// Zero points that move by less than this part of their errors stay.
+const STAYS: f64 = 0.1;
+
+/// The most probable zero point of a data set.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldZeroPoint {
+    /// Where it is held (km/s).
+    pub value_kms: f64,
+    /// Its standard error, the spots integrated out and the orbit held (km/s).
+    pub sigma_kms: f64,
+}
+
+/// Finds the zero points of those sets of `imager` that have a prior, and holds them there: by the velocity quadratic
+/// of a usual field, with the best orbit at any of the `frequencies` in the model from the second round on.
+///
+/// # Errors
+/// [`FieldError`].
+pub fn hold(
+    imager: &mut Imager,
+    values: ParameterValues,
+    known: Known,
+    frequencies: Option<&Frequencies>,
+) -> Result<Vec<HeldZeroPoint>, FieldError> {
+    let basis = Basis::rough(&imager.grid);
+    let lifetime = known.lifetime.unwrap_or(Lifetime::Days(usual_value(Parameter::SpotLifetime)));
+    let known = Known { lifetime: Some(lifetime), ..known };
+    let mut values = values;
+    values[Parameter::K] = 0.0;
+    let mut held = vec![HeldZeroPoint { value_kms: 0.0, sigma_kms: PRIOR_KMS }; imager.zero_points.len()];
+    let mut near = None;
+    for _ in 0..ROUNDS {
+        let marginal = usual(imager, &basis, values, known, near.as_ref())?.marginal;
+        let orbit = frequencies.and_then(|frequencies| {
+            let quadratic = marginal.expansion(imager, &basis, &[]).ok()?.velocities(&[]);
+            let trials = orbits::scan(&quadratic, &frequencies.per_cycle);
+            let found = trials.iter().filter_map(|trial| Some((trial.frequency, trial.orbit?)));
+            found.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))
+        });
+        if let Some((frequency, orbit)) = orbit {
+            values[Parameter::K] = orbit.k_kms;
+            values[Parameter::PorbOverProt] = 1.0 / frequency;
+            values[Parameter::Phi] = orbit.phi;
+        }
+        let known_velocities = marginal.known_zero_points(imager, &basis, &[])?;
+        let step = known_velocities.coordinates(&values) - &known_velocities.centre;
+        let gradient = &known_velocities.gradient - &known_velocities.information * step;
+        let (moves, sigmas) = most_probable(imager, &gradient, &known_velocities.information)?;
+        let mut stays = true;
+        for (z, held) in held.iter_mut().enumerate() {
+            held.value_kms += moves[z];
+            held.sigma_kms = sigmas[z];
+            stays &= moves[z].abs() < STAYS * sigmas[z];
+            imager.move_zero_point(z, moves[z]);
+        }
+        near = Some(marginal);
+        if stays {
+            break;
+        }
+    }
+    Ok(held)
+}
+
+/// How far the most probable zero points are from where they are held, and their errors (km/s).
+fn most_probable(
+    imager: &Imager,
+    gradient: &DVector<f64>,
+    information: &DMatrix<f64>,
+) -> Result<(DVector<f64>, DVector<f64>), FieldError> {
+    let columns = columns(imager, gradient.len());
+    let weight = |prior: &ZeroPointPrior| prior.sd_kms.powi(-2);
+    let mut own = columns.tr_mul(&(information * &columns));
+    let mut pulled = columns.tr_mul(gradient);
+    for (z, prior) in imager.zero_points.iter().enumerate() {
+        own[(z, z)] += weight(prior);
+        pulled[z] += weight(prior) * prior.mean_kms;
+    }
+    let factor = own.cholesky().ok_or(FieldError::NotPositive)?;
+    Ok((factor.solve(&pulled), factor.inverse().diagonal().map(f64::sqrt)))
+}
+
+/// How zero points change the coordinates of an expansion, the velocities of all profiles first: a column each.
+pub(super) fn columns(imager: &Imager, coordinates: usize) -> DMatrix<f64> {
+    let mut columns = DMatrix::zeros(coordinates, imager.zero_points.len());
+    for (mut column, prior) in columns.column_iter_mut().zip(&imager.zero_points) {
+        imager.profiles_of(prior.set).for_each(|k| column[k] = 1.0);
+    }
+    columns
+}

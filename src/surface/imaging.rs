@@ -1,0 +1,301 @@
+//! Star and maximum entropy meet: the misfit of a map to observed profiles, and the Doppler image.
+//!
+//! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is `D =
+//! line(B) / continuum(B)` (`docs/method.md` section 1), whose second derivative is kept, so that the solver's Newton
+//! steps are exact.
+
+mod data;
+mod problem;
+mod profile;
+
+use crate::maxent::entropy::Entropy;
+use crate::star::observation::Observations;
+use crate::star::{
+    Brightness, Nearby, OwnMap, Quadrature, Response, Sampling, Seen, StarSettings, StarState, SurfaceGrid,
+};
+use crate::surface::nuisances::{LineAndContinuum, Nuisances};
+use crate::surface::photometry::LightCurve;
+
+pub use data::Data;
+pub use problem::ImagingProblem;
+
+/// What is assumed of the velocity zero point of a data set beyond where it is held: a Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZeroPointPrior {
+    /// The data set.
+    pub set: usize,
+    /// Mean (km/s).
+    pub mean_kms: f64,
+    /// Standard deviation (km/s).
+    pub sd_kms: f64,
+}
+
+/// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
+#[derive(Clone, Debug)]
+pub struct Imager {
+    /// Pixels of a map.
+    pub grid: SurfaceGrid,
+    /// Area of each pixel of all maps of a star that does not change, season by season, as a fraction of them; mostly
+    /// there is one season, and this is `grid.area`. Integrated maps have no seasons.
+    pub areas: Vec<f64>,
+    /// The star, but for the parameters.
+    pub star: StarSettings,
+    /// The data sets, whose profiles follow each other: times and velocity bins, and what of the star looks different
+    /// through each.
+    pub sets: Vec<Seen>,
+    /// Observed depths and their weights.
+    pub data: Data,
+    /// Entropy of a map.
+    pub entropy: Entropy,
+    /// The data sets whose velocity zero points are integrated out; mostly none.
+    pub zero_points: Vec<ZeroPointPrior>,
+    /// Light curves beside the profiles, of which only integrated maps know; mostly none.
+    pub light_curves: Vec<LightCurve>,
+}
+
+impl Imager {
+    /// For `observations` of `star`, on about `pixels` pixels, with maps of the given `entropy`.
+    pub fn new(star: StarSettings, observations: &Observations, pixels: usize, entropy: Entropy) -> Self {
+        let grid = SurfaceGrid::equal_area(pixels, Quadrature::Gauss2x2);
+        Imager {
+            areas: grid.area.clone(),
+            grid,
+            star,
+            sets: vec![Sampling::of(observations).into()],
+            data: Data::of(observations),
+            entropy,
+            zero_points: Vec::new(),
+            light_curves: Vec::new(),
+        }
+    }
+
+    /// The same for several data sets, whose profiles follow each other in `observations`; the first sees the `star` as
+    /// it is.
+    pub fn of_sets(
+        star: StarSettings,
+        sets: Vec<Seen>,
+        observations: &Observations,
+        pixels: usize,
+        entropy: Entropy,
+    ) -> Self {
+        Imager { sets, ..Imager::new(star, observations, pixels, entropy) }
+    }
+
+    /// The same with as many `maps`, one a season, of which each profile sees that which `own_map` gives for its time
+    /// (d).
+    pub fn with_maps(mut self, maps: usize, own_map: impl Fn(f64) -> OwnMap) -> Self {
+        let share = |area: &f64| area / maps as f64;
+        self.areas = std::iter::repeat_n(&self.grid.area, maps).flatten().map(share).collect();
+        for set in &mut self.sets {
+            set.own_maps = set.sampling.profiles.iter().map(|profile| own_map(profile.0)).collect();
+        }
+        self
+    }
+
+    /// The same with one map of all seasons.
+    pub fn with_one_map(mut self) -> Self {
+        self.areas = self.grid.area.clone();
+        self.sets.iter_mut().for_each(|set| set.own_maps.clear());
+        self
+    }
+
+    /// How many maps the star has, one a season.
+    pub fn maps(&self) -> usize {
+        self.areas.len() / self.grid.len()
+    }
+
+    /// Number of data, as far as weights of the entropy over it are concerned: of several maps, whose entropy is a
+    /// mean, that of the best observed season times the number of seasons. So no map gets more weight than it would
+    /// alone.
+    pub fn data_as_of_one_map(&self) -> f64 {
+        let mut data = vec![0; self.maps()];
+        for set in &self.sets {
+            for (k, profile) in set.sampling.profiles.iter().enumerate() {
+                data[set.own_maps.get(k).map_or(0, |own| own.number)] += profile.2;
+            }
+        }
+        (data.len() * data.iter().max().copied().unwrap_or(0)) as f64
+    }
+
+    /// The map that each profile sees, from 0; empty where there is only one.
+    pub fn map_of_each(&self) -> Vec<usize> {
+        match self.maps() {
+            1 => Vec::new(),
+            _ => self.sets.iter().flat_map(|set| set.own_maps.iter().map(|own| own.number)).collect(),
+        }
+    }
+
+    /// The same with nuisances of every profile of `observations` integrated out, within priors of these standard
+    /// deviations.
+    pub fn with_nuisances(mut self, priors: LineAndContinuum, observations: &Observations) -> Self {
+        self.data.nuisances = Nuisances::new(priors, observations);
+        self
+    }
+
+    /// The same of several data sets, each with its own priors.
+    pub fn with_nuisances_of(mut self, sets: &[(LineAndContinuum, &Observations)]) -> Self {
+        self.data.nuisances = Nuisances::of_sets(sets);
+        self
+    }
+
+    /// Moves the velocities at which the profiles of a data set are expected, by `kms` to the red.
+    pub fn move_set(&mut self, set: usize, kms: f64) {
+        self.sets[set].sampling.profiles.iter_mut().for_each(|profile| profile.1 -= kms);
+    }
+
+    /// Holds a zero point that is integrated out farther to the red, by `kms`.
+    pub fn move_zero_point(&mut self, z: usize, kms: f64) {
+        self.move_set(self.zero_points[z].set, kms);
+        self.zero_points[z].mean_kms -= kms;
+    }
+
+    /// Number of each profile's data set, from 1; empty where there is only one.
+    pub fn set_of_each(&self) -> Vec<usize> {
+        let of_set = |(s, set): (usize, &Seen)| vec![s + 1; set.sampling.profiles.len()];
+        match self.sets.len() {
+            1 => Vec::new(),
+            _ => self.sets.iter().enumerate().flat_map(of_set).collect(),
+        }
+    }
+
+    /// The profiles of a data set.
+    pub fn profiles_of(&self, set: usize) -> std::ops::Range<usize> {
+        let count = |sets: &[Seen]| sets.iter().map(|set| set.sampling.profiles.len()).sum::<usize>();
+        count(&self.sets[..set])..count(&self.sets[..=set])
+    }
+
+    /// The same of each data set.
+    pub fn profiles_of_sets(&self) -> Vec<std::ops::Range<usize>> {
+        (0..self.sets.len()).map(|set| self.profiles_of(set)).collect()
+    }
+
+    /// The same with velocity zero points of every profile integrated out, of this standard deviation (km/s), where the
+    /// depths change with velocity by `slopes`; in place of those that there were.
+    pub fn with_zero_points(mut self, sd_kms: f64, slopes: &[f64]) -> Self {
+        let sigma: Vec<f64> = self.data.inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
+        let nuisances = std::mem::take(&mut self.data.nuisances);
+        self.data.nuisances = nuisances.with_zero_points(sd_kms, slopes, &self.bins(), &sigma);
+        self
+    }
+
+    /// The same without some of the profiles.
+    pub fn without(&self, profiles: &[usize]) -> Self {
+        let mut first = 0;
+        let mut sets = self.sets.clone();
+        for set in &mut sets {
+            let all = &mut set.sampling.profiles;
+            let before = first;
+            first += all.len();
+            let mut k = before..first;
+            all.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
+            let mut k = before..first;
+            set.own_maps.retain(|_| k.next().is_some_and(|k| !profiles.contains(&k)));
+        }
+        // a data set of which nothing is left is none
+        let mut zero_points = self.zero_points.clone();
+        let is_left = |set: &Seen| !set.sampling.profiles.is_empty();
+        zero_points.retain(|prior| is_left(&sets[prior.set]));
+        zero_points.iter_mut().for_each(|prior| prior.set = sets[..prior.set].iter().filter(|s| is_left(s)).count());
+        sets.retain(is_left);
+        let kept = self.bins().into_iter().enumerate().filter(|(k, _)| !profiles.contains(k)).map(|(_, bins)| bins);
+        Imager { sets, zero_points, data: self.data.of_profiles(&kept.collect::<Vec<_>>()), ..self.clone() }
+    }
+
+    /// The same of each season by itself.
+    pub fn seasons(&self) -> Vec<Self> {
+        let map_of = self.map_of_each();
+        let of_season = |map: usize| {
+            let others: Vec<usize> = (0..map_of.len()).filter(|k| map_of[*k] != map).collect();
+            self.without(&others).with_one_map()
+        };
+        match self.maps() {
+            1 => vec![self.clone()],
+            maps => (0..maps).map(of_season).filter(|season| season.profiles().next().is_some()).collect(),
+        }
+    }
+
+    /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
+    pub fn profiles(&self) -> impl Iterator<Item = (f64, f64, usize)> {
+        self.sets.iter().flat_map(|set| set.sampling.profiles.iter().copied())
+    }
+
+    /// Number of times at which the star is seen: profiles, and bins of light curves.
+    pub fn epochs(&self) -> usize {
+        self.profiles().count() + self.light_curves.iter().map(|curve| curve.bins.len()).sum::<usize>()
+    }
+
+    /// Times of all profiles (d).
+    pub fn times_d(&self) -> Vec<f64> {
+        self.profiles().map(|profile| profile.0).collect()
+    }
+
+    /// Bins of every profile within the data.
+    fn bins(&self) -> Vec<std::ops::Range<usize>> {
+        let mut end = 0;
+        let next = |profile: (f64, f64, usize)| {
+            end += profile.2;
+            end - profile.2..end
+        };
+        self.profiles().map(next).collect()
+    }
+
+    /// The response at one state of star and planet.
+    pub fn response(&self, state: &StarState) -> Response {
+        Response::of_sets(&self.grid, &self.star, state, &self.sets)
+    }
+
+    /// What responses close to a state have in common.
+    pub fn nearby(&self, state: &StarState) -> Nearby {
+        Nearby::new(&self.grid, &self.star, state, &self.sets)
+    }
+
+    /// The response at a state, in half the time if it is close to another.
+    pub fn response_near(&self, nearby: &Nearby, state: &StarState) -> Response {
+        nearby.response(&self.grid, &self.star, state, &self.sets).unwrap_or_else(|| self.response(state))
+    }
+
+    /// That of `response` at a state that differs from its own by orbit and systemic velocity alone.
+    pub fn with_velocities(&self, response: &Response, state: &StarState) -> Response {
+        response.with_velocities(&self.star, state, &self.sets)
+    }
+
+    /// The misfit of maps seen through `response`.
+    pub fn problem(&self, response: Response) -> ImagingProblem<'_> {
+        let brightness = |k: usize| match self.entropy {
+            Entropy::Spots { .. } => Brightness::of_spots(response.contrast(k)),
+            Entropy::BrightAndDark => Brightness::ITSELF,
+        };
+        let brightness = (0..response.profiles()).map(brightness).collect();
+        ImagingProblem::of_brightness(&self.areas, &self.data, response, brightness)
+    }
+
+    /// Rotation cycle of each profile.
+    pub fn cycles(&self) -> Vec<f64> {
+        self.profiles().map(|profile| self.star.cycle(profile.0)).collect()
+    }
+
+    /// Middle of the time base in rotation cycles.
+    pub fn mid_cycle(&self) -> f64 {
+        let (first, last) = self.span();
+        0.5 * (first + last)
+    }
+
+    /// Length of the time base in rotation cycles.
+    pub fn time_base_cycles(&self) -> f64 {
+        let (first, last) = self.span();
+        last - first
+    }
+
+    /// Length of the longest season in rotation cycles: as far as rotation turns a map.
+    pub fn longest_season_cycles(&self) -> f64 {
+        match self.maps() {
+            1 => self.time_base_cycles(),
+            _ => self.seasons().iter().map(Imager::time_base_cycles).fold(0.0, f64::max),
+        }
+    }
+
+    /// First and last rotation cycle.
+    fn span(&self) -> (f64, f64) {
+        self.cycles().into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), e| (lo.min(e), hi.max(e)))
+    }
+}

@@ -1,0 +1,58 @@
+//! The observed depths and the weights of their bins, which is all that the misfit needs of the observations.
+
+use crate::numerics::vector::Instructions;
+use crate::star::observation::Observations;
+use crate::surface::nuisances::Nuisances;
+use std::ops::Range;
+
+/// Data in the form that the misfit needs.
+#[derive(Clone, Debug)]
+pub struct Data {
+    /// Observed depth `1 - I` of every bin.
+    pub depth: Vec<f64>,
+    /// `1 / sigma^2` of every bin.
+    pub inverse_variance: Vec<f64>,
+    /// Over how many bins their noise is correlated, which the errors allow for; 1 for white noise.
+    pub correlated_bins: f64,
+    /// What may be wrong with each profile by itself, integrated out.
+    pub nuisances: Nuisances,
+}
+
+impl Data {
+    /// Depths and weights of all profiles, one after the other.
+    pub fn of(observations: &Observations) -> Self {
+        let profiles = || observations.profiles.iter();
+        Data {
+            depth: profiles().flat_map(|p| p.intensity.iter().map(|i| 1.0 - i)).collect(),
+            inverse_variance: profiles().flat_map(|p| p.sigma.iter().map(|s| 1.0 / (s * s))).collect(),
+            correlated_bins: 1.0,
+            nuisances: Nuisances::default(),
+        }
+    }
+
+    /// That of the profiles with these `bins` alone.
+    pub fn of_profiles(&self, profiles: &[Range<usize>]) -> Self {
+        let of = |x: &[f64]| profiles.iter().flat_map(|bins| x[bins.clone()].to_vec()).collect::<Vec<f64>>();
+        let inverse_variance = of(&self.inverse_variance);
+        let sigma: Vec<f64> = inverse_variance.iter().map(|w| w.sqrt().recip()).collect();
+        let nuisances = self.nuisances.of_profiles(profiles, &sigma);
+        Data { depth: of(&self.depth), inverse_variance, correlated_bins: self.correlated_bins, nuisances }
+    }
+
+    /// Sets `out = W x` in the `bins` of one profile, W the inverse of their covariance: no profile's weights see
+    /// another's bins.
+    #[inline(always)]
+    pub fn weigh(&self, i: impl Instructions, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+        let weights = x[bins.clone()].iter().zip(&self.inverse_variance[bins.clone()]);
+        out[bins.clone()].iter_mut().zip(weights).for_each(|(out, (x, weight))| *out = x * weight);
+        self.nuisances.weigh(i, bins, x, out);
+    }
+
+    /// Sets `out = R x` in the `bins` of one profile, `R^t R = W`.
+    pub fn weigh_root(&self, bins: Range<usize>, x: &[f64], out: &mut [f64]) {
+        for j in bins.clone() {
+            out[j] = x[j] * self.inverse_variance[j].sqrt();
+        }
+        self.nuisances.weigh_root(bins, x, out);
+    }
+}
