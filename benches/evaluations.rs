@@ -8,6 +8,7 @@ use common::stopwatch::{quantile, seconds};
 use common::table::{Table, Target, thousands};
 use dimcmc::internals::maxent::SolverSettings;
 use dimcmc::internals::sampling::log_density::{LogDensity, Status};
+use dimcmc::internals::surface::static_map::Posterior;
 
 /// An evaluation over its passes.
 const OVER_PASSES: Target = Target::AtMost(1.5);
@@ -78,7 +79,7 @@ fn measure(bulk: &Bulk, free: Free, pixels: usize, table: &mut Table) {
             time = time.min(seconds(|| bulk.target.evaluate(theta)));
             // a response in the memory that the evaluation had its own in: with two of them one would be in the other's
             // way
-            let problem = bulk.target.posterior().mapped().expect("one map a star").reconstruct(theta).1;
+            let problem = Posterior::behind(&**bulk.target.posterior()).expect("a static map").reconstruct(theta).1;
             let (response, single) = (problem.response(), problem.single_applications());
             let mut only_passes = Passes::new(response);
             double = double.min(seconds(|| only_passes.run(response, evaluation.model_applications)));

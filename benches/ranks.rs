@@ -12,14 +12,13 @@ use common::table::{Table, Target, thousands};
 use dimcmc::internals::data::config::{Config, Settings};
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::inference::search;
-use dimcmc::internals::inference::search::SearchSettings;
-use dimcmc::internals::inference::surrogate::{Surrogate, SurrogateMove};
 use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
 use dimcmc::internals::runs::origin::Origin;
 use dimcmc::internals::runs::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
 use dimcmc::internals::sampling::ensemble::{Sampler, StartDraw, draw_start};
 use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
 use dimcmc::internals::surface::static_map::Posterior;
+use dimcmc::internals::surface::surrogate::{Surrogate, SurrogateMove};
 use std::convert::Infallible;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
@@ -133,15 +132,15 @@ impl Case {
         // of the config as it is written, which is what ranks know: not with the start moved to the truth
         let Settings { resolved, path, .. } = scene(free, Size::pixels(pixels)).settings;
         let scene = Scene::new(&Config::at(resolved.clone(), &path)).unwrap();
-        let settings = SearchSettings { other_starts: 0, ..SearchSettings::new(&scene.settings) };
+        let settings = SearchSettings { other_starts: 0, ..scene.settings.search() };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let task = Task::new(&scene, &Origin::of(&scene, &found), scene.space.names(), Asked::LogProbability);
         let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();
         let (centre, covariance) = (&found.optimum.theta[..], &found.optimum.covariance);
         let draw = StartDraw { centre, covariance, scale: 1.0, ensembles: 1, walkers: BATCH, seed: 1 };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
-        let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
-        let posterior = found.posterior.mapped().expect("one map a star").clone();
+        let points = draw_start(&*found.posterior, &draw, &allowed).unwrap().remove(0);
+        let posterior = Posterior::behind(&*found.posterior).expect("a static map").clone();
         Case { scene, posterior, target, task, points }
     }
 }

@@ -8,11 +8,9 @@
 
 use dimcmc::internals::data::io::periodogram::PeriodogramResult;
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::inference::detection::{
-    Detection, DetectionSettings, Evidence, Robustness, Spots, View, robustness,
-};
+use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence, Robustness, robustness};
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings};
-use dimcmc::internals::surface::fit::Explained;
+use dimcmc::internals::surface::{Linearised, SurfaceSettings};
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -25,23 +23,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let scene = Scene::load(config.as_ref())?;
     let imager = &scene.imager;
-    let spots = match scene.spots() {
-        Spots::OneMap(_) => Spots::OneMap(None),
-        integrated @ Spots::Integrated(_) => integrated,
-    };
+    let surface = scene.surface();
+    let evolves = surface.model().begins_with_blind_search();
+    let field = surface.field.filter(|_| evolves);
     let settings = DetectionSettings {
         search: SearchSettings { draws: 10_000, seed: 1 },
-        spots,
-        ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), Vec::new())
+        ..DetectionSettings::of(SurfaceSettings { field, ..surface }, Vec::new())
     };
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let values = scene.settings.values;
     let detection = Detection::find(imager, values, frequencies, &settings, &|_| ())?;
-    let choices = match spots {
-        Spots::Integrated(_) if detection.is_candidate() => robustness(imager, values, &settings, &detection),
-        _ => Robustness { all: None, targets: Vec::new(), nights: Vec::new() },
+    let choices = match evolves && detection.is_candidate() {
+        true => robustness(imager, values, &settings, &detection),
+        false => Robustness { all: None, targets: Vec::new(), nights: Vec::new() },
     };
-    let explained = |view: &View| Explained::new(imager, &scene.observations, view);
+    let model = settings.surface.model();
+    let explained = |here: &Linearised| model.explained(imager, &scene.observations, here);
     let at_best = explained(detection.last());
     let misfit = &at_best.misfit;
     let remarks = detection.remarks(&Evidence { imager, settings: &settings, robustness: Some(&choices), misfit });

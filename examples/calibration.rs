@@ -9,13 +9,15 @@ use dimcmc::internals::data::config;
 use dimcmc::internals::data::io::csv::Table;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::data::simulate::Simulation;
-use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Spots};
-use dimcmc::internals::inference::surrogate::Surrogate;
+use dimcmc::internals::inference::detection::{Detection, DetectionSettings};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings};
 use dimcmc::internals::star::Spot;
+use dimcmc::internals::surface::SurfaceSettings;
 use dimcmc::internals::surface::expansion::Expansion;
 use dimcmc::internals::surface::imaging::Imager;
+use dimcmc::internals::surface::static_map::Reference;
+use dimcmc::internals::surface::surrogate::Surrogate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -81,12 +83,11 @@ fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
 
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
     let settings = DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target.value(),
+        surface: SurfaceSettings::spottedness(scene.settings.imaging.chi2_target.value()),
         nuisances: Vec::new(),
         search: SearchSettings { draws, seed: 1 },
         eccentric: false,
         second_planet: false,
-        spots: Spots::OneMap(None),
     };
     Ok(Detection::find(imager, scene.settings.values, frequencies(imager)?, &settings, &|_| ())?)
 }
@@ -109,13 +110,13 @@ fn null_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<NullStar, Fa
     let frequencies = frequencies(&imager)?;
     let found = detect(scene, &imager, 10_000)?;
     let view = &found.planet_free;
-    let image = view.image().expect("one map");
+    let reference = view.solution::<Reference>().expect("a static map");
     let trusting = Search::new(&view.regularised, &frequencies, SearchSettings { draws: 10_000, seed: 1 })?;
     let both = [&trusting, &found.blind];
     let height = |search: &Search| search.best().orbit.delta_ln_l;
     Ok(NullStar {
-        chi2_per_datum: image.reference.solution.chi2 / imager.data.depth.len() as f64,
-        unresolved_spots: image.unresolved_spots,
+        chi2_per_datum: reference.solution.chi2 / imager.data.depth.len() as f64,
+        unresolved_spots: view.unresolved_spots,
         delta_ln_l: both.map(height),
         porb_over_prot: both.map(|search| search.best().porb_over_prot),
         false_alarm: both.map(|search| search.false_alarm.probability(height(search)).value()),
@@ -174,7 +175,7 @@ fn planet_star(scene: &Scene, like: &Simulation, seed: u64) -> Result<PlanetStar
         (Parameter::Phi, Prior::Periodic),
     ];
     let free = free.into_iter().map(|(parameter, prior)| FreeParameter { parameter, prior }).collect();
-    let reference = &found.last().image().expect("one map").reference;
+    let reference = found.last().solution::<Reference>().expect("a static map");
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
     let space = ParameterSpace::new(free, reference.values, mid, base, imager.star.rotation_period_d);
     let expansion = Expansion::of(&imager, reference, &[]);

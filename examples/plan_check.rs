@@ -11,7 +11,6 @@
 use dimcmc::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
-use dimcmc::internals::inference::detection::Spots;
 use dimcmc::internals::planets::periodogram::FrequencySettings;
 use dimcmc::internals::planets::periodogram::orbits::scan;
 use dimcmc::internals::runs::plan::{Campaign, Outlook, PlanSettings, compared_d, outlook, range_d};
@@ -56,7 +55,7 @@ fn forecast(campaign: &Campaign, assumed: Assumed, range: [f64; 2], per_cycle: &
 /// sigma_K of the simulated profiles, and the spots that were fitted to them.
 fn achieved(config: &Config, per_cycle: &[f64], before: Option<Known>) -> (Vec<f64>, Assumed) {
     let scene = Scene::new(config).expect("a scene");
-    let Spots::Integrated(known) = scene.spots() else { panic!("maps are integrated over") };
+    let known = scene.surface().field.expect("what is known of the field");
     let basis = Basis::new(&scene.imager.grid);
     let known = before.unwrap_or(known);
     let fitted = fit(&scene.imager, &basis, scene.settings.values, known, None).expect("a field");

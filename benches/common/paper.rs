@@ -3,8 +3,7 @@
 
 use dimcmc::internals::data::config::{self, ObservationSource};
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::inference::search;
-use dimcmc::internals::inference::search::SearchSettings;
+use dimcmc::internals::inference::search::{self, SearchSettings};
 use dimcmc::internals::runs::pool::Target as Density;
 use dimcmc::internals::sampling::ensemble::{StartDraw, draw_start};
 use dimcmc::internals::star::{Response, StarState};
@@ -131,7 +130,7 @@ pub struct Bulk {
 impl Bulk {
     /// The posterior around its maximum, where a search from the injected values has put the reference.
     pub fn new(scene: &Scene, points: usize) -> Self {
-        let settings = SearchSettings { other_starts: 0, ..SearchSettings::new(&scene.settings) };
+        let settings = SearchSettings { other_starts: 0, ..scene.settings.search() };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let draw = StartDraw {
             centre: &found.optimum.theta,
@@ -142,9 +141,9 @@ impl Bulk {
             seed: 1,
         };
         let allowed = |theta: &[f64]| scene.space.log_prior(theta).is_finite();
-        let points = draw_start(&found.posterior, &draw, &allowed).unwrap().remove(0);
+        let points = draw_start(&*found.posterior, &draw, &allowed).unwrap().remove(0);
         let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();
-        let posterior = found.posterior.mapped().expect("one map a star").clone();
+        let posterior = Posterior::behind(&*found.posterior).expect("a static map").clone();
         Bulk { posterior, target, points }
     }
 }

@@ -10,7 +10,6 @@ use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
 use crate::data::scene::SceneError;
 use crate::figures::plot::PlotError;
-use crate::inference::detection::DetectionError;
 use crate::inference::search::SearchError;
 use crate::planets::periodogram::FrequencyError;
 use crate::runs::comparison::PairError;
@@ -22,6 +21,8 @@ use crate::runs::periodogram::PeriodogramError;
 use crate::runs::plan::{CampaignError, ForecastError, PlanError};
 use crate::runs::run::RunError;
 use crate::runs::simulated::SimulateError;
+use crate::surface::SurfaceError;
+use crate::surface::record::RebuildError;
 use crate::surface::static_map::ReferenceError;
 use std::error::Error;
 use std::io::ErrorKind;
@@ -106,7 +107,7 @@ impl Failure {
                 Failure::input(format!("{}: observations: {error}", config.display()))
             }
             PeriodogramError::Frequencies { error, .. } => Failure::of(error),
-            PeriodogramError::Detection { config, error: DetectionError::Reference(error) } => {
+            PeriodogramError::Detection { config, error: SurfaceError::Reference(error) } => {
                 Failure::reference(&config, error)
             }
             error @ PeriodogramError::Detection { .. } => Failure::failed(error),
@@ -161,7 +162,7 @@ impl Failure {
     /// What began in a folder cannot go on with the config at `path`.
     pub fn origin(path: &Path, error: OriginError) -> Self {
         match error {
-            OriginError::Reference(error) => Failure::reference(path, error),
+            OriginError::Reference(RebuildError::Reference(error)) => Failure::reference(path, error),
             OriginError::Irreproducible { .. } => Failure::failed(error),
             error => Failure::of(error),
         }

@@ -4,13 +4,14 @@ use super::output::{Output, remarks};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::scene::Scene;
-use crate::inference::detection::{DetectionError, DetectionSettings};
+use crate::inference::detection::DetectionSettings;
 use crate::model::for_blind_search;
 use crate::numerics::text::shown;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
 use crate::runs::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
 use crate::runs::pool::Brief;
 use crate::star::Orbit;
+use crate::surface::SurfaceError;
 use crate::surface::expansion::nuisances;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -144,12 +145,11 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
     })?;
     Ok(LimitSettings {
         detection: DetectionSettings {
-            chi2_target: scene.settings.imaging.chi2_target.value(),
+            surface: scene.surface(),
             nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
             search: SearchSettings { draws: args.draws as usize, seed: args.seed },
             eccentric: false,
             second_planet: false,
-            spots: scene.spots(),
         },
         frequencies,
         without_best: args.without_best,
@@ -176,9 +176,9 @@ fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
     })
 }
 
-fn failure(args: &Args, error: DetectionError) -> Failure {
+fn failure(args: &Args, error: SurfaceError) -> Failure {
     match error {
-        DetectionError::Reference(error) => Failure::reference(&args.config, error),
+        SurfaceError::Reference(error) => Failure::reference(&args.config, error),
         error => Failure::failed(format!("{}: {error}", args.config.display())),
     }
 }

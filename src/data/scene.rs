@@ -16,22 +16,20 @@ use crate::data::ephemeris::Ephemeris;
 use crate::data::io::FileError;
 use crate::data::io::lsd::{self, Label, LsdError};
 use crate::data::io::provenance::{Measured, MeasuredSet, Provenance};
-use crate::inference::detection::Spots;
 use crate::inference::evidence::EvidenceRecord;
 use crate::inference::search;
-use crate::inference::search::{Found, Progress, SearchError, SearchSettings};
+use crate::inference::search::{Found, Progress, SearchError};
 use crate::model::{FreeParameter, ParameterSpace, ParameterValues};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
-use crate::surface::evolving_map::Known;
 use crate::surface::fit::{ChangingFit, Fit, NoField};
 use crate::surface::imaging::Imager;
-use crate::surface::objective::ObjectiveKind;
 use crate::surface::photometry::Flux;
 use crate::surface::static_map::noise::{ErrorSettings, MeasuredErrors};
 use crate::surface::static_map::{Reference, ReferenceError, target};
+use crate::surface::{Known, SurfaceSettings};
 use imaging::hold_zero_points;
 use measuring::{measured_errors, zero_points};
 use reading::{Part, one_day_count};
@@ -259,13 +257,10 @@ impl Scene {
         self.settings.require_free().map(drop)
     }
 
-    /// What becomes of the spots in a blind search.
+    /// What is assumed of the spots.
     #[doc(hidden)]
-    pub fn spots(&self) -> Spots {
-        match self.settings.imaging.objective {
-            ObjectiveKind::MarginalLikelihood => Spots::Integrated(self.known()),
-            _ => Spots::OneMap(Some(self.known())),
-        }
+    pub fn surface(&self) -> SurfaceSettings {
+        SurfaceSettings { field: Some(self.known()), ..self.settings.surface() }
     }
 
     /// What is known of the field of spots.
@@ -295,12 +290,8 @@ impl Scene {
     /// # Errors
     /// A field that cannot be fitted to the profiles.
     pub fn changing_maps(&self, times_d: Option<&[f64]>) -> Result<ChangingFit, NoField> {
-        let known = match self.spots() {
-            Spots::Integrated(known) | Spots::OneMap(Some(known)) => known,
-            Spots::OneMap(None) => Known::default(),
-        };
         let imager = self.imager.clone().with_one_map();
-        ChangingFit::new(&imager, &self.observations, self.settings.values, known, times_d)
+        ChangingFit::new(&imager, &self.observations, self.settings.values, self.known(), times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.
@@ -316,7 +307,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::optimise`].
     pub fn optimise_with(&self, report: &(dyn Fn(Progress) + Sync)) -> Result<Found, SearchError> {
-        search::find(&self.imager, &self.space, SearchSettings::new(&self.settings), report)
+        search::find(&self.imager, &self.space, self.settings.search(), report)
     }
 
     /// The profiles in their whole width, as they are in their files, with what the list says of each: what is injected

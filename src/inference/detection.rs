@@ -10,10 +10,8 @@ mod remarks;
 mod robustness;
 
 pub use remarks::Evidence;
-pub use robustness::{AtTarget, Robustness, WithoutNight, nights, robustness};
+pub use robustness::{Robustness, WithoutNight, nights, robustness};
 
-use crate::field::{FieldError, Lifetime};
-use crate::maxent::Termination;
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::eccentric::keplerian;
 use crate::planets::periodogram::offset::{Offset, offset};
@@ -21,16 +19,14 @@ use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::peaks::refined;
 use crate::planets::periodogram::two_planets::{both, without};
 use crate::planets::periodogram::{
-    CircularOrbit, Frequencies, Jitters, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
-    co_rotation_penalty,
+    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
 };
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
-use crate::surface::evolving_map::{Basis, Change, Fitted, Known, NoFit, fit};
-use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
+use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
-use crate::surface::static_map::{Reference, ReferenceError};
+use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel, SurfaceSettings};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -43,8 +39,8 @@ const STAYS: f64 = 0.01;
 /// What to search for, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DetectionSettings {
-    /// Target of chi2, per datum.
-    pub chi2_target: f64,
+    /// What is assumed of the spots.
+    pub surface: SurfaceSettings,
     /// Parameters that are integrated out within their priors; the others are fixed.
     pub nuisances: Vec<Nuisance>,
     /// How peaks are judged.
@@ -53,65 +49,19 @@ pub struct DetectionSettings {
     pub eccentric: bool,
     /// Whether a second planet is searched for.
     pub second_planet: bool,
-    /// What becomes of the spots.
-    pub spots: Spots,
 }
 
-/// What becomes of the spots.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Spots {
-    /// They are those of the map of maximum entropy, and do not change. Whether they do is looked into first, with
-    /// what is known of the field, if anything is given.
-    OneMap(Option<Known>),
-    /// All maps are integrated over: the marginal likelihood.
-    Integrated(Known),
-}
-
-impl Spots {
-    /// What is known of the field in a comparison with a star that changes; `None` where there is none.
-    pub fn compared(&self) -> Option<Known> {
-        match self {
-            Spots::OneMap(known) => *known,
-            Spots::Integrated(known) => Some(*known).filter(|known| known.lifetime == Some(Lifetime::Static)),
+impl DetectionSettings {
+    /// The usual search: circular orbits, one planet.
+    pub fn of(surface: SurfaceSettings, nuisances: Vec<Nuisance>) -> Self {
+        DetectionSettings {
+            surface,
+            nuisances,
+            search: SearchSettings::default(),
+            eccentric: false,
+            second_planet: false,
         }
     }
-}
-
-/// The spots of a star as the profiles show them.
-#[derive(Clone, Debug)]
-pub enum Seen {
-    /// The map of maximum entropy.
-    OneMap(Box<Image>),
-    /// The field that was integrated over.
-    Integrated(Box<Fitted>),
-}
-
-/// A map of maximum entropy.
-#[derive(Clone, Debug)]
-pub struct Image {
-    /// The map.
-    pub reference: Reference,
-    /// How many times larger than the entropy expects the unresolved spots are, in variance.
-    pub unresolved_spots: f64,
-    /// Whether it reaches the target chi2.
-    pub on_target: bool,
-}
-
-/// A star with its spots, and the quadratic in its profiles' velocities around it.
-#[derive(Clone, Debug)]
-pub struct View {
-    /// The spots.
-    pub seen: Seen,
-    /// ln L around it.
-    pub expansion: Expansion,
-    /// ln L of the orbit's velocities, counted from 0 whatever the orbit of the image; spots that the map leaves over
-    /// count as noise.
-    pub quadratic: VelocityQuadratic,
-    /// The same with those zero points of data sets held that are otherwise integrated out, for tables of velocities;
-    /// `None` where there are none.
-    pub zero_points_held: Option<VelocityQuadratic>,
-    /// The same with spots as the entropy sees them: the regularised likelihood itself.
-    pub regularised: VelocityQuadratic,
 }
 
 /// The second planet.
@@ -131,12 +81,12 @@ pub struct Detection {
     /// Whether the star changes, where that was looked into: of spots that are taken for unchanging.
     pub change: Option<Result<Change, NoFit>>,
     /// Without a planet; its quadratic is the one that `search` is of.
-    pub planet_free: View,
+    pub planet_free: Linearised,
     /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots,
     /// which makes the false-alarm probability a cautious one.
     pub blind: Search,
     /// At the best orbit; `None` if it was not imaged, because its period lies on the edge of the search.
-    pub at_best: Option<View>,
+    pub at_best: Option<Linearised>,
     /// Expansions that it took to get there.
     pub rounds: usize,
     /// Whether K stays.
@@ -151,26 +101,6 @@ pub struct Detection {
     pub offset: Option<Offset>,
     /// sigma_K at Porb = Prot over its median away from it, without a planet.
     pub co_rotation_penalty: Option<f64>,
-}
-
-/// Why there is no detection, nor a limit.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum DetectionError {
-    /// No image.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
-    /// No orbit at all.
-    #[error(transparent)]
-    Unbounded(#[from] Unbounded),
-    /// No field.
-    #[error(transparent)]
-    Field(#[from] NoFit),
-}
-
-impl From<FieldError> for DetectionError {
-    fn from(error: FieldError) -> Self {
-        DetectionError::Field(error.into())
-    }
 }
 
 /// What is under way.
@@ -188,96 +118,9 @@ pub enum Stage {
     SecondPlanet,
 }
 
-impl DetectionSettings {
-    /// The usual search: circular orbits, one planet.
-    pub fn of(chi2_target: f64, nuisances: Vec<Nuisance>) -> Self {
-        let search = SearchSettings::default();
-        DetectionSettings {
-            chi2_target,
-            nuisances,
-            search,
-            eccentric: false,
-            second_planet: false,
-            spots: Spots::OneMap(None),
-        }
-    }
-}
-
-impl View {
-    /// The star imaged at `values`. Where the target chi2 takes more than three times the entropy's weight over the
-    /// number of data, the image stops short of it: beyond, noise is turned into spots. Where maps are integrated over
-    /// there is no image, and the field is fitted from that of a view `near` by, if there is one.
-    ///
-    /// # Errors
-    /// [`DetectionError`].
-    pub fn new(
-        imager: &Imager,
-        values: ParameterValues,
-        settings: &DetectionSettings,
-        near: Option<&View>,
-    ) -> Result<Self, DetectionError> {
-        let nuisances = &settings.nuisances;
-        let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
-        if let Spots::Integrated(known) = settings.spots {
-            let basis = Basis::new(&imager.grid);
-            let fitted = fit(imager, &basis, values, known, near.and_then(View::field))?;
-            let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
-            let quadratic = expansion.velocities(nuisances);
-            let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
-            let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
-            let zero_points_held = held.map(|held| held.velocities(nuisances));
-            let (regularised, seen) = (quadratic.clone(), Seen::Integrated(Box::new(fitted)));
-            return Ok(View { seen, expansion, quadratic, zero_points_held, regularised });
-        }
-        let reference = Reference::provisional(imager, values, settings.chi2_target)?;
-        let on_target = reference.solution.termination == Termination::Converged;
-        let expansion = Expansion::of(imager, &reference, &stellar);
-        let regularised = expansion.velocities(nuisances);
-        let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
-        let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
-        let seen = Seen::OneMap(Box::new(Image { reference, unresolved_spots, on_target }));
-        Ok(View { seen, expansion, quadratic, zero_points_held: None, regularised })
-    }
-
-    /// The likelihood of the velocities beside jitters of several sizes, where the profiles say how large it is.
-    fn jitters(&self, imager: &Imager, settings: &DetectionSettings) -> Result<Jitters, DetectionError> {
-        match (&self.seen, settings.spots) {
-            (Seen::Integrated(fitted), Spots::Integrated(Known { jitter_kms: None, .. }))
-                if fitted.marginal.assumed.jitter_kms > 0.0 =>
-            {
-                let basis = Basis::new(&imager.grid);
-                let expansion = fitted.marginal.without_jitter(imager, &basis)?;
-                let expansion = expansion.expansion(imager, &basis, &self.expansion.stellar)?;
-                let without = expansion.velocities(&settings.nuisances);
-                Ok(Jitters::new(&without, fitted.marginal.assumed.jitter_kms))
-            }
-            _ => Ok(Jitters::none(&self.quadratic)),
-        }
-    }
-
-    /// A search with the periods at which these spots imitate orbits.
-    fn imitated_by(&self, search: Search) -> Search {
-        match &self.seen {
-            Seen::OneMap(_) => search,
-            Seen::Integrated(_) => search.without_multiples(),
-        }
-    }
-
-    /// The map of maximum entropy, where there is one.
-    pub fn image(&self) -> Option<&Image> {
-        match &self.seen {
-            Seen::OneMap(image) => Some(image),
-            Seen::Integrated(_) => None,
-        }
-    }
-
-    /// The field that was integrated over.
-    pub fn field(&self) -> Option<&Fitted> {
-        match &self.seen {
-            Seen::OneMap(_) => None,
-            Seen::Integrated(fitted) => Some(fitted),
-        }
-    }
+/// A search with the periods at which these spots imitate orbits.
+fn imitated(surface: &dyn SurfaceModel, search: Search) -> Search {
+    if surface.imitates_at_fractions() { search } else { search.without_multiples() }
 }
 
 /// Delta ln L of the best orbit at the trial periods.
@@ -290,30 +133,31 @@ impl Detection {
     /// Searches the star in `imager`, all but the orbit as in `values`, at the given periods.
     ///
     /// # Errors
-    /// [`DetectionError`].
+    /// [`SurfaceError`].
     pub fn find(
         imager: &Imager,
         values: ParameterValues,
         frequencies: Frequencies,
         settings: &DetectionSettings,
         report: &dyn Fn(Stage),
-    ) -> Result<Self, DetectionError> {
+    ) -> Result<Self, SurfaceError> {
         report(Stage::PlanetFree);
         let mut alone = values;
         alone[Parameter::K] = 0.0;
-        let planet_free = View::new(imager, alone, settings, None)?;
+        let surface = settings.surface.model();
+        let at = At { imager, values: alone, nuisances: &settings.nuisances };
+        let planet_free = surface.linearise(at, None)?;
         report(Stage::Search);
-        let jitters = planet_free.jitters(imager, settings)?;
+        let jitters = surface.jitters(at, &planet_free)?;
         let blind = Search::with_jitter(&jitters, &frequencies, settings.search)?;
-        let blind = planet_free.imitated_by(blind);
+        let blind = imitated(&*surface, blind);
         let best = match jitters.is_none() {
             true => blind.best().orbit.delta_ln_l,
             false => highest(&planet_free.quadratic, &frequencies),
         };
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
-        let change =
-            settings.spots.compared().map(|known| Change::of(imager, values, &frequencies, &settings.nuisances, known));
+        let change = surface.evolution(At { values, ..at }, &frequencies);
         let mut found = Detection {
             best: *blind.best(),
             planet_free,
@@ -328,20 +172,20 @@ impl Detection {
             offset,
             co_rotation_penalty: None,
         };
-        found.close(imager, values, settings, report)?;
+        found.close(&*surface, At { values, ..at }, report)?;
         found.co_rotation_penalty = co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies);
         if settings.eccentric {
             found.keplerian = found.eccentric();
         }
         if settings.second_planet {
             report(Stage::SecondPlanet);
-            found.second = found.second_planet(settings.search)?;
+            found.second = found.second_planet(&*surface, settings.search)?;
         }
         Ok(found)
     }
 
     /// The last expansion.
-    pub fn last(&self) -> &View {
+    pub fn last(&self) -> &Linearised {
         self.at_best.as_ref().unwrap_or(&self.planet_free)
     }
 
@@ -370,38 +214,24 @@ impl Detection {
         self.false_alarm_probability() < CANDIDATE_FAP
     }
 
-    /// Images the star with the best orbit until that orbit stays.
-    fn close(
-        &mut self,
-        imager: &Imager,
-        mut values: ParameterValues,
-        settings: &DetectionSettings,
-        report: &dyn Fn(Stage),
-    ) -> Result<(), DetectionError> {
-        let mut settings = settings.clone();
-        // of a field that is held, those of its fit
-        let mut at_bounds = None;
+    /// Linearises the star with the best orbit until that orbit stays.
+    fn close(&mut self, surface: &dyn SurfaceModel, mut at: At, report: &dyn Fn(Stage)) -> Result<(), SurfaceError> {
+        let mut held = None;
         while self.rounds < MOST_ROUNDS && !self.closed && !self.best.on_edge {
             self.rounds += 1;
             report(Stage::BestOrbit(self.rounds));
-            values[Parameter::K] = self.best.orbit.k_kms;
-            values[Parameter::PorbOverProt] = self.best.porb_over_prot;
-            values[Parameter::Phi] = self.best.orbit.phi;
-            let mut view = View::new(imager, values, &settings, Some(self.last()))?;
-            if let (Seen::Integrated(field), Some(before)) = (&mut view.seen, at_bounds.take()) {
-                field.at_bounds = before;
-            }
-            let mut next = refined(&view.quadratic, &self.frequencies, &self.best);
+            at.values[Parameter::K] = self.best.orbit.k_kms;
+            at.values[Parameter::PorbOverProt] = self.best.porb_over_prot;
+            at.values[Parameter::Phi] = self.best.orbit.phi;
+            let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
+            let mut next = refined(&here.quadratic, &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);
             let moved = (next.orbit.k_kms - self.best.orbit.k_kms).abs();
             self.closed = moved < STAYS * next.orbit.sigma_k_kms;
             self.best = next;
-            // the field with a planet in the model is another one; what moves after that is too little to matter
-            if let Some(field) = view.field() {
-                settings.spots = Spots::Integrated(Known::of(&field.marginal));
-                at_bounds = Some(field.at_bounds.clone());
-            }
-            self.at_best = Some(view);
+            // the spots with a planet in the model are others; what moves after that is too little to matter
+            held = Some(surface.holding(&here));
+            self.at_best = Some(here);
         }
         Ok(())
     }
@@ -410,14 +240,18 @@ impl Detection {
     fn eccentric(&self) -> Vec<Option<KeplerianOrbit>> {
         let others = self.blind.peaks[1..].iter().map(|peak| (&self.planet_free, peak));
         let all = std::iter::once((self.last(), &self.best)).chain(others);
-        all.map(|(view, peak)| keplerian(&view.quadratic, &self.frequencies, peak)).collect()
+        all.map(|(there, peak)| keplerian(&there.quadratic, &self.frequencies, peak)).collect()
     }
 
     /// A search with the best orbit taken out; `None` where that leaves nothing.
-    fn second_planet(&self, settings: SearchSettings) -> Result<Option<SecondPlanet>, Unbounded> {
+    fn second_planet(
+        &self,
+        surface: &dyn SurfaceModel,
+        settings: SearchSettings,
+    ) -> Result<Option<SecondPlanet>, Unbounded> {
         let quadratic = &self.last().quadratic;
         let Some(rest) = without(quadratic, 1.0 / self.best.porb_over_prot) else { return Ok(None) };
-        let search = self.last().imitated_by(Search::new(&rest, &self.frequencies, settings)?);
+        let search = imitated(surface, Search::new(&rest, &self.frequencies, settings)?);
         let both = both(quadratic, &self.frequencies, &self.best, search.best());
         Ok(Some(SecondPlanet { search, both }))
     }

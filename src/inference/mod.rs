@@ -5,4 +5,3 @@ pub mod detection;
 pub mod evidence;
 pub mod first_look;
 pub mod search;
-pub mod surrogate;

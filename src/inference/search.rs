@@ -1,75 +1,48 @@
-//! The way to the reference: from the config's values, and from the peaks of the likelihood over all periods, to the
-//! best parameters and to the maximum-entropy image there (`docs/method.md` section 3, step 1).
-//!
-//! The peaks are those of the quadratic around the first climb's end (`docs/method.md` section 4), brought into the
-//! priors where they lie outside; where there is no quadratic (K or phi fixed), orbits drawn from the prior take their
-//! place. The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last
-//! climb is on the objective asked for.
+//! The search for the best parameters: a blind search for the planet, where the surface model begins with one, and the
+//! model's own way up from there.
 
-use crate::data::config::{ImagingSettings, Settings};
-use crate::field::FieldError;
-use crate::inference::detection::Detection;
-use crate::inference::surrogate::Surrogate;
-use crate::model::{FreeParameter, ParameterSpace, Prior};
-use crate::sampling::optimise::{OptimiseError, Optimum, climb};
+use crate::inference::detection::{Detection, DetectionSettings};
+use crate::model::{Elements, Parameter, ParameterSpace, ParameterValues, for_blind_search};
+use crate::planets::periodogram::{Frequencies, FrequencySettings};
+use crate::sampling::optimise::Optimum;
+use crate::star::Shape;
+use crate::surface::SurfaceSettings;
 use crate::surface::density::Density;
-use crate::surface::evolving_map::{Known, NoFit};
+use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
-use crate::surface::objective::ObjectiveKind;
-use crate::surface::static_map::{Posterior, Reference, ReferenceError};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use crate::surface::optimum::{Best, BlindStart, RIVAL_DISTANCE, Sought, shift, with_spots_of};
 
-mod integrated;
+pub use crate::surface::optimum::{Attempt, Progress, SearchError, Stage};
 
 /// What to search for, and from where.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchSettings {
-    /// Target of chi2 per datum.
-    pub chi2_target: f64,
-    /// The objective.
-    pub objective: ObjectiveKind,
-    /// What is known of the field, where maps are integrated over.
-    pub known: Known,
+    /// What is assumed of the spots.
+    pub surface: SurfaceSettings,
     /// Most other orbits to start from, beside the config's values.
     pub other_starts: usize,
-    /// Seed of those draws.
+    /// Seed of those that are drawn.
     pub seed: u64,
 }
 
 impl SearchSettings {
-    /// The search that a config asks for.
-    pub fn new(settings: &Settings) -> Self {
-        let ImagingSettings { chi2_target, objective, .. } = settings.imaging;
-        SearchSettings {
-            chi2_target: chi2_target.value(),
-            objective,
-            known: settings.known_field(),
-            other_starts: OTHER_STARTS,
-            seed: settings.sampler.seed,
-        }
+    /// The usual search.
+    pub fn of(surface: SurfaceSettings, seed: u64) -> Self {
+        SearchSettings { surface, other_starts: OTHER_STARTS, seed }
     }
 }
 
 /// Most orbits that a search starts from, beside the config's.
 const OTHER_STARTS: usize = 4;
 
-/// Peaks of the quadratic this much below its best in ln L are climbed too.
-const PEAK_DROP: f64 = 10.0;
+/// A circle is a saddle of the square roots of eccentricities: a climb begins beside it.
+const SMALLEST_E: f64 = 0.01;
 
-/// Evaluations of a climb, near its start for the most part.
-const CLIMB: usize = 15;
+/// Share of the largest eccentricity that a climb begins within.
+const SMALL_PART: f64 = 0.8;
 
-/// One start of the search and where it led.
-#[derive(Clone, Debug)]
-pub struct Attempt {
-    /// Where it started (physical coordinates); the first attempt is from the config's values.
-    pub start: Vec<f64>,
-    /// Where it ended, or why it did not.
-    pub end: Result<Optimum, OptimiseError>,
-}
+/// A maximum this much lower in log-probability holds a thousandth of the weight of the best, and is no rival.
+const RIVAL_DROP: f64 = 7.0;
 
 /// The result of a search.
 #[derive(Clone, Debug)]
@@ -78,175 +51,12 @@ pub struct Found {
     pub posterior: Density,
     /// The optimum of the objective asked for.
     pub optimum: Optimum,
-    /// All starts, by regularised likelihood at the first reference's lambda.
+    /// All starts.
     #[doc(hidden)]
     pub attempts: Vec<Attempt>,
-    /// The blind search that it began with, where all maps are integrated over.
+    /// The blind search that it began with, where it did.
     #[doc(hidden)]
     pub detection: Option<Box<Detection>>,
-}
-
-/// Why a search failed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SearchError {
-    /// No reference image.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
-    /// No field, where maps are integrated over.
-    #[error("{0}")]
-    Field(#[from] NoFit),
-    /// No start led anywhere.
-    #[error("{0}")]
-    Optimise(#[from] OptimiseError),
-}
-
-impl From<FieldError> for SearchError {
-    fn from(error: FieldError) -> Self {
-        SearchError::Field(error.into())
-    }
-}
-
-/// How far a search has come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// What it is at.
-    pub stage: Stage,
-    /// Evaluations made by all climbs so far.
-    pub evaluations: usize,
-}
-
-/// Stages of a search.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Reconstruction at the config's values.
-    FirstImage,
-    /// Climbs from all starts.
-    Climbing {
-        /// Climbs that have ended.
-        done: usize,
-        /// Number of starts.
-        starts: usize,
-    },
-    /// Reconstruction and trade-off curve at the best parameters.
-    Reference,
-    /// The last climb, on the objective asked for.
-    Refining,
-}
-
-impl std::fmt::Display for Stage {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Stage::FirstImage => f.write_str("reconstructing at the config's values"),
-            Stage::Climbing { done, starts } => write!(f, "searching, {done} of {starts} climbs done"),
-            Stage::Reference => f.write_str("reference image and trade-off curve"),
-            Stage::Refining => f.write_str("refining the best parameters"),
-        }
-    }
-}
-
-/// The reference is rebuilt until the optimum stays within this many standard deviations of it.
-const REFERENCE_SHIFT: f64 = 0.3;
-
-/// A maximum this much lower in log-probability holds a thousandth of the weight of the best, and is no rival.
-const RIVAL_DROP: f64 = 7.0;
-
-/// Climbs that end within this many standard deviations of each other found the same maximum.
-const RIVAL_DISTANCE: f64 = 4.0;
-
-/// Most rebuilds of the reference.
-const ROUNDS: usize = 4;
-
-/// Finds the best parameters and the reference there; `report` is called at every evaluation, from any thread.
-///
-/// # Errors
-/// If the target is out of reach even there, or no start leads to a finite log-probability.
-pub fn find(
-    imager: &Imager,
-    space: &ParameterSpace,
-    settings: SearchSettings,
-    report: &(dyn Fn(Progress) + Sync),
-) -> Result<Found, SearchError> {
-    if settings.objective == ObjectiveKind::MarginalLikelihood {
-        return integrated::find(imager, space, settings, report);
-    }
-    let SearchSettings { chi2_target, objective, .. } = settings;
-    let (evaluations, done, all) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(1));
-    let at = |stage| report(Progress { stage, evaluations: evaluations.load(Relaxed) });
-    at(Stage::FirstImage);
-    let start = space.start();
-    let first = Reference::provisional(imager, space.values_at(&start), chi2_target)?;
-    let smooth = Posterior::new(imager.clone(), space.clone(), ObjectiveKind::RegularisedLikelihood, first);
-    let climbing = || at(Stage::Climbing { done: done.load(Relaxed), starts: all.load(Relaxed) });
-    let attempt = |start: Vec<f64>| {
-        let tick = || {
-            evaluations.fetch_add(1, Relaxed);
-            climbing();
-        };
-        let near = smooth.clone().with_warm_starts_for(std::slice::from_ref(&start), CLIMB);
-        let end = climb(&near, &start, &tick);
-        done.fetch_add(1, Relaxed);
-        climbing();
-        Attempt { start, end }
-    };
-    let mut attempts = vec![attempt(start)];
-    let starts = other_starts(imager, space, settings, &attempts[0])?;
-    all.fetch_add(starts.len(), Relaxed);
-    attempts.extend(starts.into_par_iter().with_max_len(1).map(attempt).collect::<Vec<_>>());
-    let height = |attempt: &Attempt| attempt.end.as_ref().map_or(f64::NEG_INFINITY, |o| o.evaluation.log_prob);
-    let best = attempts.iter().max_by(|a, b| height(a).total_cmp(&height(b))).expect("at least the config's values");
-    let mut optimum = best.end.clone()?;
-    for round in 0.. {
-        at(Stage::Reference);
-        let reference = Reference::build(imager, space.values_at(&optimum.theta), chi2_target)?;
-        let posterior = Posterior::new(imager.clone(), space.clone(), objective, reference);
-        let tick = || {
-            evaluations.fetch_add(1, Relaxed);
-            at(Stage::Refining);
-        };
-        let next = climb(&posterior, &optimum.theta, &tick)?;
-        let moved = shift(space, &optimum.theta, &next);
-        optimum = next;
-        if moved < REFERENCE_SHIFT || round + 1 == ROUNDS {
-            let posterior = Density::Mapped(Box::new(posterior));
-            return Ok(Found { posterior, optimum, attempts, detection: None });
-        }
-    }
-    unreachable!("the loop returns")
-}
-
-/// Where else to climb from, after the `first` attempt.
-fn other_starts(
-    imager: &Imager,
-    space: &ParameterSpace,
-    settings: SearchSettings,
-    first: &Attempt,
-) -> Result<Vec<Vec<f64>>, ReferenceError> {
-    let from = first.end.as_ref().map_or(&first.start, |optimum| &optimum.theta);
-    if !space.free().iter().any(|f| f.parameter.is_orbital()) {
-        return Ok(Vec::new());
-    }
-    let here = Reference::provisional(imager, space.values_at(from), settings.chi2_target)?;
-    let Some(surrogate) = Surrogate::new(imager, space, &here) else {
-        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-        return Ok((0..settings.other_starts).map(|_| with_other_orbit(space, from, &mut rng)).collect());
-    };
-    let peaks = surrogate.peaks(PEAK_DROP, settings.other_starts + 1);
-    let starts = peaks.iter().map(|peak| within(space, space.to_physical(&peak.position)));
-    let reached = |theta: &Vec<f64>| first.end.as_ref().is_ok_and(|end| shift(space, theta, end) < RIVAL_DISTANCE);
-    let allowed = |theta: &Vec<f64>| space.log_prior(theta).is_finite();
-    Ok(starts.filter(|theta| allowed(theta) && !reached(theta)).take(settings.other_starts).collect())
-}
-
-/// `theta` brought into the bounds of the priors, a little inside.
-fn within(space: &ParameterSpace, mut theta: Vec<f64>) -> Vec<f64> {
-    for (x, f) in theta.iter_mut().zip(space.free()) {
-        let (low, high) = f.prior.bounds();
-        let margin = if (high - low).is_finite() { 0.02 * (high - low) } else { 0.0 };
-        if f.prior != Prior::Periodic && !f.prior.contains(*x) {
-            *x = x.clamp(low + margin, high - margin);
-        }
-    }
-    theta
 }
 
 impl Found {
@@ -268,19 +78,78 @@ impl Found {
     }
 }
 
-/// `theta` with an orbit drawn from the prior: it is in the orbit that the landscape has several maxima, one for every
-/// alias of the sampling; the star's own parameters have one, which the climb from the config's values has found.
-fn with_other_orbit(space: &ParameterSpace, theta: &[f64], rng: &mut ChaCha8Rng) -> Vec<f64> {
-    let draw = space.sample_prior(rng);
-    let choose = |((f, drawn), kept): ((&FreeParameter, f64), &f64)| {
-        if f.parameter.is_orbital() { drawn } else { *kept }
-    };
-    space.free().iter().zip(draw).zip(theta).map(choose).collect()
+/// Finds the best parameters and the reference there; `report` is called at every evaluation, from any thread.
+///
+/// # Errors
+/// If there is no reference, or no start leads to a finite log-probability.
+pub fn find(
+    imager: &Imager,
+    space: &ParameterSpace,
+    settings: SearchSettings,
+    report: &(dyn Fn(Progress) + Sync),
+) -> Result<Found, SearchError> {
+    let SearchSettings { surface, other_starts, seed } = settings;
+    let (model, sought) = (surface.model(), Sought { imager, space, other_starts, seed });
+    report(Progress { stage: Stage::FirstImage, evaluations: 0 });
+    let blind = if model.begins_with_blind_search() { blind(imager, space, surface) } else { None };
+    let (detection, start) = blind.map_or((None, None), |(detection, start)| (Some(Box::new(detection)), start));
+    let start = detection.as_ref().zip(start);
+    let start = start.map(|(detection, (theta, values))| BlindStart { theta, values, here: detection.last() });
+    let Best { posterior, optimum, attempts } = model.optimum(sought, start, report)?;
+    Ok(Found { posterior, optimum, attempts, detection })
 }
 
-/// Distance of an optimum from `theta`, in standard deviations of the curvature.
-fn shift(space: &ParameterSpace, theta: &[f64], to: &Optimum) -> f64 {
-    let (a, b) = (space.to_sampling(theta), space.to_sampling(&to.theta));
-    let d = nalgebra::DVector::from_iterator(a.len(), a.iter().zip(&b).map(|(a, b)| b - a));
-    (&to.curvature * &d).dot(&d).max(0.0).sqrt()
+/// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
+fn blind(
+    imager: &Imager,
+    space: &ParameterSpace,
+    surface: SurfaceSettings,
+) -> Option<(Detection, Option<(Vec<f64>, ParameterValues)>)> {
+    let is_free = |p: Parameter| space.free().iter().any(|f| f.parameter == p);
+    let sought = |of: &&Elements| is_free(of.k) && is_free(of.phi) && space.period_prior(of).is_some();
+    let sought: Vec<&Elements> = Elements::PLANETS.iter().filter(sought).collect();
+    let [first, second] = &Elements::PLANETS;
+    let beside = second.all().into_iter().any(is_free);
+    // of a planet of known ephemeris the config knows where it is
+    if !sought.contains(&first) || (beside && !sought.contains(&second)) {
+        return None;
+    }
+    let usual = FrequencySettings::default();
+    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok()?;
+    let wanted = DetectionSettings {
+        eccentric: is_free(first.shape[0]),
+        second_planet: beside,
+        ..DetectionSettings::of(surface, nuisances(space.free()))
+    };
+    let config = space.values_at(&space.start());
+    let values = for_blind_search(config, space.free());
+    let found = Detection::find(imager, values, frequencies, &wanted, &|_| ()).ok()?;
+    let mut values = found.last().expansion.values;
+    first.all().into_iter().chain(second.all()).for_each(|p| values[p] = config[p]);
+    let both = found.second.as_ref().and_then(|second| second.both).map(|both| both.orbits.to_vec());
+    let mut peaks = both.filter(|_| beside).unwrap_or_else(|| vec![found.best]);
+    for of in sought {
+        let prior = space.period_prior(of)?;
+        let allowed = peaks.iter().position(|peak| prior.contains(peak.porb_over_prot));
+        let peak = peaks.remove(allowed.or((!beside).then_some(0))?);
+        values[of.k] = peak.orbit.k_kms;
+        values[of.ratio] = peak.porb_over_prot;
+        values[of.phi] = peak.orbit.phi;
+    }
+    if let Some(Some(ellipse)) = found.keplerian.first().filter(|_| !beside) {
+        let largest =
+            first.shape.map(|p| space.free().iter().find(|f| f.parameter == p).map(|f| f.prior.bounds().1))[0]?;
+        let e = ellipse.eccentricity.clamp(SMALLEST_E, (SMALL_PART * largest * largest).max(SMALLEST_E));
+        let shape = Shape::new(e, ellipse.omega);
+        values[Parameter::SqrtECosOmega] = shape.sqrt_e_cos_omega;
+        values[Parameter::SqrtESinOmega] = shape.sqrt_e_sin_omega;
+        values[Parameter::K] = ellipse.k_kms;
+        values[Parameter::PorbOverProt] = ellipse.porb_over_prot;
+        values[Parameter::Phi] = (ellipse.maximum_cycle / ellipse.porb_over_prot).rem_euclid(1.0);
+    }
+    let mut theta = with_spots_of(space, space.theta_of(&values), &values);
+    // phi as its prior has it
+    theta = space.to_physical(&space.to_sampling(&theta));
+    let start = space.log_prior(&theta).is_finite().then_some((theta, values));
+    Some((found, start))
 }

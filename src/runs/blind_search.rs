@@ -6,7 +6,7 @@
 
 use super::known_planet::{KnownPlanet, known_planets};
 use crate::data::scene::Scene;
-use crate::inference::detection::{Detection, DetectionError, DetectionSettings, Evidence, Robustness, robustness};
+use crate::inference::detection::{Detection, DetectionSettings, Evidence, Robustness, robustness};
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{Elements, Parameter, ParameterValues, Prior, for_blind_search, period_prior};
 use crate::planets::periodogram::{
@@ -14,7 +14,7 @@ use crate::planets::periodogram::{
 };
 use crate::planets::verdict::{Finding, Remark, Signal, Verdict};
 use crate::surface::expansion::nuisances;
-use crate::surface::fit::Explained;
+use crate::surface::{Explained, SurfaceError};
 use serde::{Deserialize, Serialize};
 
 /// Frequencies closer than this many inverse time bases are the same.
@@ -41,7 +41,7 @@ enum SearchError {
     #[error("{0}")]
     Frequencies(#[from] FrequencyError),
     #[error("{0}")]
-    Detection(#[from] DetectionError),
+    Detection(#[from] SurfaceError),
 }
 
 impl BlindSearch {
@@ -55,10 +55,7 @@ impl BlindSearch {
     fn tried(scene: &Scene, before: Option<&Detection>) -> Result<Self, SearchError> {
         let rotation_period_d = scene.imager.star.rotation_period_d;
         let frequencies = Frequencies::new(&scene.imager.cycles(), rotation_period_d, FrequencySettings::default())?;
-        let settings = DetectionSettings {
-            spots: scene.spots(),
-            ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), nuisances(&scene.settings.free))
-        };
+        let settings = DetectionSettings::of(scene.surface(), nuisances(&scene.settings.free));
         let values = for_blind_search(scene.settings.values, &scene.settings.free);
         let anew;
         let found = match before {
@@ -128,7 +125,7 @@ impl Judged {
     /// Of what was found in `scene`, and whether it depends on `choices`, where these were tried.
     pub fn of(scene: &Scene, settings: &DetectionSettings, found: &Detection, choices: Option<&Robustness>) -> Self {
         let imager = &scene.imager;
-        let at_best = Explained::new(imager, &scene.observations, found.last());
+        let at_best = settings.surface.model().explained(imager, &scene.observations, found.last());
         let misfit: Vec<String> = at_best.misfit.iter().cloned().chain(scene.measured.misfit_text()).collect();
         let remarks = found.remarks(&Evidence { imager, settings, robustness: choices, misfit: &misfit });
         let of_the_period = found.of_the_period();

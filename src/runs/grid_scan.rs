@@ -122,7 +122,7 @@ impl GridScan {
         replace: bool,
     ) -> Result<Self, GridScanError> {
         let grid = &plan.grid;
-        let numbers = found.posterior.likelihood_numbers();
+        let numbers = found.posterior.likelihood_numbers().iter().map(|name| (*name).to_owned()).collect();
         let header = Header { origin: Origin::of(scene, &found), grid: grid.clone(), numbers };
         // the nodes first: whoever holds them may write the header
         let file = LineFile::create(&folder.join(NODES), replace)?;

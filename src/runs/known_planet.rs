@@ -8,11 +8,12 @@
 
 use crate::data::ephemeris::Ephemeris;
 use crate::data::scene::Scene;
-use crate::inference::detection::{Detection, DetectionSettings, View};
+use crate::inference::detection::{Detection, DetectionSettings};
 use crate::model::{Clock, Elements, ParameterValues, for_blind_search};
 use crate::planets::mixture::{Mixture, Part};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::{Remark, Signal, UNBOUNDED, Verdict};
+use crate::surface::At;
 use nalgebra::DVector;
 
 /// Ephemerides are tried within so many standard errors.
@@ -67,9 +68,10 @@ fn verdict(
     first.set_conjunction(&mut values, ephemeris.conjunction_d[0], clock);
     let alone = amplitude(&found.planet_free.quadratic, &values);
     values[first.k] = alone[0].max(0.0);
-    match View::new(&scene.imager, values, settings, Some(&found.planet_free)) {
-        Ok(view) => {
-            let Some(k) = over_errors(&view.quadratic, &values, ephemeris, clock) else {
+    let at = At { imager: &scene.imager, values, nuisances: &settings.nuisances };
+    match settings.surface.model().linearise(at, Some(&found.planet_free)) {
+        Ok(here) => {
+            let Some(k) = over_errors(&here.quadratic, &values, ephemeris, clock) else {
                 return Verdict::not_judged(UNBOUNDED);
             };
             let [k_kms, sigma_k_kms] = k.moments();

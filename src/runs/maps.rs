@@ -4,9 +4,9 @@
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::map::{ChangingMapResult, FILES, LIGHT_CURVES, MapResult};
-use crate::data::io::periodogram::FieldRecord;
 use crate::data::scene::Scene;
 use crate::model::Parameter;
+use crate::surface::SpotField;
 use crate::surface::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
 use crate::surface::objective::ObjectiveKind;
 use crate::surface::static_map::ReferenceError;
@@ -169,7 +169,7 @@ fn diagnosis(scene: &Scene) -> Option<Diagnosis> {
 fn of_changing(fit: &ChangingFit) -> Vec<(&'static str, String)> {
     let ChangingSummary { chi2, chi2_per_datum, data, profiles, .. } = fit.summary;
     let numbers = &fit.summary;
-    let field = FieldRecord::of(&fit.fitted);
+    let field = SpotField::of(&fit.fitted);
     let bound = |name: &str| match field.at_bounds.iter().any(|reached| reached == name) {
         true => ", at the bound of its search",
         false => "",

@@ -9,9 +9,9 @@ use crate::model::{
 };
 use crate::numerics::text::listed;
 use crate::runs::blind_search::BlindSearch;
-use crate::runs::origin::{OptimumRecord, ReferenceRecord};
-use crate::sampling::log_density::LogDensity as _;
+use crate::runs::origin::OptimumRecord;
 use crate::sampling::optimise::Optimum;
+use crate::surface::record::SurfaceRecord;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -52,7 +52,7 @@ pub struct OptimumFile {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derived_truth: BTreeMap<String, f64>,
     /// The reference image.
-    pub reference: ReferenceRecord,
+    pub reference: SurfaceRecord,
     /// Where the climbs started and ended, by regularised likelihood.
     pub starts: Vec<StartRecord>,
     /// Number of profiles.
@@ -107,7 +107,7 @@ impl OptimumFile {
             derived,
             truth: scene.named_truth(),
             derived_truth,
-            reference: ReferenceRecord::of(&found.posterior),
+            reference: found.posterior.record(),
             starts: found.attempts.iter().map(StartRecord::of).collect(),
             profiles: scene.observations.profiles.len(),
             time_span_d: scene.observations.time_span_d(),

@@ -4,7 +4,7 @@ use crate::data::io::atomic::WriteError;
 use crate::data::io::periodogram::PeriodogramResult;
 use crate::data::io::provenance::Provenance;
 use crate::data::scene::Scene;
-use crate::inference::detection::{Detection, DetectionError, DetectionSettings, Robustness, Stage, robustness};
+use crate::inference::detection::{Detection, DetectionSettings, Robustness, Stage, robustness};
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::for_blind_search;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
@@ -12,7 +12,7 @@ use crate::planets::verdict::{Remark, Verdict};
 use crate::runs::blind_search::{Judged, with_known};
 use crate::runs::known_planet::known_planets;
 use crate::surface::expansion::nuisances;
-use crate::surface::fit::Explained;
+use crate::surface::{Explained, SurfaceError};
 use std::path::{Path, PathBuf};
 
 /// What to search for, and how.
@@ -44,12 +44,11 @@ impl PeriodogramOptions {
 
     fn settings(&self, scene: &Scene) -> DetectionSettings {
         DetectionSettings {
-            chi2_target: scene.settings.imaging.chi2_target.value(),
+            surface: scene.surface(),
             nuisances: if self.fixed { Vec::new() } else { nuisances(&scene.settings.free) },
             search: SearchSettings { draws: self.draws, seed: self.seed },
             eccentric: self.eccentric,
             second_planet: self.second_planet,
-            spots: scene.spots(),
         }
     }
 }
@@ -102,7 +101,7 @@ pub enum PeriodogramError {
         /// The config.
         config: PathBuf,
         /// What it came to.
-        error: DetectionError,
+        error: SurfaceError,
     },
 }
 
@@ -125,7 +124,7 @@ impl<'a> Periodogram<'a> {
         let detection = Detection::find(imager, values, frequencies, &settings, &at).map_err(failed)?;
         report("other targets, without each night");
         let choices = robustness(imager, values, &settings, &detection);
-        let planet_free = Explained::new(imager, &scene.observations, &detection.planet_free);
+        let planet_free = settings.surface.model().explained(imager, &scene.observations, &detection.planet_free);
         let Judged { at_best, remarks, of_the_star } = Judged::of(scene, &settings, &detection, Some(&choices));
         let known = known_planets(scene, &settings, &detection, &of_the_star);
         let (verdict, remarks) = with_known(known, detection.verdict(&remarks), remarks, of_the_star);

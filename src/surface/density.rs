@@ -1,118 +1,69 @@
-//! What is searched, scanned and sampled: a posterior by one map of maximum entropy at each parameter vector, or one by
-//! all maps, integrated over.
+//! What is searched, scanned and sampled: the density of the free parameters that a surface model gives.
 
-use super::evolving_map::MarginalPosterior;
 use super::imaging::Imager;
-use super::static_map::{LIKELIHOOD_NUMBERS, Posterior};
+use super::objective::UnresolvedSpots;
+use super::record::SurfaceRecord;
+use super::surrogate::Surrogate;
 use crate::model::ParameterSpace;
-use crate::sampling::log_density::{Evaluation, LogDensity};
+use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
+use std::any::Any;
+use std::fmt::Debug;
+use std::sync::Arc;
 
-/// A posterior, by how it treats maps.
-#[derive(Clone, Debug)]
-pub enum Density {
-    /// The best map counts.
-    Mapped(Box<Posterior>),
-    /// All maps count.
-    Integrated(Box<MarginalPosterior>),
-}
+/// Such a density, shared.
+pub type Density = Arc<dyn SurfaceDensity>;
 
-impl Density {
+/// The residual spots have no size that fits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "imaging.unresolved_spots: no size of the unresolved spots fits the data; \"entropy\" takes them as the entropy \
+    has them"
+)]
+pub struct UnresolvedSpotsError;
+
+/// A posterior density under a surface model, around a reference.
+pub trait SurfaceDensity: LogDensity + Debug + Send {
     /// The parameter space.
-    pub fn space(&self) -> &ParameterSpace {
-        match self {
-            Density::Mapped(posterior) => posterior.space(),
-            Density::Integrated(posterior) => posterior.space(),
-        }
-    }
+    fn space(&self) -> &ParameterSpace;
 
-    /// What the data are imaged with.
-    pub fn imager(&self) -> &Imager {
-        match self {
-            Density::Mapped(posterior) => posterior.imager(),
-            Density::Integrated(posterior) => posterior.imager(),
-        }
-    }
+    /// Star, times and data.
+    fn imager(&self) -> &Imager;
 
-    /// The posterior of maximum entropy; `None` where maps are integrated over.
-    pub fn mapped(&self) -> Option<&Posterior> {
-        match self {
-            Density::Mapped(posterior) => Some(posterior),
-            Density::Integrated(_) => None,
-        }
-    }
-
-    /// ln L at `theta` (physical coordinates) without the prior, with the numbers of [`Density::likelihood_numbers`].
-    pub fn likelihood(&self, theta: &[f64]) -> Evaluation {
-        match self {
-            Density::Mapped(posterior) => posterior.likelihood(theta),
-            Density::Integrated(posterior) => posterior.likelihood(theta),
-        }
-    }
+    /// ln L at `theta` (physical coordinates) without the prior, with the numbers of
+    /// [`SurfaceDensity::likelihood_numbers`].
+    fn likelihood(&self, theta: &[f64]) -> Evaluation;
 
     /// Names of the numbers beside ln L.
-    pub fn likelihood_numbers(&self) -> Vec<String> {
-        let names: &[&str] = match self {
-            Density::Mapped(_) => &LIKELIHOOD_NUMBERS,
-            Density::Integrated(posterior) => posterior.number_names(),
-        };
-        names.iter().map(|name| (*name).to_owned()).collect()
-    }
+    fn likelihood_numbers(&self) -> &[&str];
 
-    /// The same with the warm starts that so many evaluations, spread like `thetas`, are worth.
-    #[must_use]
-    pub fn with_warm_starts_for(self, thetas: &[Vec<f64>], evaluations: usize) -> Self {
-        match self {
-            Density::Mapped(posterior) => {
-                Density::Mapped(Box::new(posterior.with_warm_starts_for(thetas, evaluations)))
-            }
-            integrated => integrated,
-        }
-    }
+    /// The same with the warm starts that so many evaluations, spread like `thetas`, are worth; itself where it needs
+    /// none.
+    fn with_warm_starts_for(self: Arc<Self>, thetas: &[Vec<f64>], evaluations: usize) -> Density;
 
     /// The same with warm starts at `thetas` (physical coordinates) besides the reference, and no others.
-    #[must_use]
-    pub fn with_warm_starts(self, thetas: &[Vec<f64>]) -> Self {
-        match self {
-            Density::Mapped(posterior) => Density::Mapped(Box::new(posterior.with_warm_starts(thetas))),
-            integrated => integrated,
-        }
-    }
+    fn with_warm_starts(self: Arc<Self>, thetas: &[Vec<f64>]) -> Density;
 
     /// Where its warm starts are, but for the reference.
-    pub fn warm_starts(&self) -> Vec<Vec<f64>> {
-        self.mapped().map_or_else(Vec::new, |posterior| posterior.warm_starts().map(<[f64]>::to_vec).collect())
+    fn warm_starts(&self) -> Vec<Vec<f64>> {
+        Vec::new()
     }
 
-    fn any(&self) -> &dyn LogDensity {
-        match self {
-            Density::Mapped(posterior) => posterior.as_ref(),
-            Density::Integrated(posterior) => posterior.as_ref(),
-        }
-    }
-}
+    /// What is written of the reference, and what it is rebuilt from.
+    fn record(&self) -> SurfaceRecord;
 
-impl LogDensity for Density {
-    fn names(&self) -> &[String] {
-        self.any().names()
-    }
+    /// The density that a chain samples: the same, with unresolved spots as a config has them.
+    ///
+    /// # Errors
+    /// [`UnresolvedSpotsError`].
+    fn sampled(self: Arc<Self>, unresolved_spots: UnresolvedSpots) -> Result<Density, UnresolvedSpotsError>;
 
-    fn number_names(&self) -> &[&str] {
-        self.any().number_names()
-    }
+    /// The quadratic of the density with the priors; `None` where there is none.
+    fn surrogate(&self) -> Option<Surrogate>;
 
-    fn evaluate(&self, theta: &[f64]) -> Evaluation {
-        self.any().evaluate(theta)
-    }
+    /// The surrogate fitted to the density itself, as far as it is not its own expansion, and the share of its
+    /// proposals accepted on trial.
+    fn fitted(&self, surrogate: Surrogate, evaluator: &dyn Evaluator) -> (Surrogate, f64);
 
-    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
-        self.any().to_sampling(theta)
-    }
-
-    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
-        self.any().to_physical(internal)
-    }
-
-    fn log_jacobian(&self, theta: &[f64]) -> f64 {
-        self.any().log_jacobian(theta)
-    }
+    /// Itself.
+    fn any(&self) -> &dyn Any;
 }

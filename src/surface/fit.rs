@@ -5,16 +5,17 @@
 mod changing;
 mod checks;
 
+pub(in crate::surface) use changing::explained;
 pub use changing::{ChangingFit, ChangingSummary, MapAt, NoField, VelocityWithoutSpots};
 pub use checks::{Checks, ProfileCheck};
 
-use crate::inference::detection::{Seen, View};
 use crate::maxent::entropy::Entropy;
 use crate::maxent::{Problem, Termination, parallelism};
 use crate::model::ParameterValues;
 use crate::numerics::json::number_or_null;
 use crate::sampling::log_density::Status;
-use crate::star::observation::{Observations, RadialVelocity};
+use crate::star::observation::Observations;
+use crate::surface::FilteredVelocity;
 use crate::surface::imaging::Imager;
 use crate::surface::nuisances::{Estimate, LineAndContinuum};
 use crate::surface::static_map::Reference;
@@ -55,28 +56,6 @@ struct Residual {
     difference: f64,
     /// The same over its standard error.
     scaled: f64,
-}
-
-/// The first moment of one profile, observed and modelled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FilteredVelocity {
-    /// Time (d).
-    pub time_d: f64,
-    /// Rotation cycle.
-    pub cycle: f64,
-    /// First moment of the observed profile.
-    pub observed: RadialVelocity,
-    /// First moment of the model profile (km/s): spots, orbit and systemic velocity.
-    pub modelled_kms: f64,
-    /// Velocity of the assumed orbit, plus the systemic velocity (km/s).
-    pub orbit_kms: f64,
-}
-
-impl FilteredVelocity {
-    /// Observed minus modelled (km/s).
-    pub fn filtered_kms(&self) -> f64 {
-        self.observed.value_kms - self.modelled_kms
-    }
 }
 
 /// How good the fit is.
@@ -188,30 +167,6 @@ impl Fit {
         let model = depths.iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect();
         let tradeoff = reference.tradeoff.nodes().to_vec();
         Fit { map, model, nuisances, zero_points_kms, velocities, tradeoff, summary, checks }
-    }
-}
-
-/// The profiles as the spots of a [`View`] explain them.
-#[derive(Clone, Debug)]
-pub struct Explained {
-    /// Radial velocities, one a profile.
-    pub velocities: Vec<FilteredVelocity>,
-    /// chi2 over the number of data.
-    pub chi2_per_datum: f64,
-    /// What is not like noise in what is left over.
-    pub misfit: Vec<String>,
-}
-
-impl Explained {
-    /// By the spots in `view`, of the `observations` that `imager` was made for.
-    pub fn new(imager: &Imager, observations: &Observations, view: &View) -> Self {
-        match &view.seen {
-            Seen::OneMap(image) => {
-                let Fit { velocities, summary, checks, .. } = Fit::new(imager, observations, &image.reference);
-                Explained { velocities, chi2_per_datum: summary.chi2_per_datum, misfit: checks.warnings }
-            }
-            Seen::Integrated(fitted) => changing::explained(imager, observations, fitted),
-        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! The quadratic against full reconstructions and against the independent posterior, on the oracle's data and pixels.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth, whole_truth};
-use dimcmc::internals::inference::surrogate::Surrogate;
 use dimcmc::internals::maxent::SolverSettings;
 use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
@@ -11,6 +10,7 @@ use dimcmc::internals::surface::imaging::Imager;
 use dimcmc::internals::surface::objective::ObjectiveKind;
 use dimcmc::internals::surface::static_map::SpotsCounted;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
+use dimcmc::internals::surface::surrogate::Surrogate;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;

@@ -84,9 +84,9 @@ fn a_planet_of_a_star_without_spots_is_found() {
     let scene = Scene::new(&config).unwrap();
     let usual = FrequencySettings::default();
     let frequencies = Frequencies::new(&scene.imager.cycles(), scene.imager.star.rotation_period_d, usual).unwrap();
-    let settings = DetectionSettings { spots: scene.spots(), ..DetectionSettings::of(0.5, Vec::new()) };
+    let settings = DetectionSettings::of(scene.surface(), Vec::new());
     let found = Detection::find(&scene.imager, scene.settings.values, frequencies, &settings, &|_| ()).unwrap();
-    assert!(found.last().image().is_none());
+    assert!(found.last().field.is_some());
     let evidence = Evidence { imager: &scene.imager, settings: &settings, robustness: None, misfit: &[] };
     let remarks = found.remarks(&evidence);
     let verdict = found.verdict(&remarks);

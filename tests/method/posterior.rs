@@ -6,7 +6,6 @@
 //! for is three times that on the same pixels, and twice as much again on another grid of pixels.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth};
-use dimcmc::internals::inference::surrogate::{Surrogate, SurrogateMove};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::chain::{Chain, Goals, ParameterKind, Shape, Summary, summarise};
 use dimcmc::internals::sampling::ensemble::{
@@ -17,6 +16,7 @@ use dimcmc::internals::sampling::optimise::climb;
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use dimcmc::internals::surface::objective::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
+use dimcmc::internals::surface::surrogate::{Surrogate, SurrogateMove};
 use std::sync::atomic::AtomicBool;
 
 const KINDS: [ParameterKind; 3] = [ParameterKind::Amplitude, ParameterKind::Linear, ParameterKind::Periodic];

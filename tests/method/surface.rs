@@ -4,7 +4,6 @@
 use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::inference::search;
-use dimcmc::internals::inference::search::SearchSettings;
 use dimcmc::internals::model::Parameter;
 use dimcmc::internals::surface::objective::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
@@ -39,7 +38,7 @@ fn a_surface_other_than_the_configs_is_found() {
             "equivalent_width_kms": uniform(3.0, 9.0),
         });
     });
-    let found = search::find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ()).unwrap();
+    let found = search::find(&scene.imager, &scene.space, scene.settings.search(), &|_| ()).unwrap();
     let optimum = &found.optimum;
     let names = scene.space.names();
     assert_eq!(names, ["limb_darkening", "line_sigma_kms", "equivalent_width_kms"]);
@@ -50,7 +49,7 @@ fn a_surface_other_than_the_configs_is_found() {
         assert!((best - injected).abs() < 3.0 * sd, "{name}: {best} +- {sd} for {injected}");
         assert!(sd < 0.1 * (injected - start).abs(), "{name}: {sd}");
     }
-    let written = serde_json::to_value(found.posterior.mapped().unwrap().reference().values).unwrap();
+    let written = serde_json::to_value(Posterior::behind(&*found.posterior).unwrap().reference().values).unwrap();
     assert_eq!(written.as_object().unwrap().len(), 11, "the eight and the free ones: {written}");
 }
 

@@ -2,13 +2,13 @@
 //! surrogate.
 
 use crate::common::{imager, oracle, truth};
-use dimcmc::internals::inference::surrogate::{Surrogate, SurrogateMove};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::chain::{Chain, Goals, MoveKind, ParameterKind, Shape, Summary, summarise};
 use dimcmc::internals::sampling::ensemble::{Sampler, SamplerSettings};
 use dimcmc::internals::sampling::log_density::{Evaluation, LogDensity, Status, Threads};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use dimcmc::internals::surface::static_map::Reference;
+use dimcmc::internals::surface::surrogate::{Surrogate, SurrogateMove};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::sync::atomic::AtomicBool;

@@ -6,18 +6,19 @@ use super::{Automatic, ConfigError, EquivalentWidth, PlanSection, SamplerSetting
 use crate::data::io::lsd::ReadOptions;
 use crate::data::simulate::Simulation;
 use crate::field::Lifetime;
+use crate::inference::search::SearchSettings;
 use crate::maxent::entropy::Entropy;
 use crate::model::{FreeParameter, Parameter, ParameterValues};
 use crate::sampling::landscape::Grid;
 use crate::star::observation::Observations;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN, velocity_grid};
 use crate::star::{Band, BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
-use crate::surface::evolving_map::Known;
 use crate::surface::evolving_map::zero_points::HeldZeroPoint;
 use crate::surface::nuisances::LineAndContinuum;
 use crate::surface::objective::{ObjectiveKind, UnresolvedSpots};
 use crate::surface::photometry::LightCurve;
 use crate::surface::static_map::noise::ErrorSettings;
+use crate::surface::{Known, SurfaceSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -381,6 +382,17 @@ impl Settings {
         let observations = &self.resolved["observations"];
         let first = observations.get(0).unwrap_or(observations);
         first["simulate"].get("faculae").cloned()
+    }
+
+    /// What is assumed of the spots.
+    pub fn surface(&self) -> SurfaceSettings {
+        let ImagingSettings { objective, chi2_target, .. } = self.imaging;
+        SurfaceSettings { objective, chi2_target: chi2_target.value(), field: Some(self.known_field()) }
+    }
+
+    /// The search for the best parameters.
+    pub fn search(&self) -> SearchSettings {
+        SearchSettings::of(self.surface(), self.sampler.seed)
     }
 
     /// What is known of the field of spots before the profiles, where maps are integrated over.

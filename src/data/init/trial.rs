@@ -8,7 +8,7 @@ use crate::data::config::{self, Automatic, ConfigError, Draft, ImagingSettings, 
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::scene::Scene;
 use crate::inference::search;
-use crate::inference::search::{SearchError, SearchSettings};
+use crate::inference::search::SearchError;
 use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
@@ -236,7 +236,7 @@ fn search(draft: &mut Draft, config: &Path, profiles: Profiles, tried: Option<&S
     let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
     let sigma_scale = by_continuum.map_or(draft.sigma_scale, Automatic::Fixed);
     let Scene { settings, imager, space, .. } = scene(&Draft { sigma_scale, ..draft.clone() }, config, profiles)?;
-    let found = match search::find(&imager, &space, SearchSettings::new(&settings), &|_| ()) {
+    let found = match search::find(&imager, &space, settings.search(), &|_| ()) {
         Ok(found) => found,
         // what matters is that there is no map
         Err(SearchError::Reference(_) | SearchError::Optimise(_) | SearchError::Field(_)) => return Ok(false),

@@ -1,20 +1,12 @@
 //! What is to be said of a blind search in words: what speaks against a planet, what else has to be known, and the
 //! verdict.
 
-use super::{Detection, DetectionSettings, Image, Robustness, Seen};
+use super::{Detection, DetectionSettings, Robustness};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict};
-use crate::surface::evolving_map::Fitted;
 use crate::surface::imaging::Imager;
-use crate::surface::static_map::UNRESOLVED_SPOTS;
-
-/// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
-const FAR: f64 = 5.0;
-
-/// A target is missed by more than this factor; errors that were measured are such that it is just reached.
-const MISSED: f64 = 1.02;
 
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
 const FEW: usize = 12;
@@ -36,55 +28,6 @@ pub struct Evidence<'a> {
     pub robustness: Option<&'a Robustness>,
     /// What is not like noise in the residuals of the last image.
     pub misfit: &'a [String],
-}
-
-/// What has to be known of the field that was integrated over.
-fn of_the_field(field: &Fitted) -> Vec<Remark> {
-    let faint = field.too_faint();
-    let reached = |name: &&str| {
-        Remark::note(match faint {
-            Some(amplitude) if *name == Parameter::SpotAmplitude.name() => format!(
-                "the profiles show no spots: their amplitude falls to the lower bound of its search, {amplitude:.2}"
-            ),
-            _ => format!("{name} lies on the bound of its search: the profiles do not tell it, or it is wrong"),
-        })
-    };
-    field.at_bounds.iter().map(reached).collect()
-}
-
-/// Whether the image fits as it should.
-fn of_the_image(image: &Image, evidence: &Evidence) -> Vec<Remark> {
-    let Evidence { imager, settings, .. } = *evidence;
-    let mut remarks = Vec::new();
-    let correlated_bins = imager.data.correlated_bins;
-    let data = imager.data.depth.len() as f64;
-    let chi2 = image.reference.solution.chi2 / data;
-    let far = (chi2 * correlated_bins - 1.0) / (2.0 * correlated_bins / data).sqrt();
-    let target = settings.chi2_target;
-    if !image.on_target && chi2 > MISSED * target {
-        remarks.push(Remark::against(
-            "no map fits to the target chi2",
-            format!(
-                "no map reaches the target chi2 of {target:.3} per datum without turning noise into spots \
-                ({chi2:.3} was reached): the target may be too low, or the model of the star wrong"
-            ),
-        ));
-    } else if far.abs() > FAR {
-        remarks.push(Remark::against(
-            "chi2 is far from 1",
-            format!(
-                "chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles or \
-                the model of the star may be wrong, and all errors here with them"
-            ),
-        ));
-    }
-    if image.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
-        remarks.push(Remark::against(
-            "the model of the star is wrong",
-            "the profiles have nothing to do with the model of the star: what the map leaves over is without bounds",
-        ));
-    }
-    remarks
 }
 
 impl Detection {
@@ -116,10 +59,7 @@ impl Detection {
 
     /// All that has to be said, what speaks against a planet with the rest.
     pub fn remarks(&self, evidence: &Evidence) -> Vec<Remark> {
-        let mut remarks = match &self.last().seen {
-            Seen::Integrated(field) => of_the_field(field),
-            Seen::OneMap(image) => of_the_image(image, evidence),
-        };
+        let mut remarks = evidence.settings.surface.model().remarks(evidence.imager, self.last());
         let misfit = |text: &String| Remark::against("the residuals are not like noise", text);
         remarks.extend(evidence.misfit.iter().map(misfit));
         remarks.extend(self.of_the_data(evidence));

@@ -4,17 +4,12 @@
 //! Every K is a closed form at the best period, around an image at the best orbit that is made anew: with the other
 //! target, or of the profiles that remain. Where maps are integrated over, profiles are taken out of the evidence.
 
-use super::{Detection, DetectionSettings, View};
+use super::{Detection, DetectionSettings};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, orbits};
 use crate::planets::velocities::VelocityQuadratic;
-use crate::surface::evolving_map::Basis;
-use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
-use rayon::prelude::*;
-
-/// Targets relative to the one asked for.
-const TARGETS: [f64; 3] = [0.97, 1.0, 1.03];
+use crate::surface::{At, AtTarget};
 
 /// Profiles further apart than this (d) belong to different nights.
 const NIGHT_GAP_D: f64 = 0.3;
@@ -27,17 +22,6 @@ const MOVES: f64 = 0.5;
 
 /// K changes by more than that many times what leaving out so many profiles does by chance.
 const SURPRISE: f64 = 3.0;
-
-/// The orbit at one target.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AtTarget {
-    /// chi2 per datum asked for.
-    pub chi2_target: f64,
-    /// Whether the image reaches it before noise is turned into spots.
-    pub on_target: bool,
-    /// The orbit; `None` where none is bounded, or no image.
-    pub orbit: Option<CircularOrbit>,
-}
 
 /// The orbit without one night.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,19 +55,9 @@ pub fn robustness(
 ) -> Robustness {
     let peak = &found.best;
     let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
-    let orbit_of = |view: &View| orbit(&view.quadratic);
     values[Parameter::K] = peak.orbit.k_kms;
     values[Parameter::PorbOverProt] = peak.porb_over_prot;
     values[Parameter::Phi] = peak.orbit.phi;
-    let at = |factor: f64| {
-        let chi2_target = factor * settings.chi2_target;
-        let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);
-        AtTarget {
-            chi2_target,
-            on_target: view.as_ref().is_ok_and(|view| view.image().is_none_or(|image| image.on_target)),
-            orbit: view.ok().as_ref().and_then(orbit_of),
-        }
-    };
     let times_d = imager.times_d();
     let mut nights = nights(&times_d, NIGHT_GAP_D);
     nights.retain(|night| times_d.len() - night.len() >= FEWEST);
@@ -91,20 +65,9 @@ pub fn robustness(
         nights.clear();
     }
     nights.iter_mut().for_each(|night| night.sort_unstable());
-    let (targets, without) = match found.last().field() {
-        Some(field) => {
-            let (basis, stellar) = (Basis::new(&imager.grid), &found.last().expansion.stellar);
-            let of_others = |others: &Expansion| orbit(&others.velocities(&settings.nuisances));
-            let all = field.marginal.without_each(imager, &basis, stellar, &nights, of_others);
-            let none = || nights.iter().map(|_| None).collect();
-            (Vec::new(), all.map_or_else(|_| none(), |all| all.into_iter().map(|of| of.ok().flatten()).collect()))
-        }
-        None => {
-            let others = |night: &[usize]| View::new(&imager.without(night), values, settings, None).ok();
-            let orbit = |night: &Vec<usize>| others(night).as_ref().and_then(orbit_of);
-            (TARGETS.map(at).to_vec(), nights.par_iter().map(orbit).collect::<Vec<_>>())
-        }
-    };
+    let (surface, at) = (settings.surface.model(), At { imager, values, nuisances: &settings.nuisances });
+    let targets = surface.at_other_targets(at, &orbit);
+    let without = surface.without_each(at, found.last(), &nights, &orbit);
     let without = nights.iter().zip(without).map(|(night, orbit)| {
         let times = || night.iter().map(|&k| times_d[k]);
         WithoutNight {
@@ -113,7 +76,7 @@ pub fn robustness(
             orbit,
         }
     });
-    Robustness { all: orbit_of(found.last()), targets, nights: without.collect() }
+    Robustness { all: orbit(&found.last().quadratic), targets, nights: without.collect() }
 }
 
 /// Profiles night by night, in order of time; nights are more than `gap_d` apart.

@@ -11,20 +11,22 @@ use crate::data::config::{Config, GridSettings};
 use crate::data::io::atomic::write_json;
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::scene::Scene;
-use crate::inference::detection::{Detection, DetectionSettings, Spots};
+use crate::inference::detection::{Detection, DetectionSettings};
 use crate::inference::search;
-use crate::inference::search::{Found, SearchError, SearchSettings};
+use crate::inference::search::{Found, SearchError};
 use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
 use crate::runs::grid_scan::{GridScan, GridScanError, PARABOLOID};
-use crate::runs::origin::by_name;
 use crate::runs::pool::Pool;
 use crate::runs::run::{CHAIN, Run, RunError, StartFrom};
 use crate::sampling::chain::Summary;
 use crate::sampling::ensemble::StopReason;
 use crate::sampling::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
 use crate::sampling::optimise::Optimum;
+use crate::surface::SurfaceSettings;
 use crate::surface::expansion::nuisances;
+use crate::surface::record::by_name;
+use crate::surface::static_map::Posterior;
 use crate::surface::static_map::{Reference, ReferenceError};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -103,7 +105,7 @@ impl Case {
         let began = Instant::now();
         let (scene, found) = search(&self.config, &folder.join("config.json"), pool)?;
         let search_seconds = began.elapsed().as_secs_f64();
-        let image = found.posterior.mapped().map(|posterior| &posterior.reference().solution);
+        let image = Posterior::behind(&*found.posterior).map(|posterior| &posterior.reference().solution);
         let data = scene.imager.data.depth.len() as f64;
         let ends = found.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok());
         let mut outcome = Outcome {
@@ -159,12 +161,11 @@ impl Nodes {
 
 /// The star of a config, and the best parameters there; its target chi2 is raised if it is out of reach.
 pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found), ExperimentError> {
-    let found =
-        |scene: Scene| match search::find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ()) {
-            Ok(found) => Ok(Ok((scene, found))),
-            Err(SearchError::Reference(error)) => Ok(Err(error)),
-            Err(error) => Err(error),
-        };
+    let found = |scene: Scene| match search::find(&scene.imager, &scene.space, scene.settings.search(), &|_| ()) {
+        Ok(found) => Ok(Ok((scene, found))),
+        Err(SearchError::Reference(error)) => Ok(Err(error)),
+        Err(error) => Err(error),
+    };
     let mut last = match found(Scene::new(&Config::at(config.clone(), path))?)? {
         Ok(found) => return Ok(found),
         Err(error) => error,
@@ -262,12 +263,11 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentEr
     let imager = &scene.imager;
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target.value(),
+        surface: SurfaceSettings::spottedness(scene.settings.imaging.chi2_target.value()),
         nuisances: nuisances(&scene.settings.free),
         search: PeriodSearch { draws, seed: 1 },
         eccentric: false,
         second_planet: false,
-        spots: Spots::OneMap(None),
     };
     let found = Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?;
     let (peak, orbit) = (&found.best, &found.best.orbit);

@@ -146,10 +146,7 @@ impl Star {
         let imager = &scene.imager;
         let frequencies =
             Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
-        let settings = DetectionSettings {
-            spots: scene.spots(),
-            ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), Vec::new())
-        };
+        let settings = DetectionSettings::of(scene.surface(), Vec::new());
         let mut found = Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?;
         let change = found.change.take().and_then(Result::ok);
         let remarks = found.remarks(&Evidence { imager, settings: &settings, robustness: None, misfit: &[] });
@@ -158,14 +155,14 @@ impl Star {
         let near = |frequency: f64| (1.0 / frequency - 1.0).abs() < NEAR;
         let trials = found.blind.rows.iter().map(|row| row.trial).filter(|trial| !near(trial.frequency));
         let away = trials.filter_map(|trial| Some(trial.orbit?.sigma_k_kms));
-        let field = found.last().field();
+        let field = found.last().field.as_ref();
         Ok(Searched {
             verdict: found.verdict(&remarks),
             porb_over_prot: found.best.porb_over_prot,
             is_right: self.has_planet && apart < SAME_PERIOD,
             median_sigma_k_kms: median(away.collect()).unwrap_or(f64::NAN),
             change: change.map(|change| change.ln_evidence_gain),
-            lifetime_d: field.and_then(|field| field.marginal.assumed.field.kernel.lifetime.days()),
+            lifetime_d: field.and_then(|field| field.spot_lifetime_d),
             seconds: began.elapsed().as_secs_f64(),
         })
     }

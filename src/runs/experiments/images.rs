@@ -103,9 +103,8 @@ pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         if columns.is_empty() {
             columns.push(("cycle".to_owned(), cycles(&scene)));
         }
-        let of = |f: &dyn Fn(&crate::surface::fit::FilteredVelocity) -> f64| {
-            fit.velocities.iter().map(f).collect::<Vec<f64>>()
-        };
+        let of =
+            |f: &dyn Fn(&crate::surface::FilteredVelocity) -> f64| fit.velocities.iter().map(f).collect::<Vec<f64>>();
         columns.push((format!("{name}_observed_kms"), of(&|v| v.observed.value_kms)));
         columns.push((format!("{name}_filtered_kms"), of(&|v| v.filtered_kms())));
         report.number(&format!("{name}_filtered_rms_kms"), fit.summary.filtered_rv_rms_kms);

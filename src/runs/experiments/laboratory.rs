@@ -7,7 +7,6 @@ use super::{Case, Outcome};
 use crate::data::config::ConfigError;
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::data::scene::SceneError;
-use crate::inference::detection::DetectionError;
 use crate::inference::search::SearchError;
 use crate::planets::periodogram::FrequencyError;
 use crate::runs::comparison::PairError;
@@ -15,6 +14,7 @@ use crate::runs::grid_scan::GridScanError;
 use crate::runs::pool::Pool;
 use crate::runs::run::RunError;
 use crate::sampling::chain::ChainError;
+use crate::surface::SurfaceError;
 use crate::surface::static_map::ReferenceError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,7 @@ pub enum ExperimentError {
     Frequency(#[from] FrequencyError),
     /// No periodogram.
     #[error(transparent)]
-    Detection(#[from] DetectionError),
+    Detection(#[from] SurfaceError),
     /// A folder that cannot be made.
     #[error("{}: {source}", path.display())]
     Folder {

@@ -172,7 +172,7 @@ impl LimitsFile {
                 self.before.period_d
             ));
         }
-        if shortcut.view.image().is_some_and(|image| !image.on_target) {
+        if !shortcut.here.on_target {
             doubts.push("no map reaches the target chi2 without turning noise into spots".into());
         }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) =

@@ -1,16 +1,14 @@
 //! The blind search after an orbit has been put in, to second order around the image without a planet.
 
-use crate::inference::detection::{DetectionError, DetectionSettings, Spots, View};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::orbits::{Trial, scan};
 use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
-use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::runs::limits::LimitSettings;
 use crate::star::Orbit;
-use crate::surface::evolving_map::{Change, NoFit};
 use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
+use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel};
 
 /// A period is right when its frequency is off by less than this many inverse time bases.
 const RIGHT: f64 = 0.5;
@@ -44,8 +42,10 @@ impl Outcome {
 pub struct Shortcut<'a> {
     /// How it is searched.
     pub settings: &'a LimitSettings,
-    /// Image and expansion.
-    pub view: View,
+    /// What is assumed of its spots.
+    surface: Box<dyn SurfaceModel>,
+    /// Maps and expansion.
+    pub here: Linearised,
     /// Whether the star changes, where spots are taken for unchanging.
     pub change: Option<Result<Change, NoFit>>,
     /// What was taken out of the profiles: the orbit found, with the opposite sign.
@@ -60,30 +60,31 @@ impl<'a> Shortcut<'a> {
     /// Images the star in `imager`, all but the orbit as in `values`, without a planet.
     ///
     /// # Errors
-    /// [`DetectionError`].
+    /// [`SurfaceError`].
     pub fn new(
         imager: &Imager,
         mut values: ParameterValues,
         settings: &'a LimitSettings,
-    ) -> Result<Self, DetectionError> {
+    ) -> Result<Self, SurfaceError> {
         values[Parameter::K] = 0.0;
-        let mut view = View::new(imager, values, &settings.detection, None)?;
-        let known = settings.detection.spots.compared();
+        let surface = settings.detection.surface.model();
         let nuisances = &settings.detection.nuisances;
-        let change = known.map(|known| Change::of(imager, values, &settings.frequencies, nuisances, known));
-        let search = |view: &View| Search::new(&view.quadratic, &settings.frequencies, settings.detection.search);
-        let mut before = search(&view)?;
+        let at = At { imager, values, nuisances };
+        let mut here = surface.linearise(at, None)?;
+        let change = surface.evolution(at, &settings.frequencies);
+        let search = |here: &Linearised| Search::new(&here.quadratic, &settings.frequencies, settings.detection.search);
+        let mut before = search(&here)?;
         let mut removed = None;
         if settings.without_best {
             let CircularOrbit { k_kms, phi, .. } = before.best().orbit;
             let orbit = Orbit { k_kms: -k_kms, porb_over_prot: before.best().porb_over_prot, phi };
-            view.expansion = with(&view.expansion, &orbit);
-            view.quadratic = counted(&view.expansion, &settings.detection).ok_or(Unbounded)?;
-            before = search(&view)?;
+            here.expansion = with(&here.expansion, &orbit);
+            here.quadratic = surface.velocities(&here.expansion, nuisances).ok_or(Unbounded)?;
+            before = search(&here)?;
             removed = Some(orbit);
         }
         let level = before.false_alarm.level(CANDIDATE_FAP);
-        Ok(Shortcut { settings, view, change, removed, before, level })
+        Ok(Shortcut { settings, surface, here, change, removed, before, level })
     }
 
     /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half
@@ -101,8 +102,10 @@ impl<'a> Shortcut<'a> {
     /// The search with `orbit` in the profiles. Nothing is found where no orbit is bounded.
     pub fn search(&self, orbit: &Orbit) -> Outcome {
         let frequencies = &self.settings.frequencies;
-        let moved = with(&self.view.expansion, orbit);
-        let Some(quadratic) = counted(&moved, &self.settings.detection) else { return Outcome::default() };
+        let moved = with(&self.here.expansion, orbit);
+        let Some(quadratic) = self.surface.velocities(&moved, &self.settings.detection.nuisances) else {
+            return Outcome::default();
+        };
         let trials = scan(&quadratic, &frequencies.per_cycle);
         let summits = scan(&quadratic, &summits(&trials));
         let highest = |trials: &[Trial]| {
@@ -143,17 +146,4 @@ fn with(expansion: &Expansion, orbit: &Orbit) -> Expansion {
         moved.gradient.axpy(velocity, &expansion.information.column(k), 1.0);
     }
     moved
-}
-
-/// The quadratic of the orbit's velocities; spots that one map does not resolve are counted as noise of the size that
-/// the gradient says.
-fn counted(expansion: &Expansion, settings: &DetectionSettings) -> Option<VelocityQuadratic> {
-    let nuisances = &settings.nuisances;
-    match settings.spots {
-        Spots::Integrated(_) => Some(expansion.velocities(nuisances)),
-        Spots::OneMap(_) => {
-            let unresolved_spots = expansion.unresolved_spots(nuisances)?;
-            Some(expansion.with_unresolved_spots(unresolved_spots)?.velocities(nuisances))
-        }
-    }
 }

@@ -4,7 +4,7 @@ use crate::data::config::{Config, ConfigError, ObservationSource, PlanSection, S
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::{Scene, SceneError, fingerprint, imager};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
-use crate::inference::detection::{Spots, nights};
+use crate::inference::detection::nights;
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
 use crate::star::observation::{Observations, Profile};
@@ -248,7 +248,7 @@ impl Campaign {
 /// The config's observations with the field that fits them, without a planet.
 fn taken(config: &Config) -> Result<Taken, CampaignError> {
     let scene = Scene::new(config)?;
-    let Spots::Integrated(known) = scene.spots() else { unreachable!("the objective integrates maps out") };
+    let known = scene.surface().field.unwrap_or_default();
     let mut values: ParameterValues = scene.settings.values;
     values[Parameter::K] = 0.0;
     let fitted = fit(&scene.imager, &Basis::new(&scene.imager.grid), values, known, None);

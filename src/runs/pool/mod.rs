@@ -11,7 +11,7 @@ mod task;
 #[cfg(feature = "mpi")]
 pub use message::orbit_from_bytes;
 pub use message::{Answer, Question};
-pub use target::{Target, UnresolvedSpotsError};
+pub use target::Target;
 pub use task::{Asked, Brief, Task, TaskError};
 
 #[cfg(feature = "mpi")]

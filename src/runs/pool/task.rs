@@ -3,13 +3,14 @@
 //! It builds scene, reference and density as a resumed computation does, and with the same checks.
 
 use super::message::{Answer as _, numbers_from_bytes};
-use super::target::{Target, UnresolvedSpotsError};
+use super::target::Target;
 use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
 use crate::model::FreeParameter;
 use crate::runs::limits::{WholeWay, WholeWayError};
 use crate::runs::origin::{Origin, OriginError};
 use crate::sampling::log_density::LogDensity as _;
+use crate::surface::density::UnresolvedSpotsError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

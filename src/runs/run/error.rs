@@ -6,9 +6,9 @@ use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::JournalError;
 use crate::inference::search::SearchError;
 use crate::runs::origin::OriginError;
-use crate::runs::pool::UnresolvedSpotsError;
 use crate::sampling::chain::ChainError;
 use crate::sampling::ensemble::EnsembleError;
+use crate::surface::density::UnresolvedSpotsError;
 use std::path::PathBuf;
 
 /// Why a run cannot begin, or go on.

@@ -17,7 +17,6 @@ use crate::data::io::journal::{self, Journal, JournalError};
 use crate::data::io::lines;
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
-use crate::inference::surrogate::{Surrogate, SurrogateMove};
 use crate::runs::blind_search::BlindSearch;
 use crate::runs::manifest::{self, Manifest, kinds_and_goals};
 use crate::runs::origin::Origin;
@@ -27,6 +26,7 @@ use crate::sampling::ensemble::{
     self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason,
 };
 use crate::sampling::log_density::LogDensity as _;
+use crate::surface::surrogate::{Surrogate, SurrogateMove};
 use std::path::Path;
 
 /// Name of the chain in a run's folder.

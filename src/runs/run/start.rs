@@ -4,11 +4,11 @@
 use super::RunError;
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
-use crate::inference::surrogate::Surrogate;
 use crate::runs::pool::Target;
 use crate::sampling::ensemble::{EnsembleError, Positions, StartDraw, draw_start, start_numbers};
 use crate::sampling::log_density::{Evaluator, LogDensity as _};
 use crate::sampling::optimise::Optimum;
+use crate::surface::surrogate::Surrogate;
 use rand_chacha::ChaCha8Rng;
 
 /// Starts are wider than the curvature by this factor, so that R-hat can tell whether the chain has forgotten them.

@@ -18,6 +18,7 @@
 pub mod change;
 mod climb;
 mod condense;
+mod density;
 mod design;
 mod expand;
 mod fit;
@@ -25,11 +26,14 @@ mod forecast;
 mod known;
 mod light;
 mod maps;
+mod optimum;
 mod planned;
 mod posterior;
+mod surface;
 pub mod zero_points;
 
 pub use change::Change;
+pub use density::FieldRecord;
 pub use design::{Basis, Design};
 pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
@@ -38,6 +42,7 @@ pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
 pub use planned::Planned;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
+pub use surface::EvolvingMap;
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};
 use crate::model::{Parameter, ParameterValues};

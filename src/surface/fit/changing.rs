@@ -2,7 +2,7 @@
 //! deviation at any time, model profiles, and radial velocities with all maps integrated out (`docs/method.md` section
 //! 9).
 
-use super::{Checks, Explained, FilteredVelocity, Residual, residuals, rms, scatter};
+use super::{Checks, Residual, residuals, rms, scatter};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::model::ParameterValues;
 use crate::numerics::json::number_or_null;
@@ -12,6 +12,7 @@ use crate::star::observation::{Observations, Profile, RadialVelocity};
 use crate::surface::evolving_map::{Assumed, Basis, Fitted, FluxFit, Known, Maps, Marginal, NoFit, fit};
 use crate::surface::imaging::{Data, Imager};
 use crate::surface::nuisances::{Estimate, LineAndContinuum};
+use crate::surface::{Explained, FilteredVelocity};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -228,7 +229,7 @@ impl ChangingFit {
 }
 
 /// The profiles as the most probable maps of a field explain them.
-pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &Fitted) -> Explained {
+pub(in crate::surface) fn explained(imager: &Imager, observations: &Observations, fitted: &Fitted) -> Explained {
     let marginal = &fitted.marginal;
     let modelled = Modelled::of(imager, &Basis::new(&imager.grid), marginal, &marginal.settled.coefficients);
     let residuals = residuals(observations, &modelled.depths());

@@ -2,19 +2,24 @@
 //! chi2 stands for all maps (`docs/method.md` sections 2 to 4; Petit et al. 2015).
 
 mod counted;
+mod density;
 pub mod jitter;
 mod likelihood;
 pub mod noise;
+mod optimum;
 pub mod posterior;
 mod prediction;
 pub mod reference;
 mod spots;
+mod surface;
 pub mod target;
 pub mod tradeoff;
 mod warm_start;
 
 pub use counted::SpotsCounted;
+pub use density::ImageRecord;
 pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
 pub use posterior::{CHI2, Posterior, SPOTTEDNESS, is_physical};
 pub use reference::{Reference, ReferenceError};
 pub use spots::UNRESOLVED_SPOTS;
+pub use surface::StaticMap;

@@ -5,11 +5,11 @@ use super::light::{LIGHT_CURVES, table};
 use super::{CONVENTIONS, FILES, beside};
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
-use crate::data::io::periodogram::FieldRecord;
 use crate::data::io::provenance::{MeasuredSet, Provenance};
 use crate::model::ParameterValues;
 use crate::star::SurfaceGrid;
 use crate::star::observation::Observations;
+use crate::surface::SpotField;
 use crate::surface::evolving_map::MEAN_FILLING;
 use crate::surface::fit::{ChangingFit, ChangingSummary, Checks, MapAt};
 use crate::surface::imaging::Imager;
@@ -67,7 +67,7 @@ pub struct ChangingMapFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub data_sets: Vec<MeasuredSet>,
     /// The field of spots that was integrated over.
-    pub field: FieldRecord,
+    pub field: SpotField,
     /// Mean filling factor that is assumed: profiles do not tell it.
     pub mean_filling: f64,
     /// Number of pixels.
@@ -91,7 +91,7 @@ pub struct ChangingFitFile {
     #[serde(flatten)]
     pub summary: ChangingSummary,
     /// The field of spots that was integrated over.
-    pub field: FieldRecord,
+    pub field: SpotField,
     /// One entry a profile, in the order of the list.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<LineAndContinuum>,
@@ -135,7 +135,7 @@ impl ChangingMapResult<'_> {
             epoch_d: self.imager.star.epoch_d,
             parameters: self.fit.summary.parameters,
             contrast: self.fit.summary.contrast,
-            field: FieldRecord::of(&self.fit.fitted),
+            field: SpotField::of(&self.fit.fitted),
             mean_filling: MEAN_FILLING,
             pixels: self.imager.grid.len(),
             ring_pixels: rings.iter().map(|ring| ring.pixels.len()).collect(),
@@ -186,7 +186,7 @@ impl ChangingMapResult<'_> {
     fn fit(&self) -> ChangingFitFile {
         ChangingFitFile {
             summary: self.fit.summary.clone(),
-            field: FieldRecord::of(&self.fit.fitted),
+            field: SpotField::of(&self.fit.fitted),
             nuisances: self.fit.nuisances.clone(),
             zero_points_kms: self.fit.zero_points_kms.clone(),
             truth: self.truth,

@@ -9,7 +9,7 @@ mod robustness;
 
 pub use alarm::{FalseAlarmRecord, LevelRecord};
 pub use quantities::QuantitiesRecord;
-pub use record::{AliasRecord, FieldRecord, OrbitRecord, PeakRecord, PeriodogramFile};
+pub use record::{AliasRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 
 use super::atomic::{WriteError, write, write_json};
 use super::csv::Table;
@@ -20,7 +20,7 @@ use crate::model::ParameterValues;
 use crate::planets::periodogram::Search;
 use crate::planets::periodogram::orbits::scan;
 use crate::planets::verdict::{Remark, Verdict};
-use crate::surface::fit::Explained;
+use crate::surface::Explained;
 use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
@@ -104,7 +104,7 @@ impl PeriodogramResult<'_> {
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
     fn velocities(&self) -> (DVector<f64>, DMatrix<f64>) {
         let last = self.detection.last();
-        let quadratic = last.zero_points_held.as_ref().unwrap_or(&last.quadratic);
+        let quadratic = last.offsets_held.as_ref().unwrap_or(&last.quadratic);
         let n = quadratic.len();
         let missing = |_| (DVector::from_element(n, f64::NAN), DMatrix::from_element(n, n, f64::NAN));
         quadratic.radial_velocities().unwrap_or_else(missing)

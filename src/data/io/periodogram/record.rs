@@ -5,7 +5,6 @@ use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::quantities::QuantitiesRecord;
 use super::robustness::RobustnessRecord;
-use crate::field::Field;
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::ParameterValues;
 use crate::numerics::json::number_or_null;
@@ -13,7 +12,7 @@ use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::surface::evolving_map::{Assumed, Change, Fitted};
+use crate::surface::{Change, SpotField};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -41,7 +40,7 @@ pub struct PeriodogramFile {
     pub search: SearchRecord,
     /// The spots as a field, where all maps are integrated over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub field: Option<FieldRecord>,
+    pub field: Option<SpotField>,
     /// Whether the star changes, where spots are taken for unchanging.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub change: Option<Change>,
@@ -61,58 +60,6 @@ pub struct PeriodogramFile {
     /// Config, data and program.
     #[serde(flatten)]
     pub provenance: Provenance,
-}
-
-/// The most probable field of spots, at the best orbit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FieldRecord {
-    /// Standard deviation of the filling factor.
-    pub spot_amplitude: f64,
-    /// Slope of its spectrum.
-    pub spot_slope: f64,
-    /// Degree below which the spectrum is flat.
-    #[serde(default)]
-    pub spot_break_degree: f64,
-    /// Lifetime (d); null for a star that does not change.
-    pub spot_lifetime_d: Option<f64>,
-    /// Velocity jitter (km/s).
-    pub velocity_jitter_kms: f64,
-    /// ln Z.
-    pub ln_evidence: f64,
-    /// Which of them lie on a bound of the search.
-    pub at_bounds: Vec<String>,
-}
-
-impl FieldRecord {
-    /// Of a fit.
-    pub fn of(fitted: &Fitted) -> Self {
-        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
-        FieldRecord {
-            spot_amplitude: spectrum.amplitude,
-            spot_slope: spectrum.slope,
-            spot_break_degree: spectrum.break_degree,
-            spot_lifetime_d: kernel.lifetime.days(),
-            velocity_jitter_kms: jitter_kms,
-            ln_evidence: fitted.ln_evidence,
-            at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
-        }
-    }
-
-    /// Shape of the spectrum in words.
-    pub fn spectrum(&self) -> &'static str {
-        if self.spot_break_degree > 0.0 { "flat at low degrees" } else { "a power law" }
-    }
-
-    /// It in a line.
-    pub fn line(&self) -> String {
-        let FieldRecord { spot_amplitude, spot_slope, velocity_jitter_kms, ln_evidence, .. } = self;
-        let life = self.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2} d"));
-        format!(
-            "spots, integrated over: amplitude {spot_amplitude:.3}, slope {spot_slope:.2} ({}), lifetime {life}; \
-            velocity jitter {velocity_jitter_kms:.3} km/s; ln of the evidence {ln_evidence:.1}\n",
-            self.spectrum()
-        )
-    }
 }
 
 /// A circular orbit.
@@ -290,17 +237,16 @@ impl PeriodogramResult<'_> {
                 time_base_d: found.frequencies.time_base_cycles * prot,
                 seed: self.settings.search.seed,
             },
-            field: found.last().field().map(FieldRecord::of),
+            field: found.last().field.clone(),
             change: found.change.and_then(Result::ok),
             expansion: ExpansionRecord {
                 marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name().to_owned()).collect(),
-                unresolved_spots: [&found.planet_free, found.last()]
-                    .map(|view| view.image().map_or(1.0, |image| image.unresolved_spots)),
+                unresolved_spots: [&found.planet_free, found.last()].map(|here| here.unresolved_spots),
                 regularised_delta_ln_l: found.regularised_delta_ln_l(),
                 rounds: found.rounds,
                 closed: found.closed,
                 data: self.imager.data.depth.len(),
-                chi2_target: self.settings.chi2_target,
+                chi2_target: self.settings.surface.chi2_target,
                 chi2_per_datum_planet_free: self.planet_free.chi2_per_datum,
                 chi2_per_datum: self.at_best.chi2_per_datum,
             },

@@ -3,7 +3,7 @@
 
 use super::PeriodogramResult;
 use super::alarm::{FalseAlarmRecord, false_alarm};
-use super::record::{FieldRecord, OrbitRecord, PeakRecord};
+use super::record::{OrbitRecord, PeakRecord};
 use crate::model::{OrbitQuantity, Parameter};
 use crate::numerics::text::{Align, aligned, columns};
 use crate::planets::verdict::probability;
@@ -18,8 +18,8 @@ impl PeriodogramResult<'_> {
         let best = self.orbit(&found.best);
         let meanings = self.meanings(&best.quantities);
         let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(&[best]) + &meanings;
-        if let Some(field) = found.last().field() {
-            text += &FieldRecord::of(field).line();
+        if let Some(field) = &found.last().field {
+            text += &field.line();
         }
         text += &format!("{}\n", chance(&false_alarm(&found.blind)));
         if let Some(evidence) = self.evidence {

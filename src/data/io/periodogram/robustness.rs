@@ -1,9 +1,10 @@
 //! Whether the best orbit hangs on a choice, in `periodogram.json` and as text.
 
 use super::PeriodogramResult;
-use crate::inference::detection::{AtTarget, WithoutNight};
+use crate::inference::detection::WithoutNight;
 use crate::numerics::text::aligned;
 use crate::planets::periodogram::CircularOrbit;
+use crate::surface::AtTarget;
 use serde::{Deserialize, Serialize};
 
 /// Whether the best orbit hangs on a choice.

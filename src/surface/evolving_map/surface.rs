@@ -1,0 +1,169 @@
+//! The evolving map behind the interface of all surface models.
+
+use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, fit, optimum};
+use crate::field::{Field, Lifetime};
+use crate::model::{Parameter, ParameterSpace, ParameterValues};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters};
+use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::Remark;
+use crate::star::observation::Observations;
+use crate::surface::density::Density;
+use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
+use crate::surface::fit::explained;
+use crate::surface::imaging::Imager;
+use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
+use crate::surface::record::{RebuildError, SurfaceRecord};
+use crate::surface::{At, AtTarget, Explained, Linearised, OrbitOf, SpotField, SurfaceError, SurfaceModel};
+use std::sync::Arc;
+
+/// Spots that come and go: a Gaussian field, marginalised.
+#[derive(Clone, Debug)]
+pub struct EvolvingMap {
+    /// What is known of the field before the data.
+    known: Known,
+    /// Bounds that its fit reached, where it is held as it was fitted.
+    at_bounds: Option<Vec<&'static str>>,
+}
+
+impl EvolvingMap {
+    /// Of a field of which that is `known`.
+    pub fn new(known: Known) -> Self {
+        EvolvingMap { known, at_bounds: None }
+    }
+}
+
+impl SurfaceModel for EvolvingMap {
+    fn linearise(&self, at: At, near: Option<&Linearised>) -> Result<Linearised, SurfaceError> {
+        let At { imager, values, nuisances } = at;
+        let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
+        let basis = Basis::new(&imager.grid);
+        let mut fitted = fit(imager, &basis, values, self.known, near.map(|near| near.kept::<Fitted>()))?;
+        if let Some(reached) = &self.at_bounds {
+            fitted.at_bounds.clone_from(reached);
+        }
+        let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
+        let quadratic = expansion.velocities(nuisances);
+        let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
+        let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
+        Ok(Linearised {
+            expansion,
+            offsets_held: held.map(|held| held.velocities(nuisances)),
+            regularised: quadratic.clone(),
+            quadratic,
+            unresolved_spots: 1.0,
+            on_target: true,
+            field: Some(SpotField::of(&fitted)),
+            solution: Arc::new(fitted),
+        })
+    }
+
+    fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
+        Some(expansion.velocities(nuisances))
+    }
+
+    fn jitters(&self, at: At, here: &Linearised) -> Result<Jitters, SurfaceError> {
+        let marginal = &here.kept::<Fitted>().marginal;
+        if self.known.jitter_kms.is_some() || marginal.assumed.jitter_kms <= 0.0 {
+            return Ok(Jitters::none(&here.quadratic));
+        }
+        let basis = Basis::new(&at.imager.grid);
+        let expansion = marginal.without_jitter(at.imager, &basis)?;
+        let expansion = expansion.expansion(at.imager, &basis, &here.expansion.stellar)?;
+        Ok(Jitters::new(&expansion.velocities(at.nuisances), marginal.assumed.jitter_kms))
+    }
+
+    fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel> {
+        let Fitted { marginal, at_bounds, .. } = here.kept();
+        Box::new(EvolvingMap { known: Known::of(marginal), at_bounds: Some(at_bounds.clone()) })
+    }
+
+    fn evolution(&self, at: At, frequencies: &Frequencies) -> Option<Result<Change, NoFit>> {
+        let known = Some(self.known).filter(|known| known.lifetime == Some(Lifetime::Static));
+        known.map(|known| Change::of(at.imager, at.values, frequencies, at.nuisances, known))
+    }
+
+    fn imitates_at_fractions(&self) -> bool {
+        false
+    }
+
+    /// Profiles are taken out of the evidence: the field, and the maps around which profiles are linear, stay.
+    fn without_each(
+        &self,
+        at: At,
+        here: &Linearised,
+        groups: &[Vec<usize>],
+        orbit: OrbitOf,
+    ) -> Vec<Option<CircularOrbit>> {
+        let (marginal, basis) = (&here.kept::<Fitted>().marginal, Basis::new(&at.imager.grid));
+        let of_others = |others: &Expansion| orbit(&others.velocities(at.nuisances));
+        match marginal.without_each(at.imager, &basis, &here.expansion.stellar, groups, of_others) {
+            Ok(all) => all.into_iter().map(|of| of.ok().flatten()).collect(),
+            Err(_) => vec![None; groups.len()],
+        }
+    }
+
+    fn at_other_targets(&self, _: At, _: OrbitOf) -> Vec<AtTarget> {
+        Vec::new()
+    }
+
+    fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained {
+        explained(imager, observations, here.kept())
+    }
+
+    /// What has to be known of the field.
+    fn remarks(&self, _: &Imager, here: &Linearised) -> Vec<Remark> {
+        let field: &Fitted = here.kept();
+        let faint = field.too_faint();
+        let reached = |name: &&str| {
+            Remark::note(match faint {
+                Some(amplitude) if *name == Parameter::SpotAmplitude.name() => format!(
+                    "the profiles show no spots: their amplitude falls to the lower bound of its search, {amplitude:.2}"
+                ),
+                _ => format!("{name} lies on the bound of its search: the profiles do not tell it, or it is wrong"),
+            })
+        };
+        field.at_bounds.iter().map(reached).collect()
+    }
+
+    fn begins_with_blind_search(&self) -> bool {
+        true
+    }
+
+    fn optimum(
+        &self,
+        sought: Sought,
+        start: Option<BlindStart>,
+        report: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Best, SearchError> {
+        optimum::find(self.known, sought, start, report)
+    }
+
+    fn rebuilt(
+        &self,
+        imager: Imager,
+        space: ParameterSpace,
+        record: &SurfaceRecord,
+        others: &ParameterValues,
+    ) -> Result<Density, RebuildError> {
+        let then = record.field()?;
+        let posterior = MarginalPosterior::new(imager, &space, record.values(others), then.held())?;
+        RebuildError::check("ln of the evidence", then.ln_evidence, posterior.reference_ln_evidence())?;
+        Ok(Arc::new(posterior))
+    }
+}
+
+impl SpotField {
+    /// Of a fit.
+    pub(crate) fn of(fitted: &Fitted) -> Self {
+        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
+        SpotField {
+            spot_amplitude: spectrum.amplitude,
+            spot_slope: spectrum.slope,
+            spot_break_degree: spectrum.break_degree,
+            spot_lifetime_d: kernel.lifetime.days(),
+            velocity_jitter_kms: jitter_kms,
+            ln_evidence: fitted.ln_evidence,
+            at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! What every surface model gives at one place of parameter space, and why it may not.
+
+use super::evolving_map::NoFit;
+use super::expansion::Expansion;
+use super::static_map::ReferenceError;
+use crate::field::FieldError;
+use crate::planets::periodogram::{CircularOrbit, Unbounded};
+use crate::planets::velocities::VelocityQuadratic;
+use crate::star::observation::RadialVelocity;
+use serde::{Deserialize, Serialize};
+use std::any::Any;
+use std::sync::Arc;
+
+/// A star with its spots, and the quadratic in its profiles' velocities around it.
+#[derive(Clone, Debug)]
+pub struct Linearised {
+    /// ln L around it.
+    pub expansion: Expansion,
+    /// ln L of the orbit's velocities, counted from 0 whatever the orbit at the centre; spots that the map does not
+    /// resolve count as noise.
+    pub quadratic: VelocityQuadratic,
+    /// The same with those RV offsets of data sets held that are otherwise integrated out, for tables of velocities;
+    /// `None` where there are none.
+    pub offsets_held: Option<VelocityQuadratic>,
+    /// The same without that noise.
+    pub regularised: VelocityQuadratic,
+    /// How many times larger than the model expects the unresolved spots are, in variance.
+    pub unresolved_spots: f64,
+    /// Whether the maps reach the target chi2; true where there is none.
+    pub on_target: bool,
+    /// The spots as a field, where they are one.
+    pub field: Option<SpotField>,
+    /// What the model keeps for itself.
+    pub(super) solution: Arc<dyn Any + Send + Sync>,
+}
+
+impl Linearised {
+    /// What the model that made it has kept.
+    pub(super) fn kept<T: 'static>(&self) -> &T {
+        self.solution.downcast_ref().expect("of the model that is asked")
+    }
+
+    /// What the model that made it has kept, if that is such a thing.
+    pub fn solution<T: 'static>(&self) -> Option<&T> {
+        self.solution.downcast_ref()
+    }
+}
+
+/// Spots as a Gaussian field on the sphere and in time, the most probable one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpotField {
+    /// Standard deviation of the filling factor.
+    pub spot_amplitude: f64,
+    /// Slope of its spectrum.
+    pub spot_slope: f64,
+    /// Degree below which the spectrum is flat.
+    #[serde(default)]
+    pub spot_break_degree: f64,
+    /// Lifetime (d); null for static spots.
+    pub spot_lifetime_d: Option<f64>,
+    /// Velocity jitter (km/s).
+    pub velocity_jitter_kms: f64,
+    /// ln Z.
+    pub ln_evidence: f64,
+    /// Which of them lie on a bound of the search.
+    pub at_bounds: Vec<String>,
+}
+
+impl SpotField {
+    /// Shape of the spectrum in words.
+    pub fn spectrum(&self) -> &'static str {
+        if self.spot_break_degree > 0.0 { "flat at low degrees" } else { "a power law" }
+    }
+
+    /// It in a line.
+    pub fn line(&self) -> String {
+        let SpotField { spot_amplitude, spot_slope, velocity_jitter_kms, ln_evidence, .. } = self;
+        let life = self.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2} d"));
+        format!(
+            "spots, integrated over: amplitude {spot_amplitude:.3}, slope {spot_slope:.2} ({}), lifetime {life}; \
+            velocity jitter {velocity_jitter_kms:.3} km/s; ln of the evidence {ln_evidence:.1}\n",
+            self.spectrum()
+        )
+    }
+}
+
+/// The orbit at one target of chi2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtTarget {
+    /// chi2 per datum asked for.
+    pub chi2_target: f64,
+    /// Whether the image reaches it before noise is turned into spots.
+    pub on_target: bool,
+    /// The orbit; `None` where none is bounded, or no image.
+    pub orbit: Option<CircularOrbit>,
+}
+
+/// The profiles as the most probable maps explain them.
+#[derive(Clone, Debug)]
+pub struct Explained {
+    /// Radial velocities, one a profile.
+    pub velocities: Vec<FilteredVelocity>,
+    /// chi2 over the number of data.
+    pub chi2_per_datum: f64,
+    /// What is not like noise in the residuals.
+    pub misfit: Vec<String>,
+}
+
+/// The first moment of one profile, observed and modelled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilteredVelocity {
+    /// Time (d).
+    pub time_d: f64,
+    /// Rotation cycle.
+    pub cycle: f64,
+    /// First moment of the observed profile.
+    pub observed: RadialVelocity,
+    /// First moment of the model profile (km/s): spots, orbit and systemic velocity.
+    pub modelled_kms: f64,
+    /// Velocity of the assumed orbit, plus the systemic velocity (km/s).
+    pub orbit_kms: f64,
+}
+
+impl FilteredVelocity {
+    /// Observed minus modelled (km/s).
+    pub fn filtered_kms(&self) -> f64 {
+        self.observed.value_kms - self.modelled_kms
+    }
+}
+
+/// Why a surface model says nothing.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// No image.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// No orbit at all.
+    #[error(transparent)]
+    Unbounded(#[from] Unbounded),
+    /// No field.
+    #[error(transparent)]
+    Field(#[from] NoFit),
+}
+
+impl From<FieldError> for SurfaceError {
+    fn from(error: FieldError) -> Self {
+        SurfaceError::Field(error.into())
+    }
+}

@@ -1,0 +1,166 @@
+//! The static map behind the interface of all surface models.
+
+use super::{Posterior, Reference, UNRESOLVED_SPOTS, optimum};
+use crate::maxent::Termination;
+use crate::model::{Parameter, ParameterSpace, ParameterValues};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters, Unbounded};
+use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::Remark;
+use crate::star::observation::Observations;
+use crate::surface::density::Density;
+use crate::surface::evolving_map::{Change, Known, NoFit};
+use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
+use crate::surface::fit::Fit;
+use crate::surface::imaging::Imager;
+use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
+use crate::surface::record::{RebuildError, SurfaceRecord};
+use crate::surface::{At, AtTarget, Explained, Linearised, ObjectiveKind, OrbitOf, SurfaceError, SurfaceModel};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Targets of chi2, relative to the one asked for, at which an orbit is looked at.
+const TARGETS: [f64; 3] = [0.97, 1.0, 1.03];
+/// chi2 per datum that many of its standard deviations from 1 says that something is wrong.
+const FAR: f64 = 5.0;
+/// A target is missed by more than this factor; errors that were measured are such that it is just reached.
+const MISSED: f64 = 1.02;
+
+/// Spots that do not change within a season, as the map of maximum entropy at a target chi2 has them.
+#[derive(Clone, Copy, Debug)]
+pub struct StaticMap {
+    /// What a map is judged by.
+    pub objective: ObjectiveKind,
+    /// Target of chi2, per datum. Where it takes more than three times the entropy's weight over the number of data, the
+    /// image stops short of it: beyond, noise is turned into spots.
+    pub chi2_target: f64,
+    /// What is known of the field in a comparison with spots that evolve; without it there is none.
+    pub compared_with: Option<Known>,
+}
+
+impl SurfaceModel for StaticMap {
+    fn linearise(&self, at: At, _: Option<&Linearised>) -> Result<Linearised, SurfaceError> {
+        let At { imager, values, nuisances } = at;
+        let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
+        let reference = Reference::provisional(imager, values, self.chi2_target)?;
+        let on_target = reference.solution.termination == Termination::Converged;
+        let expansion = Expansion::of(imager, &reference, &stellar);
+        let regularised = expansion.velocities(nuisances);
+        let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
+        let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
+        let (offsets_held, field, solution) = (None, None, Arc::new(reference));
+        Ok(Linearised { expansion, quadratic, offsets_held, regularised, unresolved_spots, on_target, field, solution })
+    }
+
+    fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
+        let unresolved_spots = expansion.unresolved_spots(nuisances)?;
+        Some(expansion.with_unresolved_spots(unresolved_spots)?.velocities(nuisances))
+    }
+
+    fn jitters(&self, _: At, here: &Linearised) -> Result<Jitters, SurfaceError> {
+        Ok(Jitters::none(&here.quadratic))
+    }
+
+    fn holding(&self, _: &Linearised) -> Box<dyn SurfaceModel> {
+        Box::new(*self)
+    }
+
+    fn evolution(&self, at: At, frequencies: &Frequencies) -> Option<Result<Change, NoFit>> {
+        self.compared_with.map(|known| Change::of(at.imager, at.values, frequencies, at.nuisances, known))
+    }
+
+    fn imitates_at_fractions(&self) -> bool {
+        true
+    }
+
+    fn without_each(
+        &self,
+        at: At,
+        _: &Linearised,
+        groups: &[Vec<usize>],
+        orbit: OrbitOf,
+    ) -> Vec<Option<CircularOrbit>> {
+        let without = |group: &Vec<usize>| {
+            let imager = &at.imager.without(group);
+            self.linearise(At { imager, ..at }, None).ok().and_then(|others| orbit(&others.quadratic))
+        };
+        groups.par_iter().map(without).collect()
+    }
+
+    fn at_other_targets(&self, at: At, orbit: OrbitOf) -> Vec<AtTarget> {
+        let with = |factor: f64| {
+            let chi2_target = factor * self.chi2_target;
+            let there = StaticMap { chi2_target, ..*self }.linearise(at, None);
+            AtTarget {
+                chi2_target,
+                on_target: there.as_ref().is_ok_and(|there| there.on_target),
+                orbit: there.ok().and_then(|there| orbit(&there.quadratic)),
+            }
+        };
+        TARGETS.map(with).to_vec()
+    }
+
+    fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained {
+        let Fit { velocities, summary, checks, .. } = Fit::new(imager, observations, here.kept());
+        Explained { velocities, chi2_per_datum: summary.chi2_per_datum, misfit: checks.warnings }
+    }
+
+    /// Whether the image fits as it should.
+    fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark> {
+        let mut remarks = Vec::new();
+        let correlated_bins = imager.data.correlated_bins;
+        let data = imager.data.depth.len() as f64;
+        let chi2 = here.kept::<Reference>().solution.chi2 / data;
+        let far = (chi2 * correlated_bins - 1.0) / (2.0 * correlated_bins / data).sqrt();
+        let target = self.chi2_target;
+        if !here.on_target && chi2 > MISSED * target {
+            remarks.push(Remark::against(
+                "no map fits to the target chi2",
+                format!(
+                    "no map reaches the target chi2 of {target:.3} per datum without turning noise into spots \
+                    ({chi2:.3} was reached): the target may be too low, or the model of the star wrong"
+                ),
+            ));
+        } else if far.abs() > FAR {
+            remarks.push(Remark::against(
+                "chi2 is far from 1",
+                format!(
+                    "chi2 is {chi2:.3} per datum, {far:+.1} standard deviations from 1: the errors of the profiles or \
+                    the model of the star may be wrong, and all errors here with them"
+                ),
+            ));
+        }
+        if here.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
+            remarks.push(Remark::against(
+                "the model of the star is wrong",
+                "the profiles have nothing to do with the model of the star: what the map leaves over is without bounds",
+            ));
+        }
+        remarks
+    }
+
+    fn begins_with_blind_search(&self) -> bool {
+        false
+    }
+
+    fn optimum(
+        &self,
+        sought: Sought,
+        _: Option<BlindStart>,
+        report: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Best, SearchError> {
+        optimum::find(self, sought, report)
+    }
+
+    fn rebuilt(
+        &self,
+        imager: Imager,
+        space: ParameterSpace,
+        record: &SurfaceRecord,
+        others: &ParameterValues,
+    ) -> Result<Density, RebuildError> {
+        let then = record.image()?;
+        let reference = Reference::build(&imager, record.values(others), self.chi2_target)?;
+        RebuildError::check("lambda", then.lambda, reference.solution.image.lambda)?;
+        Ok(Arc::new(Posterior::new(imager, space, self.objective, reference)))
+    }
+}
