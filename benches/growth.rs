@@ -9,7 +9,7 @@ use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::maxent::Problem;
 use dimcmc::internals::sampling::log_density::{Evaluation, LogDensity, Status};
 use dimcmc::internals::star::Response;
-use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -6,7 +6,8 @@ mod common;
 use common::stopwatch::{fastest, seconds};
 use common::table::{Table, Target};
 use dimcmc::internals::model::{FreeParameter, Parameter, Prior};
-use dimcmc::internals::surface::evolving_map::{Basis, Held, Known, MarginalPosterior, fit};
+use dimcmc::internals::surface::Known;
+use dimcmc::internals::surface::evolving_map::{fit, Basis, Held, MarginalPosterior};
 use dimcmc::{Config, LogDensity as _, Scene};
 use serde_json::json;
 

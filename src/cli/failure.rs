@@ -23,7 +23,7 @@ use crate::runs::run::RunError;
 use crate::runs::simulated::SimulateError;
 use crate::surface::SurfaceError;
 use crate::surface::record::RebuildError;
-use crate::surface::static_map::ReferenceError;
+use crate::surface::ReferenceError;
 use std::error::Error;
 use std::io::ErrorKind;
 use std::path::Path;

@@ -8,7 +8,7 @@ use crate::data::io::lsd::LsdError;
 use crate::data::io::{atomic, lsd};
 use crate::numerics::text::shown;
 use crate::star::BrightnessModel;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use std::path::{Path, PathBuf};
 
 /// Write a first config for observed profiles

@@ -9,7 +9,7 @@ use crate::data::init::{Given, Known};
 use crate::data::io::zdipy::{BrightnessEntropy, Field, Input, LocalLineFile, Target};
 use crate::numerics::text::{Align, columns};
 use crate::star::BrightnessModel;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use std::fmt::Write as _;
 use std::path::Path;
 

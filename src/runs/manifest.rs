@@ -14,7 +14,7 @@ use crate::runs::blind_search::BlindSearch;
 use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
 use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
 use crate::sampling::ensemble::Positions;
-use crate::surface::static_map::{CHI2, SPOTTEDNESS};
+use crate::surface::{CHI2, SPOTTEDNESS};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -8,8 +8,8 @@ use crate::data::scene::Scene;
 use crate::model::Parameter;
 use crate::surface::SpotField;
 use crate::surface::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};
-use crate::surface::objective::ObjectiveKind;
-use crate::surface::static_map::ReferenceError;
+use crate::surface::ObjectiveKind;
+use crate::surface::ReferenceError;
 use std::path::{Path, PathBuf};
 
 /// The star of a [`Scene`] reconstructed at the values of its config.

@@ -16,6 +16,8 @@ use crate::star::{
 use crate::surface::nuisances::{LineAndContinuum, Nuisances};
 use crate::surface::photometry::LightCurve;
 
+use nalgebra::DMatrix;
+
 pub use data::Data;
 pub use problem::ImagingProblem;
 
@@ -147,6 +149,15 @@ impl Imager {
     pub fn move_zero_point(&mut self, z: usize, kms: f64) {
         self.move_set(self.zero_points[z].set, kms);
         self.zero_points[z].mean_kms -= kms;
+    }
+
+    /// How RV offsets change the coordinates of an expansion, the velocities of all profiles first: a column each.
+    pub fn offset_columns(&self, coordinates: usize) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(coordinates, self.zero_points.len());
+        for (mut column, prior) in columns.column_iter_mut().zip(&self.zero_points) {
+            self.profiles_of(prior.set).for_each(|k| column[k] = 1.0);
+        }
+        columns
     }
 
     /// Number of each profile's data set, from 1; empty where there is only one.

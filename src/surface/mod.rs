@@ -9,6 +9,7 @@
 //! [`nuisances`] and light curves ([`photometry`]). Both give the same things: ln L to second order in the velocities of
 //! the profiles ([`Linearised`], [`expansion`]), a density of the parameters ([`density`]), maps ([`fit`]).
 
+pub mod calibration;
 pub mod density;
 pub mod evolving_map;
 pub mod expansion;
@@ -23,9 +24,10 @@ pub mod record;
 pub mod static_map;
 pub mod surrogate;
 
-pub use evolving_map::{Change, Known, NoFit};
+pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError};
 pub use objective::{ObjectiveKind, UnresolvedSpots};
+pub use static_map::{CHI2, ReferenceError, SPOTTEDNESS};
 
 use crate::model::{ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters};

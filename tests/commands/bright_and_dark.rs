@@ -7,7 +7,7 @@ use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::maxent::{Curvature, Problem, SolverSettings};
 use dimcmc::internals::surface::imaging::Imager;
-use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

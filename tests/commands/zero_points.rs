@@ -7,7 +7,7 @@ use dimcmc::internals::model::Parameter;
 use dimcmc::internals::surface::expansion::Expansion;
 use dimcmc::internals::surface::imaging::Imager;
 use dimcmc::internals::surface::static_map::Reference;
-use dimcmc::internals::surface::static_map::jitter::ZeroPoints;
+use dimcmc::internals::surface::calibration::jitter::ZeroPoints;
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;

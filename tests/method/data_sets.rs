@@ -2,10 +2,11 @@
 
 use dimcmc::internals::maxent::Problem;
 use dimcmc::internals::star::{Response, StarSettings};
-use dimcmc::internals::surface::evolving_map::zero_points::HeldZeroPoint;
+use dimcmc::internals::surface::calibration::offsets::HeldZeroPoint;
 use dimcmc::internals::surface::evolving_map::{Basis, Design};
 use dimcmc::internals::surface::imaging::Imager;
-use dimcmc::internals::surface::static_map::{Reference, ReferenceError};
+use dimcmc::internals::surface::ReferenceError;
+use dimcmc::internals::surface::static_map::Reference;
 use dimcmc::{Config, Parameter, Scene};
 use nalgebra::DMatrix;
 use serde_json::{Value, json};

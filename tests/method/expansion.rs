@@ -7,7 +7,7 @@ use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Paramet
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use dimcmc::internals::surface::expansion::{Expansion, Nuisance, STELLAR};
 use dimcmc::internals::surface::imaging::Imager;
-use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::SpotsCounted;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use dimcmc::internals::surface::surrogate::Surrogate;

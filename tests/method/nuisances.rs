@@ -11,7 +11,7 @@ use dimcmc::internals::surface::expansion::{Expansion, STELLAR};
 use dimcmc::internals::surface::fit::Fit;
 use dimcmc::internals::surface::imaging::Imager;
 use dimcmc::internals::surface::nuisances::LineAndContinuum;
-use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;

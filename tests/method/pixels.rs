@@ -4,7 +4,7 @@ use crate::common::{imager, oracle, values};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::optimise::climb;
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
-use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 
 /// Best vsini and its standard deviation, the rest fixed at the injected values.

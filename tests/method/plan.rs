@@ -2,7 +2,8 @@
 
 use dimcmc::internals::field::{Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::model::Parameter;
-use dimcmc::internals::surface::evolving_map::{Assumed, Basis, MEAN_FILLING, Planned};
+use dimcmc::internals::surface::MEAN_FILLING;
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Planned};
 use dimcmc::{Config, Scene};
 use nalgebra::{DMatrix, DVector};
 use serde_json::json;

@@ -14,7 +14,7 @@ use dimcmc::internals::sampling::ensemble::{
 use dimcmc::internals::sampling::log_density::Threads;
 use dimcmc::internals::sampling::optimise::climb;
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
-use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use dimcmc::internals::surface::surrogate::{Surrogate, SurrogateMove};
 use std::sync::atomic::AtomicBool;

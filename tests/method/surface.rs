@@ -5,7 +5,7 @@ use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::inference::search;
 use dimcmc::internals::model::Parameter;
-use dimcmc::internals::surface::objective::ObjectiveKind;
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use serde_json::{Value, json};
 use std::path::Path;

@@ -4,7 +4,7 @@
 use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Planet, Star};
 use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
 use super::{Automatic, EquivalentWidth, ImagingSettings, VelocityJitter};
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use serde::Serialize;
 use std::path::PathBuf;
 

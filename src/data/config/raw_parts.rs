@@ -7,7 +7,7 @@ use super::raw::Line;
 use crate::data::simulate::{RandomSpots, Schedule};
 use crate::model::Parameter;
 use crate::surface::nuisances::LineAndContinuum;
-use crate::surface::static_map::noise::Weights;
+use crate::surface::calibration::noise::Weights;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;

@@ -17,7 +17,7 @@ use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, P
 use crate::star::{BrightnessModel, StarSettings};
 use crate::surface::evolving_map;
 use crate::surface::nuisances::LineAndContinuum;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use std::path::Path;
 
 /// Largest degree of a break: harmonics go to 36.

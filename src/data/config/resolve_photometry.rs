@@ -10,7 +10,7 @@ use super::resolve_sets::names;
 use super::resolve_star::{contrast, limb_darkening};
 use super::{LightCurveSettings, LightSource};
 use crate::star::Band;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use std::path::Path;
 
 /// Longest gap within a segment (d): level and slope do not hold for longer.

@@ -3,7 +3,7 @@
 use super::ImagingSettings;
 use super::domain::{check_size, most};
 use super::error::Fault;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 
 /// What tells the seasons apart.
 pub(super) fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {

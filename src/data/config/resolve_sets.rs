@@ -12,7 +12,7 @@ use super::resolve_star::resolve_star;
 use super::{Automatic, DataSetSettings, ObservationSource};
 use crate::model::{Parameter, ParameterValues};
 use crate::star::{BrightnessModel, StarSettings};
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use std::path::Path;
 
 /// Zero points beyond it (km/s) are a mistake.

@@ -18,7 +18,7 @@ use crate::data::io::lsd::{self, DataSet, LsdError, ReadOptions};
 use crate::inference::first_look::LookError;
 use crate::numerics::units::gaussian_as_wide_as_voigt;
 use crate::star::BrightnessModel;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
 use trial::Profiles;

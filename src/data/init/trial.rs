@@ -13,11 +13,12 @@ use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
-use crate::surface::evolving_map::Change;
+use crate::surface::Change;
 use crate::surface::expansion::nuisances;
-use crate::surface::objective::ObjectiveKind;
-use crate::surface::static_map::noise::MeasuredErrors;
-use crate::surface::static_map::{Reference, ReferenceError};
+use crate::surface::ObjectiveKind;
+use crate::surface::calibration::noise::MeasuredErrors;
+use crate::surface::ReferenceError;
+use crate::surface::static_map::Reference;
 use std::path::Path;
 
 /// Stands in for a rotation period that is still to be given, so that everything else is checked (d).

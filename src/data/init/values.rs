@@ -9,9 +9,9 @@ use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
-use crate::surface::evolving_map::Change;
+use crate::surface::Change;
 use crate::surface::nuisances::LineAndContinuum;
-use crate::surface::static_map::noise::MeasuredErrors;
+use crate::surface::calibration::noise::MeasuredErrors;
 
 /// What is assumed where nobody says otherwise.
 mod assumed {

@@ -1,9 +1,9 @@
 //! What every result says of where it came from.
 
-use crate::surface::evolving_map::zero_points::HeldZeroPoint;
-use crate::surface::static_map::jitter::MeasuredJitter;
-use crate::surface::static_map::noise::MeasuredErrors;
-use crate::surface::static_map::target::ChosenTarget;
+use crate::surface::calibration::offsets::HeldZeroPoint;
+use crate::surface::calibration::jitter::MeasuredJitter;
+use crate::surface::calibration::noise::MeasuredErrors;
+use crate::surface::calibration::target::ChosenTarget;
 use serde::{Deserialize, Serialize};
 
 /// Config, data and program that made a result.

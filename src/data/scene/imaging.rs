@@ -7,7 +7,7 @@ use crate::data::config::{ConfigError, DataSetSettings, Settings, ZeroPoint};
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::observation::Observations;
 use crate::star::{Sampling, Seen, StarSettings};
-use crate::surface::evolving_map::zero_points;
+use crate::surface::calibration::offsets;
 use crate::surface::imaging::{Imager, ZeroPointPrior};
 
 /// What the observations of all data sets are imaged with.
@@ -42,7 +42,7 @@ pub fn imager(settings: &Settings, parts: &[Observations]) -> Result<Imager, Con
             ZeroPoint::Known(kms) => imager.move_set(s, kms),
             ZeroPoint::Fitted => {
                 let held = set.held.map_or(0.0, |held| held.value_kms);
-                let prior = ZeroPointPrior { set: s, mean_kms: 0.0, sd_kms: zero_points::PRIOR_KMS };
+                let prior = ZeroPointPrior { set: s, mean_kms: 0.0, sd_kms: offsets::PRIOR_KMS };
                 imager.zero_points.push(prior);
                 imager.move_zero_point(imager.zero_points.len() - 1, held);
             }
@@ -60,7 +60,7 @@ pub(super) fn hold_zero_points(settings: &mut Settings, imager: &mut Imager) -> 
     let usual = FrequencySettings::default();
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok();
     let first = imager.zero_points[0].set;
-    let held = zero_points::hold(imager, settings.values, settings.known_field(), frequencies.as_ref())
+    let held = offsets::hold(imager, settings.values, settings.known_field(), frequencies.as_ref())
         .map_err(|e| settings.fault(&format!("{}.zero_point_kms", settings.sets[first].key), &e.to_string()))?;
     for (set, held) in settings.sets.iter_mut().filter(unknown).zip(held) {
         set.held = Some(held);

@@ -5,10 +5,10 @@ use super::imager;
 use crate::data::config::{ConfigError, DataSetSettings, Settings, VelocityJitter};
 use crate::star::observation::Observations;
 use crate::surface::imaging::Imager;
-use crate::surface::objective::ObjectiveKind;
-use crate::surface::static_map::jitter::{JitterError, MeasuredJitter, ZeroPoints};
-use crate::surface::static_map::noise;
-use crate::surface::static_map::noise::{ErrorSettings, MeasuredErrors, NoiseError};
+use crate::surface::ObjectiveKind;
+use crate::surface::calibration::jitter::{JitterError, MeasuredJitter, ZeroPoints};
+use crate::surface::calibration::noise;
+use crate::surface::calibration::noise::{ErrorSettings, MeasuredErrors, NoiseError};
 
 /// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
 /// target chi2 is per datum, independent or not.

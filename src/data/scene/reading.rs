@@ -7,7 +7,7 @@ use super::{SceneError, fingerprint};
 use crate::data::config::{ConfigError, DataSetSettings, ObservationSource, Settings};
 use crate::data::io::lsd::{self, Label, LsdError, ReadOptions};
 use crate::star::observation::{Observations, Profile};
-use crate::surface::static_map::noise::{ErrorSettings, MeasuredErrors};
+use crate::surface::calibration::noise::{ErrorSettings, MeasuredErrors};
 
 /// What became of a data set.
 pub(super) struct Part {

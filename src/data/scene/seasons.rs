@@ -5,7 +5,7 @@ use crate::data::io::provenance::Season;
 use crate::star::OwnMap;
 use crate::star::observation::Observations;
 use crate::surface::imaging::Imager;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 
 /// The seasons of profiles, in the order of time: as the config has them, or parted by gaps. Integrated maps, which
 /// change, have one.

@@ -20,7 +20,7 @@ use crate::numerics::json::number_or_null;
 use crate::sampling::chain::statistics::wrap;
 use crate::sampling::chain::{ChainError, Summary};
 use crate::sampling::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
-use crate::surface::objective::{ObjectiveKind, UnresolvedSpots};
+use crate::surface::{ObjectiveKind, UnresolvedSpots};
 use draws::Draws;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -13,7 +13,7 @@ use crate::runs::origin::{Origin, OriginError};
 use crate::runs::run::CHAIN;
 use crate::sampling::chain::Chain;
 use crate::sampling::landscape::Landscape;
-use crate::surface::objective::ObjectiveKind;
+use crate::surface::ObjectiveKind;
 use std::path::{Path, PathBuf};
 
 /// A run and a landscape, read and found to belong together.

@@ -15,7 +15,7 @@ use crate::runs::pool::Pool;
 use crate::runs::run::RunError;
 use crate::sampling::chain::ChainError;
 use crate::surface::SurfaceError;
-use crate::surface::static_map::ReferenceError;
+use crate::surface::ReferenceError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

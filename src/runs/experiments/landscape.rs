@@ -8,7 +8,7 @@ use crate::inference::search;
 use crate::model::Parameter;
 use crate::runs::comparison::{Comparison, Pair};
 use crate::sampling::landscape::{Axis, Grid, Node, Rule};
-use crate::surface::static_map::{CHI2, SPOTTEDNESS};
+use crate::surface::{CHI2, SPOTTEDNESS};
 use serde_json::{Value, json};
 
 /// Ends of the axes: K (km/s), Porb/Prot, phi.

@@ -10,7 +10,7 @@
 use super::draws::Draws;
 use super::{Contents, ExportError, Quantity};
 use crate::data::io::atomic::{self, WriteError};
-use crate::surface::static_map::CHI2;
+use crate::surface::CHI2;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

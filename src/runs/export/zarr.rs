@@ -16,7 +16,7 @@ use crate::data::io::atomic::WriteError;
 use crate::data::io::zarr::{self, Array, Attributes, Group, Values};
 use crate::sampling::chain::{MoveKind, Record};
 use crate::sampling::log_density::Status;
-use crate::surface::static_map::{CHI2, SPOTTEDNESS};
+use crate::surface::{CHI2, SPOTTEDNESS};
 use serde_json::{Value, json};
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! ln Z to second order in the velocities of the profiles and in the star's own parameters.
 
-use super::{Basis, Design, Marginal, zero_points};
+use super::{Basis, Design, Marginal};
 use crate::field::{FieldError, Quadratic};
 use crate::model::{Parameter, ParameterValues};
 use crate::star::Response;
@@ -61,7 +61,7 @@ impl Marginal {
             DVector::from_iterator(imager.zero_points.len(), imager.zero_points.iter().map(number))
         };
         let (mean, sd) = (of_each(&|prior| prior.mean_kms), of_each(&|prior| prior.sd_kms));
-        let columns = zero_points::columns(imager, quadratic.gradient.len());
+        let columns = imager.offset_columns(quadratic.gradient.len());
         let quadratic = quadratic.integrated(&columns, &mean, &sd).ok_or(FieldError::NotPositive)?;
         Ok(self.expanded(imager, stellar, quadratic))
     }

@@ -91,7 +91,7 @@ impl Fitted {
 
 /// The profiles with a usual field, but for what is known: one that does not change, if the lifetime is not. Maps are
 /// found from those `near` by.
-pub(super) fn usual(
+pub(in crate::surface) fn usual(
     imager: &Imager,
     basis: &Basis,
     values: ParameterValues,

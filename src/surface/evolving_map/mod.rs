@@ -11,9 +11,8 @@
 //! 4. [`fit()`]: the amplitude, slope and lifetime of the field, and the jitter, for which ln Z is largest.
 //! 5. [`Maps`]: the most probable maps at any times, with their errors.
 //! 6. [`change`]: whether a star that changes explains the profiles better than one that does not.
-//! 7. [`zero_points`]: the velocity zero points of data sets, before anything else.
-//! 8. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
-//! 9. [`Planned`]: what profiles that are not yet taken will say of velocities.
+//! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
+//! 8. [`Planned`]: what profiles that are not yet taken will say of velocities.
 
 pub mod change;
 mod climb;
@@ -21,7 +20,7 @@ mod condense;
 mod density;
 mod design;
 mod expand;
-mod fit;
+pub(in crate::surface) mod fit;
 mod forecast;
 mod known;
 mod light;
@@ -30,7 +29,6 @@ mod optimum;
 mod planned;
 mod posterior;
 mod surface;
-pub mod zero_points;
 
 pub use change::Change;
 pub use density::FieldRecord;

@@ -3,16 +3,13 @@
 
 mod counted;
 mod density;
-pub mod jitter;
 mod likelihood;
-pub mod noise;
 mod optimum;
 pub mod posterior;
 mod prediction;
 pub mod reference;
 mod spots;
 mod surface;
-pub mod target;
 pub mod tradeoff;
 mod warm_start;
 

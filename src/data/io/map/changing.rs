@@ -10,7 +10,7 @@ use crate::model::ParameterValues;
 use crate::star::SurfaceGrid;
 use crate::star::observation::Observations;
 use crate::surface::SpotField;
-use crate::surface::evolving_map::MEAN_FILLING;
+use crate::surface::MEAN_FILLING;
 use crate::surface::fit::{ChangingFit, ChangingSummary, Checks, MapAt};
 use crate::surface::imaging::Imager;
 use crate::surface::nuisances::LineAndContinuum;

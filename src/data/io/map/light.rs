@@ -1,7 +1,7 @@
 //! `lightcurve.csv`: light curves and what the most probable maps make of them.
 
 use crate::data::io::csv::Table;
-use crate::surface::evolving_map::FluxFit;
+use crate::surface::FluxFit;
 
 /// Name of the file, which is there where there are light curves.
 pub const LIGHT_CURVES: &str = "lightcurve.csv";

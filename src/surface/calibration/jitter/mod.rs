@@ -19,7 +19,8 @@ use crate::model::{Parameter, ParameterValues};
 use crate::surface::expansion::{Expansion, velocity_slopes};
 use crate::surface::imaging::Imager;
 use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
-use crate::surface::static_map::{Reference, ReferenceError};
+use crate::surface::ReferenceError;
+use crate::surface::static_map::Reference;
 use serde::{Deserialize, Serialize};
 
 /// Zero points are first counted as this many times what photon noise makes of the velocity of a profile.

@@ -18,7 +18,8 @@ use crate::star::StarSettings;
 use crate::star::observation::Observations;
 use crate::surface::imaging::Imager;
 use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
-use crate::surface::static_map::{Reference, ReferenceError};
+use crate::surface::ReferenceError;
+use crate::surface::static_map::Reference;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

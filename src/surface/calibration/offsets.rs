@@ -2,11 +2,12 @@
 //! Gaussian prior; in maps they are held where they are most probable, so that no spot stands in for them
 //! (`docs/method.md` section 9).
 
-use super::fit::usual;
-use super::{Basis, Known, usual_value};
 use crate::field::{FieldError, Lifetime};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{Frequencies, orbits};
+use crate::surface::Known;
+use crate::surface::evolving_map::fit::usual;
+use crate::surface::evolving_map::{Basis, usual_value};
 use crate::surface::imaging::{Imager, ZeroPointPrior};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -85,7 +86,7 @@ fn most_probable(
     gradient: &DVector<f64>,
     information: &DMatrix<f64>,
 ) -> Result<(DVector<f64>, DVector<f64>), FieldError> {
-    let columns = columns(imager, gradient.len());
+    let columns = imager.offset_columns(gradient.len());
     let weight = |prior: &ZeroPointPrior| prior.sd_kms.powi(-2);
     let mut own = columns.tr_mul(&(information * &columns));
     let mut pulled = columns.tr_mul(gradient);
@@ -95,13 +96,4 @@ fn most_probable(
     }
     let factor = own.cholesky().ok_or(FieldError::NotPositive)?;
     Ok((factor.solve(&pulled), factor.inverse().diagonal().map(f64::sqrt)))
-}
-
-/// How zero points change the coordinates of an expansion, the velocities of all profiles first: a column each.
-pub(super) fn columns(imager: &Imager, coordinates: usize) -> DMatrix<f64> {
-    let mut columns = DMatrix::zeros(coordinates, imager.zero_points.len());
-    for (mut column, prior) in columns.column_iter_mut().zip(&imager.zero_points) {
-        imager.profiles_of(prior.set).for_each(|k| column[k] = 1.0);
-    }
-    columns
 }

@@ -7,7 +7,7 @@
 //! shrinks at the lambda beyond which noise is turned into spots, which with the right model and errors it does not,
 //! that lambda is the end.
 
-use super::reference::{PROVISIONAL_LAMBDA, Reference, ReferenceError};
+use crate::surface::static_map::reference::{PROVISIONAL_LAMBDA, Reference, ReferenceError};
 use crate::maxent::{Goal, Problem, Solution, Solver, SolverSettings, Start};
 use crate::model::ParameterValues;
 use crate::star::observation::Profile;

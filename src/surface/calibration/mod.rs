@@ -1,0 +1,7 @@
+//! What the profiles say of themselves before anything else: how large their uncertainties are ([`noise`]), the RV jitter
+//! ([`jitter`]), RV offsets between data sets ([`offsets`]), and the target chi2 ([`target`]).
+
+pub mod jitter;
+pub mod noise;
+pub mod offsets;
+pub mod target;
