@@ -7,7 +7,7 @@ use common::stopwatch::{fastest, seconds};
 use common::table::{Table, Target};
 use dimcmc::internals::model::{FreeParameter, Parameter, Prior};
 use dimcmc::internals::surface::Known;
-use dimcmc::internals::surface::evolving_map::{fit, Basis, Held, MarginalPosterior};
+use dimcmc::internals::surface::evolving_map::{Basis, Held, MarginalPosterior, fit};
 use dimcmc::{Config, LogDensity as _, Scene};
 use serde_json::json;
 

@@ -15,7 +15,7 @@ use dimcmc::internals::planets::periodogram::FrequencySettings;
 use dimcmc::internals::planets::periodogram::orbits::scan;
 use dimcmc::internals::runs::plan::{Campaign, Outlook, PlanSettings, compared_d, outlook, range_d};
 use dimcmc::internals::surface::Known;
-use dimcmc::internals::surface::evolving_map::{fit, Assumed, Basis};
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, fit};
 use dimcmc::internals::surface::expansion::nuisances;
 use serde_json::json;
 use std::time::Instant;

@@ -50,7 +50,7 @@
 //!     .free(Parameter::K, Prior::Uniform { min: 0.0, max: 1.0 })
 //!     .free(Parameter::Phi, Prior::Periodic);
 //! let scene = Scene::new(&config)?;
-//! println!("spots cover {:.1} % of the map", 100.0 * scene.map()?.summary.spottedness);
+//! println!("chi2 of the maps: {:.3} per datum", scene.maps(None)?.summary.chi2_per_datum);
 //!
 //! let mut run = Run::new(&scene)?;
 //! run.finish()?;
@@ -181,5 +181,5 @@ pub use sampling::log_density::{Evaluation, LogDensity, Status};
 pub use sampling::optimise::Optimum;
 pub use star::Orbit;
 pub use star::observation::{Observations, Profile};
-pub use surface::fit::{ChangingFit, ChangingSummary, Fit, FitSummary, MapAt, NoField, VelocityWithoutSpots};
 pub use surface::static_map::Posterior;
+pub use surface::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};

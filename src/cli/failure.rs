@@ -21,9 +21,9 @@ use crate::runs::periodogram::PeriodogramError;
 use crate::runs::plan::{CampaignError, ForecastError, PlanError};
 use crate::runs::run::RunError;
 use crate::runs::simulated::SimulateError;
-use crate::surface::SurfaceError;
-use crate::surface::record::RebuildError;
 use crate::surface::ReferenceError;
+use crate::surface::record::RebuildError;
+use crate::surface::{NoMaps, SurfaceError};
 use std::error::Error;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -94,9 +94,9 @@ impl Failure {
     /// No map.
     pub fn maps(error: MapError) -> Self {
         match &error {
-            MapError::Reference { .. } => Failure::input(error.to_string()),
+            MapError::NoMaps { error: NoMaps::Reference(_), .. } => Failure::input(error.to_string()),
             MapError::Times(problem) => Failure::input(format!("--times: {problem}")),
-            MapError::Field { .. } => Failure::failed(error),
+            MapError::NoMaps { .. } => Failure::failed(error),
         }
     }
 

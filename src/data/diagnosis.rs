@@ -10,7 +10,7 @@ mod change;
 
 use crate::data::scene::{self, Scene};
 use crate::star::observation::Observations;
-use crate::surface::calibration::noise::{chi2_at, factor_to_fit, FITTED};
+use crate::surface::calibration::noise::{FITTED, chi2_at, factor_to_fit};
 use change::{Change, Patient};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -24,14 +24,12 @@ use crate::planets::velocities::VelocityQuadratic;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
-use crate::surface::fit::{ChangingFit, Fit, NoField};
+use crate::surface::ReferenceError;
+use crate::surface::calibration::noise::{ErrorSettings, MeasuredErrors};
+use crate::surface::calibration::target;
 use crate::surface::imaging::Imager;
 use crate::surface::photometry::Flux;
-use crate::surface::calibration::noise::{ErrorSettings, MeasuredErrors};
-use crate::surface::ReferenceError;
-use crate::surface::calibration::target;
-use crate::surface::static_map::Reference;
-use crate::surface::{Known, SurfaceSettings};
+use crate::surface::{Known, NoMaps, SurfaceMaps, SurfaceSettings};
 use imaging::hold_zero_points;
 use measuring::{measured_errors, zero_points};
 use reading::{Part, one_day_count};
@@ -275,25 +273,13 @@ impl Scene {
         }
     }
 
-    /// The star reconstructed at the config's values: map, model profiles, and whether they fit.
+    /// The maps of the star at the config's values, and whether they fit: one, one a season, or, where maps evolve, one
+    /// at each of `times_d`, by default of each night.
     ///
     /// # Errors
-    /// A target chi2 that no map reaches.
-    pub fn map(&self) -> Result<Fit, ReferenceError> {
-        let target = self.settings.imaging.chi2_target.value();
-        let reference = Reference::build(&self.imager, self.settings.values, target)?;
-        Ok(Fit::new(&self.imager, &self.observations, &reference))
-    }
-
-    /// Maps of a star that may change, all maps integrated over, at the config's values: the most probable one and its
-    /// standard deviation at each of `times_d`, by default a map a night. The config's `imaging.objective` has no part
-    /// in it.
-    ///
-    /// # Errors
-    /// A field that cannot be fitted to the profiles.
-    pub fn changing_maps(&self, times_d: Option<&[f64]>) -> Result<ChangingFit, NoField> {
-        let imager = self.imager.clone().with_one_map();
-        ChangingFit::new(&imager, &self.observations, self.settings.values, self.known(), times_d)
+    /// [`NoMaps`]: a target chi2 that no map reaches, a field that cannot be fitted, times that make no sense.
+    pub fn maps(&self, times_d: Option<&[f64]>) -> Result<SurfaceMaps, NoMaps> {
+        self.surface().model().maps(&self.imager, &self.observations, self.settings.values, times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.

@@ -7,15 +7,16 @@
 //!
 //! Both look at the same thing, an [`Imager`](imaging::Imager): the star, when it was observed, and the data with their
 //! [`nuisances`] and light curves ([`photometry`]). Both give the same things: ln L to second order in the velocities of
-//! the profiles ([`Linearised`], [`expansion`]), a density of the parameters ([`density`]), maps ([`fit`]).
+//! the profiles ([`Linearised`], [`expansion`]), a density of the parameters ([`density`]), maps ([`maps`]).
 
 pub mod calibration;
+pub mod checks;
 pub mod density;
 pub mod evolving_map;
 pub mod expansion;
-pub mod fit;
 pub mod imaging;
 mod linearised;
+pub mod maps;
 pub mod nuisances;
 pub mod objective;
 pub mod optimum;
@@ -26,6 +27,7 @@ pub mod surrogate;
 
 pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError};
+pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
 pub use objective::{ObjectiveKind, UnresolvedSpots};
 pub use static_map::{CHI2, ReferenceError, SPOTTEDNESS};
 
@@ -101,6 +103,21 @@ pub trait SurfaceModel: Debug + Send + Sync {
 
     /// What has to be known of the maps.
     fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark>;
+
+    /// Whether maps evolve, so that they are of a time.
+    fn evolves(&self) -> bool;
+
+    /// The maps at `values`, of these times (d) where they are given and the maps evolve.
+    ///
+    /// # Errors
+    /// [`NoMaps`].
+    fn maps(
+        &self,
+        imager: &Imager,
+        observations: &Observations,
+        values: ParameterValues,
+        times_d: Option<&[f64]>,
+    ) -> Result<SurfaceMaps, NoMaps>;
 
     /// Whether the search for the best parameters begins with a blind search for the planet.
     fn begins_with_blind_search(&self) -> bool;

@@ -2,7 +2,7 @@
 
 use crate::desk::{Desk, dimcmc, says, text, two_spots};
 use crate::svg::{paths, texts};
-use dimcmc::internals::data::io::map::{ChangingFitFile, ChangingMapFile, MapKind};
+use dimcmc::internals::data::io::map::{FitFile, MapFile};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -24,11 +24,11 @@ fn the_files_are_typed_and_the_figures_are_of_them() {
     );
     says(&said, &["tell little of the star at 10000.00 d", "written", "map.json, profiles.csv, rv.csv, fit.json"]);
     // what is read is what was written
-    let map: ChangingMapFile = serde_json::from_value(desk.json("maps/map.json")).unwrap();
-    let fit: ChangingFitFile = serde_json::from_value(desk.json("maps/fit.json")).unwrap();
+    let map: MapFile = serde_json::from_value(desk.json("maps/map.json")).unwrap();
+    let fit: FitFile = serde_json::from_value(desk.json("maps/fit.json")).unwrap();
     assert_eq!(serde_json::to_value(&map).unwrap(), desk.json("maps/map.json"));
     assert_eq!(serde_json::to_value(&fit).unwrap(), desk.json("maps/fit.json"));
-    assert_eq!(map.maps.iter().map(|map| map.time_d).collect::<Vec<_>>(), [-2.0, 0.5, 10000.0]);
+    assert_eq!(map.maps.iter().filter_map(|map| map.time_d).collect::<Vec<_>>(), [-2.0, 0.5, 10000.0]);
     assert_eq!(map.field, fit.field);
     assert_eq!(desk.lines("maps/rv.csv"), 1 + fit.summary.profiles);
     assert_eq!(desk.lines("maps/profiles.csv"), 1 + fit.summary.data);
@@ -93,10 +93,10 @@ fn what_makes_no_sense_is_one_line() {
     desk.set("/imaging/objective", json!("entropy"));
     let said = desk.refusal(&["map", CONFIG, "--out", "maps", "--times", "1"]);
     says(&said, &["--times: the map does not change", "\"entropy\"", "\"marginal-likelihood\""]);
-    // maps of one kind are not taken for those of the other
+    // a static map is of all times
     desk.succeed(&["map", CONFIG, "--out", "map"]);
-    let kind: MapKind = serde_json::from_value(desk.json("map/map.json")).unwrap();
-    assert!(!kind.is_changing());
+    let map: MapFile = serde_json::from_value(desk.json("map/map.json")).unwrap();
+    assert_eq!((map.maps.len(), map.maps[0].time_d, map.mean.is_some()), (1, None, true));
 
     desk.set("/imaging/objective", json!("marginal-likelihood"));
     let mut bare = config();

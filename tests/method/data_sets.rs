@@ -1,11 +1,12 @@
 //! Several data sets of one star: each is seen as if it were alone, and zero points between them do not become spots.
 
+use dimcmc::NoMaps;
 use dimcmc::internals::maxent::Problem;
 use dimcmc::internals::star::{Response, StarSettings};
+use dimcmc::internals::surface::ReferenceError;
 use dimcmc::internals::surface::calibration::offsets::HeldZeroPoint;
 use dimcmc::internals::surface::evolving_map::{Basis, Design};
 use dimcmc::internals::surface::imaging::Imager;
-use dimcmc::internals::surface::ReferenceError;
 use dimcmc::internals::surface::static_map::Reference;
 use dimcmc::{Config, Parameter, Scene};
 use nalgebra::DMatrix;
@@ -112,8 +113,11 @@ fn each_season_has_the_map_that_it_would_have_alone() {
     // a star that does not change from one to the other fits neither
     known["imaging"]["season_gap_d"] = json!(1000.0);
     let one = Config::from_json(&known.to_string()).unwrap();
-    let error = Scene::new(&one).unwrap().map().unwrap_err();
-    assert!(matches!(error, ReferenceError::TargetBelowFloor { floor, .. } if floor > 1.1), "{error}");
+    let error = Scene::new(&one).unwrap().maps(None).unwrap_err();
+    assert!(
+        matches!(error, NoMaps::Reference(ReferenceError::TargetBelowFloor { floor, .. }) if floor > 1.1),
+        "{error}"
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use dimcmc::internals::field::{Compression, Epoch, Evidence, Field, Kernel, Lifetime, Spectrum};
 use dimcmc::internals::model::Parameter;
 use dimcmc::internals::surface::Known;
-use dimcmc::internals::surface::evolving_map::{fit, Assumed, Basis, Design, Marginal, LEVEL};
+use dimcmc::internals::surface::evolving_map::{Assumed, Basis, Design, LEVEL, Marginal, fit};
 use dimcmc::{Config, Scene};
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};

@@ -1,17 +1,17 @@
 //! Nuisances of line and continuum against dense algebra, differences and simulated stars whose continua wander.
 
 use crate::common::{dot, hold_derivatives, imager, oracle, truth};
+use dimcmc::SurfaceMaps;
 use dimcmc::internals::data::config::{Config, ObservationSource};
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::maxent::{Problem, SolverSettings};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, ParameterValues, Prior};
 use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::expansion::{Expansion, STELLAR};
-use dimcmc::internals::surface::fit::Fit;
 use dimcmc::internals::surface::imaging::Imager;
 use dimcmc::internals::surface::nuisances::LineAndContinuum;
-use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -159,7 +159,7 @@ fn an_orbit_is_found_under_wandering_continua() {
     // not much is lost to them: without wandering the error is 0.011
     assert!(sigma_k < 0.02);
     let reference = Reference::build(&scene.imager, scene.settings.values, 0.97).unwrap();
-    let fit = Fit::new(&scene.imager, &scene.observations, &reference);
+    let fit = SurfaceMaps::of_reference(&scene.imager, &scene.observations, &reference);
     assert!(fit.summary.residual_rms < 1.05e-3, "{}", fit.summary.residual_rms);
     // every profile's own numbers come back: within their errors, which priors and spots make no smaller than a tenth
     // of the prior

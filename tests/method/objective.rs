@@ -6,8 +6,8 @@ use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::log_density::{Gradient, LogDensity, Status};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
-use dimcmc::internals::surface::imaging::Imager;
 use dimcmc::internals::surface::ObjectiveKind;
+use dimcmc::internals::surface::imaging::Imager;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
 
 const KINDS: [ObjectiveKind; 3] =

@@ -15,9 +15,9 @@ use super::resolve_star::resolve_star;
 use super::{Automatic, Hyperparameter, ImagingSettings, Settings, VelocityJitter};
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
+use crate::surface::ObjectiveKind;
 use crate::surface::evolving_map;
 use crate::surface::nuisances::LineAndContinuum;
-use crate::surface::ObjectiveKind;
 use std::path::Path;
 
 /// Largest degree of a break: harmonics go to 36.

@@ -10,8 +10,8 @@ use crate::data::io::lsd::ReadOptions;
 use crate::data::simulate::Simulation;
 use crate::model::{Clock, Elements, ParameterValues};
 use crate::star::StarSettings;
-use crate::surface::nuisances::LineAndContinuum;
 use crate::surface::calibration::noise::ErrorSettings;
+use crate::surface::nuisances::LineAndContinuum;
 use std::path::Path;
 
 /// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.

@@ -14,10 +14,10 @@ use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
 use crate::surface::Change;
-use crate::surface::expansion::nuisances;
 use crate::surface::ObjectiveKind;
-use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::ReferenceError;
+use crate::surface::calibration::noise::MeasuredErrors;
+use crate::surface::expansion::nuisances;
 use crate::surface::static_map::Reference;
 use std::path::Path;
 

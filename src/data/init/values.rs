@@ -10,8 +10,8 @@ use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
 use crate::surface::Change;
-use crate::surface::nuisances::LineAndContinuum;
 use crate::surface::calibration::noise::MeasuredErrors;
+use crate::surface::nuisances::LineAndContinuum;
 
 /// What is assumed where nobody says otherwise.
 mod assumed {

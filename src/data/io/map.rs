@@ -1,10 +1,8 @@
-//! The files of one reconstruction: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`. Those of a star that may
-//! change are in `changing`.
+//! The files of the maps of a star: `map.json`, `profiles.csv`, `rv.csv` and `fit.json`; where there are light curves
+//! `lightcurve.csv`, too.
 
-mod changing;
 mod light;
 
-pub use changing::{ChangingFitFile, ChangingMapFile, ChangingMapResult, MapKind, UNCHANGING};
 pub use light::LIGHT_CURVES;
 
 use super::atomic::{WriteError, write, write_json};
@@ -15,21 +13,23 @@ use crate::maxent::entropy::Entropy;
 use crate::model::ParameterValues;
 use crate::star::SurfaceGrid;
 use crate::star::observation::Observations;
-use crate::surface::fit::{Checks, Fit, FitSummary};
+use crate::surface::checks::Checks;
 use crate::surface::imaging::Imager;
+use crate::surface::maps::TradeOffNode;
 use crate::surface::nuisances::LineAndContinuum;
+use crate::surface::{MEAN_FILLING, MapSummary, SpotField, SurfaceMap, SurfaceMaps};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A reconstruction with all that its files say of it.
+/// Maps with all that their files say of them.
 #[derive(Clone, Debug)]
 pub struct MapResult<'a> {
     /// What the data were imaged with.
     pub imager: &'a Imager,
     /// The data.
     pub observations: &'a Observations,
-    /// The reconstruction.
-    pub fit: &'a Fit,
+    /// The maps.
+    pub maps: &'a SurfaceMaps,
     /// The true map on the imager's pixels, of the same kind, for simulated data; of several seasons one after the
     /// other.
     pub true_map: Option<&'a [f64]>,
@@ -49,6 +49,9 @@ pub const FIT: &str = "fit.json";
 
 /// The column of `profiles.csv` and `rv.csv` with the number of the season, from 1, where there are several.
 pub const SEASON: &str = "season";
+
+/// The column of `profiles.csv` with the model of static spots, where maps evolve.
+pub const UNCHANGING: &str = "unchanging_model";
 
 /// Names of the files, in the order in which they are written.
 pub const FILES: [&str; 4] = [MAP, "profiles.csv", "rv.csv", FIT];
@@ -80,10 +83,12 @@ pub struct MapFile {
     /// Each of several data sets, in the order of the profiles.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub data_sets: Vec<MeasuredSet>,
-    /// As [`FitSummary::spottedness`].
-    pub spottedness: f64,
-    /// The same of the star that was simulated.
-    pub true_spottedness: Option<f64>,
+    /// The spots as a field, where they are one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<SpotField>,
+    /// Its mean filling factor, which is assumed: profiles do not tell it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_filling: Option<f64>,
     /// Number of pixels.
     pub pixels: usize,
     /// The same in each ring, from south to north.
@@ -94,27 +99,49 @@ pub struct MapFile {
     pub latitude_deg: Vec<f64>,
     /// Share of the surface of each pixel.
     pub area_fraction: Vec<f64>,
-    /// What the pixels hold; of several seasons the mean over them.
-    #[serde(flatten)]
-    pub map: MapColumns,
-    /// The maps of several seasons, in the order of time.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub seasons: Vec<SeasonMap>,
+    /// The map of all times, where there is one: of several seasons the mean over them.
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    pub mean: Option<OneMap>,
+    /// The maps in the order of time: one, one a season, or one at each time asked for.
+    pub maps: Vec<MapAt>,
 }
 
-/// The map of one of several seasons.
+/// A map, and how spotted it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SeasonMap {
-    /// When it was, and how often the star was seen.
-    #[serde(flatten)]
-    pub season: Season,
-    /// As [`FitSummary::spottedness`], of this map.
+pub struct OneMap {
+    /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
     pub spottedness: f64,
     /// The same of the star that was simulated.
     pub true_spottedness: Option<f64>,
     /// What the pixels hold.
     #[serde(flatten)]
-    pub map: MapColumns,
+    pub pixels: MapColumns,
+}
+
+/// One of the maps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapAt {
+    /// Its time (d), where maps evolve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_d: Option<f64>,
+    /// The rotation cycle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cycle: Option<f64>,
+    /// The season that it is of, and how often the star was seen, where there are several.
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    pub season: Option<Season>,
+    /// As [`OneMap::spottedness`], of one of several seasons.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spottedness: Option<f64>,
+    /// The same of the star that was simulated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub true_spottedness: Option<f64>,
+    /// What the pixels hold; below 0 a spot filling factor is brighter than the photosphere.
+    #[serde(flatten)]
+    pub pixels: MapColumns,
+    /// Standard deviation of the filling factors, what is assumed of the field held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_spot_filling: Option<Vec<f64>>,
 }
 
 /// What the pixels hold, and what those of the star that was simulated do.
@@ -126,6 +153,7 @@ pub enum MapColumns {
         /// Of the map.
         spot_filling: Vec<f64>,
         /// Of the star that was simulated.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         true_spot_filling: Option<Vec<f64>>,
     },
     /// Brightness relative to the photosphere. Profiles say nothing of the scale; the entropy has it near 1.
@@ -133,6 +161,7 @@ pub enum MapColumns {
         /// Of the map.
         brightness: Vec<f64>,
         /// Of the star that was simulated.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         true_brightness: Option<Vec<f64>>,
     },
 }
@@ -142,38 +171,32 @@ pub enum MapColumns {
 pub struct FitFile {
     /// How good the fit is.
     #[serde(flatten)]
-    pub summary: FitSummary,
+    pub summary: MapSummary,
+    /// The spots as a field, where they are one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<SpotField>,
     /// One entry a profile, in the order of the list.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<LineAndContinuum>,
-    /// The same for the zero point of its velocity.
+    /// The same for the offset of its velocity by the RV jitter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zero_points_kms: Vec<f64>,
     /// The true parameters, for simulated data.
     pub truth: Option<ParameterValues>,
-    /// Whether what is left over looks like noise.
+    /// Whether the residuals look like noise.
     pub checks: Checks,
     /// Why the model does not fit as well as the errors promise, if it does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<serde_json::Value>,
-    /// Images of other chi2.
+    /// Images of other chi2, where there is a target.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub trade_off: Vec<TradeOffNode>,
+    /// What has to be known of maps and times.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// Config, data and program.
     #[serde(flatten)]
     pub provenance: Provenance,
-}
-
-/// One image on the trade-off curve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TradeOffNode {
-    /// Lagrange multiplier of chi2 / 2.
-    pub lambda: f64,
-    /// chi2.
-    pub chi2: f64,
-    /// Spottedness.
-    pub spottedness: f64,
-    /// Entropy.
-    pub entropy: f64,
 }
 
 /// Columns that profiles have beside the others where there are several seasons or data sets, each with the number of
@@ -203,94 +226,111 @@ impl MapResult<'_> {
         write_json(&map, &self.map())?;
         write(&profiles, &self.profiles().into_bytes())?;
         write(&rv, &self.velocities().into_bytes())?;
-        write_json(&fit, &self.fit())
+        write_json(&fit, &self.fit())?;
+        match self.maps.light.is_empty() {
+            true => Ok(()),
+            false => write(&folder.join(LIGHT_CURVES), &light::table(&self.maps.light).into_bytes()),
+        }
     }
 
     fn map(&self) -> MapFile {
-        let SurfaceGrid { longitude, latitude, area, rings, .. } = &self.imager.grid;
+        let MapResult { imager, maps: SurfaceMaps { maps, summary, field, .. }, true_map, .. } = *self;
+        let SurfaceGrid { longitude, latitude, area, rings, .. } = &imager.grid;
         let degrees = |angles: &[f64]| angles.iter().map(|x| x.to_degrees()).collect();
-        let (map, true_map) = (&self.fit.map[..], self.true_map);
-        let (n, entropy) = (self.imager.grid.len(), self.imager.entropy);
-        let of_season = |(k, season): (usize, &Season)| {
-            let of = |maps: &[f64]| maps[k * n..(k + 1) * n].to_vec();
-            let (map, true_map) = (of(map), true_map.map(of));
-            SeasonMap {
-                season: *season,
-                spottedness: entropy.spottedness(&map, area),
-                true_spottedness: true_map.as_ref().map(|map| entropy.spottedness(map, area)),
-                map: MapColumns::of(entropy, map, true_map),
-            }
+        let (n, entropy) = (imager.grid.len(), imager.entropy);
+        let mean = |maps: &[&[f64]]| -> Vec<f64> {
+            (0..n).map(|p| maps.iter().map(|map| map[p]).sum::<f64>() / maps.len() as f64).collect()
         };
-        let mean = |maps: &[f64]| {
-            let of_pixel = |p: usize| maps[p..].iter().step_by(n).sum::<f64>() / (maps.len() / n) as f64;
-            (0..n).map(of_pixel).collect()
+        let all: Vec<&[f64]> = maps.iter().map(|map| &map.pixels[..]).collect();
+        let one_map = summary.image.as_ref().map(|image| OneMap {
+            spottedness: image.spottedness,
+            true_spottedness: true_map.map(|map| entropy.spottedness(map, &imager.areas)),
+            pixels: MapColumns::of(entropy, mean(&all), true_map.map(|map| mean(&map.chunks(n).collect::<Vec<_>>()))),
+        });
+        let seasons = &self.provenance.measured.seasons;
+        let map_at = |(k, SurfaceMap { time_d, pixels, sigma }): (usize, &SurfaceMap)| {
+            let season = seasons.get(k).filter(|_| time_d.is_none()).copied();
+            let truth = true_map.filter(|_| season.is_some()).map(|map| map[k * n..(k + 1) * n].to_vec());
+            MapAt {
+                time_d: *time_d,
+                cycle: time_d.map(|time_d| imager.star.cycle(time_d)),
+                season,
+                spottedness: season.map(|_| entropy.spottedness(pixels, area)),
+                true_spottedness: truth.as_ref().map(|map| entropy.spottedness(map, area)),
+                pixels: MapColumns::of(entropy, pixels.clone(), truth),
+                sigma_spot_filling: sigma.clone(),
+            }
         };
         MapFile {
             conventions: CONVENTIONS.into(),
-            rotation_period_d: self.imager.star.rotation_period_d,
-            epoch_d: self.imager.star.epoch_d,
-            parameters: self.fit.summary.parameters,
-            contrast: self.fit.summary.contrast,
+            rotation_period_d: imager.star.rotation_period_d,
+            epoch_d: imager.star.epoch_d,
+            parameters: summary.parameters,
+            contrast: summary.contrast,
             data_sets: self.provenance.measured.sets.clone(),
-            spottedness: self.fit.summary.spottedness,
-            true_spottedness: true_map.map(|map| entropy.spottedness(map, &self.imager.areas)),
-            pixels: self.imager.grid.len(),
+            field: field.clone(),
+            mean_filling: field.as_ref().map(|_| MEAN_FILLING),
+            pixels: n,
             ring_pixels: rings.iter().map(|ring| ring.pixels.len()).collect(),
             longitude_deg: degrees(longitude),
             latitude_deg: degrees(latitude),
             area_fraction: area.clone(),
-            map: MapColumns::of(entropy, mean(map), true_map.map(mean)),
-            seasons: self.provenance.measured.seasons.iter().enumerate().map(of_season).collect(),
+            mean: one_map,
+            maps: maps.iter().enumerate().map(map_at).collect(),
         }
     }
 
     fn profiles(&self) -> Table {
         let columns = ["profile", "time_d", "cycle", "velocity_kms", "observed", "sigma", "model", "residual"];
+        let of_static = self.maps.static_model.as_ref();
         let beside = beside(self.imager);
-        let names = columns.into_iter().chain(beside.iter().map(|(name, _)| *name));
-        let mut table = Table::new(&names.collect::<Vec<_>>());
-        for (k, (profile, model)) in self.observations.profiles.iter().zip(&self.fit.model).enumerate() {
+        let more = of_static.map(|_| UNCHANGING).into_iter().chain(beside.iter().map(|(name, _)| *name));
+        let mut table = Table::new(&columns.into_iter().chain(more).collect::<Vec<_>>());
+        for (k, (profile, model)) in self.observations.profiles.iter().zip(&self.maps.model).enumerate() {
             let cycle = self.imager.star.cycle(profile.time_d);
             for (j, model) in model.iter().enumerate() {
                 let velocity = profile.velocity_kms(j);
                 let (observed, sigma) = (profile.intensity[j], profile.sigma[j]);
-                let residual = observed - model;
-                let row = [k as f64, profile.time_d, cycle, velocity, observed, sigma, *model, residual];
-                table.row(&row.into_iter().chain(beside.iter().map(|(_, of)| of[k] as f64)).collect::<Vec<_>>());
+                let mut row =
+                    vec![k as f64, profile.time_d, cycle, velocity, observed, sigma, *model, observed - model];
+                row.extend(of_static.map(|of_static| of_static[k][j]));
+                row.extend(beside.iter().map(|(_, of)| of[k] as f64));
+                table.row(&row);
             }
         }
         table
     }
 
     fn velocities(&self) -> Table {
-        let columns = ["time_d", "cycle", "observed_kms", "sigma_kms", "modelled_kms", "orbit_kms", "filtered_kms"];
+        let marginalised = self.maps.velocities.iter().any(|v| v.marginalised_kms.is_some());
+        let free: &[&str] = if marginalised { &["rv_kms", "rv_sigma_kms"] } else { &["filtered_kms"] };
+        let columns = ["time_d", "cycle", "observed_kms", "sigma_kms", "modelled_kms", "orbit_kms"];
         let beside = beside(self.imager);
-        let names = columns.into_iter().chain(beside.iter().map(|(name, _)| *name));
+        let names = columns.iter().chain(free).copied().chain(beside.iter().map(|(name, _)| *name));
         let mut table = Table::new(&names.collect::<Vec<_>>());
-        for (k, v) in self.fit.velocities.iter().enumerate() {
-            let observed = v.observed;
-            let (modelled, filtered) = (v.modelled_kms, v.filtered_kms());
-            let row = [v.time_d, v.cycle, observed.value_kms, observed.sigma_kms, modelled, v.orbit_kms, filtered];
-            table.row(&row.into_iter().chain(beside.iter().map(|(_, of)| of[k] as f64)).collect::<Vec<_>>());
+        for (k, v) in self.maps.velocities.iter().enumerate() {
+            let m = &v.moments;
+            let (value_kms, sigma_kms) = (m.observed.value_kms, m.observed.sigma_kms);
+            let mut row = vec![m.time_d, m.cycle, value_kms, sigma_kms, m.modelled_kms, m.orbit_kms];
+            row.extend(v.marginalised_kms.map_or(vec![m.filtered_kms()], |rv| rv.to_vec()));
+            row.extend(beside.iter().map(|(_, of)| of[k] as f64));
+            table.row(&row);
         }
         table
     }
 
     fn fit(&self) -> FitFile {
-        let node = |n: &crate::surface::static_map::tradeoff::Node| TradeOffNode {
-            lambda: n.lambda,
-            chi2: n.chi2,
-            spottedness: n.spottedness,
-            entropy: n.entropy,
-        };
+        let SurfaceMaps { summary, field, nuisances, zero_points_kms, checks, trade_off, warnings, .. } = self.maps;
         FitFile {
-            summary: self.fit.summary.clone(),
-            nuisances: self.fit.nuisances.clone(),
-            zero_points_kms: self.fit.zero_points_kms.clone(),
+            summary: summary.clone(),
+            field: field.clone(),
+            nuisances: nuisances.clone(),
+            zero_points_kms: zero_points_kms.clone(),
             truth: self.truth,
-            checks: self.fit.checks.clone(),
+            checks: checks.clone(),
             diagnosis: self.diagnosis.clone(),
-            trade_off: self.fit.tradeoff.iter().map(node).collect(),
+            trade_off: trade_off.clone(),
+            warnings: warnings.clone(),
             provenance: self.provenance.clone(),
         }
     }

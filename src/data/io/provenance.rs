@@ -1,8 +1,8 @@
 //! What every result says of where it came from.
 
-use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::calibration::jitter::MeasuredJitter;
 use crate::surface::calibration::noise::MeasuredErrors;
+use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::calibration::target::ChosenTarget;
 use serde::{Deserialize, Serialize};
 

@@ -4,11 +4,11 @@
 use super::imager;
 use crate::data::config::{ConfigError, DataSetSettings, Settings, VelocityJitter};
 use crate::star::observation::Observations;
-use crate::surface::imaging::Imager;
 use crate::surface::ObjectiveKind;
 use crate::surface::calibration::jitter::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::surface::calibration::noise;
 use crate::surface::calibration::noise::{ErrorSettings, MeasuredErrors, NoiseError};
+use crate::surface::imaging::Imager;
 
 /// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
 /// target chi2 is per datum, independent or not.

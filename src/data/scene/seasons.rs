@@ -4,8 +4,8 @@ use crate::data::config::{ConfigError, ImagingSettings, ObservationSource, SEASO
 use crate::data::io::provenance::Season;
 use crate::star::OwnMap;
 use crate::star::observation::Observations;
-use crate::surface::imaging::Imager;
 use crate::surface::ObjectiveKind;
+use crate::surface::imaging::Imager;
 
 /// The seasons of profiles, in the order of time: as the config has them, or parted by gaps. Integrated maps, which
 /// change, have one.

@@ -4,11 +4,11 @@ use super::projection::{Projection, SOUTHERNMOST_DEG};
 use super::surface::{PixelMap, Scale, graticule, photosphere};
 use super::{ANY, PlotError, velocities};
 use crate::data::io::csv::Columns;
-use crate::data::io::map::{ChangingMapFile, MAP};
+use crate::data::io::map::{MAP, MapAt, MapColumns, MapFile};
 use crate::figures::drawing::colour::{BLACK, ColourMap, GREY};
 use crate::figures::drawing::panel::Shade;
 use crate::figures::drawing::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, Stroke, open};
-use crate::runs::origin;
+use crate::surface::SpotField;
 use std::path::Path;
 
 /// Most maps of a strip.
@@ -26,6 +26,13 @@ const SAME_NIGHT_D: f64 = 0.5;
 /// Pixels of the whole star in a picture of 1 pt of radius: finer ones are not seen.
 const PIXELS_PER_PT2: f64 = 1.0;
 
+/// One of the maps.
+struct Strip {
+    time_d: f64,
+    filling: Vec<f64>,
+    sd: Vec<f64>,
+}
+
 /// What the pictures have in common.
 struct Common {
     filling: Scale,
@@ -36,36 +43,37 @@ struct Common {
     observed: Vec<[f64; 2]>,
 }
 
-/// The maps in `folder`.
-pub(super) fn figure(folder: &Path) -> Result<Figure, PlotError> {
-    let file: ChangingMapFile = origin::read(folder, MAP)?;
+/// The maps in `folder`, which `file` holds.
+pub(super) fn figure(folder: &Path, file: &MapFile) -> Result<Figure, PlotError> {
     let pixels: usize = file.ring_pixels.iter().sum();
     let wrong = |problem: &str| PlotError::Content { path: folder.join(MAP), problem: problem.into() };
-    let whole = |values: &[f64]| values.len() == pixels && !values.is_empty();
-    if file.maps.is_empty() {
-        return Err(wrong("holds no map"));
-    }
-    if !file.maps.iter().all(|map| whole(&map.spot_filling) && whole(&map.sigma_spot_filling)) {
+    let of_time = |map: &MapAt| {
+        let (MapColumns::Spots { spot_filling, .. }, Some(sd)) = (&map.pixels, &map.sigma_spot_filling) else {
+            return None;
+        };
+        let is_whole = spot_filling.len() == pixels && sd.len() == pixels && pixels > 0;
+        is_whole.then(|| Strip { time_d: map.time_d.unwrap_or(0.0), filling: spot_filling.clone(), sd: sd.clone() })
+    };
+    let Some(maps) = file.maps.iter().map(of_time).collect::<Option<Vec<Strip>>>() else {
         return Err(wrong("ring_pixels, spot_filling and sigma_spot_filling do not belong together"));
-    }
-    let shown = evenly(file.maps.len());
+    };
+    let (Some(field), false) = (&file.field, maps.is_empty()) else { return Err(wrong("holds no map")) };
+    let shown = evenly(maps.len());
     let columns = shown.len().min(COLUMNS);
     let mut figure = Figure::new("maps", PAGE_MM, 100.0);
     let cell = ((figure.width - MARGIN) / columns as f64).min(WIDEST);
-    let common = common(folder, &file, &shown, 0.5 * cell - 9.0)?;
+    let common = common(folder, (file, field, &maps), &shown, 0.5 * cell - 9.0)?;
     let block = 4.0 * common.radius + 44.0;
     figure.height = block * shown.len().div_ceil(columns) as f64 + 40.0;
-    figure.caption = caption(&file, shown.len());
-    for (k, map) in shown.iter().map(|k| &file.maps[*k]).enumerate() {
+    figure.caption = caption(maps.len(), field, shown.len());
+    for (k, map) in shown.iter().map(|k| &maps[*k]).enumerate() {
         let (row, column) = (k / columns, k % columns);
         let left = MARGIN + 0.5 * (figure.width - MARGIN - cell * columns as f64);
         let x = left + cell * (column as f64 + 0.5);
         let top = block * row as f64;
         let centres = [1.0, 3.0].map(|n| [x, top + 16.0 + n * common.radius + 5.0 * n]);
         figure.text(&format!("{:.2} d", map.time_d), [x, top + 10.0], Font::LABEL, Align::Centre, 0.0);
-        for (values, scale, centre) in
-            [(&map.spot_filling, common.filling, centres[0]), (&map.sigma_spot_filling, common.sd, centres[1])]
-        {
+        for (values, scale, centre) in [(&map.filling, common.filling, centres[0]), (&map.sd, common.sd, centres[1])] {
             let pixels = PixelMap { ring_pixels: file.ring_pixels.clone(), values: values.clone() };
             common.paint(&mut figure, &pixels, scale, centre);
             common.phases(&mut figure, map.time_d, centre);
@@ -91,11 +99,16 @@ fn evenly(n: usize) -> Vec<usize> {
     }
 }
 
-fn common(folder: &Path, file: &ChangingMapFile, shown: &[usize], radius: f64) -> Result<Common, PlotError> {
-    let highest = shown.iter().flat_map(|k| &file.maps[*k].spot_filling).fold(0.0, |high: f64, x| high.max(x.abs()));
+fn common(
+    folder: &Path,
+    (file, field, maps): (&MapFile, &SpotField, &[Strip]),
+    shown: &[usize],
+    radius: f64,
+) -> Result<Common, PlotError> {
+    let highest = shown.iter().flat_map(|k| &maps[*k].filling).fold(0.0, |high: f64, x| high.max(x.abs()));
     let reach = if highest > 0.5 { 1.0 } else { ((10.0 * highest).ceil() / 10.0).max(0.1) };
-    let lowest = shown.iter().flat_map(|k| &file.maps[*k].sigma_spot_filling).fold(f64::MAX, |low, x| low.min(*x));
-    let amplitude = file.field.spot_amplitude;
+    let lowest = shown.iter().flat_map(|k| &maps[*k].sd).fold(f64::MAX, |low, x| low.min(*x));
+    let amplitude = field.spot_amplitude;
     let observed = match folder.join(velocities::FILE) {
         table if table.is_file() => {
             let table = Columns::read(&table)?;
@@ -122,13 +135,13 @@ fn common(folder: &Path, file: &ChangingMapFile, shown: &[usize], radius: f64) -
     })
 }
 
-fn caption(file: &ChangingMapFile, shown: usize) -> String {
-    let of = match file.maps.len() {
+fn caption(maps: usize, field: &SpotField, shown: usize) -> String {
+    let of = match maps {
         all if all > shown => format!("{shown} of {all} maps, evenly chosen in time"),
         1 => "The map".to_owned(),
         all => format!("{all} maps"),
     };
-    let life = match file.field.spot_lifetime_d {
+    let life = match field.spot_lifetime_d {
         Some(days) => format!("whose spots live some {days:.1} d"),
         None => "that does not change".to_owned(),
     };
@@ -138,7 +151,7 @@ fn caption(file: &ChangingMapFile, shown: usize) -> String {
         projection down to -30 degrees, longitude 0 at the bottom, longitudes grow anticlockwise; parallels at +60, \
         +30 and 0 (bold). Ticks outside are the rotation phases observed within half a day. What is always below the \
         horizon is grey.",
-        file.field.spot_amplitude
+        field.spot_amplitude
     )
 }
 

@@ -34,7 +34,7 @@ pub use trace::Sampled;
 use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
-use crate::data::io::map::{LIGHT_CURVES, MAP, MapKind};
+use crate::data::io::map::{LIGHT_CURVES, MAP, MapFile};
 use crate::data::io::{self, FileError, truth};
 use crate::figures::drawing::Figure;
 use crate::runs::origin::OriginError;
@@ -139,17 +139,21 @@ pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotErr
 }
 
 fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
-    let changes = origin::read::<MapKind>(folder, MAP)?.is_changing();
-    let mut figures = if changes { vec![maps::figure(folder)?] } else { star_map::figures(folder)? };
+    let file: MapFile = origin::read(folder, MAP)?;
+    // maps of several times, with their errors, are a strip
+    let mut figures = match file.mean {
+        None => vec![maps::figure(folder, &file)?],
+        Some(_) => star_map::figures(folder, &file)?,
+    };
     if folder.join(profiles::FILE).is_file() {
         let profiles = profiles::read(folder)?;
         figures.extend(changes::figure(&profiles));
         figures.extend([profiles::figure(&profiles), dynamic::figure(&profiles)]);
     }
     if folder.join(velocities::FILE).is_file() {
-        figures.push(if changes { velocities::of_changing_map(folder)? } else { velocities::of_map(folder)? });
+        figures.push(velocities::of_map(folder)?);
     }
-    if changes && folder.join(LIGHT_CURVES).is_file() {
+    if folder.join(LIGHT_CURVES).is_file() {
         figures.push(light::figure(folder)?);
     }
     Ok(figures)

@@ -4,7 +4,7 @@ use super::star_map::ephemeris;
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::lsd::{self, ReadOptions};
-use crate::data::io::map::{ChangingFitFile, FIT, FitFile, MapKind, UNCHANGING};
+use crate::data::io::map::{FIT, FitFile, UNCHANGING};
 use crate::data::io::periodogram::DATA_SET;
 use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, GREY, VERMILION};
@@ -42,10 +42,7 @@ impl Line {
 pub(super) fn read(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
     if folder.join(FIT).is_file() {
-        let data = match origin::read::<MapKind>(folder, FIT)?.is_changing() {
-            true => origin::read::<ChangingFitFile>(folder, FIT)?.summary.data,
-            false => origin::read::<FitFile>(folder, FIT)?.summary.data,
-        };
+        let data = origin::read::<FitFile>(folder, FIT)?.summary.data;
         table.check_rows(data, &format!("the data, by {FIT}"))?;
     }
     let numbers = table.column("profile")?;

@@ -6,7 +6,7 @@ use super::projection::Projection;
 use super::surface::{PixelMap, Scale, graticule, outline, paint_discs, photosphere};
 use super::{PlotError, velocities};
 use crate::data::io::csv::Columns;
-use crate::data::io::map::{MAP, MapColumns, MapFile, SEASON, SeasonMap};
+use crate::data::io::map::{MAP, MapAt, MapColumns, MapFile, OneMap, SEASON};
 use crate::data::io::provenance::Season;
 use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, VERMILION, WHITE};
@@ -31,32 +31,36 @@ enum Surface {
     Discs(Vec<(Disc, f64)>),
 }
 
-/// The map in `folder`; of several seasons a map each.
-pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
-    let map: MapFile = origin::read(folder, MAP)?;
-    if map.seasons.is_empty() {
-        return Ok(vec![figure(folder, map, None)?]);
-    }
-    let seasons = map.seasons.len();
-    let of_season = |k: usize| {
-        let SeasonMap { season, spottedness, true_spottedness, map: pixels } = map.seasons[k].clone();
-        let Season { first_d, last_d, epoch_d, .. } = season;
-        let text = format!("in season {} of {seasons}, {first_d:.2} to {last_d:.2} d, at {epoch_d:.2} d", k + 1);
-        let own = MapFile { spottedness, true_spottedness, map: pixels, seasons: Vec::new(), ..map.clone() };
-        figure(folder, own, Some((k + 1, text)))
+/// The map in `folder`, which `file` holds; of several seasons a map each.
+pub(super) fn figures(folder: &Path, file: &MapFile) -> Result<Vec<Figure>, PlotError> {
+    let of_season = |(k, map): (usize, &MapAt)| {
+        let (season, spottedness) = (map.season?, map.spottedness?);
+        let own = OneMap { spottedness, true_spottedness: map.true_spottedness, pixels: map.pixels.clone() };
+        Some((k + 1, season, own))
     };
-    (0..seasons).map(of_season).collect()
+    let seasons: Vec<(usize, Season, OneMap)> = file.maps.iter().enumerate().filter_map(of_season).collect();
+    if seasons.is_empty() {
+        let one = file.mean.clone();
+        return one.map(|one| figure(folder, file, one, None)).into_iter().collect();
+    }
+    let count = seasons.len();
+    let of_season = |(number, season, own): (usize, Season, OneMap)| {
+        let Season { first_d, last_d, epoch_d, .. } = season;
+        let text = format!("in season {number} of {count}, {first_d:.2} to {last_d:.2} d, at {epoch_d:.2} d");
+        figure(folder, file, own, Some((number, text)))
+    };
+    seasons.into_iter().map(of_season).collect()
 }
 
-/// One `map`; of a season with its number and what is said of it.
-fn figure(folder: &Path, map: MapFile, season: Option<(usize, String)>) -> Result<Figure, PlotError> {
-    let (content, values) = match map.map {
+/// One map of a `file`; of a season with its number and what is said of it.
+fn figure(folder: &Path, file: &MapFile, map: OneMap, season: Option<(usize, String)>) -> Result<Figure, PlotError> {
+    let (content, values) = match map.pixels {
         MapColumns::BrightAndDark { brightness, .. } => {
-            (Content::Brightness(Brightness::of_spots(map.contrast)), brightness)
+            (Content::Brightness(Brightness::of_spots(file.contrast)), brightness)
         }
         MapColumns::Spots { spot_filling, .. } => (Content::Spots, spot_filling),
     };
-    let pixels = PixelMap { ring_pixels: map.ring_pixels, values };
+    let pixels = PixelMap { ring_pixels: file.ring_pixels.clone(), values };
     if !pixels.is_whole() {
         let what = if content == Content::Spots { "spot_filling" } else { "brightness" };
         let problem = format!("ring_pixels and {what} do not belong together");

@@ -3,7 +3,7 @@
 
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
-use crate::data::io::map::{ChangingFitFile, FIT, FitFile};
+use crate::data::io::map::{FIT, FitFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, GREY, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Axis, COLUMN_MM, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
@@ -38,60 +38,34 @@ struct Curves<'a> {
     orbital: usize,
 }
 
-/// The velocities of a map.
+/// The velocities of maps: marginalised over maps, or with the model's spots taken out.
 pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     let table = Columns::read(&folder.join(FILE))?;
     let fit: FitFile = origin::read(folder, FIT)?;
     table.check_rows(fit.summary.profiles, &format!("the profiles, by {FIT}"))?;
     let state = fit.summary.parameters.state();
-    let [observed, modelled, filtered] =
-        [table.column("observed_kms")?, table.column("modelled_kms")?, table.column("filtered_kms")?];
-    let (sigma, orbit_kms) = (table.column("sigma_kms")?, table.column("orbit_kms")?);
-    let clean = filtered.iter().zip(orbit_kms).map(|(f, o)| f + o).collect();
-    let errors = |y: Vec<f64>, label| Series { class: "observed", label, y, sigma: sigma.to_vec(), marker: POINT };
-    let model = Series { class: "model", label: "model", y: modelled.to_vec(), sigma: Vec::new(), marker: MODEL };
-    let curves = Curves {
-        cycle: table.column_within("cycle", ANY)?,
-        panels: vec![
-            ("RV (km/s)", vec![errors(observed.to_vec(), "first moment"), model]),
-            ("RV − spots (km/s)", vec![errors(clean, "")]),
-            ("residual (km/s)", vec![errors(filtered.to_vec(), "")]),
-        ],
-        motion: state.motion,
-        vsys_kms: state.vsys_kms,
-        orbit_is: "assumed orbit",
-        orbital: 1,
-    };
-    let mut figure = curves.draw();
-    figure.caption = "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: the \
-    model's \
-                      spots taken out, with the assumed orbit. Below: the model taken out. To the right: the middle \
-                      folded with \
-                      the orbital period; phase 0 is the largest velocity."
-        .into();
-    Ok(figure)
-}
-
-/// The velocities of a star that may change.
-pub(super) fn of_changing_map(folder: &Path) -> Result<Figure, PlotError> {
-    let table = Columns::read(&folder.join(FILE))?;
-    let fit: ChangingFitFile = origin::read(folder, FIT)?;
-    table.check_rows(fit.summary.profiles, &format!("the profiles, by {FIT}"))?;
-    let state = fit.summary.parameters.state();
     let column = |name: &str| Ok::<_, PlotError>(table.column(name)?.to_vec());
-    let (orbit_kms, rv_sigma) = (column("orbit_kms")?, column("rv_sigma_kms")?);
-    let rv: Vec<f64> = column("rv_kms")?.iter().map(|rv| rv + state.vsys_kms).collect();
-    let residual = rv.iter().zip(&orbit_kms).map(|(rv, orbit)| rv - orbit).collect();
-    let errors = |y, sigma, label| Series { class: "observed", label, y, sigma, marker: POINT };
-    let moments = errors(column("observed_kms")?, column("sigma_kms")?, "first moment");
+    let (orbit_kms, sigma) = (column("orbit_kms")?, column("sigma_kms")?);
+    let (clean, residual, errors): (Vec<f64>, Vec<f64>, Vec<f64>) = match fit.summary.rv_rms_kms.is_some() {
+        true => {
+            let rv: Vec<f64> = column("rv_kms")?.iter().map(|rv| rv + state.vsys_kms).collect();
+            let residual = rv.iter().zip(&orbit_kms).map(|(rv, orbit)| rv - orbit).collect();
+            (rv, residual, column("rv_sigma_kms")?)
+        }
+        false => {
+            let filtered = column("filtered_kms")?;
+            (filtered.iter().zip(&orbit_kms).map(|(f, o)| f + o).collect(), filtered, sigma.clone())
+        }
+    };
+    let series = |y, sigma, label| Series { class: "observed", label, y, sigma, marker: POINT };
     let modelled = column("modelled_kms")?;
     let model = Series { class: "model", label: "model", y: modelled, sigma: Vec::new(), marker: MODEL };
     let curves = Curves {
         cycle: table.column_within("cycle", ANY)?,
         panels: vec![
-            ("RV (km/s)", vec![moments, model]),
-            ("RV − spots (km/s)", vec![errors(rv, rv_sigma.clone(), "")]),
-            ("residual (km/s)", vec![errors(residual, rv_sigma, "")]),
+            ("RV (km/s)", vec![series(column("observed_kms")?, sigma, "first moment"), model]),
+            ("RV − spots (km/s)", vec![series(clean, errors.clone(), "")]),
+            ("residual (km/s)", vec![series(residual, errors, "")]),
         ],
         motion: state.motion,
         vsys_kms: state.vsys_kms,
@@ -99,10 +73,20 @@ pub(super) fn of_changing_map(folder: &Path) -> Result<Figure, PlotError> {
         orbital: 1,
     };
     let mut figure = curves.draw();
-    figure.caption = "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: with \
-    all maps integrated out, and the assumed orbit; their errors are correlated. Below: the assumed orbit taken out. \
-    To the right, if an orbit is assumed: the middle folded with the orbital period; phase 0 is the largest velocity."
-        .into();
+    figure.caption = match fit.summary.rv_rms_kms.is_some() {
+        true => {
+            "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: with all maps \
+            integrated out, and the assumed orbit; their errors are correlated. Below: the assumed orbit taken out. To \
+            the right, if an orbit is assumed: the middle folded with the orbital period; phase 0 is the largest \
+            velocity."
+        }
+        false => {
+            "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: the model's \
+            spots taken out, with the assumed orbit. Below: the model taken out. To the right: the middle folded with \
+            the orbital period; phase 0 is the largest velocity."
+        }
+    }
+    .into();
     Ok(figure)
 }
 

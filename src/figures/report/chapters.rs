@@ -1,7 +1,7 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, NOTHING, Table, Tone, changing, injection, is_empty, planned, run, verdicts};
-use crate::data::io::map::{FIT, FitFile, MAP, MapKind};
+use super::{Chapter, NOTHING, Table, Tone, injection, is_empty, maps, planned, run, verdicts};
+use crate::data::io::map::{FIT, MAP};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::periodogram::{self, PeakRecord, PeriodogramFile};
 use crate::data::io::truth::{self, Truth, TruthFile};
@@ -14,7 +14,6 @@ use crate::runs::grid_scan::{self, Header, PARABOLOID};
 use crate::runs::optimum::{self, OptimumFile};
 use crate::runs::{limits, manifest, origin, plan};
 use crate::sampling::landscape::Axis;
-use crate::sampling::log_density::Status;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -22,10 +21,7 @@ use std::path::Path;
 pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError> {
     Ok(match file {
         manifest::FILE => run::chapter(folder)?,
-        MAP => match origin::read::<MapKind>(folder, FIT)?.is_changing() {
-            true => changing::chapter(&origin::read(folder, FIT)?),
-            false => map(&origin::read(folder, FIT)?),
-        },
+        MAP => maps::chapter(&origin::read(folder, FIT)?),
         periodogram::FILE => search(&origin::read(folder, file)?),
         grid_scan::HEADER => {
             let present = folder.join(PARABOLOID).is_file();
@@ -65,44 +61,7 @@ fn table(head: &[&str], rows: Vec<Vec<String>>) -> Table {
     Table { head: head.iter().map(|text| (*text).to_owned()).collect(), rows }
 }
 
-fn map(file: &FitFile) -> Chapter {
-    let fit = &file.summary;
-    let converged = fit.status == Status::Converged;
-    let sentence = match converged {
-        true => "The map reaches the target chi2 and is the one of greatest entropy that does.",
-        false => {
-            "The reconstruction stopped short of the target chi2: this map is not the one of greatest entropy there."
-        }
-    };
-    let spottedness = match fit.deviation {
-        None => ("spot coverage", number(fit.spottedness, 4)),
-        Some(mean) => (
-            "brightness minus 1, rms (mean of dark, of bright parts)",
-            format!("{:.4} ({:.4}, {:.4})", fit.spottedness, mean.darkness, mean.brightness_excess),
-        ),
-    };
-    let rows = [
-        ("chi2 per datum", number(fit.chi2_per_datum, 4)),
-        ("data in profiles", format!("{} in {}", fit.data, fit.profiles)),
-        spottedness,
-        ("entropy", number(fit.entropy, 4)),
-        ("scatter of the radial velocities (km/s)", number(fit.observed_rv_rms_kms, 4)),
-        ("the same with the model taken out (km/s)", number(fit.filtered_rv_rms_kms, 4)),
-        ("photon noise of a radial velocity (km/s)", number(fit.photon_rv_error_kms, 4)),
-        ("residuals, rms", number(fit.residual_rms, 6)),
-        ("pixels", fit.pixels.to_string()),
-    ];
-    let parameters = parameters(&fit.parameters, file.truth.as_ref());
-    Chapter {
-        heading: "Map".into(),
-        verdicts: vec![(tone(converged), sentence.into())],
-        warnings: file.checks.warnings.clone(),
-        tables: vec![("The fit.".into(), pairs(&rows)), ("Parameters of star and orbit.".into(), parameters)],
-        ..Chapter::default()
-    }
-}
-
-fn tone(good: bool) -> Tone {
+pub(super) fn tone(good: bool) -> Tone {
     if good { Tone::Good } else { Tone::Doubt }
 }
 
@@ -394,7 +353,7 @@ mod tests {
     #[test]
     fn what_a_map_warns_of_is_told_and_it_does_not_converge() {
         let chapter = |status: &str| {
-            map(&file(&[
+            maps::chapter(&file(&[
                 &json!({ "status": status, "chi2": 9.0, "chi2_per_datum": 0.97, "chi2_target": 9.0, "lambda": 1.0 }),
                 &json!({ "alpha": 1.0, "entropy": -1.0, "spottedness": 0.1, "test": 0.0, "model_applications": 9 }),
                 &json!({ "newton_steps": 3, "profiles": 2, "data": 9, "pixels": 100, "equivalent_width_kms": 5.0 }),

@@ -2,11 +2,11 @@
 //! figures, the config and how to cite. A single HTML file that needs nothing else: no network, no script, figures as
 //! SVG within it.
 
-mod changing;
 mod chapters;
 mod citation;
 mod html;
 mod injection;
+mod maps;
 mod planned;
 mod run;
 mod subject;

@@ -5,7 +5,7 @@ use super::report::{Panel, Report, Series};
 use super::star::{paper, with};
 use crate::data::config::Config;
 use crate::data::scene::Scene;
-use crate::surface::fit::Fit;
+use crate::surface::SurfaceMaps;
 use crate::surface::static_map::Reference;
 use serde_json::{Value, json};
 
@@ -99,17 +99,21 @@ pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         // spots
         let reference = Reference::build(&scene.imager, settings.values, target)
             .or_else(|_| Reference::provisional(&scene.imager, settings.values, target))?;
-        let fit = Fit::new(&scene.imager, &scene.observations, &reference);
+        let fit = SurfaceMaps::of_reference(&scene.imager, &scene.observations, &reference);
         if columns.is_empty() {
             columns.push(("cycle".to_owned(), cycles(&scene)));
         }
-        let of =
-            |f: &dyn Fn(&crate::surface::FilteredVelocity) -> f64| fit.velocities.iter().map(f).collect::<Vec<f64>>();
-        columns.push((format!("{name}_observed_kms"), of(&|v| v.observed.value_kms)));
-        columns.push((format!("{name}_filtered_kms"), of(&|v| v.filtered_kms())));
-        report.number(&format!("{name}_filtered_rms_kms"), fit.summary.filtered_rv_rms_kms);
+        let of = |f: &dyn Fn(&crate::surface::VelocityWithoutSpots) -> f64| {
+            fit.velocities.iter().map(f).collect::<Vec<f64>>()
+        };
+        columns.push((format!("{name}_observed_kms"), of(&|v| v.moments.observed.value_kms)));
+        columns.push((format!("{name}_filtered_kms"), of(&|v| v.moments.filtered_kms())));
+        report.number(&format!("{name}_filtered_rms_kms"), fit.summary.filtered_rv_rms_kms.unwrap_or(f64::NAN));
         report.number(&format!("{name}_observed_rms_kms"), fit.summary.observed_rv_rms_kms);
-        report.number(&format!("{name}_spottedness"), fit.summary.spottedness);
+        report.number(
+            &format!("{name}_spottedness"),
+            fit.summary.image.as_ref().map_or(f64::NAN, |image| image.spottedness),
+        );
         report.number(&format!("{name}_chi2_per_datum"), fit.summary.chi2_per_datum);
     }
     report.columns = columns.iter().map(|(name, _)| name.clone()).collect();

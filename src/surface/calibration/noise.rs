@@ -16,10 +16,10 @@ use crate::inference::first_look::Scatter;
 use crate::model::{Parameter, ParameterValues};
 use crate::star::StarSettings;
 use crate::star::observation::Observations;
-use crate::surface::imaging::Imager;
-use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
 use crate::surface::ReferenceError;
+use crate::surface::imaging::Imager;
 use crate::surface::static_map::Reference;
+use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

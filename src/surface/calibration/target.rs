@@ -7,11 +7,11 @@
 //! shrinks at the lambda beyond which noise is turned into spots, which with the right model and errors it does not,
 //! that lambda is the end.
 
-use crate::surface::static_map::reference::{PROVISIONAL_LAMBDA, Reference, ReferenceError};
 use crate::maxent::{Goal, Problem, Solution, Solver, SolverSettings, Start};
 use crate::model::ParameterValues;
 use crate::star::observation::Profile;
 use crate::surface::imaging::Imager;
+use crate::surface::static_map::reference::{PROVISIONAL_LAMBDA, Reference, ReferenceError};
 use serde::{Deserialize, Serialize};
 
 /// The velocities stop shrinking where a doubling of lambda leaves this much of them.

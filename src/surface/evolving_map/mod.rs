@@ -25,6 +25,7 @@ mod forecast;
 mod known;
 mod light;
 mod maps;
+mod nights;
 mod optimum;
 mod planned;
 mod posterior;

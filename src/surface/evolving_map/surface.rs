@@ -1,6 +1,6 @@
 //! The evolving map behind the interface of all surface models.
 
-use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, fit, optimum};
+use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, fit, nights, optimum};
 use crate::field::{Field, Lifetime};
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters};
@@ -9,11 +9,12 @@ use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
 use crate::surface::density::Density;
 use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
-use crate::surface::fit::explained;
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
-use crate::surface::{At, AtTarget, Explained, Linearised, OrbitOf, SpotField, SurfaceError, SurfaceModel};
+use crate::surface::{
+    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, SpotField, SurfaceError, SurfaceMaps, SurfaceModel,
+};
 use std::sync::Arc;
 
 /// Spots that come and go: a Gaussian field, marginalised.
@@ -107,7 +108,7 @@ impl SurfaceModel for EvolvingMap {
     }
 
     fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained {
-        explained(imager, observations, here.kept())
+        nights::explained(imager, observations, here.kept())
     }
 
     /// What has to be known of the field.
@@ -123,6 +124,20 @@ impl SurfaceModel for EvolvingMap {
             })
         };
         field.at_bounds.iter().map(reached).collect()
+    }
+
+    fn evolves(&self) -> bool {
+        true
+    }
+
+    fn maps(
+        &self,
+        imager: &Imager,
+        observations: &Observations,
+        values: ParameterValues,
+        times_d: Option<&[f64]>,
+    ) -> Result<SurfaceMaps, NoMaps> {
+        SurfaceMaps::of_field(imager, observations, values, self.known, times_d)
     }
 
     fn begins_with_blind_search(&self) -> bool {

@@ -4,6 +4,7 @@
 mod counted;
 mod density;
 mod likelihood;
+mod maps;
 mod optimum;
 pub mod posterior;
 mod prediction;

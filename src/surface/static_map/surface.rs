@@ -10,11 +10,12 @@ use crate::star::observation::Observations;
 use crate::surface::density::Density;
 use crate::surface::evolving_map::{Change, Known, NoFit};
 use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
-use crate::surface::fit::Fit;
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
-use crate::surface::{At, AtTarget, Explained, Linearised, ObjectiveKind, OrbitOf, SurfaceError, SurfaceModel};
+use crate::surface::{
+    At, AtTarget, Explained, Linearised, NoMaps, ObjectiveKind, OrbitOf, SurfaceError, SurfaceMaps, SurfaceModel,
+};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -100,7 +101,9 @@ impl SurfaceModel for StaticMap {
     }
 
     fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained {
-        let Fit { velocities, summary, checks, .. } = Fit::new(imager, observations, here.kept());
+        let SurfaceMaps { velocities, summary, checks, .. } =
+            SurfaceMaps::of_reference(imager, observations, here.kept());
+        let velocities = velocities.into_iter().map(|velocity| velocity.moments).collect();
         Explained { velocities, chi2_per_datum: summary.chi2_per_datum, misfit: checks.warnings }
     }
 
@@ -136,6 +139,21 @@ impl SurfaceModel for StaticMap {
             ));
         }
         remarks
+    }
+
+    fn evolves(&self) -> bool {
+        false
+    }
+
+    fn maps(
+        &self,
+        imager: &Imager,
+        observations: &Observations,
+        values: ParameterValues,
+        _: Option<&[f64]>,
+    ) -> Result<SurfaceMaps, NoMaps> {
+        let reference = Reference::build(imager, values, self.chi2_target)?;
+        Ok(SurfaceMaps::of_reference(imager, observations, &reference))
     }
 
     fn begins_with_blind_search(&self) -> bool {

@@ -16,11 +16,11 @@ mod fit;
 pub use fit::{BesideOrbit, Scatter};
 
 use crate::model::{Parameter, ParameterValues};
+use crate::surface::ReferenceError;
 use crate::surface::expansion::{Expansion, velocity_slopes};
 use crate::surface::imaging::Imager;
-use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
-use crate::surface::ReferenceError;
 use crate::surface::static_map::Reference;
+use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
 use serde::{Deserialize, Serialize};
 
 /// Zero points are first counted as this many times what photon noise makes of the velocity of a profile.

@@ -7,7 +7,7 @@
 //! and neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many
 //! fewer. What the map itself takes up is spread evenly here.
 
-use super::Residual;
+use super::maps::Residual;
 use crate::numerics::json::number_or_null;
 use crate::numerics::normal::cumulative;
 use serde::{Deserialize, Serialize};

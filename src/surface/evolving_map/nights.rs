@@ -1,0 +1,251 @@
+//! The maps of an evolving star held against the data: the field fitted, its most probable map and standard deviation at
+//! any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
+
+use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
+use crate::field::{Field, FieldError, Kernel, Lifetime};
+use crate::model::ParameterValues;
+use crate::numerics::vector::{self, Instructions, Task};
+use crate::sampling::log_density::Status;
+use crate::star::observation::Observations;
+use crate::surface::checks::Checks;
+use crate::surface::imaging::{Data, Imager};
+use crate::surface::maps::{Against, MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots, rms, scatter};
+use crate::surface::nuisances::Estimate;
+use crate::surface::{Explained, SpotField};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Profiles further apart than this (d) have maps of their own.
+const NIGHT_GAP_D: f64 = 0.5;
+
+/// Maps of a larger chi2 per datum do not explain the profiles: those of a right star and right errors have some 0.9.
+const WORST_CHI2: f64 = 2.0;
+
+impl SurfaceMaps {
+    /// Fits the field of the star at `values` to the `observations` that `imager` was made for, but for what is
+    /// `known` of it. Maps are those of `times_d`, by default of each night, or one where the spots are static.
+    ///
+    /// # Errors
+    /// [`NoMaps`].
+    #[doc(hidden)]
+    pub fn of_field(
+        imager: &Imager,
+        observations: &Observations,
+        values: ParameterValues,
+        known: Known,
+        times_d: Option<&[f64]>,
+    ) -> Result<Self, NoMaps> {
+        let times_d = times_d.map(in_order).transpose()?;
+        let basis = Basis::new(&imager.grid);
+        let fitted = fit(imager, &basis, values, known, None)?;
+        if let Some(amplitude) = fitted.too_faint() {
+            return Err(NoMaps::TooFaint(amplitude));
+        }
+        let marginal = &fitted.marginal;
+        let settled = &marginal.settled;
+        let modelled = Modelled::of(imager, &basis, marginal, &settled.coefficients);
+        let of_static = of_static(imager, &basis, marginal);
+        let times_d = times_d.unwrap_or_else(|| match is_static(marginal) {
+            true => vec![mean(&observations.times_d())],
+            false => nights(&observations.times_d()),
+        });
+        let maps = Maps::at(settled, &basis, &times_d);
+        let map = |(k, time_d): (usize, &f64)| SurfaceMap {
+            time_d: Some(*time_d),
+            pixels: maps.filling.column(k).iter().copied().collect(),
+            sigma: Some(maps.sd.column(k).iter().copied().collect()),
+        };
+        let mut warnings = reached(&fitted);
+        warnings.extend(far(&times_d, observations, &marginal.assumed.field.kernel));
+        let against = Against::new(imager, observations, marginal.values, &modelled.depths());
+        let velocities = velocities(imager, &basis, marginal, &against).map_err(NoFit::from)?;
+        let [rv, sigma] =
+            [0, 1].map(|i| velocities.iter().map(move |v| v.marginalised_kms.map_or(f64::NAN, |rv| rv[i])));
+        let per_datum = |modelled: &Modelled| {
+            let against = Against::new(imager, observations, marginal.values, &modelled.depths());
+            against.chi2() / observations.len() as f64
+        };
+        let summary = MapSummary {
+            rv_rms_kms: Some(scatter(rv)),
+            rv_error_kms: Some(rms(sigma)),
+            chi2_per_datum_unchanging: of_static.as_ref().map(per_datum),
+            ..against.summary(Status::Converged, against.chi2())
+        };
+        if summary.chi2_per_datum > WORST_CHI2 {
+            warnings.push(format!(
+                "the maps do not explain the profiles: chi2 is {:.2} per datum. star.vsini_kms, star.line or the \
+                errors are wrong; observations.sigma_scale \"auto\" measures these",
+                summary.chi2_per_datum
+            ));
+        }
+        let counted = |counted: bool| modelled.estimates.iter().filter(move |_| counted);
+        let nuisances = &imager.data.nuisances;
+        Ok(SurfaceMaps {
+            maps: times_d.iter().enumerate().map(map).collect(),
+            nuisances: counted(nuisances.has_line_and_continuum()).map(|found| found.line_and_continuum).collect(),
+            zero_points_kms: counted(marginal.assumed.jitter_kms > 0.0).map(|found| found.zero_point_kms).collect(),
+            light: marginal.light_curves(imager),
+            trade_off: Vec::new(),
+            field: Some(SpotField::of(&fitted)),
+            model: modelled.intensities(),
+            static_model: of_static.map(|modelled| modelled.intensities()),
+            velocities,
+            checks: Checks::of_flexible(&against.residuals, &imager.profiles_of_sets(), imager.data.correlated_bins),
+            warnings,
+            summary,
+        })
+    }
+}
+
+/// The profiles as the most probable maps of a field explain them.
+pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &Fitted) -> Explained {
+    let marginal = &fitted.marginal;
+    let modelled = Modelled::of(imager, &Basis::new(&imager.grid), marginal, &marginal.settled.coefficients);
+    let against = Against::new(imager, observations, marginal.values, &modelled.depths());
+    let sets = imager.profiles_of_sets();
+    Explained {
+        chi2_per_datum: against.chi2() / observations.len() as f64,
+        misfit: Checks::of_flexible(&against.residuals, &sets, imager.data.correlated_bins).warnings,
+        velocities: against.moments,
+    }
+}
+
+/// What is to be said of bounds that the field reached.
+fn reached(fitted: &Fitted) -> Vec<String> {
+    let said = |name: &&str| {
+        format!("{name} lies on the bound of its search: the profiles do not tell it, or something else is wrong")
+    };
+    fitted.at_bounds.iter().map(said).collect()
+}
+
+/// What is to be said of times of which the profiles tell little: those where the spots have less than this
+/// correlation with those of any profile.
+const FORGOTTEN: f64 = 0.1;
+
+fn far(times_d: &[f64], observations: &Observations, kernel: &Kernel) -> Option<String> {
+    let nearest =
+        |time_d: f64| observations.profiles.iter().map(|p| (p.time_d - time_d).abs()).fold(f64::MAX, f64::min);
+    let far: Vec<String> =
+        times_d.iter().filter(|t| kernel.at(nearest(**t)) < FORGOTTEN).map(|t| format!("{t:.2}")).collect();
+    let [first, last] = observations.time_span_d()?;
+    (!far.is_empty()).then(|| {
+        format!(
+            "the profiles, of {first:.2} to {last:.2} d, tell little of the star at {} d: spots do not live that long",
+            far.join(", ")
+        )
+    })
+}
+
+/// Times (d) at which maps are asked for, from the first to the last.
+fn in_order(times_d: &[f64]) -> Result<Vec<f64>, NoMaps> {
+    /// Beyond it (d) a time has no fractions of an hour in double precision.
+    const FARTHEST_D: f64 = 1e12;
+    let mut times_d = times_d.to_vec();
+    times_d.sort_by(f64::total_cmp);
+    match times_d.as_slice() {
+        [] => Err(NoMaps::Times("there is none; give one or more, in days as in the list of profiles")),
+        times if times.iter().any(|t| t.is_nan() || t.abs() > FARTHEST_D) => {
+            Err(NoMaps::Times("each must be a number of days, as in the list of profiles"))
+        }
+        times if times.windows(2).any(|pair| pair[0] == pair[1]) => {
+            Err(NoMaps::Times("one is there twice; give each time once"))
+        }
+        _ => Ok(times_d),
+    }
+}
+
+fn is_static(marginal: &Marginal) -> bool {
+    marginal.assumed.field.kernel.lifetime == Lifetime::Static
+}
+
+/// Mean times (d) of the nights.
+fn nights(times_d: &[f64]) -> Vec<f64> {
+    let mut times_d = times_d.to_vec();
+    times_d.sort_by(f64::total_cmp);
+    times_d.chunk_by(|a, b| b - a <= NIGHT_GAP_D).map(mean).collect()
+}
+
+fn mean(x: &[f64]) -> f64 {
+    // of times near each other, far from 0
+    x[0] + x.iter().map(|x_k| x_k - x[0]).sum::<f64>() / x.len() as f64
+}
+
+/// Model profiles of the most probable maps.
+struct Modelled {
+    /// All profiles, one after the other, nuisances included.
+    depth: Vec<f64>,
+    bins: Vec<std::ops::Range<usize>>,
+    estimates: Vec<Estimate>,
+}
+
+impl Modelled {
+    /// Of maps of these coefficients (H, profiles).
+    fn of(imager: &Imager, basis: &Basis, marginal: &Marginal, coefficients: &DMatrix<f64>) -> Self {
+        let response = marginal.design.response();
+        let mut depth = response.depths_of_each(&marginal.design.brightness(basis, coefficients));
+        let slopes: Vec<f64> =
+            marginal.slopes(imager, basis, &[]).iter().flat_map(|slopes| slopes.iter().copied()).collect();
+        let with_jitter = imager.clone().with_zero_points(marginal.assumed.jitter_kms, &slopes);
+        let bins: Vec<_> = (0..response.profiles()).map(|k| response.bins(k)).collect();
+        let residual: Vec<f64> = depth.iter().zip(&imager.data.depth).map(|(model, data)| model - data).collect();
+        let mut weighted = vec![0.0; residual.len()];
+        vector::run(Weigh { data: &with_jitter.data, bins: &bins, residual: &residual, weighted: &mut weighted });
+        let nuisances = &with_jitter.data.nuisances;
+        let estimates = bins.iter().map(|bins| nuisances.estimate(bins.clone(), &weighted, &mut depth)).collect();
+        Modelled { depth, bins, estimates }
+    }
+
+    fn depths(&self) -> Vec<&[f64]> {
+        self.bins.iter().map(|bins| &self.depth[bins.clone()]).collect()
+    }
+
+    fn intensities(&self) -> Vec<Vec<f64>> {
+        self.depths().iter().map(|depth| depth.iter().map(|d| 1.0 - d).collect()).collect()
+    }
+}
+
+/// `W (model - data)` of all profiles.
+struct Weigh<'a> {
+    data: &'a Data,
+    bins: &'a [std::ops::Range<usize>],
+    residual: &'a [f64],
+    weighted: &'a mut [f64],
+}
+
+impl Task for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self, i: I) {
+        for bins in self.bins {
+            self.data.weigh(i, bins.clone(), self.residual, self.weighted);
+        }
+    }
+}
+
+/// Model profiles of static spots.
+fn of_static(imager: &Imager, basis: &Basis, marginal: &Marginal) -> Option<Modelled> {
+    let Marginal { values, design, assumed, .. } = marginal;
+    if is_static(marginal) {
+        return None;
+    }
+    let field = Field { kernel: Kernel::of(Lifetime::Static), ..assumed.field };
+    let assumed = Assumed { field, ..*assumed };
+    let still = Marginal::new(imager, basis, Arc::clone(design), *values, assumed, None).ok()?;
+    Some(Modelled::of(imager, basis, &still, &still.settled.coefficients))
+}
+
+/// The velocities of the profiles, marginalised over maps.
+fn velocities(
+    imager: &Imager,
+    basis: &Basis,
+    marginal: &Marginal,
+    against: &Against,
+) -> Result<Vec<VelocityWithoutSpots>, FieldError> {
+    let free = marginal.known_zero_points(imager, basis, &[])?.velocities(&[]).radial_velocities().ok();
+    let velocity = |(k, moments)| {
+        let (rv_kms, variance) = free.as_ref().map_or((f64::NAN, f64::NAN), |(v, c)| (v[k], c[(k, k)]));
+        VelocityWithoutSpots { moments, marginalised_kms: Some([rv_kms, variance.sqrt()]) }
+    };
+    Ok(against.moments.iter().copied().enumerate().map(velocity).collect())
+}

@@ -1,0 +1,306 @@
+//! The maps that a surface model finds, and what they make of the profiles: model profiles, radial velocities before and
+//! after the spots are taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is judged.
+
+use super::checks::Checks;
+use super::evolving_map::{FluxFit, NoFit};
+use super::imaging::Imager;
+use super::nuisances::LineAndContinuum;
+use super::static_map::ReferenceError;
+use super::{FilteredVelocity, SpotField};
+use crate::model::ParameterValues;
+use crate::numerics::json::number_or_null;
+use crate::sampling::log_density::Status;
+use crate::star::observation::{Observations, Profile};
+use serde::{Deserialize, Serialize};
+
+/// Maps of a star, and what they make of the data.
+#[derive(Clone, Debug)]
+pub struct SurfaceMaps {
+    /// The maps in the order of time: one, one a season, or one at each time asked for.
+    pub maps: Vec<SurfaceMap>,
+    /// Model intensity of every bin, one vector a profile, in units of the continuum; with its nuisances, where there
+    /// are any.
+    pub model: Vec<Vec<f64>>,
+    /// The same of static spots, where the maps evolve; `None` otherwise, and where such a star has no map.
+    pub static_model: Option<Vec<Vec<f64>>>,
+    /// Radial velocities, one a profile.
+    pub velocities: Vec<VelocityWithoutSpots>,
+    /// Posterior mean of the nuisances of each profile, given its map; empty where none are integrated out.
+    #[doc(hidden)]
+    pub nuisances: Vec<LineAndContinuum>,
+    /// Posterior mean of each profile's velocity offset by the RV jitter (km/s), given its map; empty where there is no
+    /// jitter.
+    pub zero_points_kms: Vec<f64>,
+    /// Light curves, and what the maps make of them; mostly none.
+    #[doc(hidden)]
+    pub light: Vec<FluxFit>,
+    /// Images of other chi2, in order of falling chi2, where there is a target.
+    #[doc(hidden)]
+    pub trade_off: Vec<TradeOffNode>,
+    /// The spots as a field, where they are one.
+    pub field: Option<SpotField>,
+    /// What has to be known of maps and times.
+    pub warnings: Vec<String>,
+    /// The numbers.
+    pub summary: MapSummary,
+    /// Whether the residuals look like noise.
+    #[doc(hidden)]
+    pub checks: Checks,
+}
+
+/// One map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceMap {
+    /// Time (d), of a map that evolves.
+    pub time_d: Option<f64>,
+    /// What the pixels hold: the spot filling factor, below 0 where it is brighter than the photosphere; or the
+    /// brightness.
+    pub pixels: Vec<f64>,
+    /// Its standard deviation, what is assumed of the field held; `None` where there is none.
+    pub sigma: Option<Vec<f64>>,
+}
+
+/// The velocity of one profile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VelocityWithoutSpots {
+    /// Its first moment, and that of the model.
+    pub moments: FilteredVelocity,
+    /// The most likely velocity relative to the systemic one, marginalised over maps, whatever the assumed orbit, and its
+    /// standard error, of which those of other profiles are not independent (km/s); NaN where the data do not bound it,
+    /// `None` where there is one map alone.
+    pub marginalised_kms: Option<[f64; 2]>,
+}
+
+/// How good the fit is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapSummary {
+    /// How the reconstruction ended.
+    pub status: Status,
+    /// chi2.
+    pub chi2: f64,
+    /// chi2 over the number of data.
+    pub chi2_per_datum: f64,
+    /// That of static spots, where the maps evolve; null where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chi2_per_datum_unchanging: Option<f64>,
+    /// The map as one of maximum entropy, where it is one.
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    pub image: Option<ImageSummary>,
+    /// Number of profiles.
+    pub profiles: usize,
+    /// Number of data.
+    pub data: usize,
+    /// Number of pixels.
+    pub pixels: usize,
+    /// Equivalent width of the local line (km/s).
+    pub equivalent_width_kms: f64,
+    /// Brightness of a spot over that of the photosphere.
+    pub contrast: f64,
+    /// The parameters at which the star was reconstructed.
+    pub parameters: ParameterValues,
+    /// Standard deviation of the first moments (km/s).
+    #[serde(deserialize_with = "number_or_null")]
+    pub observed_rv_rms_kms: f64,
+    /// Standard deviation of the first moments, those of the model taken out (km/s), where that means something.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filtered_rv_rms_kms: Option<f64>,
+    /// Root mean square of the errors that photon noise makes in the first moments (km/s).
+    #[serde(deserialize_with = "number_or_null")]
+    pub photon_rv_error_kms: f64,
+    /// Standard deviation of the velocities, marginalised over maps (km/s), where they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rv_rms_kms: Option<f64>,
+    /// Root mean square of their errors (km/s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rv_error_kms: Option<f64>,
+    /// Root mean square of observed minus modelled intensity.
+    pub residual_rms: f64,
+    /// The same over the core of the line: bins where the model is deeper than half its greatest depth.
+    #[serde(deserialize_with = "number_or_null")]
+    pub residual_rms_core: f64,
+    /// Root mean square of the standard errors of the intensities, scaled as the config says.
+    pub sigma_rms: f64,
+}
+
+/// A map of maximum entropy in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ImageSummary {
+    /// Target of chi2.
+    pub chi2_target: f64,
+    /// Lagrange multiplier of chi2 / 2.
+    pub lambda: f64,
+    /// `1 / lambda`.
+    pub alpha: f64,
+    /// Entropy.
+    pub entropy: f64,
+    /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
+    pub spottedness: f64,
+    /// Of an image of bright and dark pixels, what is darker and what is brighter than the photosphere.
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<Deviation>,
+    /// Skilling & Bryan's TEST, 0 at a maximum-entropy image.
+    pub test: f64,
+    /// Applications of the response or its transpose, those for the trade-off curve included.
+    #[serde(alias = "passes")]
+    pub model_applications: u32,
+    /// Newton steps of the last, exact solution.
+    pub newton_steps: usize,
+}
+
+/// Deviation from the brightness of the photosphere, means over the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Deviation {
+    /// Mean of what pixels lack in brightness, 0 for bright ones.
+    pub darkness: f64,
+    /// Mean of what they have too much, 0 for dark ones.
+    pub brightness_excess: f64,
+}
+
+/// One image on the trade-off curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TradeOffNode {
+    /// Lagrange multiplier of chi2 / 2.
+    pub lambda: f64,
+    /// chi2.
+    pub chi2: f64,
+    /// Spottedness.
+    pub spottedness: f64,
+    /// Entropy.
+    pub entropy: f64,
+}
+
+/// Why there are no maps.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoMaps {
+    /// The target chi2 is not reached.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// There is no most probable field.
+    #[error(transparent)]
+    Fit(#[from] NoFit),
+    /// No map can be asked for at these times.
+    #[error("{0}")]
+    Times(&'static str),
+    /// The profiles know no spots.
+    #[error(
+        "the amplitude of the spots falls to the lower bound of its search, {0:.2}: the profiles show no spots; \
+        observations.sigma_scale may be too large"
+    )]
+    TooFaint(f64),
+}
+
+impl NoMaps {
+    /// A name for it; `None` where the error says all.
+    pub fn status(&self) -> Option<&'static str> {
+        match self {
+            NoMaps::Fit(error) => Some(error.status()),
+            NoMaps::TooFaint(_) => Some("amplitude-at-bound"),
+            NoMaps::Times(_) => Some("no-such-times"),
+            NoMaps::Reference(_) => None,
+        }
+    }
+}
+
+/// What is left over in one bin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Residual {
+    /// Depth of the model.
+    pub depth: f64,
+    /// Observed minus modelled intensity.
+    pub difference: f64,
+    /// The same over its standard error.
+    pub scaled: f64,
+}
+
+/// Model profiles against the observed ones.
+pub(super) struct Against<'a> {
+    pub imager: &'a Imager,
+    pub observations: &'a Observations,
+    /// The parameters of the model.
+    pub values: ParameterValues,
+    /// Residuals of every profile, with its time.
+    pub residuals: Vec<(f64, Vec<Residual>)>,
+    /// First moments.
+    pub moments: Vec<FilteredVelocity>,
+}
+
+impl<'a> Against<'a> {
+    /// Of model profiles of these depths.
+    pub fn new(imager: &'a Imager, observations: &'a Observations, values: ParameterValues, depths: &[&[f64]]) -> Self {
+        let state = values.state();
+        let moments = |(profile, depth): (&Profile, &&[f64])| {
+            let cycle = imager.star.cycle(profile.time_d);
+            FilteredVelocity {
+                time_d: profile.time_d,
+                cycle,
+                observed: profile.first_moment(),
+                modelled_kms: profile.first_moment_of(depth),
+                orbit_kms: state.vsys_kms + state.motion.velocity_kms(cycle),
+            }
+        };
+        let moments = observations.profiles.iter().zip(depths).map(moments).collect();
+        Against { imager, observations, values, residuals: residuals(observations, depths), moments }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Residual> {
+        self.residuals.iter().flat_map(|(_, residuals)| residuals)
+    }
+
+    /// chi2.
+    pub fn chi2(&self) -> f64 {
+        self.all().map(|r| r.scaled * r.scaled).sum()
+    }
+
+    /// The numbers that all maps have, of this chi2.
+    pub fn summary(&self, status: Status, chi2: f64) -> MapSummary {
+        let Against { imager, observations, values, moments, .. } = self;
+        let star = imager.star.with(&values.state().surface);
+        let deepest = self.all().map(|r| r.depth).fold(0.0, f64::max);
+        let core = || self.all().filter(|r| r.depth > 0.5 * deepest);
+        MapSummary {
+            status,
+            chi2,
+            chi2_per_datum: chi2 / observations.len() as f64,
+            chi2_per_datum_unchanging: None,
+            image: None,
+            profiles: observations.profiles.len(),
+            data: observations.len(),
+            pixels: imager.grid.len(),
+            equivalent_width_kms: star.line.equivalent_width_kms,
+            contrast: star.contrast,
+            parameters: *values,
+            observed_rv_rms_kms: scatter(moments.iter().map(|v| v.observed.value_kms)),
+            filtered_rv_rms_kms: None,
+            photon_rv_error_kms: rms(moments.iter().map(|v| v.observed.sigma_kms)),
+            rv_rms_kms: None,
+            rv_error_kms: None,
+            residual_rms: rms(self.all().map(|r| r.difference)),
+            residual_rms_core: rms(core().map(|r| r.difference)),
+            sigma_rms: rms(observations.profiles.iter().flat_map(|p| p.sigma.iter().copied())),
+        }
+    }
+}
+
+/// Residuals of every profile, with its time.
+fn residuals(observations: &Observations, depths: &[&[f64]]) -> Vec<(f64, Vec<Residual>)> {
+    let of = |(profile, depths): (&Profile, &&[f64])| {
+        let residual = |((intensity, sigma), depth): ((&f64, &f64), &f64)| {
+            let difference = intensity - (1.0 - depth);
+            Residual { depth: *depth, difference, scaled: difference / sigma }
+        };
+        (profile.time_d, profile.intensity.iter().zip(&profile.sigma).zip(depths.iter()).map(residual).collect())
+    };
+    observations.profiles.iter().zip(depths).map(of).collect()
+}
+
+/// Root mean square.
+pub(super) fn rms(x: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = x.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x * x));
+    (sum / n).sqrt()
+}
+
+/// Root mean square about the mean.
+pub(super) fn scatter(x: impl Iterator<Item = f64> + Clone) -> f64 {
+    let mean = x.clone().sum::<f64>() / x.clone().count() as f64;
+    rms(x.map(|x| x - mean))
+}
