@@ -117,6 +117,7 @@ mod surface;
 #[doc(hidden)]
 pub mod internals {
     #![allow(missing_docs)]
+    // what a program beside the commands needs to behave as they do
     pub mod cli {
         pub use crate::cli::{Global, cluster, console, progress, signals};
     }
