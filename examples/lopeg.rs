@@ -7,10 +7,14 @@
 //! print the tables of `results/lopeg.md`. Chains are kept in `runs/lopeg` and gone on with. The profiles are not part
 //! of this repository: see `configs/lopeg.json` for where they are looked for.
 
+#[path = "reproduce/cases/mod.rs"]
+#[allow(dead_code, unused_imports)]
+mod cases;
+
+use cases::{Case, Failure, Laboratory, Outcome};
+use dimcmc::Pool;
 use dimcmc::internals::data::io::lsd;
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::runs::experiments::{Case, ExperimentError, Laboratory, Outcome, star};
-use dimcmc::internals::runs::pool::Pool;
 use dimcmc::internals::star::Orbit;
 use dimcmc::internals::star::injection::inject;
 use serde_json::{Value, json};
@@ -18,8 +22,6 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-type Failure = Box<dyn std::error::Error>;
 
 /// What a model of the star says more than the plain one: a name, and changes of its config.
 type Model = (&'static str, &'static [(&'static str, fn() -> Value)]);
@@ -85,12 +87,12 @@ fn base() -> Result<Value, Failure> {
         ("/sampler/ess", json!(500)),
         ("/sampler/rhat", json!(1.02)),
     ];
-    Ok(star::with(config, &changes))
+    Ok(cases::with(config, &changes))
 }
 
 fn with(base: &Value, model: &Model) -> Value {
     let changes: Vec<(&str, Value)> = model.1.iter().map(|(key, value)| (*key, value())).collect();
-    star::with(base.clone(), &changes)
+    cases::with(base.clone(), &changes)
 }
 
 fn case(name: &str, config: Value, periodogram: Option<usize>) -> Case {
@@ -103,8 +105,7 @@ fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
     for model in &MODELS {
         let case = case(model.0, with(base, model), Some(10_000));
         let outcome = laboratory.outcomes("models", &[case])?.remove(0);
-        let chain = |name: &str| outcome.chain.as_ref()?.parameters.get(name).copied();
-        let (Some(k), Some(period)) = (chain("k_kms"), chain("porb_over_prot")) else {
+        let (Some(k), Some(period)) = (outcome.by_chain("k_kms"), outcome.by_chain("porb_over_prot")) else {
             println!("| {} | no result: {} |||||||", model.0, outcome.failed.unwrap_or_default());
             continue;
         };
@@ -114,8 +115,8 @@ fn models(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
             "| {} | {:.3} | {:.3} | {:.2} ({:.2} to {:.2}){limit} | {:.2} to {:.2} | {:.2} ({:.2} to {:.2}) | {:.2} | \
             {:.1e} |",
             model.0,
-            outcome.chi2_target,
-            outcome.spottedness,
+            outcome.chi2_target.unwrap_or(f64::NAN),
+            outcome.spottedness.unwrap_or(f64::NAN),
             k.value,
             k.ci68[0],
             k.ci68[1],
@@ -175,11 +176,11 @@ fn injections(laboratory: &Laboratory, base: &Value) -> Result<(), Failure> {
 }
 
 /// What the recommended model finds of an orbit in the profiles that it was put into, its period known.
-fn recovered(laboratory: &Laboratory, base: &Value, orbit: Orbit) -> Result<Outcome, ExperimentError> {
+fn recovered(laboratory: &Laboratory, base: &Value, orbit: Orbit) -> Result<Outcome, Failure> {
     let name = format!("k_{}_p_{}_phi_{}", orbit.k_kms, orbit.porb_over_prot, orbit.phi);
     let config = with(base, &RECOMMENDED);
     let list = injected(laboratory, base, orbit, &name).expect("profiles can be read and written");
-    let mut config = star::with(
+    let mut config = cases::with(
         config,
         &[
             ("/observations/path", json!(list)),

@@ -19,7 +19,7 @@
 //! | `sampling` | log-densities, the affine-invariant ensemble, chains, optimiser, landscapes |
 //! | `posterior` | parameters and priors, images, objectives, fits, what profiles say by themselves |
 //! | `data` | configs, file formats, a config with its observations, a first config |
-//! | `runs` | chains and grids on disk, threads and ranks, merging, batches, exports, the paper's rows |
+//! | `runs` | chains and grids on disk, threads and ranks, merging, batches, exports |
 //! | `figures` | figures of a folder, a page of them |
 //! | `cli` | the commands |
 //!
@@ -117,6 +117,10 @@ mod surface;
 #[doc(hidden)]
 pub mod internals {
     #![allow(missing_docs)]
+    // what a program beside the commands needs to behave as they do
+    pub mod cli {
+        pub use crate::cli::{Global, cluster, console, progress, signals};
+    }
     pub mod data {
         pub use crate::data::*;
     }

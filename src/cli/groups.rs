@@ -7,7 +7,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Begin", &["init", "import", "plan", "simulate", "inject"]),
     ("Image and search", &["map", "periodogram", "limits", "optimise", "grid"]),
     ("Sample", &["sample", "analyse", "compare", "merge", "batch"]),
-    ("Show and pass on", &["plot", "report", "export", "reproduce"]),
+    ("Show and pass on", &["plot", "report", "export"]),
     ("This program", &["schema", "completions", "man", "help"]),
 ];
 

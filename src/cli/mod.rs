@@ -6,10 +6,10 @@
 
 mod analyse;
 mod batch;
-mod cluster;
+pub mod cluster;
 mod compare;
 mod completions;
-mod console;
+pub mod console;
 mod export;
 mod failure;
 mod grid;
@@ -26,18 +26,18 @@ mod output;
 mod periodogram;
 mod plan;
 mod plot;
-mod progress;
+pub mod progress;
 mod report;
 mod report_lines;
-mod reproduce;
 mod sample;
 mod schema;
 mod search;
-mod signals;
+pub mod signals;
 mod simulate;
 
 pub use failure::Failure;
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
@@ -97,7 +97,6 @@ enum Command {
     Compare(compare::Args),
     Merge(merge::Args),
     Batch(batch::Args),
-    Reproduce(reproduce::Args),
     Export(export::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -116,8 +115,24 @@ fn command() -> clap::Command {
 ///
 /// Prints help or what is wrong with the arguments, and ends the process, where that is all there is to do.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let matches = command().get_matches_from(arguments);
+    let matches = match command().try_get_matches_from(arguments) {
+        Ok(matches) => matches,
+        Err(error) => match has_moved(&error) {
+            Some(failure) => return console::end(Err(failure)),
+            None => error.exit(),
+        },
+    };
     console::end(run(&Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit())))
+}
+
+/// Where a command went that is none any more.
+fn has_moved(error: &clap::Error) -> Option<Failure> {
+    match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(name)) if name == "reproduce" => {
+            Some(Failure::input("`dimcmc reproduce` is now `cargo run --release --example reproduce`"))
+        }
+        _ => None,
+    }
 }
 
 /// Runs the command.
@@ -141,7 +156,6 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Compare(args) => compare::run(args, &cli.global),
         Command::Merge(args) => merge::run(args, &cli.global),
         Command::Batch(args) => batch::run(args, &cli.global),
-        Command::Reproduce(args) => reproduce::run(args, &cli.global),
         Command::Export(args) => export::run(args, &cli.global),
         Command::Schema(args) => schema::run(args),
         Command::Completions(args) => completions::run(args),

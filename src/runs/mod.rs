@@ -9,7 +9,7 @@
 //!    [`known_planet`] what is said of a planet of known ephemeris, [`plan`] what profiles not yet taken would show.
 //!    [`log_posterior`] is the density of a chain for samplers elsewhere.
 //! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] holds a chain against a
-//!    landscape, [`experiments`] has the rows of the paper.
+//!    landscape.
 //! 5. [`export`] writes a chain for other programs. A new format is a file of it, and a variant of `Format` in
 //!    `export/mod.rs`.
 
@@ -18,7 +18,6 @@ pub mod blind_search;
 #[cfg(feature = "mpi")]
 pub mod cluster;
 pub mod comparison;
-pub mod experiments;
 pub mod export;
 pub mod grid_scan;
 pub mod known_planet;

@@ -298,3 +298,14 @@ fn what_cannot_be_printed_is_a_failure() {
         assert!(output.status.success() && output.stderr.is_empty(), "{args:?}: {}", text(&output.stderr));
     }
 }
+
+/// What only repeats the paper is a program of its own; whoever looks for it here is told where it is.
+#[test]
+fn a_command_that_moved_says_where() {
+    for args in [&["reproduce", "R1", "--quick"][..], &["--quiet", "reproduce", "--list"], &["help", "reproduce"]] {
+        let output = dimcmc(args, Path::new("."));
+        assert_eq!(output.status.code(), Some(2));
+        let told = "error: `dimcmc reproduce` is now `cargo run --release --example reproduce`\n";
+        assert_eq!(text(&output.stderr), told, "{args:?}");
+    }
+}

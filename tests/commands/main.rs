@@ -30,6 +30,5 @@ mod periodogram;
 mod plan;
 mod plot;
 mod report;
-mod reproduce;
 mod sample;
 mod zero_points;

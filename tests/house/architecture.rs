@@ -48,7 +48,6 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
             "export",
             "merge",
             "batch",
-            "experiments",
         ],
         &["numerics", "star", "maxent", "field", "planets", "sampling", "model", "surface", "inference", "data"],
     ),

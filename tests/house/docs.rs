@@ -274,6 +274,14 @@ fn commands_and_options_exist() {
         for (number, code) in spans {
             let words: Vec<&str> = code.split([' ', '|']).collect();
             if words[0] == "cargo" {
+                let example = words.iter().skip_while(|word| **word != "--example").nth(1);
+                let is_there = |name: &str| {
+                    let paths = [format!("examples/{name}.rs"), format!("examples/{name}/main.rs")];
+                    paths.iter().any(|path| root().join(path).exists())
+                };
+                if let Some(name) = example.filter(|name| **name != "NAME" && !is_there(name)) {
+                    faults.push(format!("{}: no example {name}", place(number)));
+                }
                 continue;
             }
             let at = words.iter().position(|word| *word == "dimcmc");

@@ -31,7 +31,6 @@ const ORDER: &[&str] = &[
     "plot",
     "report",
     "export",
-    "reproduce",
 ];
 
 /// The lines below "Example:" in the help of a command.

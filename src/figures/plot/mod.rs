@@ -1,7 +1,7 @@
 //! Figures of what a folder holds, from its files alone; nothing is computed anew.
 //!
 //! Which figures there are goes by the files: those of `simulate`, `inject`, `map`, `periodogram`, `limits`,
-//! `plan`, `optimise`, `grid`, `sample`, `compare` and `reproduce`.
+//! `plan`, `optimise`, `grid`, `sample` and `compare`.
 
 mod changes;
 mod comparison;
@@ -9,7 +9,6 @@ mod content;
 mod corner;
 mod density;
 mod dynamic;
-mod experiment;
 mod injected;
 mod landscape;
 mod light;
@@ -89,7 +88,7 @@ const ANY: [f64; 2] = [-1e12, 1e12];
 type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 
 /// The files by which a folder is known, with what draws it.
-const KINDS: [(&str, Draw); 10] = [
+const KINDS: [(&str, Draw); 9] = [
     (MAP, star_map_figures),
     (io::periodogram::FILE, |folder, _| periodogram::figures(folder)),
     (runs::limits::JSON, |folder, _| limits::figures(folder)),
@@ -98,7 +97,6 @@ const KINDS: [(&str, Draw); 10] = [
     (grid_scan::HEADER, landscape::figures),
     (runs::optimum::FILE, |folder, _| optimum::figures(folder)),
     (runs::comparison::FILE, |folder, _| comparison::figures(folder)),
-    (experiment::FILE, |folder, _| experiment::figures(folder)),
     (truth::FILE, |folder, _| simulation_figures(folder)),
 ];
 
@@ -182,16 +180,6 @@ pub fn write(figure: &Figure, folder: &Path, dpi: f64) -> Result<[String; 2], Wr
     atomic::write(&folder.join(&names[0]), figure.svg().as_bytes())?;
     atomic::write(&folder.join(&names[1]), &figure.png(dpi))?;
     Ok(names)
-}
-
-/// Writes a figure into `folder` as PNG alone; the name of the file.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn write_png(figure: &Figure, folder: &Path, dpi: f64) -> Result<String, WriteError> {
-    let [_, name] = names(figure);
-    atomic::write(&folder.join(&name), &figure.png(dpi))?;
-    Ok(name)
 }
 
 /// The names of a figure's files.

@@ -45,8 +45,6 @@ pub fn symbol(name: &str) -> (&str, &'static str) {
         None if name == "eccentricity2" => ("*e*_{2}", ""),
         None if name == "omega2_deg" => ("*ω*_{2}", "°"),
         None if name == "msini_mjup" => ("*M* sin *i*", "*M*_{Jup}"),
-        // columns of the experiments' tables
-        None if name == "assumed_deg" => ("assumed *i*", "°"),
         None => (name, ""),
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError
             TruthFile::Injected(truth) => injection::injection(&truth),
             TruthFile::Simulated(truth) => simulation(&truth),
         },
-        // experiments are figures and no more
+        // figures and no more
         _ => Chapter::default(),
     })
 }

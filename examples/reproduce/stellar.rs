@@ -3,13 +3,11 @@
 //! The chain starts three standard deviations off in each of them. A landscape over the orbit alone, all else at its
 //! injected value, says how many nodes a grid over all of them would take.
 
-use super::case;
-use super::laboratory::{ExperimentError, Laboratory};
-use super::report::{Drawn, Report};
-use super::star::{paper, with};
-use crate::model::Parameter;
-use crate::runs::comparison::{Comparison, Pair};
-use crate::sampling::landscape::Rule;
+use crate::cases::{ENDS, Estimate, Failure, Laboratory, Nodes, case, paper, with};
+use crate::report::{Drawn, Report};
+use dimcmc::Parameter;
+use dimcmc::internals::runs::comparison::{Comparison, Pair};
+use dimcmc::internals::sampling::landscape::Rule;
 use serde_json::{Value, json};
 
 /// A parameter of the star: where the config has it, its injected value, how far off the start is, prior.
@@ -67,11 +65,11 @@ const STELLAR: [Stellar; 4] = [
 const COSTS: [&str; 3] = ["dimensions", "chain_reconstructions", "nodes_of_a_grid"];
 
 /// R12.
-pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn stellar(laboratory: &Laboratory) -> Result<Report, Failure> {
     let names: Vec<&str> =
         Parameter::ALL.iter().filter(|&&p| p != Parameter::Vsys && !p.is_surface()).map(|p| p.name()).collect();
-    let ends = ["true", "median", "low68", "high68", "low95", "high95"];
-    let of_one = |name: &&str| ends.map(|end| format!("{name}_{end}"));
+    let ends = || ["true"].into_iter().chain(ENDS);
+    let of_one = |name: &&str| ends().map(|end| format!("{name}_{end}")).collect::<Vec<_>>();
     let mut report = Report::new(COSTS.map(String::from).into_iter().chain(names.iter().flat_map(of_one)));
     for free in [2, 4] {
         let dimensions = 3 + free;
@@ -84,7 +82,7 @@ pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError
         (laboratory.report)(&format!("R12, {dimensions} parameters: landscape of the orbit"));
         let (conditional, found) =
             case::search(&config(laboratory, &[], false), &folder.join("config.json"), laboratory.pool)?;
-        let grid = case::Nodes::Around(laboratory.full_or_quick(9, 5)).grid(&found.optimum);
+        let grid = Nodes::Around(laboratory.full_or_quick(9, 5)).grid(&found.optimum);
         let (grid, _) = case::landscape(&conditional, found, grid, &folder.join("grid"), laboratory.pool)?;
         let comparison = Comparison::of(&Pair::read(&folder.join("chain"), &folder.join("grid"))?, Rule::default())?;
         let truth = &scene.truth.expect("the star is simulated");
@@ -94,13 +92,12 @@ pub(super) fn stellar(laboratory: &Laboratory) -> Result<Report, ExperimentError
         let (mut inside, mut all) = (0, 0);
         for name in &names {
             let injected = truth[Parameter::from_name(name).expect("a parameter's own name")];
-            match chain.parameters.get(*name) {
-                Some(one) => {
-                    row.extend([injected, one.value, one.ci68[0], one.ci68[1], one.ci95[0], one.ci95[1]]);
-                    inside += usize::from(one.ci95[0] <= injected && injected <= one.ci95[1]);
-                    all += 1;
-                }
-                None => row.extend([injected, f64::NAN, f64::NAN, f64::NAN, f64::NAN, f64::NAN]),
+            let estimate = chain.parameters.get(*name);
+            row.push(injected);
+            row.extend(Estimate::numbers(estimate));
+            if let Some(one) = estimate {
+                inside += usize::from(one.ci95[0] <= injected && injected <= one.ci95[1]);
+                all += 1;
             }
         }
         report.row(row);

@@ -4,33 +4,27 @@
 //! Grid and chain share the search for the reference. Where the star is modelled wrongly the target chi2 may be out of
 //! reach; then it is raised to what is in reach, as an observer would, and the outcome says so.
 
-use super::laboratory::ExperimentError;
-use super::outcome::{Estimate, Outcome, Route};
-use super::star::with;
-use crate::data::config::{Config, GridSettings};
-use crate::data::io::atomic::write_json;
-use crate::data::io::paraboloid::ParaboloidFile;
-use crate::data::scene::Scene;
-use crate::inference::detection::{Detection, DetectionSettings};
-use crate::inference::search;
-use crate::inference::search::{Found, SearchError};
-use crate::model::Parameter;
-use crate::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
-use crate::runs::grid_scan::{GridScan, GridScanError, PARABOLOID};
-use crate::runs::pool::Pool;
-use crate::runs::run::{CHAIN, Run, RunError, StartFrom};
-use crate::sampling::chain::Summary;
-use crate::sampling::ensemble::StopReason;
-use crate::sampling::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
-use crate::sampling::optimise::Optimum;
-use crate::surface::ReferenceError;
-use crate::surface::SurfaceSettings;
-use crate::surface::expansion::nuisances;
-use crate::surface::record::by_name;
-use crate::surface::static_map::Posterior;
-use crate::surface::static_map::Reference;
+use super::{Estimate, Failure, Interrupted, Outcome, Route, with};
+use dimcmc::internals::data::config::GridSettings;
+use dimcmc::internals::data::io::atomic::write_json;
+use dimcmc::internals::data::io::paraboloid::ParaboloidFile;
+use dimcmc::internals::inference::detection::{Detection, DetectionSettings};
+use dimcmc::internals::inference::search::{self, SearchError};
+use dimcmc::internals::planets::periodogram::{Frequencies, SearchSettings as PeriodSearch};
+use dimcmc::internals::runs::grid_scan::{GridScan, GridScanError, PARABOLOID};
+use dimcmc::internals::runs::run::CHAIN;
+use dimcmc::internals::sampling::landscape::{Axis, Grid, Rule, Undefined, paraboloid};
+use dimcmc::internals::surface::ReferenceError;
+use dimcmc::internals::surface::SurfaceError;
+use dimcmc::internals::surface::SurfaceSettings;
+use dimcmc::internals::surface::expansion::nuisances;
+use dimcmc::internals::surface::record::by_name;
+use dimcmc::internals::surface::static_map::Posterior;
+use dimcmc::internals::surface::static_map::Reference;
+use dimcmc::{Config, Found, FrequencySettings, Optimum, Parameter, Pool, Run, RunError, Scene, StartFrom, StopReason};
+use dimcmc::{ParameterSummary, Summary};
+use serde::Serialize;
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -45,7 +39,7 @@ const SHORTEST: f64 = 0.3;
 const ABOVE_REACHED: [f64; 5] = [1.05, 1.08, 1.12, 1.2, 1.5];
 
 /// Where the nodes of a grid over K, Porb/Prot and phi are.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Nodes {
     /// So many along each axis, around the best orbit.
     Around(usize),
@@ -54,7 +48,7 @@ pub enum Nodes {
 }
 
 /// One star.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
     /// Name of its folder.
     pub name: String,
@@ -70,39 +64,18 @@ pub struct Case {
 
 impl Case {
     /// Runs it; landscape and chain are kept in `folder`.
-    ///
-    /// # Errors
-    /// [`ExperimentError`].
-    pub fn run(&self, folder: &Path, pool: &Pool) -> Result<Outcome, ExperimentError> {
+    pub fn run(&self, folder: &Path, pool: &Pool) -> Result<Outcome, Failure> {
         write_json(&folder.join("config.json"), &self.config)?;
         match self.tried(folder, pool) {
             // no image, no maximum: that is a result too
-            Err(error) if error.is_of_the_star() => Ok(Outcome { failed: Some(error.to_string()), ..self.nothing() }),
+            Err(error) if is_of_the_star(&error) => {
+                Ok(Outcome { failed: Some(error.to_string()), ..Outcome::default() })
+            }
             tried => tried,
         }
     }
 
-    /// An outcome without any result.
-    fn nothing(&self) -> Outcome {
-        Outcome {
-            config: self.config.clone(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            failed: None,
-            truth: BTreeMap::new(),
-            chi2_target: f64::NAN,
-            lambda_data: f64::NAN,
-            spottedness: f64::NAN,
-            search_reconstructions: 0,
-            search_seconds: 0.0,
-            grid: None,
-            chain: None,
-            k_upper95_kms: None,
-            periodogram: None,
-            false_alarm: None,
-        }
-    }
-
-    fn tried(&self, folder: &Path, pool: &Pool) -> Result<Outcome, ExperimentError> {
+    fn tried(&self, folder: &Path, pool: &Pool) -> Result<Outcome, Failure> {
         let began = Instant::now();
         let (scene, found) = search(&self.config, &folder.join("config.json"), pool)?;
         let search_seconds = began.elapsed().as_secs_f64();
@@ -111,12 +84,12 @@ impl Case {
         let ends = found.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok());
         let mut outcome = Outcome {
             truth: scene.truth.map(|values| by_name(&values)).unwrap_or_default(),
-            chi2_target: scene.settings.imaging.chi2_target.value(),
-            lambda_data: image.map_or(f64::NAN, |image| image.image.lambda * data),
-            spottedness: image.map_or(f64::NAN, |image| image.spottedness),
+            chi2_target: Some(scene.settings.imaging.chi2_target.value()),
+            lambda_data: image.map(|image| image.image.lambda * data),
+            spottedness: image.map(|image| image.spottedness),
             search_reconstructions: ends.map(|end| end.evaluations).sum::<usize>() + found.optimum.evaluations,
             search_seconds,
-            ..self.nothing()
+            ..Outcome::default()
         };
         if let Some(nodes) = &self.grid {
             let grid = nodes.grid(&found.optimum);
@@ -135,9 +108,17 @@ impl Case {
     }
 }
 
+/// Whether it lies in the star: one that cannot be imaged, or has no best orbit, is a result of an experiment.
+pub fn is_of_the_star(error: &Failure) -> bool {
+    error.is::<SearchError>()
+        || error.is::<ReferenceError>()
+        || error.is::<SurfaceError>()
+        || matches!(error.downcast_ref(), Some(RunError::UnresolvedSpots(_) | RunError::PriorStart))
+}
+
 impl Nodes {
     /// The grid; the best orbit is where the curvature is known.
-    pub(super) fn grid(&self, optimum: &Optimum) -> Grid {
+    pub fn grid(&self, optimum: &Optimum) -> Grid {
         let orbit = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
         let axis = |(i, parameter): (usize, &Parameter)| {
             let periodic = *parameter == Parameter::Phi;
@@ -161,11 +142,11 @@ impl Nodes {
 }
 
 /// The star of a config, and the best parameters there; its target chi2 is raised if it is out of reach.
-pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found), ExperimentError> {
+pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found), Failure> {
     let found = |scene: Scene| match search::find(&scene.imager, &scene.space, scene.settings.search(), &|_| ()) {
         Ok(found) => Ok(Ok((scene, found))),
         Err(SearchError::Reference(error)) => Ok(Err(error)),
-        Err(error) => Err(error),
+        Err(error) => Err(Failure::from(error)),
     };
     let mut last = match found(Scene::new(&Config::at(config.clone(), path))?)? {
         Ok(found) => return Ok(found),
@@ -180,7 +161,7 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
     let reached = reached / first.imager.data.depth.len() as f64;
     for factor in ABOVE_REACHED {
         if pool.stopped() {
-            return Err(ExperimentError::Interrupted);
+            return Err(Interrupted.into());
         }
         let target = json!((1e4 * factor * reached).round() / 1e4);
         match found(Scene::new(&Config::at(with(config.clone(), &[("/imaging/chi2_target", target)]), path))?)? {
@@ -198,12 +179,12 @@ pub fn landscape(
     grid: Grid,
     folder: &Path,
     pool: &Pool,
-) -> Result<(Route, GridScan), ExperimentError> {
+) -> Result<(Route, GridScan), Failure> {
     let began = Instant::now();
     let names: Vec<String> = grid.names().map(str::to_owned).collect();
     let free = scene.settings.free.iter().filter(|f| names.iter().any(|name| name == f.parameter.name()));
     let plan = GridSettings { free: free.copied().collect(), grid };
-    std::fs::create_dir_all(folder).map_err(|source| ExperimentError::Folder { path: folder.into(), source })?;
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     // one that was stopped goes on
     let mut survey = match GridScan::resume(scene, &plan, folder) {
         Err(GridScanError::Origin(_)) => GridScan::begin(scene, &plan, found, folder, true)?,
@@ -211,29 +192,25 @@ pub fn landscape(
     };
     let resumed = !survey.landscape.nodes().is_empty();
     if !survey.go(pool, |_| ())? {
-        return Err(ExperimentError::Interrupted);
+        return Err(Interrupted.into());
     }
     let fitted = paraboloid(&survey.landscape, Rule::default());
     let truth = survey.header.origin.truth.as_ref();
     ParaboloidFile::new(&plan.grid, Rule::default(), truth, &fitted).write(&folder.join(PARABOLOID))?;
+    let vertex = |(name, one): (&String, &dimcmc::internals::sampling::landscape::Estimate)| {
+        (name.clone(), Estimate::gaussian(one.vertex, one.error))
+    };
     let route = Route {
         note: fitted.as_ref().err().map(Undefined::to_string),
-        parameters: fitted.ok().map(|fitted| vertex(&fitted)).unwrap_or_default(),
+        parameters: fitted.map(|fitted| fitted.parameters.iter().map(vertex).collect()).unwrap_or_default(),
         reconstructions: survey.landscape.nodes().len(),
-        seconds: if resumed { f64::NAN } else { began.elapsed().as_secs_f64() },
+        seconds: (!resumed).then(|| began.elapsed().as_secs_f64()),
     };
     Ok((route, survey))
 }
 
-fn vertex(fitted: &Paraboloid) -> BTreeMap<String, Estimate> {
-    let estimate = |(name, one): (&String, &crate::sampling::landscape::Estimate)| {
-        (name.clone(), Estimate::gaussian(one.vertex, one.error))
-    };
-    fitted.parameters.iter().map(estimate).collect()
-}
-
 /// The chain, kept in `folder`, and its summary.
-pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, Summary), ExperimentError> {
+pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, Summary), Failure> {
     let began = Instant::now();
     let resumed = folder.join(CHAIN).exists();
     let mut run = match Run::resume(scene, folder, None, pool) {
@@ -241,34 +218,30 @@ pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<
         resumed => resumed?,
     };
     if run.go(pool, |_, _| ())? == StopReason::Interrupted {
-        return Err(ExperimentError::Interrupted);
+        return Err(Interrupted.into());
     }
     let (summary, _) = run.manifest.summarise(&scene.settings, &run.chain)?;
-    let estimate = |one: &crate::sampling::chain::summary::ParameterSummary| Estimate {
-        value: one.median,
-        ci68: one.ci68,
-        ci95: one.ci95,
-    };
+    let estimate = |one: &ParameterSummary| Estimate { value: one.median, ci68: one.ci68, ci95: one.ci95 };
     let route = Route {
         parameters: summary.parameters.iter().map(|(name, one)| (name.clone(), estimate(one))).collect(),
         reconstructions: run.preparation + summary.evaluations,
-        seconds: if resumed { f64::NAN } else { began.elapsed().as_secs_f64() },
+        seconds: (!resumed).then(|| began.elapsed().as_secs_f64()),
         note: (!summary.converged).then(|| "not converged".to_owned()),
     };
     Ok((route, summary))
 }
 
 /// The best orbit of the periodogram, and its false-alarm probability.
-fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentError> {
+fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), Failure> {
     let began = Instant::now();
     let imager = &scene.imager;
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
-        surface: SurfaceSettings::spottedness(scene.settings.imaging.chi2_target.value()),
-        nuisances: nuisances(&scene.settings.free),
         search: PeriodSearch { draws, seed: 1 },
-        eccentric: false,
-        second_planet: false,
+        ..DetectionSettings::of(
+            SurfaceSettings::spottedness(scene.settings.imaging.chi2_target.value()),
+            nuisances(&scene.settings.free),
+        )
     };
     let found = Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?;
     let (peak, orbit) = (&found.best, &found.best.orbit);
@@ -285,7 +258,7 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentEr
     let route = Route {
         parameters: estimates.into_iter().filter_map(estimate).collect(),
         reconstructions: 1 + found.rounds,
-        seconds: began.elapsed().as_secs_f64(),
+        seconds: Some(began.elapsed().as_secs_f64()),
         note: peak.on_edge.then(|| "the best period lies on the edge of the search".to_owned()),
     };
     Ok((route, false_alarm))

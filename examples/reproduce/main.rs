@@ -1,13 +1,36 @@
-//! `dimcmc reproduce`: the paper's experiments.
+//! The experiments of Petit et al. (2015), repeated, and a few beyond them.
+//!
+//!     cargo run --release --example reproduce -- --list
+//!     cargo run --release --example reproduce -- R1
+//!
+//! A row of `rows.rs` is data: its stars (`cases::paper` is the paper's, changed key by key), and which of the three
+//! routes to an orbit each of them takes (`cases::Case`): grid and paraboloid, chain, periodogram. A
+//! `cases::Laboratory` runs them and keeps what is done. `results/README.md` puts every number beside the paper's.
 
-use super::signals::Signals;
-use super::{Failure, Global, cluster, console, progress};
-use crate::figures::plot::{self, DPI};
-use crate::numerics::text::shown;
-use crate::runs::experiments::files::{Made, SUMMARY, TABLE};
-use crate::runs::experiments::{ExperimentError, Laboratory, ROWS, Report, Row};
-use crate::runs::run::RunError;
+mod cases;
+mod changing;
+mod coverage;
+mod figure;
+mod images;
+mod landscape;
+mod models;
+mod orbits;
+mod report;
+mod rows;
+mod stellar;
+#[cfg(test)]
+mod tests;
+
+use cases::{Interrupted, Laboratory};
+use clap::Parser as _;
+use dimcmc::internals::cli::{Global, cluster, console, progress, signals::Signals};
+use dimcmc::internals::numerics::text::shown;
+use dimcmc::{Failure, RunError};
+use report::{Made, SUMMARY, TABLE};
+use rows::{ROWS, Row};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::time::Instant;
 
 /// Repeat the experiments of Petit et al. (2015), and a few beyond them
@@ -15,10 +38,11 @@ use std::time::Instant;
 /// Every row of experiments gets a folder with table.csv, summary.json and figures. A row that is there already is left
 /// alone; one that was stopped goes on where it was. Without a ROW, all are done, which takes the better part of an
 /// hour on two cores.
-#[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  dimcmc reproduce R2 --quick --out runs/reproduced --work runs/reproduce_raw\n  \
-                        dimcmc reproduce --list")]
-pub struct Args {
+#[derive(clap::Parser)]
+#[command(name = "reproduce", version, after_help = EXAMPLE)]
+struct Args {
+    #[command(flatten)]
+    global: Global,
     /// Rows: R1 to R12, co-rotation, coverage, models, changing
     #[arg(value_name = "ROW")]
     rows: Vec<String>,
@@ -39,25 +63,28 @@ pub struct Args {
     list: bool,
 }
 
-/// Runs the command.
-pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
-    let rows = rows(&args.rows)?;
-    if args.list {
-        for row in rows {
-            console::line(format_args!("{:<11}  {}", row.name, row.title));
-            if !row.paper.is_empty() {
-                console::line(format_args!("{:<11}  paper: {}", "", row.paper));
-            }
-        }
+/// How the program is called.
+const COMMAND: &str = "cargo run --release --example reproduce --";
+
+const EXAMPLE: &str = "Example:\n  cargo run --release --example reproduce -- R2 --quick --out runs/reproduced --work \
+                       runs/reproduce_raw\n  cargo run --release --example reproduce -- --list";
+
+fn main() -> ExitCode {
+    console::end(run(&Args::parse())).into()
+}
+
+fn run(args: &Args) -> Result<(), Failure> {
+    if cluster::join(&args.global)? == cluster::Done::Everything {
         return Ok(());
     }
-    let or = |given: &Option<PathBuf>, full: &str, quick: &str| {
-        given.clone().unwrap_or_else(|| PathBuf::from(if args.quick { quick } else { full }))
-    };
-    let out = or(&args.out, "results", "runs/quick");
-    let work = or(&args.work, "runs/reproduce", "runs/reproduce_quick");
+    let rows = rows(&args.rows)?;
+    if args.list {
+        console::print(list(&rows));
+        return Ok(());
+    }
+    let [out, work] = args.folders();
     let signals = Signals::catch("reconstruction")?;
-    let pool = cluster::pool(global, &signals);
+    let pool = cluster::pool(&args.global, &signals);
     for row in rows {
         let folder = out.join(row.name);
         if folder.join(SUMMARY).exists() && !args.force {
@@ -70,63 +97,63 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             continue;
         }
         // what is wrong with the folder is to be known before, not after
-        create(&folder)?;
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::failed(format!("{}: {e}", folder.display())))?;
         if args.force {
             remove(&work.join(row.name))?;
         }
-        let spinner = progress::bar(global, None, "begins");
+        let spinner = progress::bar(&args.global, None, "begins");
         let report = |message: &str| spinner.set_message(message.to_owned());
         signals.defer();
         let laboratory = Laboratory { folder: work.clone(), quick: args.quick, pool: &pool, report: &report };
         let began = Instant::now();
-        let result = row.run(&laboratory);
+        let result = (row.run)(&laboratory);
         spinner.finish_and_clear();
-        let result = result.map_err(|error| match error {
-            ExperimentError::Interrupted | ExperimentError::Run(RunError::Interrupted) => {
-                signals.interrupted(format!("{}: {}", row.name, ExperimentError::Interrupted))
-            }
-            error => Failure::failed(format!("{}: {error}", row.name)),
+        let failed = |error| Failure::failed(format!("{}: {error}", row.name));
+        let result = result.map_err(|error| match is_interrupted(&error) {
+            true => signals.interrupted(format!("{}: {Interrupted}", row.name)),
+            false => failed(error),
         })?;
         let made = Made {
-            command: format!("dimcmc reproduce {}{}", row.name, if args.quick { " --quick" } else { "" }),
+            command: format!("{COMMAND} {}{}", row.name, if args.quick { " --quick" } else { "" }),
             quick: args.quick,
             seconds: began.elapsed().as_secs_f64().round(),
             threads: rayon::current_num_threads(),
         };
-        result.write(row, &made, &folder)?;
+        result.write(row, &made, &folder).map_err(Failure::failed)?;
         // without its figures a row is not done
-        let figures = figures(&result, &folder).inspect_err(|_| {
+        let figures = figure::write(&result, row.name, &folder).map_err(|error| {
             let _ = std::fs::remove_file(folder.join(SUMMARY));
+            Failure::failed(error)
         })?;
         let paper = if row.paper.is_empty() { String::new() } else { format!("\n  paper: {}", row.paper) };
         console::print(format_args!("{}: {}{paper}\n{}", row.name, row.title, result.text()));
-        console::line(format_args!(
-            "  in {} s; written: {}: {TABLE}, {SUMMARY}{figures}",
-            made.seconds,
-            shown(&folder)
-        ));
+        let written = [TABLE, SUMMARY].into_iter().chain(figures.iter().map(String::as_str));
+        let written = written.collect::<Vec<_>>().join(", ");
+        console::line(format_args!("  in {} s; written: {}: {written}", made.seconds, shown(&folder)));
     }
     Ok(())
 }
 
-/// Draws the figures of a row into `folder`; their names, each after a comma.
-fn figures(report: &Report, folder: &Path) -> Result<String, Failure> {
-    let mut figures = if report.figure.is_empty() { Vec::new() } else { plot::figures(folder, None)? };
-    for drawn in &report.drawn {
-        for mut figure in plot::figures(&drawn.folder, drawn.chain.as_deref())? {
-            // traces and autocorrelations are for whoever has the chain
-            if figure.name == "corner" || figure.name == "landscape" {
-                figure.name = format!("{}_{}", drawn.name, figure.name);
-                figures.push(figure);
-            }
+impl Args {
+    /// Folders of the results, and of chains and landscapes.
+    fn folders(&self) -> [PathBuf; 2] {
+        let or = |given: &Option<PathBuf>, full: &str, quick: &str| {
+            given.clone().unwrap_or_else(|| PathBuf::from(if self.quick { quick } else { full }))
+        };
+        [or(&self.out, "results", "runs/quick"), or(&self.work, "runs/reproduce", "runs/reproduce_quick")]
+    }
+}
+
+/// Rows with what the paper found.
+fn list(rows: &[&Row]) -> String {
+    let mut lines = String::new();
+    for row in rows {
+        lines += &format!("{:<11}  {}\n", row.name, row.title);
+        if !row.paper.is_empty() {
+            lines += &format!("{:<11}  paper: {}\n", "", row.paper);
         }
     }
-    let mut names = String::new();
-    for figure in &figures {
-        let name = plot::write_png(figure, folder, DPI)?;
-        names.push_str(&format!(", {name}"));
-    }
-    Ok(names)
+    lines
 }
 
 /// The rows of these names, all of them if there is none.
@@ -151,8 +178,13 @@ fn rows(names: &[String]) -> Result<Vec<&'static Row>, Failure> {
 
 /// Whether what is in the folder is the reduced version.
 fn quick_there(folder: &Path) -> Option<bool> {
-    let made: Made = serde_json::from_slice(&std::fs::read(folder.join(SUMMARY)).ok()?).ok()?;
-    Some(made.quick)
+    let made: Value = serde_json::from_slice(&std::fs::read(folder.join(SUMMARY)).ok()?).ok()?;
+    made["quick"].as_bool()
+}
+
+/// Whether a signal stopped it.
+fn is_interrupted(error: &cases::Failure) -> bool {
+    error.is::<Interrupted>() || matches!(error.downcast_ref(), Some(RunError::Interrupted))
 }
 
 fn remove(folder: &Path) -> Result<(), Failure> {
@@ -162,8 +194,4 @@ fn remove(folder: &Path) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
-}
-
-fn create(folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|e| Failure::failed(format!("{}: {e}", folder.display())))
 }

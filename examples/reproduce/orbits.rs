@@ -3,11 +3,9 @@
 //! The orbit is looked for at periods within a factor of 1.4 of the injected one, as the paper's grids did (1.2 to 2.2
 //! for 1.7); the periodogram searches all periods, and so do all routes where there is no planet, and in a part of R9.
 
-use super::case::{Case, Nodes, search};
-use super::laboratory::{ExperimentError, Laboratory};
-use super::outcome::{Estimate, Outcome, Route};
-use super::report::{Panel, Report, Series};
-use super::star::{paper, with};
+use crate::cases::case::search;
+use crate::cases::{Case, Estimate, Failure, Laboratory, Nodes, Outcome, Route, paper, with};
+use crate::report::{Panel, Report, Series};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -62,12 +60,7 @@ fn star(
 }
 
 /// Runs the stars of a row and tabulates them.
-fn tabulated(
-    laboratory: &Laboratory,
-    row: &str,
-    names: &[&str],
-    stars: Vec<Varied>,
-) -> Result<Report, ExperimentError> {
+fn tabulated(laboratory: &Laboratory, row: &str, names: &[&str], stars: Vec<Varied>) -> Result<Report, Failure> {
     let stars = laboratory.some(stars);
     let cases: Vec<Case> = stars.iter().map(|star| star.case.clone()).collect();
     let outcomes = laboratory.outcomes(row, &cases)?;
@@ -138,19 +131,21 @@ fn numbers(outcome: &Outcome) -> Vec<f64> {
                 .map_or([f64::NAN; 3], |e| [e.value, e.ci68[0], e.ci68[1]].map(|x| x + turns(e).unwrap_or(0.0)));
             numbers.extend(three.map(|x| rounded(x, 6)));
         }
-        let cost = route.map_or([f64::NAN; 2], |route| [route.reconstructions as f64, rounded(route.seconds, 3)]);
+        let cost = route.map_or([f64::NAN; 2], |route| {
+            [route.reconstructions as f64, rounded(route.seconds.unwrap_or(f64::NAN), 3)]
+        });
         numbers.extend(cost);
     }
     let others = [
-        outcome.k_upper95_kms.unwrap_or(f64::NAN),
-        outcome.false_alarm.unwrap_or(f64::NAN),
+        outcome.k_upper95_kms,
+        outcome.false_alarm,
         outcome.chi2_target,
         outcome.lambda_data,
         outcome.spottedness,
-        outcome.search_reconstructions as f64,
-        outcome.search_seconds,
+        Some(outcome.search_reconstructions as f64),
+        Some(outcome.search_seconds),
     ];
-    numbers.extend(others.map(|x| rounded(x, 4)));
+    numbers.extend(others.map(|x| rounded(x.unwrap_or(f64::NAN), 4)));
     numbers
 }
 
@@ -195,7 +190,7 @@ fn sum_up(report: &mut Report, outcomes: &[Outcome]) {
         let total = |f: &dyn Fn(&Route) -> f64| routes.iter().map(|(_, route)| f(route)).sum::<f64>();
         let each = routes.len().max(1) as f64;
         numbers.insert("reconstructions_each".into(), json!(rounded(total(&|r| r.reconstructions as f64) / each, 4)));
-        numbers.insert("seconds_each".into(), json!(rounded(total(&|r| r.seconds) / each, 3)));
+        numbers.insert("seconds_each".into(), json!(rounded(total(&|r| r.seconds.unwrap_or(f64::NAN)) / each, 3)));
         let notes: Vec<&String> = routes.iter().filter_map(|(_, route)| route.note.as_ref()).collect();
         numbers.insert("notes".into(), json!(notes));
         report.number(name, Value::Object(numbers));
@@ -228,7 +223,7 @@ fn all_the_periods() -> [(&'static str, Value); 2] {
 }
 
 /// R4. The landscape knows nothing of unresolved spots, so that only the chain is made in both ways.
-pub(super) fn no_planet(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn no_planet(laboratory: &Laboratory) -> Result<Report, Failure> {
     let mut stars = Vec::new();
     for (way, unresolved_spots) in ways_with_unresolved_spots() {
         for seed in 1..=5_u32 {
@@ -246,7 +241,7 @@ pub(super) fn no_planet(laboratory: &Laboratory) -> Result<Report, ExperimentErr
 }
 
 /// R5.
-pub(super) fn amplitudes(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn amplitudes(laboratory: &Laboratory) -> Result<Report, Failure> {
     let [_, period, phi] = PLANET;
     let star = |&k: &f64| star(laboratory, &[("k_kms", k)], [k, period, phi], &[]);
     let all = [0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15, 0.2];
@@ -254,7 +249,7 @@ pub(super) fn amplitudes(laboratory: &Laboratory) -> Result<Report, ExperimentEr
 }
 
 /// R6.
-pub(super) fn periods(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn periods(laboratory: &Laboratory) -> Result<Report, Failure> {
     let [k, _, phi] = PLANET;
     let star = |tenths: u32| {
         let period = f64::from(tenths) / 10.0;
@@ -264,7 +259,7 @@ pub(super) fn periods(laboratory: &Laboratory) -> Result<Report, ExperimentError
 }
 
 /// R7.
-pub(super) fn phases(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn phases(laboratory: &Laboratory) -> Result<Report, Failure> {
     let [k, period, _] = PLANET;
     let star = |tenths: u32| {
         let phi = f64::from(tenths) / 10.0;
@@ -274,7 +269,7 @@ pub(super) fn phases(laboratory: &Laboratory) -> Result<Report, ExperimentError>
 }
 
 /// R8.
-pub(super) fn targets(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn targets(laboratory: &Laboratory) -> Result<Report, Failure> {
     let star = |(target, seed): (f64, u32)| {
         let changes = [("/imaging/chi2_target", json!(target)), (SEED, json!(seed))];
         star(laboratory, &[("chi2_target", target), ("seed", f64::from(seed))], PLANET, &changes)
@@ -285,7 +280,7 @@ pub(super) fn targets(laboratory: &Laboratory) -> Result<Report, ExperimentError
 
 /// R9. Once with the projected velocity as it is, as a line's width gives it, and once with the equatorial velocity
 /// kept, so that vsini goes with the inclination; the latter also with all periods allowed.
-pub(super) fn inclinations(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn inclinations(laboratory: &Laboratory) -> Result<Report, Failure> {
     const TRUE_DEG: f64 = 38.0;
     const VSINI_KMS: f64 = 40.0;
     let star = |(assumed, equatorial, all_periods): (f64, bool, bool)| {
@@ -325,14 +320,14 @@ fn sheared(laboratory: &Laboratory, gamma: f64, assumed: f64) -> Varied {
 }
 
 /// R10.
-pub(super) fn shear_modelled(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn shear_modelled(laboratory: &Laboratory) -> Result<Report, Failure> {
     let stars = (0..=5).map(|k| f64::from(4 * k) / 1000.0).map(|gamma| sheared(laboratory, gamma, gamma));
     tabulated(laboratory, "R10", &["gamma"], stars.collect())
 }
 
 /// R11. Once with the rotation of the equator, and once with the solid rotation that fits the profiles best, as an
 /// observer would take it who knows of no shear.
-pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Failure> {
     let mut stars = Vec::new();
     for gamma in (0..=6).map(|k| f64::from(4 * k) / 1000.0) {
         stars.push(Varied { values: vec![gamma, 0.0], ..sheared(laboratory, gamma, 0.0) });
@@ -357,7 +352,7 @@ pub(super) fn shear_ignored(laboratory: &Laboratory) -> Result<Report, Experimen
 
 /// K = 100 m/s at the rotation period, the same number of profiles over more and more rotations, for several noise
 /// seeds.
-pub(super) fn co_rotation(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn co_rotation(laboratory: &Laboratory) -> Result<Report, Failure> {
     const PROFILES: u32 = 50;
     let mut stars = Vec::new();
     for (way, unresolved_spots) in ways_with_unresolved_spots() {

@@ -3,17 +3,13 @@
 //!
 //! Orbits are drawn from the very prior that the chain has, so that an exact posterior covers just as often as it says.
 
-use super::case::Case;
-use super::laboratory::{ExperimentError, Laboratory};
-use super::outcome::{Estimate, Outcome, share};
-use super::report::{Panel, Report, Series};
-use super::star::{paper, with};
-use crate::data::config::Config;
-use crate::data::scene::Scene;
-use crate::surface::static_map::Reference;
+use crate::cases::{Case, ENDS, Estimate, Failure, Laboratory, Outcome, paper, share, with};
+use crate::report::{Panel, Report, Series};
+use dimcmc::internals::surface::static_map::Reference;
+use dimcmc::{Config, Scene};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// What a reconstruction is judged by.
 struct Judge {
@@ -41,14 +37,13 @@ const PERIODS: (f64, f64) = (0.5, 4.0);
 const NEAR: f64 = 0.15;
 
 /// Coverage over 20 spot maps, five noise seeds and orbits each.
-pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn coverage(laboratory: &Laboratory) -> Result<Report, Failure> {
     let (maps, seeds) = laboratory.full_or_quick((20u64, 5u64), (1, 2));
     let stars: Vec<(u64, u64)> = (0..maps).flat_map(|map| (0..seeds).map(move |seed| (map, seed))).collect();
     let mut columns: Vec<String> = ["map", "seed"].map(str::to_owned).to_vec();
     columns.extend(ORBIT.map(|name| format!("true_{name}")));
     let judged = JUDGES.iter().flat_map(|judge| ORBIT.map(|name| (judge, name)));
-    let ends = ["median", "low68", "high68", "low95", "high95"];
-    columns.extend(judged.flat_map(|(judge, name)| ends.map(|end| format!("{}_{name}_{end}", judge.name))));
+    columns.extend(judged.flat_map(|(judge, name)| ENDS.map(|end| format!("{}_{name}_{end}", judge.name))));
     let mut report = Report::new(columns);
     let mut by_judge = Vec::new();
     (laboratory.report)("coverage: targets");
@@ -73,14 +68,9 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
     }
     for (k, &(map, seed)) in stars.iter().enumerate() {
         let mut row = vec![map as f64, noise_seed(map, seed) as f64];
-        row.extend(ORBIT.map(|name| injected(&by_judge[0][k], name)));
+        row.extend(ORBIT.map(|name| injected(&configs[k], name)));
         for outcomes in &by_judge {
-            for name in ORBIT {
-                row.extend(match estimate(&outcomes[k], name) {
-                    Some(one) => [one.value, one.ci68[0], one.ci68[1], one.ci95[0], one.ci95[1]],
-                    None => [f64::NAN; 5],
-                });
-            }
+            row.extend(ORBIT.iter().flat_map(|name| Estimate::numbers(outcomes[k].by_chain(name))));
         }
         report.row(row);
     }
@@ -98,26 +88,25 @@ pub(super) fn coverage(laboratory: &Laboratory) -> Result<Report, ExperimentErro
     };
     report.figure = JUDGES.iter().map(panel).collect();
     for (judge, outcomes) in JUDGES.iter().zip(&by_judge) {
-        report.number(judge.name, shares(outcomes));
+        report.number(judge.name, shares(&configs, outcomes));
     }
     Ok(report)
 }
 
-fn estimate(outcome: &Outcome, name: &str) -> Option<Estimate> {
-    outcome.chain.as_ref()?.parameters.get(name).copied()
-}
-
 /// The injected value, which the config has in place of a start.
-fn injected(outcome: &Outcome, name: &str) -> f64 {
-    outcome.config["planet"][name].as_f64().unwrap_or(f64::NAN)
+fn injected(config: &Value, name: &str) -> f64 {
+    config["planet"][name].as_f64().unwrap_or(f64::NAN)
 }
 
 /// Shares of the stars inside the intervals, with their binomial errors, for all periods, away from co-rotation and
 /// near it.
-fn shares(outcomes: &[Outcome]) -> Value {
-    let is_near = |outcome: &&Outcome| (injected(outcome, "porb_over_prot") - 1.0).abs() < NEAR;
-    let (near, away): (Vec<&Outcome>, Vec<&Outcome>) = outcomes.iter().partition(is_near);
-    let groups = [("all", outcomes.iter().collect()), ("away_from_co_rotation", away), ("near_co_rotation", near)];
+fn shares(configs: &[Value], outcomes: &[Outcome]) -> Value {
+    let is_near = |config: &Value| (injected(config, "porb_over_prot") - 1.0).abs() < NEAR;
+    let of = |near: bool| -> Vec<&Outcome> {
+        configs.iter().zip(outcomes).filter(|(config, _)| is_near(config) == near).map(|(_, outcome)| outcome).collect()
+    };
+    let groups =
+        [("all", outcomes.iter().collect()), ("away_from_co_rotation", of(false)), ("near_co_rotation", of(true))];
     let of_group = |(group, stars): (&str, Vec<&Outcome>)| {
         let of_one = |name: &str| {
             let shares = [("inside_68", 0), ("inside_95", 1)].map(|(level, k)| {
@@ -126,11 +115,11 @@ fn shares(outcomes: &[Outcome]) -> Value {
             });
             (name.to_owned(), Value::Object(shares.into_iter().collect()))
         };
-        let mut of_all: serde_json::Map<String, Value> = ORBIT.iter().map(|name| of_one(name)).collect();
+        let mut of_all: Map<String, Value> = ORBIT.iter().map(|name| of_one(name)).collect();
         of_all.insert("stars".into(), json!(stars.len()));
         (group.to_owned(), Value::Object(of_all))
     };
-    let mut all: serde_json::Map<String, Value> = groups.into_iter().map(of_group).collect();
+    let mut all: Map<String, Value> = groups.into_iter().map(of_group).collect();
     let converged = outcomes.iter().filter(|o| o.chain.as_ref().is_some_and(|chain| chain.note.is_none())).count();
     all.insert("converged".into(), json!(converged));
     Value::Object(all)
@@ -142,7 +131,7 @@ fn noise_seed(map: u64, seed: u64) -> u64 {
 }
 
 /// A star with spots of its map, and orbit and noise of its seed.
-fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, ExperimentError> {
+fn star(laboratory: &Laboratory, map: u64, seed: u64) -> Result<Value, Failure> {
     let mut rng = ChaCha8Rng::seed_from_u64(map);
     let spots = random_spots(&mut rng);
     rng.set_stream(1 + seed);
@@ -170,7 +159,7 @@ const LAMBDA: f64 = 3.0;
 /// `config` with a target chi2 that its image attains: that of the image where lambda is [`LAMBDA`] over the number of
 /// data. How far down a noise realisation lets chi2 come is up to it, and a target near the floor would make noise of
 /// the spots.
-pub(super) fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, ExperimentError> {
+pub fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value, Failure> {
     let scene = Scene::new(&Config::at(config.clone(), &laboratory.folder.join("config.json")))?;
     let image = Reference::at_lambda(&scene.imager, scene.settings.values, LAMBDA)?;
     let chi2 = (1e4 * image.solution.chi2 / scene.imager.data.depth.len() as f64).round() / 1e4;
@@ -178,7 +167,7 @@ pub(super) fn attainable(laboratory: &Laboratory, config: Value) -> Result<Value
 }
 
 /// A dozen spots from the pole down to latitude -17.
-pub(super) fn random_spots(rng: &mut ChaCha8Rng) -> Value {
+pub fn random_spots(rng: &mut ChaCha8Rng) -> Value {
     let mut spot = || {
         let longitude = rng.random_range(0.0..360.0f64);
         let latitude = rng.random_range(-0.3f64..1.0).asin().to_degrees();

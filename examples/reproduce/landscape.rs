@@ -1,21 +1,20 @@
 //! R3: the landscape in three dimensions and in slices, and the chain of the same data beside it.
 
-use super::case;
-use super::laboratory::{ExperimentError, Laboratory};
-use super::report::{Drawn, Report};
-use super::star::{paper, with};
-use crate::inference::search;
-use crate::model::Parameter;
-use crate::runs::comparison::{Comparison, Pair};
-use crate::sampling::landscape::{Axis, Grid, Node, Rule};
-use crate::surface::{CHI2, SPOTTEDNESS};
+use crate::cases::{Failure, Laboratory, case, paper, with};
+use crate::report::{Drawn, Report};
+use dimcmc::Parameter;
+use dimcmc::internals::inference::search;
+use dimcmc::internals::runs::comparison::{Comparison, Pair};
+use dimcmc::internals::runs::grid_scan::GridScan;
+use dimcmc::internals::sampling::landscape::{Axis, Grid, Node, Rule};
+use dimcmc::internals::surface::{CHI2, SPOTTEDNESS};
 use serde_json::{Value, json};
 
 /// Ends of the axes: K (km/s), Porb/Prot, phi.
 const AXES: [(&str, f64, f64); 3] = [("k_kms", 0.0, 0.2), ("porb_over_prot", 1.2, 2.2), ("phi", 0.3, 0.7)];
 
 /// R3.
-pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn landscape(laboratory: &Laboratory) -> Result<Report, Failure> {
     let changes = [
         ("/imaging/pixels", json!(laboratory.full_or_quick(20_000, 1000))),
         ("/sampler/walkers", json!(6)),
@@ -43,7 +42,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         let numbers = [SPOTTEDNESS, CHI2].map(|name| survey.landscape.number(node, name).unwrap_or(f64::NAN));
         report.row([&node.theta[..], &numbers, &[node.evaluation.log_prob]].concat());
     }
-    let highest = |survey: &crate::runs::grid_scan::GridScan| survey.landscape.best().map(|node| node.theta.clone());
+    let highest = |survey: &GridScan| survey.landscape.best().map(|node| node.theta.clone());
     report.number("highest_node", json!(highest(&survey)));
     let mut slices = 0;
     for (k, &(fixed, ..)) in AXES.iter().enumerate() {

@@ -1,27 +1,8 @@
 //! The experiments of Petit et al. (2015), row by row, and a few beyond them: each from simulated stars to a table.
-//!
-//! A [`Row`] is data: its stars (`star` is the paper's, changed key by key), and which of the three routes to an orbit
-//! each of them takes (`case`): grid and paraboloid, chain, periodogram. A [`Laboratory`] runs them and keeps what is
-//! done.
 
-pub mod case;
-mod changing;
-mod coverage;
-pub mod files;
-mod images;
-mod laboratory;
-mod landscape;
-mod models;
-mod orbits;
-pub mod outcome;
-pub mod report;
-pub mod star;
-mod stellar;
-
-pub use case::{Case, Nodes};
-pub use laboratory::{ExperimentError, Laboratory};
-pub use outcome::{Estimate, Outcome, Route};
-pub use report::Report;
+use crate::cases::{Failure, Laboratory};
+use crate::report::Report;
+use crate::{changing, coverage, images, landscape, models, orbits, stellar};
 
 /// One experiment.
 #[derive(Clone, Copy, Debug)]
@@ -32,18 +13,11 @@ pub struct Row {
     pub title: &'static str,
     /// What the paper found; empty for experiments that are not the paper's.
     pub paper: &'static str,
-    run: fn(&Laboratory) -> Result<Report, ExperimentError>,
+    /// Does it.
+    pub run: fn(&Laboratory) -> Result<Report, Failure>,
 }
 
 impl Row {
-    /// Does it.
-    ///
-    /// # Errors
-    /// [`ExperimentError`].
-    pub fn run(&self, laboratory: &Laboratory) -> Result<Report, ExperimentError> {
-        (self.run)(laboratory)
-    }
-
     /// The row of that name, in upper or lower case.
     pub fn from_name(name: &str) -> Option<&'static Row> {
         ROWS.iter().find(|row| row.name.eq_ignore_ascii_case(name))

@@ -1,6 +1,5 @@
 //! What a case came to: three estimates of the same orbit, and what each of them took.
 
-use crate::numerics::json::number_or_null;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -22,34 +21,25 @@ pub struct Route {
     pub parameters: BTreeMap<String, Estimate>,
     /// Reconstructions that it took, the search for the reference left out.
     pub reconstructions: usize,
-    /// Seconds that it took; NaN (null) where it was stopped and gone on with.
-    #[serde(deserialize_with = "number_or_null")]
-    pub seconds: f64,
+    /// Seconds that it took; not known where it was stopped and gone on with.
+    pub seconds: Option<f64>,
     /// What is to be said of it: why it came to nothing, or that a chain did not converge.
     pub note: Option<String>,
 }
 
-/// A case with its results.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What a case came to.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// The config that it was run with.
-    pub config: serde_json::Value,
-    /// Version of the program.
-    pub version: String,
     /// Why there is no result at all.
     pub failed: Option<String>,
     /// What was injected, all parameters by name.
     pub truth: BTreeMap<String, f64>,
-    /// Target chi2 per datum (null, as the next two, where there is no result); above the config's where that could not
-    /// be reached.
-    #[serde(deserialize_with = "number_or_null")]
-    pub chi2_target: f64,
+    /// Target chi2 per datum; above the config's where that could not be reached.
+    pub chi2_target: Option<f64>,
     /// Multiplier of chi2 / 2 in the image at the best orbit, times the number of data.
-    #[serde(deserialize_with = "number_or_null")]
-    pub lambda_data: f64,
+    pub lambda_data: Option<f64>,
     /// Spot coverage of that image.
-    #[serde(deserialize_with = "number_or_null")]
-    pub spottedness: f64,
+    pub spottedness: Option<f64>,
     /// Reconstructions of the search for it, which grid and chain share.
     pub search_reconstructions: usize,
     /// Seconds of that search.
@@ -66,6 +56,9 @@ pub struct Outcome {
     pub false_alarm: Option<f64>,
 }
 
+/// Ends of the names of columns with the numbers of an estimate.
+pub const ENDS: [&str; 5] = ["median", "low68", "high68", "low95", "high95"];
+
 /// Share of `of` and its binomial error: that of the share with one more of either kind, which is not nothing where all
 /// are alike.
 pub fn share(count: usize, of: usize) -> [f64; 2] {
@@ -81,6 +74,11 @@ impl Estimate {
         Estimate { value, ci68: around(1.0), ci95: around(2.0) }
     }
 
+    /// The numbers of the columns [`ENDS`], NaN where there is no estimate.
+    pub fn numbers(estimate: Option<&Self>) -> [f64; 5] {
+        estimate.map_or([f64::NAN; 5], |e| [e.value, e.ci68[0], e.ci68[1], e.ci95[0], e.ci95[1]])
+    }
+
     /// Half the width of the 68 % interval.
     pub fn error(&self) -> f64 {
         0.5 * (self.ci68[1] - self.ci68[0])
@@ -94,11 +92,15 @@ impl Outcome {
         all.into_iter().filter_map(|(name, route)| Some((name, route.as_ref()?)))
     }
 
+    /// What the chain says of a parameter.
+    pub fn by_chain(&self, name: &str) -> Option<&Estimate> {
+        self.chain.as_ref()?.parameters.get(name)
+    }
+
     /// Whether the injected value is inside the chain's interval of 68 (level 0) or 95 % (1); a phase in any turn. A
     /// star without a result counts as one that is missed.
     pub fn is_covered(&self, name: &str, level: usize) -> bool {
-        let estimate = self.chain.as_ref().and_then(|chain| chain.parameters.get(name));
-        let (Some(one), Some(truth)) = (estimate, self.truth.get(name)) else { return false };
+        let (Some(one), Some(truth)) = (self.by_chain(name), self.truth.get(name)) else { return false };
         let [low, high] = [one.ci68, one.ci95][level];
         let turns: &[f64] = if name == "phi" { &[-1.0, 0.0, 1.0] } else { &[0.0] };
         turns.iter().any(|turn| (low..=high).contains(&(truth + turn)))

@@ -4,15 +4,11 @@
 //! What a wrong model costs: bias of K and coverage of its intervals. Every noise seed has a spot map and a phase of
 //! its own.
 
-use super::case::Case;
-use super::coverage::{attainable, random_spots};
-use super::laboratory::{ExperimentError, Laboratory};
-use super::outcome::{Outcome, share};
-use super::report::Report;
-use super::star::{paper, with};
-use crate::data::config::Config;
-use crate::data::io::lsd;
-use crate::data::scene::{Scene, SceneError};
+use crate::cases::{Case, ENDS, Estimate, Failure, Laboratory, Outcome, paper, share, with};
+use crate::coverage::{attainable, random_spots};
+use crate::report::{Report, rounded};
+use dimcmc::internals::data::io::lsd;
+use dimcmc::{Config, Scene};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
@@ -69,12 +65,11 @@ fn faculae(rng: &mut ChaCha8Rng) -> Value {
 const ORBIT: [(&str, f64); 2] = [("k_kms", 0.1), ("porb_over_prot", 1.7)];
 
 /// The stars of all kinds, each analysed by the plain model and by the right one.
-pub(super) fn models(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn models(laboratory: &Laboratory) -> Result<Report, Failure> {
     let seeds = laboratory.full_or_quick(10u64, 1);
     let columns = ["kind", "right_model", "seed", "chi2_target", "spottedness", "true_phi"].map(str::to_owned);
     let names = ["k_kms", "porb_over_prot", "phi"];
-    let ends = ["median", "low68", "high68", "low95", "high95"];
-    let estimates = names.iter().flat_map(|name| ends.map(|end| format!("{name}_{end}")));
+    let estimates = names.iter().flat_map(|name| ENDS.map(|end| format!("{name}_{end}")));
     let mut report = Report::new(columns.into_iter().chain(estimates));
     for (k, kind) in KINDS.iter().enumerate() {
         let simulated: Vec<(Value, f64)> =
@@ -93,16 +88,14 @@ pub(super) fn models(laboratory: &Laboratory) -> Result<Report, ExperimentError>
                     periodogram: None,
                 })
             };
-            let cases: Vec<Case> = simulated.iter().enumerate().map(case).collect::<Result<_, ExperimentError>>()?;
+            let cases: Vec<Case> = simulated.iter().enumerate().map(case).collect::<Result<_, Failure>>()?;
             let mut outcomes = laboratory.outcomes("models", &cases)?;
             for (seed, (outcome, (_, phi))) in outcomes.iter_mut().zip(&simulated).enumerate() {
                 let [k_kms, period] = ORBIT.map(|(name, value)| (name.to_owned(), value));
                 outcome.truth = BTreeMap::from([k_kms, period, ("phi".to_owned(), *phi)]);
-                let row = [k as f64, is_right, seed as f64, outcome.chi2_target, outcome.spottedness, *phi];
-                let estimates = names.iter().flat_map(|name| {
-                    let estimate = outcome.chain.as_ref().and_then(|chain| chain.parameters.get(*name));
-                    estimate.map_or([f64::NAN; 5], |e| [e.value, e.ci68[0], e.ci68[1], e.ci95[0], e.ci95[1]])
-                });
+                let [target, spottedness] = [outcome.chi2_target, outcome.spottedness].map(|x| x.unwrap_or(f64::NAN));
+                let row = [k as f64, is_right, seed as f64, target, spottedness, *phi];
+                let estimates = names.iter().flat_map(|name| Estimate::numbers(outcome.by_chain(name)));
                 report.row(row.into_iter().chain(estimates).collect());
             }
             report.number(&format!("{}, {way} model", kind.name), sum_up(&outcomes));
@@ -114,20 +107,20 @@ pub(super) fn models(laboratory: &Laboratory) -> Result<Report, ExperimentError>
 /// Bias and scatter of K, its mean error bar, and the shares of intervals that hold the truth.
 fn sum_up(outcomes: &[Outcome]) -> Value {
     let found = outcomes.iter().filter_map(|outcome| {
-        let estimate = outcome.chain.as_ref()?.parameters.get("k_kms")?;
+        let estimate = outcome.by_chain("k_kms")?;
         Some((outcome.deviation("k_kms", estimate)?, estimate.error()))
     });
     let found: Vec<(f64, f64)> = found.collect();
     let n = found.len() as f64;
-    let rounded = |x: f64| (1e5 * x).round() / 1e5;
     let bias = found.iter().map(|(d, _)| d).sum::<f64>() / n;
+    let targets = outcomes.iter().map(|outcome| outcome.chi2_target.unwrap_or(f64::NAN));
     let covered = |name: &str, level| {
         share(outcomes.iter().filter(|outcome| outcome.is_covered(name, level)).count(), outcomes.len())
     };
     json!({
         "stars": outcomes.len(),
         "without_result": outcomes.len() - found.len(),
-        "mean_chi2_target": rounded(outcomes.iter().map(|o| o.chi2_target).sum::<f64>() / outcomes.len() as f64),
+        "mean_chi2_target": rounded(targets.sum::<f64>() / outcomes.len() as f64),
         "k_bias_kms": rounded(bias),
         "k_scatter_kms": rounded((found.iter().map(|(d, _)| (d - bias).powi(2)).sum::<f64>() / (n - 1.0)).sqrt()),
         "k_error_kms": rounded(found.iter().map(|(_, error)| error).sum::<f64>() / n),
@@ -139,7 +132,7 @@ fn sum_up(outcomes: &[Outcome]) -> Value {
 }
 
 /// A star of this kind, simulated into files, with the plain model of it as a config; and the phase of its planet.
-fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64), ExperimentError> {
+fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64), Failure> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let spots = random_spots(&mut rng);
     let phi = rng.random::<f64>();
@@ -161,7 +154,7 @@ fn star(laboratory: &Laboratory, kind: &Kind, seed: u64) -> Result<(Value, f64),
     let simulated = with(with(plain.clone(), &seeded), &more);
     let folder = laboratory.folder(&format!("models/{}_data_{seed}", kind.name))?;
     let observations = Scene::new(&Config::at(simulated, &folder.join("config.json")))?.observations;
-    lsd::write(&folder, &observations).map_err(SceneError::from)?;
+    lsd::write(&folder, &observations)?;
     // the same file for whoever reads the config from elsewhere
     let path = std::path::absolute(folder.join("observations.txt")).unwrap_or_else(|_| folder.join("observations.txt"));
     Ok((with(plain, &[("/observations", json!({ "path": path }))]), phi))

@@ -1,19 +1,17 @@
 //! R1 and R2: the radial velocities of a spotted star, and what is left of them once the image is taken out.
 
-use super::laboratory::{ExperimentError, Laboratory};
-use super::report::{Panel, Report, Series};
-use super::star::{paper, with};
-use crate::data::config::Config;
-use crate::data::scene::Scene;
-use crate::surface::SurfaceMaps;
-use crate::surface::static_map::Reference;
+use crate::cases::{Failure, Laboratory, paper, with};
+use crate::report::{Panel, Report, Series};
+use dimcmc::internals::surface::VelocityWithoutSpots;
+use dimcmc::internals::surface::static_map::Reference;
+use dimcmc::{Config, Scene, SurfaceMaps};
 use serde_json::{Value, json};
 
 /// Signal-to-noise ratio of the profiles.
 const SNR: &str = "/observations/simulate/snr";
 
 /// The paper's star on as many pixels as the paper had, with some keys changed.
-fn scene(laboratory: &Laboratory, changes: &[(&str, Value)]) -> Result<Scene, ExperimentError> {
+fn scene(laboratory: &Laboratory, changes: &[(&str, Value)]) -> Result<Scene, Failure> {
     let pixels = [("/imaging/pixels", json!(laboratory.full_or_quick(20_000, 2000)))];
     let config = with(with(paper(), &pixels), changes);
     let path = laboratory.folder.join("config.json");
@@ -46,7 +44,7 @@ fn panel(label: &str, series: &[(&str, &str)], joined: bool) -> Panel {
 }
 
 /// R1: the first moments with and without noise, and of a star without spots.
-pub(super) fn profiles(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn profiles(laboratory: &Laboratory) -> Result<Report, Failure> {
     let none = ("/planet/k_kms", json!(0.0));
     let noisy = scene(laboratory, std::slice::from_ref(&none))?;
     let clean = scene(laboratory, &[none.clone(), (SNR, Value::Null)])?;
@@ -79,7 +77,7 @@ pub(super) fn profiles(laboratory: &Laboratory) -> Result<Report, ExperimentErro
 
 /// R2: observed minus modelled first moments, without a planet; with one that the image knows, and one that it does
 /// not.
-pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn filtered(laboratory: &Laboratory) -> Result<Report, Failure> {
     let injected = |k: f64| ("/observations/simulate/truth/k_kms", json!(k));
     let assumed = |k: f64| ("/planet/k_kms", json!(k));
     let cases = [
@@ -103,9 +101,7 @@ pub(super) fn filtered(laboratory: &Laboratory) -> Result<Report, ExperimentErro
         if columns.is_empty() {
             columns.push(("cycle".to_owned(), cycles(&scene)));
         }
-        let of = |f: &dyn Fn(&crate::surface::VelocityWithoutSpots) -> f64| {
-            fit.velocities.iter().map(f).collect::<Vec<f64>>()
-        };
+        let of = |f: &dyn Fn(&VelocityWithoutSpots) -> f64| fit.velocities.iter().map(f).collect::<Vec<f64>>();
         columns.push((format!("{name}_observed_kms"), of(&|v| v.moments.observed.value_kms)));
         columns.push((format!("{name}_filtered_kms"), of(&|v| v.moments.filtered_kms())));
         report.number(&format!("{name}_filtered_rms_kms"), fit.summary.filtered_rv_rms_kms.unwrap_or(f64::NAN));

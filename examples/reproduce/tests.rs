@@ -1,11 +1,15 @@
-//! The experiments: what must come out whatever the paper says, each test named after the mistake that it would catch;
-//! and the command on a row of them.
+//! What must come out whatever the paper says, each test named after the mistake that it would catch; and the program on
+//! a row.
 
-use crate::desk::{dimcmc, text};
-use dimcmc::internals::runs::experiments::{Case, Nodes, Outcome, ROWS, star};
-use dimcmc::internals::runs::pool::Pool;
+use super::{Args, list, rows, run};
+use crate::cases::{Case, Nodes, Outcome, Route, paper, with};
+use crate::report::{SUMMARY, TABLE};
+use crate::rows::ROWS;
+use clap::Parser as _;
+use dimcmc::{Failure, Pool};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
+use std::path::Path;
 
 /// Rotation period of the paper's star (d).
 const ROTATION_PERIOD_D: f64 = 3.0;
@@ -21,10 +25,11 @@ const ORBIT: [(&str, f64); 3] = [("k_kms", 0.12), ("porb_over_prot", 1.6), ("phi
 fn outcome(changes: &[(&str, Value)]) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
     let lone = [("/planet", json!({ "k_kms": 0.0, "porb_over_prot": 1.0, "phi": 0.0 }))];
-    let config = star::with(star::with(star::paper(), &lone), changes);
+    let config = with(with(paper(), &lone), changes);
     std::fs::write(folder.path().join("lone.json"), config.to_string()).unwrap();
-    let simulated = dimcmc(&["simulate", "lone.json", "--out", "profiles"], folder.path());
-    assert!(simulated.status.success(), "{}", text(&simulated.stderr));
+    let path = |name: &str| folder.path().join(name).into_os_string();
+    let simulate = ["dimcmc".into(), "simulate".into(), path("lone.json"), "--out".into(), path("profiles")];
+    assert_eq!(dimcmc::command_line(simulate), 0);
     let list = std::fs::read_to_string(folder.path().join("profiles/observations.txt")).unwrap();
     let [(_, k), (_, period), (_, phi)] = ORBIT;
     let shifted = |line: &str| {
@@ -43,7 +48,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
         // a start that is not the answer
         ("/planet", json!({ "k_kms": 0.05, "porb_over_prot": 1.8, "phi": 0.4 })),
     ];
-    let config = star::with(config, &own);
+    let config = with(config, &own);
     let case =
         Case { name: "test".into(), config, grid: Some(Nodes::Around(5)), chain: false, periodogram: Some(1000) };
     let mut outcome = case.run(folder.path(), &Pool::default()).unwrap();
@@ -53,7 +58,7 @@ fn outcome(changes: &[(&str, Value)]) -> Outcome {
 
 /// Deviation of every route from the injected value, in its error bars.
 fn deviations(outcome: &Outcome, name: &str) -> Vec<(&'static str, f64)> {
-    let of_route = |(route, found): (&'static str, &dimcmc::internals::runs::experiments::Route)| {
+    let of_route = |(route, found): (&'static str, &Route)| {
         let estimate = found.parameters.get(name).unwrap_or_else(|| panic!("{route}: {:?}", found.note));
         (route, outcome.deviation(name, estimate).unwrap() / estimate.error())
     };
@@ -96,7 +101,7 @@ fn phi_is_counted_in_orbital_cycles_from_the_epoch() {
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn axes_are_not_swapped() {
-    let config = star::with(star::paper(), &[("/imaging/pixels", json!(1500))]);
+    let config = with(paper(), &[("/imaging/pixels", json!(1500))]);
     let at = Nodes::At([(0.06, 0.14, 3), (1.5, 1.9, 3), (0.4, 0.6, 3)]);
     let case = Case { name: "axes".into(), config, grid: Some(at), chain: false, periodogram: None };
     let folder = tempfile::tempdir().unwrap();
@@ -127,22 +132,40 @@ fn chi2_has_its_scale() {
     }
 }
 
+/// Runs the program on the reduced row R1, in `folder`.
+fn first_row(folder: &Path, more: &[&str]) -> Result<(), Failure> {
+    let [out, work] = ["out", "work"].map(|name| folder.join(name).to_str().unwrap().to_owned());
+    run(&Args::parse_from([&["reproduce", "r1", "--out", &out, "--work", &work], more].concat()))
+}
+
 #[test]
-fn a_row_is_done_once_and_listed() {
+fn a_row_is_done_once() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |more: &[&str]| dimcmc(&[&["reproduce", "r1", "--quick"], more].concat(), folder.path());
-    let first = run(&[]);
-    assert!(first.status.success(), "{}", text(&first.stderr));
-    let table = folder.path().join("runs/quick/R1/table.csv");
+    first_row(folder.path(), &["--quick"]).unwrap();
+    let row = folder.path().join("out/R1");
+    let table = row.join(TABLE);
     let written = std::fs::read_to_string(&table).unwrap();
     assert_eq!(written.lines().count(), 51, "a line a profile");
-    let again = run(&[]);
-    assert!(text(&again.stdout).contains("done before"));
-    assert!(run(&["--force"]).status.success());
+    assert!(row.join("R1.png").is_file());
+    let summary: Value = serde_json::from_slice(&std::fs::read(row.join(SUMMARY)).unwrap()).unwrap();
+    assert_eq!(summary["command"], "cargo run --release --example reproduce -- R1 --quick");
+    std::fs::write(&table, "left alone").unwrap();
+    first_row(folder.path(), &["--quick"]).unwrap();
+    assert_eq!(std::fs::read_to_string(&table).unwrap(), "left alone");
+    let whole = first_row(folder.path(), &[]).unwrap_err();
+    assert_eq!(whole.exit_code(), 2);
+    assert!(whole.to_string().contains("--quick") && whole.to_string().contains("--force"), "{whole}");
+    first_row(folder.path(), &["--quick", "--force"]).unwrap();
     assert_eq!(std::fs::read_to_string(&table).unwrap(), written, "the same bytes");
-    let list = text(&dimcmc(&["reproduce", "--list"], folder.path()).stdout);
-    assert!(ROWS.iter().all(|row| list.contains(row.name)), "{list}");
-    let wrong = dimcmc(&["reproduce", "R99"], folder.path());
-    assert_eq!(wrong.status.code(), Some(2));
-    assert!(text(&wrong.stderr).contains("R99"));
+}
+
+#[test]
+fn rows_are_listed_and_others_refused() {
+    let all = list(&rows(&[]).unwrap());
+    assert!(ROWS.iter().all(|row| all.contains(row.name) && all.contains(row.paper)), "{all}");
+    let wrong = rows(&["R99".to_owned()]).unwrap_err();
+    assert_eq!(wrong.exit_code(), 2);
+    assert!(wrong.to_string().contains("R99"));
+    let quick = Args::parse_from(["reproduce", "--quick"]).folders();
+    assert_eq!(quick.map(|folder| folder.to_str().unwrap().to_owned()), ["runs/quick", "runs/reproduce_quick"]);
 }

@@ -4,18 +4,15 @@
 //! Star and line are known; the errors of the profiles are measured. A star has the same nights, noise and orbit
 //! whatever the lifetime of its spots.
 
-use super::laboratory::{ExperimentError, Laboratory};
-use super::outcome::share;
-use super::report::{Panel, Report, Series};
-use super::star::{paper, with};
-use crate::data::config::Config;
-use crate::data::io::lsd;
-use crate::data::scene::{Scene, SceneError};
-use crate::inference::detection::{Detection, DetectionSettings, Evidence};
-use crate::numerics::json::number_or_null;
-use crate::planets::periodogram::{Frequencies, FrequencySettings};
-use crate::planets::verdict::{CANDIDATE_FAP, Finding, Verdict};
-use crate::surface::evolving_map::change::CHANGES;
+use crate::cases::case::is_of_the_star;
+use crate::cases::{Failure, Laboratory, paper, share, with};
+use crate::report::{Panel, Report, Series, rounded};
+use dimcmc::internals::data::io::lsd;
+use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence};
+use dimcmc::internals::planets::periodogram::Frequencies;
+use dimcmc::internals::planets::verdict::CANDIDATE_FAP;
+use dimcmc::internals::surface::evolving_map::change::CHANGES;
+use dimcmc::{Config, Finding, FrequencySettings, Scene, SceneError, Verdict};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -74,8 +71,7 @@ struct Searched {
     /// Whether that is the period of the planet, to half the inverse time base.
     is_right: bool,
     /// sigma_K (km/s), its median over all periods away from that of the rotation.
-    #[serde(deserialize_with = "number_or_null")]
-    median_sigma_k_kms: f64,
+    median_sigma_k_kms: Option<f64>,
     /// ln Z of a star that changes over that of one that does not, where they are compared.
     change: Option<f64>,
     /// Lifetime of the fitted field (d).
@@ -122,25 +118,23 @@ impl Star {
     }
 
     /// What both objectives say of it; its profiles are kept in `folder`.
-    fn searched(&self, config: &Value, folder: &Path) -> Result<OfStar, ExperimentError> {
+    fn searched(&self, config: &Value, folder: &Path) -> Result<OfStar, Failure> {
         let at = |config: Value| Config::at(config, &folder.join("config.json"));
         let observations = Scene::new(&at(config.clone()))?.observations;
-        lsd::write(folder, &observations).map_err(SceneError::from)?;
+        lsd::write(folder, &observations)?;
         let observed = json!({ "path": "observations.txt", "sigma_scale": "auto" });
         let by = |(objective, _): &(&str, &str)| {
             let changes = [("/observations", observed.clone()), ("/imaging/objective", json!(objective))];
             match self.search(at(with(config.clone(), &changes))) {
                 // no map, no maximum: that is a result too
-                Err(error) if error.is_of_the_star() || matches!(error, ExperimentError::Scene(_)) => {
-                    Ok(Err(error.to_string()))
-                }
+                Err(error) if is_of_the_star(&error) || error.is::<SceneError>() => Ok(Err(error.to_string())),
                 searched => searched.map(Ok),
             }
         };
         OBJECTIVES.iter().map(by).collect()
     }
 
-    fn search(&self, config: Config) -> Result<Searched, ExperimentError> {
+    fn search(&self, config: Config) -> Result<Searched, Failure> {
         let began = Instant::now();
         let scene = Scene::new(&config)?;
         let imager = &scene.imager;
@@ -160,7 +154,7 @@ impl Star {
             verdict: found.verdict(&remarks),
             porb_over_prot: found.best.porb_over_prot,
             is_right: self.has_planet && apart < SAME_PERIOD,
-            median_sigma_k_kms: median(away.collect()).unwrap_or(f64::NAN),
+            median_sigma_k_kms: median(away.collect()),
             change: change.map(|change| change.ln_evidence_gain),
             lifetime_d: field.and_then(|field| field.spot_lifetime_d),
             seconds: began.elapsed().as_secs_f64(),
@@ -182,7 +176,7 @@ impl Searched {
         let log10 = false_alarm.max(f64::MIN_POSITIVE).log10();
         let [k_kms, sigma_k_kms] = self.verdict.signal.map_or([f64::NAN; 2], |s| [s.k_kms, s.sigma_k_kms]);
         let is_right = f64::from(self.is_right);
-        let median = self.median_sigma_k_kms;
+        let median = self.median_sigma_k_kms.unwrap_or(f64::NAN);
         [false_alarm, log10, finding, self.porb_over_prot, is_right, k_kms, sigma_k_kms, median]
     }
 
@@ -201,7 +195,7 @@ impl Searched {
 }
 
 /// The stars of all lifetimes, without and with a planet, by both objectives.
-pub(super) fn changing(laboratory: &Laboratory) -> Result<Report, ExperimentError> {
+pub fn changing(laboratory: &Laboratory) -> Result<Report, Failure> {
     let seeds = laboratory.full_or_quick(1..=5, 1..=1);
     let lifetimes_d = laboratory.some(LIFETIMES_D.to_vec());
     let groups: Vec<(Option<f64>, bool)> =
@@ -270,12 +264,11 @@ fn panel(group: usize, lifetime: &str, has_planet: bool) -> Panel {
 
 /// What each objective makes of the stars of a group.
 fn sum_up(results: &[OfStar], has_planet: bool) -> Value {
-    let rounded = |x: f64| (1e5 * x).round() / 1e5;
     let of_objective = |k: usize| {
         let found: Vec<&Searched> = results.iter().filter_map(|result| result[k].as_ref().ok()).collect();
         let count = |is: &dyn Fn(&Searched) -> bool| found.iter().filter(|searched| is(searched)).count();
         let lowest = found.iter().map(|searched| searched.false_alarm()).fold(f64::NAN, f64::min);
-        let sigmas = found.iter().map(|searched| searched.median_sigma_k_kms).filter(|sigma| sigma.is_finite());
+        let sigmas = found.iter().filter_map(|searched| searched.median_sigma_k_kms).filter(|sigma| sigma.is_finite());
         let mut of_all = json!({
             "without_result": results.len() - found.len(),
             "lowest_false_alarm": lowest,
