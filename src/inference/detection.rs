@@ -300,7 +300,7 @@ impl Detection {
     ) -> Result<Self, DetectionError> {
         report(Stage::PlanetFree);
         let mut alone = values;
-        alone[Parameter::K] = 0.0;
+        alone.set(Parameter::K, 0.0);
         let planet_free = View::new(imager, alone, settings, None)?;
         report(Stage::Search);
         let jitters = planet_free.jitters(imager, settings)?;
@@ -384,9 +384,9 @@ impl Detection {
         while self.rounds < MOST_ROUNDS && !self.closed && !self.best.on_edge {
             self.rounds += 1;
             report(Stage::BestOrbit(self.rounds));
-            values[Parameter::K] = self.best.orbit.k_kms;
-            values[Parameter::PorbOverProt] = self.best.porb_over_prot;
-            values[Parameter::Phi] = self.best.orbit.phi;
+            values.set(Parameter::K, self.best.orbit.k_kms);
+            values.set(Parameter::PorbOverProt, self.best.porb_over_prot);
+            values.set(Parameter::Phi, self.best.orbit.phi);
             let mut view = View::new(imager, values, &settings, Some(self.last()))?;
             if let (Seen::Integrated(field), Some(before)) = (&mut view.seen, at_bounds.take()) {
                 field.at_bounds = before;

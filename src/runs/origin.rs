@@ -11,7 +11,7 @@ use crate::inference::search::Found;
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
 use crate::sampling::optimise::Optimum;
 use crate::surface::density::Density;
-use crate::surface::evolving_map::{Held, MarginalPosterior, bounds};
+use crate::surface::evolving_map::{Held, MarginalPosterior};
 use crate::surface::static_map::{Posterior, Reference, ReferenceError};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -335,9 +335,9 @@ impl ReferenceRecord {
     /// for ever.
     pub fn values(&self, others: &ParameterValues) -> ParameterValues {
         let mut values = *others;
-        values[Parameter::SpotLifetime] = f64::NAN;
-        for p in Parameter::ALL {
-            values[p] = self.parameters().get(p.name()).copied().unwrap_or(values[p]);
+        values.field.iter_mut().for_each(|field| field.lifetime_d = None);
+        for p in Parameter::ALL.into_iter().filter(|p| !p.is_ephemeris()) {
+            self.parameters().get(p.name()).into_iter().for_each(|value| values.set(p, *value));
         }
         values
     }
@@ -365,7 +365,7 @@ impl FieldRecord {
         /// Nearer than this part a bound is reached.
         const REACHED: f64 = 0.01;
         let on_bound = |p: &Parameter| {
-            let (value, (low, high)) = (*self.parameters.get(p.name())?, bounds(*p));
+            let (value, (low, high)) = (*self.parameters.get(p.name())?, p.widest());
             let near = |bound: f64| (value / bound - 1.0).abs() < REACHED;
             let bound = [low, high].into_iter().find(|bound| near(*bound))?;
             Some(match (p, bound == high) {
@@ -440,7 +440,7 @@ impl OptimumRecord {
 
 /// The values that are given, by name.
 pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
-    Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.given(p)?))).collect()
+    Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.get(p)?))).collect()
 }
 
 #[cfg(test)]

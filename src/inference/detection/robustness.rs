@@ -72,9 +72,9 @@ pub fn robustness(
     let peak = &found.best;
     let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
     let orbit_of = |view: &View| orbit(&view.quadratic);
-    values[Parameter::K] = peak.orbit.k_kms;
-    values[Parameter::PorbOverProt] = peak.porb_over_prot;
-    values[Parameter::Phi] = peak.orbit.phi;
+    values.set(Parameter::K, peak.orbit.k_kms);
+    values.set(Parameter::PorbOverProt, peak.porb_over_prot);
+    values.set(Parameter::Phi, peak.orbit.phi);
     let at = |factor: f64| {
         let chi2_target = factor * settings.chi2_target;
         let view = View::new(imager, values, &DetectionSettings { chi2_target, ..settings.clone() }, None);

@@ -125,7 +125,7 @@ impl WholeWay {
             let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();
             let star = scene.injected(&whole, &orbits).ok()?;
             let mut values = for_blind_search(star.settings.values, &star.settings.free);
-            values[Parameter::K] = 0.0;
+            values.set(Parameter::K, 0.0);
             let view = View::new(&star.imager, values, &settings.detection, None).ok()?;
             let search = Search::new(&view.quadratic, &settings.frequencies, settings.detection.search).ok()?;
             let best = search.best();

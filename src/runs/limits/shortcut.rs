@@ -66,7 +66,7 @@ impl<'a> Shortcut<'a> {
         mut values: ParameterValues,
         settings: &'a LimitSettings,
     ) -> Result<Self, DetectionError> {
-        values[Parameter::K] = 0.0;
+        values.set(Parameter::K, 0.0);
         let mut view = View::new(imager, values, &settings.detection, None)?;
         let known = settings.detection.spots.compared();
         let nuisances = &settings.detection.nuisances;
