@@ -5,9 +5,8 @@
 //! period, nor on the eccentricity. Eccentricity is `sqrt(e) cos(omega), sqrt(e) sin(omega)` as it is.
 
 use super::elements::{Clock, Elements};
-use super::parameters::Parameter;
+use super::parameters::{Parameter, Step, turning};
 use super::prior::Prior;
-use super::table::Step;
 use super::values::ParameterValues;
 use crate::star::stability::{self, Unstable};
 use std::f64::consts::{PI, TAU};
@@ -319,11 +318,6 @@ impl ParameterSpace {
         };
         self.free.iter().map(scale).collect()
     }
-}
-
-/// Angular velocity (rad/d) that turns a map by a hundredth of a radian in that time.
-pub fn turning(time_d: f64) -> f64 {
-    0.01 / time_d
 }
 
 #[cfg(test)]

@@ -4,10 +4,9 @@
 //! `phi = (T - epoch) / P - (lambda_c - lambda_max)`, the mean longitudes (cycles) of conjunction and largest velocity,
 //! a quarter of a cycle apart on a circle.
 
-use super::parameters::Parameter;
+use super::parameters::{PARAMETERS, Parameter, Role};
 use super::prior::Prior;
-use super::table::{Element, Role};
-use super::values::ParameterValues;
+use super::values::{Element, ParameterValues};
 use crate::star::{Eccentric, Shape};
 use std::f64::consts::FRAC_PI_2;
 
@@ -41,26 +40,19 @@ pub struct Clock {
 
 impl Elements {
     /// Of the planet and of a second one.
-    pub const PLANETS: [Elements; 2] = [
+    pub const PLANETS: [Elements; 2] = [Elements::of_planet(0), Elements::of_planet(1)];
+
+    const fn of_planet(planet: usize) -> Self {
         Elements {
-            planet: 0,
-            k: Parameter::K,
-            ratio: Parameter::PorbOverProt,
-            period: Parameter::Period,
-            phi: Parameter::Phi,
-            conjunction: Parameter::Conjunction,
-            shape: [Parameter::SqrtECosOmega, Parameter::SqrtESinOmega],
-        },
-        Elements {
-            planet: 1,
-            k: Parameter::K2,
-            ratio: Parameter::PorbOverProt2,
-            period: Parameter::Period2,
-            phi: Parameter::Phi2,
-            conjunction: Parameter::Conjunction2,
-            shape: [Parameter::SqrtECosOmega2, Parameter::SqrtESinOmega2],
-        },
-    ];
+            planet,
+            k: parameter(planet, Element::Amplitude),
+            ratio: parameter(planet, Element::Ratio),
+            period: parameter(planet, Element::Period),
+            phi: parameter(planet, Element::Phase),
+            conjunction: parameter(planet, Element::Conjunction),
+            shape: [parameter(planet, Element::ShapeCos), parameter(planet, Element::ShapeSin)],
+        }
+    }
 
     /// Writes values of free parameters into `values`. An ephemeris becomes what it stands for here.
     pub fn write(values: &mut ParameterValues, given: impl Iterator<Item = (Parameter, f64)> + Clone, clock: Clock) {
@@ -143,6 +135,21 @@ impl Elements {
             _ => values.get(parameter),
         }
     }
+}
+
+/// The parameter that is this number of a planet's orbit.
+const fn parameter(planet: usize, element: Element) -> Parameter {
+    let mut i = 0;
+    while i < PARAMETERS.len() {
+        if let Role::Orbit(of, own) = PARAMETERS[i].role
+            && of == planet
+            && own as usize == element as usize
+        {
+            return PARAMETERS[i].parameter;
+        }
+        i += 1;
+    }
+    panic!("each planet has all of them")
 }
 
 /// From the largest radial velocity to the inferior conjunction (orbital cycles).

@@ -1,7 +1,14 @@
-//! The parameters that may be sampled. What is true of each stands in [`super::table`].
+//! The parameters that may be sampled, and their table: a row each, with all that is true of one and of no other.
+//!
+//! Config, checks, schema, tables, plots, exports, sampling coordinates and numerical derivatives read it. A parameter
+//! is added as a variant of [`Parameter`], a row in the same place of [`PARAMETERS`], and the number of
+//! [`super::values`] that it stands for.
 
-use super::table::{Element, PARAMETERS, Role, Scale, Spec};
+use super::prior::PriorKind::{self, Isotropic, LogUniform, Normal, Periodic, Uniform, UnitDisc};
+use super::values::{Element, FieldValues, StarValues};
+use crate::star::Surface;
 use serde::{Deserialize, Serialize};
+use std::ops::Bound;
 
 /// One of the parameters that may be free. The order is that of every table and chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -59,6 +66,508 @@ pub enum Parameter {
     /// Lifetime of the spots there (d).
     SpotLifetime,
 }
+
+/// A parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Spec {
+    /// Which.
+    pub parameter: Parameter,
+    /// Its name in config, chain, tables and plots, which ends with the unit.
+    pub key: &'static str,
+    /// Unit of its values; `1` for a ratio.
+    pub unit: &'static str,
+    /// Its symbol, in LaTeX without dollars.
+    pub latex: &'static str,
+    /// What it is: its description among the free parameters.
+    pub about: &'static str,
+    /// What it is, in a line below tables, where its name does not say it.
+    pub definition: Option<&'static str>,
+    /// Where its value stands in the config.
+    pub config_key: &'static str,
+    /// Description of the value there, in a section that is made from this table.
+    pub about_value: &'static str,
+    /// Which values make sense.
+    pub values: Interval,
+    /// Size beyond which a value is a slip of the pen, see [`most`].
+    pub most: f64,
+    /// Widest bounds of a prior.
+    pub widest: (f64, f64),
+    /// Kinds of priors that it may have.
+    pub priors: &'static [PriorKind],
+    /// Kind of the prior, over the widest bounds, where the config leaves it to the profiles.
+    pub usual_prior: Option<PriorKind>,
+    /// Its value where none is given.
+    pub usual: Option<f64>,
+    /// The coordinate that samplers move in.
+    pub scale: Scale,
+    /// Over what profiles change by a percent or so of their features, in that coordinate: what searches and first
+    /// trust regions are scaled with.
+    pub step: Step,
+    /// Step of the derivatives of profiles with respect to it.
+    pub difference: Step,
+    /// What it belongs to, and its number there.
+    pub role: Role,
+}
+
+/// An interval, which says of each end whether it belongs to it.
+pub type Interval = (Bound<f64>, Bound<f64>);
+
+/// The coordinate that samplers move in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// The value itself.
+    Linear,
+    /// Its logarithm.
+    Logarithmic,
+}
+
+/// How long a step is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// So long.
+    Fixed(f64),
+    /// So much of the value.
+    Relative(f64),
+    /// So many times the angular velocity that turns a map by a hundredth of a radian in half the time that it is seen.
+    Turn(f64),
+    /// That of a period over the rotation period: so much of an orbit in half the time base.
+    Ratio(f64),
+    /// The same of a period in days.
+    Period(f64),
+    /// So much of an orbit, in days.
+    Time(f64),
+}
+
+/// What a parameter belongs to, and how its number is read and written there.
+#[derive(Clone, Copy, Debug)]
+pub enum Role {
+    /// The orbit of planet 0 or 1.
+    Orbit(usize, Element),
+    /// Rotation, geometry and velocity of the star, which are always given.
+    Star(fn(&StarValues) -> &f64, fn(&mut StarValues, f64)),
+    /// The surface: in place of one of the star's settings, where it is given.
+    Surface(fn(&Surface) -> Option<&f64>, fn(&mut Surface, f64)),
+    /// The field of spots that is marginalised.
+    Field(fn(&FieldValues) -> Option<&f64>, fn(&mut FieldValues, f64)),
+}
+
+/// Angular velocity (rad/d) that turns a map by a hundredth of a radian in that time.
+pub fn turning(time_d: f64) -> f64 {
+    0.01 / time_d
+}
+
+/// Bounds of numbers that no star needs to exceed: beyond them they are slips of the pen, digits of a phase are lost,
+/// or the computation has no end.
+pub mod most {
+    /// Rotation velocity (km/s); velocity axes grow absurdly long beyond it.
+    pub const VSINI_KMS: f64 = 2000.0;
+    /// Any other velocity (km/s), up or down: that of light.
+    pub const VELOCITY_KMS: f64 = 3e5;
+    /// Times and periods (d), rotation cycles, and periods over each other: some millions of years.
+    pub const TIME: f64 = 1e9;
+    /// Angular velocity (rad/d), up or down: a rotation in less than a second.
+    pub const OMEGA_RAD_D: f64 = 1e6;
+}
+
+const INFINITE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
+const ABOVE_0: Interval = (Bound::Excluded(0.0), Bound::Unbounded);
+const ANY: Interval = (Bound::Unbounded, Bound::Unbounded);
+
+const fn from_to((low, high): (f64, f64)) -> Interval {
+    (Bound::Included(low), Bound::Included(high))
+}
+
+/// What rows have that say nothing else: a positive number of the star.
+const PLAIN: Spec = Spec {
+    parameter: Parameter::K,
+    key: "",
+    unit: "1",
+    latex: "",
+    about: "",
+    definition: None,
+    config_key: "",
+    about_value: "",
+    values: ABOVE_0,
+    most: f64::INFINITY,
+    widest: POSITIVE,
+    priors: &[Uniform, LogUniform, Normal],
+    usual_prior: None,
+    usual: None,
+    scale: Scale::Linear,
+    step: Step::Fixed(0.02),
+    difference: Step::Relative(1e-3),
+    role: Role::Orbit(0, Element::Amplitude),
+};
+
+const AMPLITUDE: Spec = Spec {
+    unit: "km/s",
+    values: (Bound::Included(0.0), Bound::Unbounded),
+    most: most::VELOCITY_KMS,
+    usual: Some(0.0),
+    ..PLAIN
+};
+
+const RATIO: Spec = Spec { most: most::TIME, step: Step::Ratio(0.02), ..PLAIN };
+
+const PERIOD: Spec = Spec { unit: "d", most: most::TIME, step: Step::Period(0.02), ..PLAIN };
+
+const PHASE: Spec = Spec {
+    unit: "cycles",
+    definition: Some(
+        "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity; 0: a maximum at \
+         star.epoch_d",
+    ),
+    values: ANY,
+    widest: (0.0, 1.0),
+    priors: &[Periodic, Uniform],
+    usual: Some(0.0),
+    ..PLAIN
+};
+
+const CONJUNCTION: Spec = Spec {
+    unit: "d",
+    definition: Some("time (d) of the inferior conjunction (planet in front) that its prior is on"),
+    values: ANY,
+    most: most::TIME,
+    widest: INFINITE,
+    priors: &[Uniform, Normal],
+    step: Step::Time(0.02),
+    ..PLAIN
+};
+
+const SHAPE: Spec = Spec {
+    definition: Some("of eccentricity e and argument of periastron omega of the star's orbit"),
+    values: (Bound::Excluded(-1.0), Bound::Excluded(1.0)),
+    widest: (-1.0, 1.0),
+    priors: &[UnitDisc],
+    step: Step::Fixed(0.05),
+    ..PLAIN
+};
+
+/// A number of the field that may lie within these bounds.
+const fn field(bounds: (f64, f64), usual: f64, usual_prior: PriorKind) -> Spec {
+    Spec {
+        values: from_to(bounds),
+        widest: bounds,
+        usual: Some(usual),
+        usual_prior: Some(usual_prior),
+        step: Step::Fixed(0.05),
+        ..PLAIN
+    }
+}
+
+/// All parameters, in the order of [`Parameter`], of every table and chain.
+pub const PARAMETERS: [Spec; 26] = [
+    Spec {
+        parameter: Parameter::K,
+        key: "k_kms",
+        latex: "K",
+        about: "Semi-amplitude of the planet's orbit (km/s).",
+        config_key: "planet.k_kms",
+        about_value: "Semi-amplitude of the star's radial velocity (km/s), 0 or more.",
+        role: Role::Orbit(0, Element::Amplitude),
+        ..AMPLITUDE
+    },
+    Spec {
+        parameter: Parameter::PorbOverProt,
+        key: "porb_over_prot",
+        latex: r"P_\mathrm{orb}/P_\mathrm{rot}",
+        about: "Orbital period over the rotation period.",
+        config_key: "planet.porb_over_prot",
+        about_value: "Orbital period over the rotation period, above 0.",
+        usual: Some(2.0),
+        role: Role::Orbit(0, Element::Ratio),
+        ..RATIO
+    },
+    Spec {
+        parameter: Parameter::Period,
+        key: "period_d",
+        latex: r"P_\mathrm{orb}",
+        about: "Orbital period (d), in place of `porb_over_prot`.",
+        config_key: "planet.period_d",
+        about_value: "Orbital period (d), above 0, in place of `porb_over_prot`.",
+        role: Role::Orbit(0, Element::Period),
+        ..PERIOD
+    },
+    Spec {
+        parameter: Parameter::Phi,
+        key: "phi",
+        latex: r"\phi",
+        about: "Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's \
+                radial\nvelocity.",
+        config_key: "planet.phi",
+        about_value: "Orbital phase (cycles, 0 to 1): the part of an orbit from `star.epoch_d` (rotation cycle 0) to \
+                      the next maximum\nof the star's radial velocity. `phi` = 0 is a maximum at `star.epoch_d`.",
+        role: Role::Orbit(0, Element::Phase),
+        ..PHASE
+    },
+    Spec {
+        parameter: Parameter::Conjunction,
+        key: "t_conjunction_d",
+        latex: r"T_\mathrm{conj}",
+        about: "Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in \
+                place of `phi`.\nA normal prior is an ephemeris: at the time of the data it must tell the phase to a \
+                tenth of an orbit.",
+        config_key: "planet.t_conjunction_d",
+        about_value: "Time of an inferior conjunction (planet in front; d, on the time scale of the observations), in \
+                      place of `phi`.",
+        role: Role::Orbit(0, Element::Conjunction),
+        ..CONJUNCTION
+    },
+    Spec {
+        parameter: Parameter::SqrtECosOmega,
+        key: "sqrt_e_cos_omega",
+        latex: r"\sqrt{e} \cos \omega",
+        about: "Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's \
+                orbit; free\nwith `sqrt_e_sin_omega`, both with a unit-disc prior.",
+        config_key: "planet.sqrt_e_cos_omega",
+        about_value: "Square root of the eccentricity e times the cosine of the argument of periastron omega of the \
+                      star's orbit; a\ncircle if not given.",
+        role: Role::Orbit(0, Element::ShapeCos),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::SqrtESinOmega,
+        key: "sqrt_e_sin_omega",
+        latex: r"\sqrt{e} \sin \omega",
+        about: "The same with the sine.",
+        config_key: "planet.sqrt_e_sin_omega",
+        about_value: "The same with the sine.",
+        role: Role::Orbit(0, Element::ShapeSin),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::K2,
+        key: "k2_kms",
+        latex: "K_2",
+        about: "Semi-amplitude of the orbit of a second planet (km/s).",
+        config_key: "planet.k2_kms",
+        about_value: "Semi-amplitude of the star's radial velocity by a second planet (km/s), 0 or more; without any \
+                      key of its there\nis none.",
+        role: Role::Orbit(1, Element::Amplitude),
+        ..AMPLITUDE
+    },
+    Spec {
+        parameter: Parameter::PorbOverProt2,
+        key: "porb2_over_prot",
+        latex: r"P_{\mathrm{orb},2}/P_\mathrm{rot}",
+        about: "Orbital period of the second planet over the rotation period.",
+        config_key: "planet.porb2_over_prot",
+        about_value: "Orbital period of the second planet over the rotation period, above 0.",
+        role: Role::Orbit(1, Element::Ratio),
+        ..RATIO
+    },
+    Spec {
+        parameter: Parameter::Period2,
+        key: "period2_d",
+        latex: r"P_{\mathrm{orb},2}",
+        about: "Orbital period of the second planet (d), in place of `porb2_over_prot`.",
+        config_key: "planet.period2_d",
+        about_value: "Orbital period of the second planet (d), in place of `porb2_over_prot`.",
+        role: Role::Orbit(1, Element::Period),
+        ..PERIOD
+    },
+    Spec {
+        parameter: Parameter::Phi2,
+        key: "phi2",
+        latex: r"\phi_2",
+        about: "Orbital phase of the second planet (cycles), as `phi`.",
+        config_key: "planet.phi2",
+        about_value: "Orbital phase of the second planet (cycles), as `phi`; 0 if not given.",
+        role: Role::Orbit(1, Element::Phase),
+        ..PHASE
+    },
+    Spec {
+        parameter: Parameter::Conjunction2,
+        key: "t_conjunction2_d",
+        latex: r"T_{\mathrm{conj},2}",
+        about: "Time of one inferior conjunction of the second planet (d), as `t_conjunction_d`.",
+        config_key: "planet.t_conjunction2_d",
+        about_value: "Time of an inferior conjunction of the second planet (d), in place of `phi2`.",
+        role: Role::Orbit(1, Element::Conjunction),
+        ..CONJUNCTION
+    },
+    Spec {
+        parameter: Parameter::SqrtECosOmega2,
+        key: "sqrt_e2_cos_omega2",
+        latex: r"\sqrt{e_2} \cos \omega_2",
+        about: "Of the second planet's orbit, as `sqrt_e_cos_omega`.",
+        config_key: "planet.sqrt_e2_cos_omega2",
+        about_value: "Of the second planet's orbit, as `sqrt_e_cos_omega`.",
+        role: Role::Orbit(1, Element::ShapeCos),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::SqrtESinOmega2,
+        key: "sqrt_e2_sin_omega2",
+        latex: r"\sqrt{e_2} \sin \omega_2",
+        about: "Of the second planet's orbit, as `sqrt_e_sin_omega`.",
+        config_key: "planet.sqrt_e2_sin_omega2",
+        about_value: "Of the second planet's orbit, as `sqrt_e_sin_omega`.",
+        role: Role::Orbit(1, Element::ShapeSin),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::OmegaEq,
+        key: "omega_eq_rad_d",
+        unit: "rad/d",
+        latex: r"\Omega_\mathrm{eq}",
+        about: "Angular velocity of the equator (rad/d).",
+        config_key: "star.omega_eq_rad_d",
+        most: most::OMEGA_RAD_D,
+        step: Step::Turn(1.0),
+        difference: Step::Turn(1.0),
+        role: Role::Star(|star| &star.omega_eq_rad_d, |star, x| star.omega_eq_rad_d = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::DOmega,
+        key: "domega_rad_d",
+        unit: "rad/d",
+        latex: r"\mathrm{d}\Omega",
+        about: "Angular velocity of the equator minus that of the pole (rad/d).",
+        config_key: "star.domega_rad_d",
+        values: ANY,
+        most: most::OMEGA_RAD_D,
+        widest: INFINITE,
+        step: Step::Turn(3.0),
+        difference: Step::Turn(3.0),
+        role: Role::Star(|star| &star.domega_rad_d, |star, x| star.domega_rad_d = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Inclination,
+        key: "inclination_deg",
+        unit: "deg",
+        latex: "i",
+        about: "Inclination (degrees).",
+        config_key: "star.inclination_deg",
+        values: (Bound::Excluded(0.0), Bound::Included(90.0)),
+        widest: (0.0, 90.0),
+        priors: &[Uniform, LogUniform, Normal, Isotropic],
+        step: Step::Fixed(0.5),
+        difference: Step::Fixed(0.5),
+        role: Role::Star(|star| &star.inclination_deg, |star, x| star.inclination_deg = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Vsini,
+        key: "vsini_kms",
+        unit: "km/s",
+        latex: r"v \sin i",
+        about: "Projected equatorial rotation velocity (km/s).",
+        config_key: "star.vsini_kms",
+        values: (Bound::Excluded(0.0), Bound::Included(most::VSINI_KMS)),
+        step: Step::Relative(5e-4),
+        role: Role::Star(|star| &star.vsini_kms, |star, x| star.vsini_kms = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Vsys,
+        key: "vsys_kms",
+        unit: "km/s",
+        latex: r"v_\mathrm{sys}",
+        about: "Systemic radial velocity (km/s).",
+        config_key: "star.vsys_kms",
+        values: ANY,
+        most: most::VELOCITY_KMS,
+        widest: INFINITE,
+        role: Role::Star(|star| &star.vsys_kms, |star, x| star.vsys_kms = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::LimbDarkening,
+        key: "limb_darkening",
+        latex: "u",
+        about: "First coefficient of the limb darkening, 0 to 1.",
+        config_key: "star.limb_darkening.coefficients",
+        values: from_to((0.0, 1.0)),
+        widest: (0.0, 1.0),
+        step: Step::Fixed(0.01),
+        // the model is smooth in those of the surface, but for 1e-7 of it where a narrower line needs another velocity
+        // grid
+        difference: Step::Fixed(0.02),
+        role: Role::Surface(|surface| surface.limb_darkening.as_ref(), |surface, x| surface.limb_darkening = Some(x)),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::LineSigma,
+        key: "line_sigma_kms",
+        unit: "km/s",
+        latex: r"\sigma_\mathrm{line}",
+        about: "Standard deviation of the local line (km/s), before the spectrograph.",
+        config_key: "star.line.sigma_kms",
+        most: most::VELOCITY_KMS,
+        step: Step::Relative(0.01),
+        difference: Step::Relative(0.02),
+        role: Role::Surface(|surface| surface.line_sigma_kms.as_ref(), |surface, x| surface.line_sigma_kms = Some(x)),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::EquivalentWidth,
+        key: "equivalent_width_kms",
+        unit: "km/s",
+        latex: r"W_\mathrm{line}",
+        about: "Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a \
+                nuisance of\neach profile's own by the priors alone.",
+        config_key: "star.line.equivalent_width_kms",
+        most: most::VELOCITY_KMS,
+        step: Step::Relative(2e-3),
+        difference: Step::Relative(0.02),
+        role: Role::Surface(
+            |surface| surface.equivalent_width_kms.as_ref(),
+            |surface, x| surface.equivalent_width_kms = Some(x),
+        ),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Contrast,
+        key: "contrast",
+        latex: "c",
+        about: "Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter \
+                than some\nvalue: the darker they are, the fewer a map needs, so that a flat prior ends at 0.",
+        config_key: "star.contrast",
+        values: (Bound::Included(0.0), Bound::Excluded(1.0)),
+        widest: (0.0, 1.0),
+        difference: Step::Fixed(0.02),
+        role: Role::Surface(|surface| surface.contrast.as_ref(), |surface, x| surface.contrast = Some(x)),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::SpotAmplitude,
+        key: "spot_amplitude",
+        latex: r"\sigma_\mathrm{spot}",
+        about: "Standard deviation of the spots' filling factor before the data, with objective \
+                \"marginal-likelihood\".",
+        config_key: "imaging.spot_amplitude",
+        scale: Scale::Logarithmic,
+        role: Role::Field(|field| Some(&field.amplitude), |field, x| field.amplitude = x),
+        ..field((0.01, 1.5), 0.2, LogUniform)
+    },
+    Spec {
+        parameter: Parameter::SpotSlope,
+        key: "spot_slope",
+        latex: r"\alpha_\mathrm{spot}",
+        about: "How fast the spots' power falls with the degree of the harmonics, with objective \
+                \"marginal-likelihood\".",
+        config_key: "imaging.spot_slope",
+        role: Role::Field(|field| Some(&field.slope), |field, x| field.slope = x),
+        ..field((0.0, 3.0), 1.5, Uniform)
+    },
+    Spec {
+        parameter: Parameter::SpotLifetime,
+        key: "spot_lifetime_d",
+        unit: "d",
+        latex: r"\tau_\mathrm{spot}",
+        about: "How long spots live (d), with objective \"marginal-likelihood\".",
+        config_key: "imaging.spot_lifetime_d",
+        scale: Scale::Logarithmic,
+        step: Step::Fixed(0.1),
+        role: Role::Field(|field| field.lifetime_d.as_ref(), |field, x| field.lifetime_d = Some(x)),
+        ..field((0.3, 3000.0), 36.0, LogUniform)
+    },
+];
 
 impl Parameter {
     /// All of them, in order.

@@ -2,8 +2,8 @@
 
 use super::error::Fault;
 use super::raw_parts::PriorSection;
-pub(super) use crate::model::table::most;
-use crate::model::table::{Interval, Spec};
+pub(super) use crate::model::parameters::most;
+use crate::model::parameters::{Interval, Spec};
 use crate::model::{Parameter, Prior, PriorKind};
 use std::ops::{Bound, RangeBounds};
 

@@ -1,8 +1,7 @@
 //! Sections of the config with a key for each parameter. Keys and their descriptions are those of the table of
 //! parameters.
 
-use crate::model::Parameter;
-use crate::model::table::{PARAMETERS, Spec};
+use crate::model::{PARAMETERS, Parameter, Spec};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{DeserializeSeed, Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

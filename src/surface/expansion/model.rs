@@ -3,8 +3,7 @@
 //! A shift of all profiles at once gives every profile's own derivative, because no profile sees another's velocity.
 
 use crate::maxent::Problem;
-use crate::model::table::Step;
-use crate::model::{Parameter, ParameterValues, turning};
+use crate::model::{Parameter, ParameterValues, Step, turning};
 use crate::numerics::vector::Portable;
 use crate::star::Response;
 use crate::surface::imaging::{Imager, ImagingProblem};
