@@ -78,6 +78,8 @@ pub struct Spec {
     pub unit: &'static str,
     /// Its symbol, in LaTeX without dollars.
     pub latex: &'static str,
+    /// The same in figures: cursive between asterisks, an index in `_{}`.
+    pub symbol: &'static str,
     /// What it is: its description among the free parameters.
     pub about: &'static str,
     /// What it is, in a line below tables, where its name does not say it.
@@ -184,6 +186,7 @@ const PLAIN: Spec = Spec {
     key: "",
     unit: "1",
     latex: "",
+    symbol: "",
     about: "",
     definition: None,
     config_key: "",
@@ -263,6 +266,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::K,
         key: "k_kms",
         latex: "K",
+        symbol: "*K*",
         about: "Semi-amplitude of the planet's orbit (km/s).",
         config_key: "planet.k_kms",
         about_value: "Semi-amplitude of the star's radial velocity (km/s), 0 or more.",
@@ -273,6 +277,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::PorbOverProt,
         key: "porb_over_prot",
         latex: r"P_\mathrm{orb}/P_\mathrm{rot}",
+        symbol: "*P*_{orb}/*P*_{rot}",
         about: "Orbital period over the rotation period.",
         config_key: "planet.porb_over_prot",
         about_value: "Orbital period over the rotation period, above 0.",
@@ -284,6 +289,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::Period,
         key: "period_d",
         latex: r"P_\mathrm{orb}",
+        symbol: "*P*_{orb}",
         about: "Orbital period (d), in place of `porb_over_prot`.",
         config_key: "planet.period_d",
         about_value: "Orbital period (d), above 0, in place of `porb_over_prot`.",
@@ -294,6 +300,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::Phi,
         key: "phi",
         latex: r"\phi",
+        symbol: "*φ*",
         about: "Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's \
                 radial\nvelocity.",
         config_key: "planet.phi",
@@ -306,6 +313,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::Conjunction,
         key: "t_conjunction_d",
         latex: r"T_\mathrm{conj}",
+        symbol: "*T*_{conj}",
         about: "Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in \
                 place of `phi`.\nA normal prior is an ephemeris: at the time of the data it must tell the phase to a \
                 tenth of an orbit.",
@@ -319,6 +327,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::SqrtECosOmega,
         key: "sqrt_e_cos_omega",
         latex: r"\sqrt{e} \cos \omega",
+        symbol: "√*e* cos *ω*",
         about: "Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's \
                 orbit; free\nwith `sqrt_e_sin_omega`, both with a unit-disc prior.",
         config_key: "planet.sqrt_e_cos_omega",
@@ -331,6 +340,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::SqrtESinOmega,
         key: "sqrt_e_sin_omega",
         latex: r"\sqrt{e} \sin \omega",
+        symbol: "√*e* sin *ω*",
         about: "The same with the sine.",
         config_key: "planet.sqrt_e_sin_omega",
         about_value: "The same with the sine.",
@@ -341,6 +351,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::K2,
         key: "k2_kms",
         latex: "K_2",
+        symbol: "*K*_{2}",
         about: "Semi-amplitude of the orbit of a second planet (km/s).",
         config_key: "planet.k2_kms",
         about_value: "Semi-amplitude of the star's radial velocity by a second planet (km/s), 0 or more; without any \
@@ -352,6 +363,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::PorbOverProt2,
         key: "porb2_over_prot",
         latex: r"P_{\mathrm{orb},2}/P_\mathrm{rot}",
+        symbol: "*P*_{orb,2}/*P*_{rot}",
         about: "Orbital period of the second planet over the rotation period.",
         config_key: "planet.porb2_over_prot",
         about_value: "Orbital period of the second planet over the rotation period, above 0.",
@@ -362,6 +374,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::Period2,
         key: "period2_d",
         latex: r"P_{\mathrm{orb},2}",
+        symbol: "*P*_{orb,2}",
         about: "Orbital period of the second planet (d), in place of `porb2_over_prot`.",
         config_key: "planet.period2_d",
         about_value: "Orbital period of the second planet (d), in place of `porb2_over_prot`.",
@@ -372,6 +385,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::Phi2,
         key: "phi2",
         latex: r"\phi_2",
+        symbol: "*φ*_{2}",
         about: "Orbital phase of the second planet (cycles), as `phi`.",
         config_key: "planet.phi2",
         about_value: "Orbital phase of the second planet (cycles), as `phi`; 0 if not given.",
@@ -382,6 +396,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::Conjunction2,
         key: "t_conjunction2_d",
         latex: r"T_{\mathrm{conj},2}",
+        symbol: "*T*_{conj,2}",
         about: "Time of one inferior conjunction of the second planet (d), as `t_conjunction_d`.",
         config_key: "planet.t_conjunction2_d",
         about_value: "Time of an inferior conjunction of the second planet (d), in place of `phi2`.",
@@ -392,6 +407,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::SqrtECosOmega2,
         key: "sqrt_e2_cos_omega2",
         latex: r"\sqrt{e_2} \cos \omega_2",
+        symbol: "√*e*_{2} cos *ω*_{2}",
         about: "Of the second planet's orbit, as `sqrt_e_cos_omega`.",
         config_key: "planet.sqrt_e2_cos_omega2",
         about_value: "Of the second planet's orbit, as `sqrt_e_cos_omega`.",
@@ -402,6 +418,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::SqrtESinOmega2,
         key: "sqrt_e2_sin_omega2",
         latex: r"\sqrt{e_2} \sin \omega_2",
+        symbol: "√*e*_{2} sin *ω*_{2}",
         about: "Of the second planet's orbit, as `sqrt_e_sin_omega`.",
         config_key: "planet.sqrt_e2_sin_omega2",
         about_value: "Of the second planet's orbit, as `sqrt_e_sin_omega`.",
@@ -413,6 +430,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "omega_eq_rad_d",
         unit: "rad/d",
         latex: r"\Omega_\mathrm{eq}",
+        symbol: "*Ω*_{eq}",
         about: "Angular velocity of the equator (rad/d).",
         config_key: "star.omega_eq_rad_d",
         most: most::OMEGA_RAD_D,
@@ -426,6 +444,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "domega_rad_d",
         unit: "rad/d",
         latex: r"\mathrm{d}\Omega",
+        symbol: "d*Ω*",
         about: "Angular velocity of the equator minus that of the pole (rad/d).",
         config_key: "star.domega_rad_d",
         values: ANY,
@@ -441,6 +460,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "inclination_deg",
         unit: "deg",
         latex: "i",
+        symbol: "*i*",
         about: "Inclination (degrees).",
         config_key: "star.inclination_deg",
         values: (Bound::Excluded(0.0), Bound::Included(90.0)),
@@ -456,6 +476,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "vsini_kms",
         unit: "km/s",
         latex: r"v \sin i",
+        symbol: "*v* sin *i*",
         about: "Projected equatorial rotation velocity (km/s).",
         config_key: "star.vsini_kms",
         values: (Bound::Excluded(0.0), Bound::Included(most::VSINI_KMS)),
@@ -468,6 +489,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "vsys_kms",
         unit: "km/s",
         latex: r"v_\mathrm{sys}",
+        symbol: "*v*_{sys}",
         about: "Systemic radial velocity (km/s).",
         config_key: "star.vsys_kms",
         values: ANY,
@@ -480,6 +502,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::LimbDarkening,
         key: "limb_darkening",
         latex: "u",
+        symbol: "*u*",
         about: "First coefficient of the limb darkening, 0 to 1.",
         config_key: "star.limb_darkening.coefficients",
         values: from_to((0.0, 1.0)),
@@ -496,6 +519,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "line_sigma_kms",
         unit: "km/s",
         latex: r"\sigma_\mathrm{line}",
+        symbol: "*σ*_{line}",
         about: "Standard deviation of the local line (km/s), before the spectrograph.",
         config_key: "star.line.sigma_kms",
         most: most::VELOCITY_KMS,
@@ -509,6 +533,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "equivalent_width_kms",
         unit: "km/s",
         latex: r"W_\mathrm{line}",
+        symbol: "*W*_{line}",
         about: "Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a \
                 nuisance of\neach profile's own by the priors alone.",
         config_key: "star.line.equivalent_width_kms",
@@ -525,6 +550,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::Contrast,
         key: "contrast",
         latex: "c",
+        symbol: "*c*",
         about: "Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter \
                 than some\nvalue: the darker they are, the fewer a map needs, so that a flat prior ends at 0.",
         config_key: "star.contrast",
@@ -538,6 +564,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::SpotAmplitude,
         key: "spot_amplitude",
         latex: r"\sigma_\mathrm{spot}",
+        symbol: "*σ*_{spot}",
         about: "Standard deviation of the spots' filling factor before the data, with objective \
                 \"marginal-likelihood\".",
         config_key: "imaging.spot_amplitude",
@@ -549,6 +576,7 @@ pub const PARAMETERS: [Spec; 26] = [
         parameter: Parameter::SpotSlope,
         key: "spot_slope",
         latex: r"\alpha_\mathrm{spot}",
+        symbol: "*α*_{spot}",
         about: "How fast the spots' power falls with the degree of the harmonics, with objective \
                 \"marginal-likelihood\".",
         config_key: "imaging.spot_slope",
@@ -560,6 +588,7 @@ pub const PARAMETERS: [Spec; 26] = [
         key: "spot_lifetime_d",
         unit: "d",
         latex: r"\tau_\mathrm{spot}",
+        symbol: "*τ*_{spot}",
         about: "How long spots live (d), with objective \"marginal-likelihood\".",
         config_key: "imaging.spot_lifetime_d",
         scale: Scale::Logarithmic,
@@ -694,6 +723,11 @@ impl Parameter {
     /// Whether it only shifts whole profiles, so that what a pixel looks like does not depend on it.
     pub fn only_shifts(self) -> bool {
         self.is_orbital() || self == Parameter::Vsys
+    }
+
+    /// Whether it is one of the star's own that change profiles by more than a shift.
+    pub fn is_stellar(self) -> bool {
+        !self.only_shifts() && !self.is_of_field()
     }
 
     /// The parameter of that name.
