@@ -68,7 +68,7 @@ fn measure(profiles: usize, table: &mut Table) {
     let scene = scene(profiles);
     let mut values = scene.settings.values;
     let field = [(Parameter::SpotAmplitude, 0.25), (Parameter::SpotSlope, 1.5), (Parameter::SpotLifetime, 30.0)];
-    field.into_iter().for_each(|(p, value)| values[p] = value);
+    field.into_iter().for_each(|(p, value)| values.set(p, value));
     let posterior = |free: &[Parameter]| {
         let wide = |parameter: &Parameter| FreeParameter {
             parameter: *parameter,

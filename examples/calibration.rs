@@ -66,9 +66,9 @@ fn star(scene: &Scene, like: &Simulation, seed: u64, orbit: Option<(f64, f64)>) 
     let spots = (0..12).map(|_| spot()).collect();
     let mut truth = scene.settings.values;
     let (period, phi) = orbit.unwrap_or((1.7, 0.5));
-    truth[Parameter::K] = if orbit.is_some() { K_KMS } else { 0.0 };
-    truth[Parameter::PorbOverProt] = period;
-    truth[Parameter::Phi] = phi;
+    truth.set(Parameter::K, if orbit.is_some() { K_KMS } else { 0.0 });
+    truth.set(Parameter::PorbOverProt, period);
+    truth.set(Parameter::Phi, phi);
     let simulation = Simulation { spots, truth, seed: 1000 + seed, ..like.clone() };
     let star = scene.imager.star.clone();
     let observations = simulation.observe(&star);

@@ -143,7 +143,7 @@ impl Detection {
     ) -> Result<Self, SurfaceError> {
         report(Stage::PlanetFree);
         let mut alone = values;
-        alone[Parameter::K] = 0.0;
+        alone.set(Parameter::K, 0.0);
         let surface = settings.surface.model();
         let at = At { imager, values: alone, nuisances: &settings.nuisances };
         let planet_free = surface.linearise(at, None)?;
@@ -220,9 +220,9 @@ impl Detection {
         while self.rounds < MOST_ROUNDS && !self.closed && !self.best.on_edge {
             self.rounds += 1;
             report(Stage::BestOrbit(self.rounds));
-            at.values[Parameter::K] = self.best.orbit.k_kms;
-            at.values[Parameter::PorbOverProt] = self.best.porb_over_prot;
-            at.values[Parameter::Phi] = self.best.orbit.phi;
+            at.values.set(Parameter::K, self.best.orbit.k_kms);
+            at.values.set(Parameter::PorbOverProt, self.best.porb_over_prot);
+            at.values.set(Parameter::Phi, self.best.orbit.phi);
             let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
             let mut next = refined(&here.quadratic, &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);

@@ -124,28 +124,27 @@ fn blind(
     let config = space.values_at(&space.start());
     let values = for_blind_search(config, space.free());
     let found = Detection::find(imager, values, frequencies, &wanted, &|_| ()).ok()?;
-    let mut values = found.last().expansion.values;
-    first.all().into_iter().chain(second.all()).for_each(|p| values[p] = config[p]);
+    let mut values = found.last().expansion.values.with_orbits_of(&config);
     let both = found.second.as_ref().and_then(|second| second.both).map(|both| both.orbits.to_vec());
     let mut peaks = both.filter(|_| beside).unwrap_or_else(|| vec![found.best]);
     for of in sought {
         let prior = space.period_prior(of)?;
         let allowed = peaks.iter().position(|peak| prior.contains(peak.porb_over_prot));
         let peak = peaks.remove(allowed.or((!beside).then_some(0))?);
-        values[of.k] = peak.orbit.k_kms;
-        values[of.ratio] = peak.porb_over_prot;
-        values[of.phi] = peak.orbit.phi;
+        values.set(of.k, peak.orbit.k_kms);
+        values.set(of.ratio, peak.porb_over_prot);
+        values.set(of.phi, peak.orbit.phi);
     }
     if let Some(Some(ellipse)) = found.keplerian.first().filter(|_| !beside) {
         let largest =
             first.shape.map(|p| space.free().iter().find(|f| f.parameter == p).map(|f| f.prior.bounds().1))[0]?;
         let e = ellipse.eccentricity.clamp(SMALLEST_E, (SMALL_PART * largest * largest).max(SMALLEST_E));
         let shape = Shape::new(e, ellipse.omega);
-        values[Parameter::SqrtECosOmega] = shape.sqrt_e_cos_omega;
-        values[Parameter::SqrtESinOmega] = shape.sqrt_e_sin_omega;
-        values[Parameter::K] = ellipse.k_kms;
-        values[Parameter::PorbOverProt] = ellipse.porb_over_prot;
-        values[Parameter::Phi] = (ellipse.maximum_cycle / ellipse.porb_over_prot).rem_euclid(1.0);
+        values.set(Parameter::SqrtECosOmega, shape.sqrt_e_cos_omega);
+        values.set(Parameter::SqrtESinOmega, shape.sqrt_e_sin_omega);
+        values.set(Parameter::K, ellipse.k_kms);
+        values.set(Parameter::PorbOverProt, ellipse.porb_over_prot);
+        values.set(Parameter::Phi, (ellipse.maximum_cycle / ellipse.porb_over_prot).rem_euclid(1.0));
     }
     let mut theta = with_spots_of(space, space.theta_of(&values), &values);
     // phi as its prior has it

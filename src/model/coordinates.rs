@@ -5,8 +5,9 @@
 //! period, nor on the eccentricity. Eccentricity is `sqrt(e) cos(omega), sqrt(e) sin(omega)` as it is.
 
 use super::elements::{Clock, Elements};
-use super::parameters::{Parameter, ParameterValues};
+use super::parameters::{Parameter, Step, turning};
 use super::prior::Prior;
+use super::values::ParameterValues;
 use crate::star::stability::{self, Unstable};
 use std::f64::consts::{PI, TAU};
 
@@ -58,10 +59,9 @@ pub fn period_prior(free: &[FreeParameter], of: &Elements, clock: Clock) -> Opti
 
 /// Values for a blind search: circles, and none of a second planet that is looked for as well.
 pub fn for_blind_search(mut values: ParameterValues, free: &[FreeParameter]) -> ParameterValues {
-    let [first, second] = &Elements::PLANETS;
-    first.shape.into_iter().for_each(|p| values[p] = f64::NAN);
-    if free.iter().any(|f| second.all().contains(&f.parameter)) {
-        second.all().into_iter().for_each(|p| values[p] = f64::NAN);
+    values.first.shape = None;
+    if free.iter().any(|f| Elements::of(f.parameter).is_some_and(|of| of.planet > 0)) {
+        values.second = None;
     }
     values
 }
@@ -139,8 +139,10 @@ impl ParameterSpace {
 
     /// The same with the field of `values` where it is fixed.
     pub fn with_field_of(mut self, values: &ParameterValues) -> Self {
-        for p in Parameter::FIELD.into_iter().filter(|p| self.free.iter().all(|f| f.parameter != *p)) {
-            self.values[p] = values[p];
+        let own = self.values;
+        self.values.field = values.field;
+        for p in self.free.iter().map(|f| f.parameter).filter(|p| p.is_of_field()) {
+            own.get(p).into_iter().for_each(|value| self.values.set(p, value));
         }
         self
     }
@@ -168,13 +170,20 @@ impl ParameterSpace {
     }
 
     /// The free ones among `values`.
+    ///
+    /// # Panics
+    /// If one of them is not given.
     pub fn theta_of(&self, values: &ParameterValues) -> Vec<f64> {
-        let one = |f: &FreeParameter| match Elements::of(f.parameter) {
-            Some(of) if of.period == f.parameter => of.period_d(values, self.clock),
-            Some(of) if of.conjunction == f.parameter => of.conjunction_d(values, self.clock, f.prior.centre()),
-            _ => values[f.parameter],
+        let given = |f: &FreeParameter| match self.value_among(f, values) {
+            Some(value) => value,
+            None => panic!("{} is not given", f.parameter.name()),
         };
-        self.free.iter().map(one).collect()
+        self.free.iter().map(given).collect()
+    }
+
+    /// The value of a free parameter among `values`, if it is given.
+    pub fn value_among(&self, free: &FreeParameter, values: &ParameterValues) -> Option<f64> {
+        Elements::value(free.parameter, &free.prior, values, self.clock)
     }
 
     /// Where a search starts: the free parameters as given.
@@ -200,8 +209,7 @@ impl ParameterSpace {
     }
 
     fn has_two_planets(&self) -> bool {
-        let [_, second] = &Elements::PLANETS;
-        self.values.given(second.k).is_some()
+        self.values.second.is_some()
     }
 
     /// A draw from the prior.
@@ -294,33 +302,19 @@ impl ParameterSpace {
     /// Steps of the sampling coordinates over which profiles change by a percent or so of their features: what
     /// numerical derivatives and a first trust region are scaled with.
     pub fn scales(&self) -> Vec<f64> {
-        // a change of angular velocity that turns a map by this angle (rad) in half the time that it is seen
-        let turn = 0.01;
-        let omega = turn / (0.5 * self.season_cycles.max(0.1) * self.clock.rotation_period_d);
-        let ratio = |of: Parameter| {
-            let period = self.values[of];
-            0.02 * period * period / (0.5 * self.time_base_cycles).max(0.1)
-        };
-        let scale = |f: &FreeParameter| match f.parameter {
-            Parameter::K | Parameter::K2 | Parameter::Vsys => 0.02,
-            Parameter::Phi | Parameter::Phi2 => 0.02,
-            Parameter::PorbOverProt | Parameter::PorbOverProt2 => ratio(f.parameter),
-            Parameter::Period => self.clock.rotation_period_d * ratio(Parameter::PorbOverProt),
-            Parameter::Period2 => self.clock.rotation_period_d * ratio(Parameter::PorbOverProt2),
-            Parameter::Conjunction => 0.02 * self.clock.rotation_period_d * self.values[Parameter::PorbOverProt],
-            Parameter::Conjunction2 => 0.02 * self.clock.rotation_period_d * self.values[Parameter::PorbOverProt2],
-            Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => 0.05,
-            Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => 0.05,
-            Parameter::OmegaEq => omega,
-            Parameter::DOmega => 3.0 * omega,
-            Parameter::Inclination => 0.5,
-            Parameter::Vsini => 5e-4 * self.values[Parameter::Vsini],
-            Parameter::LimbDarkening => 0.01,
-            Parameter::LineSigma => 0.01 * self.values[Parameter::LineSigma],
-            Parameter::EquivalentWidth => 2e-3 * self.values[Parameter::EquivalentWidth],
-            Parameter::Contrast => 0.02,
-            Parameter::SpotAmplitude | Parameter::SpotSlope => 0.05,
-            Parameter::SpotLifetime => 0.1,
+        let season_d = self.season_cycles.max(0.1) * self.clock.rotation_period_d;
+        let scale = |f: &FreeParameter| {
+            let period = || self.values[Elements::of(f.parameter).expect("a parameter of an orbit").ratio];
+            // in half the time base
+            let ratio = |orbits: f64| orbits * period() * period() / (0.5 * self.time_base_cycles).max(0.1);
+            match f.parameter.spec().step {
+                Step::Fixed(step) => step,
+                Step::Relative(part) => part * self.values[f.parameter],
+                Step::Turn(times) => times * turning(0.5 * season_d),
+                Step::Ratio(orbits) => ratio(orbits),
+                Step::Period(orbits) => self.clock.rotation_period_d * ratio(orbits),
+                Step::Time(orbits) => orbits * self.clock.rotation_period_d * period(),
+            }
         };
         self.free.iter().map(scale).collect()
     }
@@ -400,7 +394,9 @@ mod tests {
             other(Phi2, Prior::Periodic),
         ];
         let mut values = ParameterValues::of_eight([0.1, 0.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]);
-        (values[K2], values[PorbOverProt2], values[Phi2]) = (0.1, 3.5, 0.5);
+        values.set(K2, 0.1);
+        values.set(PorbOverProt2, 3.5);
+        values.set(Phi2, 0.5);
         let space = ParameterSpace::new(free, values, 1.47, 2.94, 3.0);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         for _ in 0..20 {
@@ -459,7 +455,7 @@ mod tests {
         let density = |space: &ParameterSpace, theta: &[f64]| space.log_prior(theta);
         for phi in [0.0, 0.2, 0.77] {
             let mut values = values;
-            values[Phi] = phi;
+            values.set(Phi, phi);
             let theta = conjunction.theta_of(&values);
             assert!((150.0..=155.1).contains(&theta[1]), "{theta:?}");
             let back = conjunction.values_at(&theta)[Phi];

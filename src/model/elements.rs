@@ -4,13 +4,17 @@
 //! `phi = (T - epoch) / P - (lambda_c - lambda_max)`, the mean longitudes (cycles) of conjunction and largest velocity,
 //! a quarter of a cycle apart on a circle.
 
-use super::parameters::{Parameter, ParameterValues};
-use crate::star::{Eccentric, Orbit, Shape};
+use super::parameters::{PARAMETERS, Parameter, Role};
+use super::prior::Prior;
+use super::values::{Element, ParameterValues};
+use crate::star::{Eccentric, Shape};
 use std::f64::consts::FRAC_PI_2;
 
 /// The parameters of one planet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Elements {
+    /// Which of the planets: 0 or 1.
+    pub planet: usize,
     /// Semi-amplitude.
     pub k: Parameter,
     /// Period over rotation period.
@@ -36,70 +40,71 @@ pub struct Clock {
 
 impl Elements {
     /// Of the planet and of a second one.
-    pub const PLANETS: [Elements; 2] = [
+    pub const PLANETS: [Elements; 2] = [Elements::of_planet(0), Elements::of_planet(1)];
+
+    const fn of_planet(planet: usize) -> Self {
         Elements {
-            k: Parameter::K,
-            ratio: Parameter::PorbOverProt,
-            period: Parameter::Period,
-            phi: Parameter::Phi,
-            conjunction: Parameter::Conjunction,
-            shape: [Parameter::SqrtECosOmega, Parameter::SqrtESinOmega],
-        },
-        Elements {
-            k: Parameter::K2,
-            ratio: Parameter::PorbOverProt2,
-            period: Parameter::Period2,
-            phi: Parameter::Phi2,
-            conjunction: Parameter::Conjunction2,
-            shape: [Parameter::SqrtECosOmega2, Parameter::SqrtESinOmega2],
-        },
-    ];
+            planet,
+            k: parameter(planet, Element::Amplitude),
+            ratio: parameter(planet, Element::Ratio),
+            period: parameter(planet, Element::Period),
+            phi: parameter(planet, Element::Phase),
+            conjunction: parameter(planet, Element::Conjunction),
+            shape: [parameter(planet, Element::ShapeCos), parameter(planet, Element::ShapeSin)],
+        }
+    }
 
     /// Writes values of free parameters into `values`. An ephemeris becomes what it stands for here.
     pub fn write(values: &mut ParameterValues, given: impl Iterator<Item = (Parameter, f64)> + Clone, clock: Clock) {
-        given.clone().filter(|(p, _)| !p.is_ephemeris()).for_each(|(p, x)| values[p] = x);
-        for (p, x) in given.filter(|(p, _)| p.is_ephemeris()) {
+        given.clone().filter(|(p, _)| !p.is_ephemeris()).for_each(|(p, x)| values.set(p, x));
+        for (p, x) in given {
             // in the order of all parameters the period comes before the conjunction
-            match Elements::of(p) {
-                Some(of) if of.period == p => of.set_period(values, x, clock),
-                Some(of) => of.set_conjunction(values, x, clock),
-                None => unreachable!("ephemerides belong to planets"),
+            match p.spec().role {
+                Role::Orbit(planet, Element::Period) => Elements::PLANETS[planet].set_period(values, x, clock),
+                Role::Orbit(planet, Element::Conjunction) => {
+                    Elements::PLANETS[planet].set_conjunction(values, x, clock)
+                }
+                _ => {}
             }
         }
     }
 
     /// Those of the planet that a parameter belongs to.
     pub fn of(parameter: Parameter) -> Option<&'static Elements> {
-        Elements::PLANETS.iter().find(|elements| elements.all().contains(&parameter))
+        match parameter.spec().role {
+            Role::Orbit(planet, _) => Some(&Elements::PLANETS[planet]),
+            _ => None,
+        }
     }
 
     /// All of them, in the order of [`Parameter::ALL`].
     pub fn all(&self) -> [Parameter; 7] {
-        let Elements { k, ratio, period, phi, conjunction, shape: [cos, sin] } = *self;
+        let Elements { k, ratio, period, phi, conjunction, shape: [cos, sin], .. } = *self;
         [k, ratio, period, phi, conjunction, cos, sin]
     }
 
     /// Eccentricity and argument of periastron.
     pub fn shape(&self, values: &ParameterValues) -> Shape {
-        let [sqrt_e_cos_omega, sqrt_e_sin_omega] = self.shape.map(|p| values.given(p).unwrap_or(0.0));
-        Shape { sqrt_e_cos_omega, sqrt_e_sin_omega }
+        values.orbit(self.planet).and_then(|orbit| orbit.shape).unwrap_or_default()
     }
 
-    /// The orbit.
+    /// The orbit of a planet that is there.
+    ///
+    /// # Panics
+    /// If it is not.
     pub fn orbit(&self, values: &ParameterValues) -> Eccentric {
-        let (k_kms, porb_over_prot, phi) = (values[self.k], values[self.ratio], values[self.phi]);
-        Eccentric { orbit: Orbit { k_kms, porb_over_prot, phi }, shape: self.shape(values) }
+        values.orbit(self.planet).expect("a planet that is there").eccentric()
     }
 
     /// Writes a period in days into `values`.
     pub fn set_period(&self, values: &mut ParameterValues, period_d: f64, clock: Clock) {
-        values[self.ratio] = period_d / clock.rotation_period_d;
+        values.set(self.ratio, period_d / clock.rotation_period_d);
     }
 
     /// Writes the time of a conjunction into `values`, whose period and shape are there.
     pub fn set_conjunction(&self, values: &mut ParameterValues, time_d: f64, clock: Clock) {
         let cycles = (time_d - clock.epoch_d) / self.period_d(values, clock);
-        values[self.phi] = (cycles - to_conjunction(&self.shape(values))).rem_euclid(1.0);
+        values.set(self.phi, (cycles - to_conjunction(&self.shape(values))).rem_euclid(1.0));
     }
 
     /// The period in days.
@@ -114,6 +119,37 @@ impl Elements {
         let turns = ((near - clock.epoch_d) / period - phase).round();
         clock.epoch_d + period * (turns + phase)
     }
+
+    /// The value of a parameter of one of the planets or of any other that has the given prior, if it is given; of a
+    /// conjunction the one nearest to the middle of the prior.
+    pub fn value(parameter: Parameter, prior: &Prior, values: &ParameterValues, clock: Clock) -> Option<f64> {
+        match parameter.spec().role {
+            Role::Orbit(planet, element @ (Element::Period | Element::Conjunction)) => {
+                values.orbit(planet)?;
+                let of = &Elements::PLANETS[planet];
+                Some(match element {
+                    Element::Period => of.period_d(values, clock),
+                    _ => of.conjunction_d(values, clock, prior.centre()),
+                })
+            }
+            _ => values.get(parameter),
+        }
+    }
+}
+
+/// The parameter that is this number of a planet's orbit.
+const fn parameter(planet: usize, element: Element) -> Parameter {
+    let mut i = 0;
+    while i < PARAMETERS.len() {
+        if let Role::Orbit(of, own) = PARAMETERS[i].role
+            && of == planet
+            && own as usize == element as usize
+        {
+            return PARAMETERS[i].parameter;
+        }
+        i += 1;
+    }
+    panic!("each planet has all of them")
 }
 
 /// From the largest radial velocity to the inferior conjunction (orbital cycles).
@@ -133,9 +169,8 @@ mod tests {
             for (e, omega) in [(0.0, 0.0), (0.2, 1.0), (0.7, -2.0)] {
                 let mut values = ParameterValues::of_eight([0.1, 1.7, 0.5, 2.0, 0.0, 38.0, 40.0, 0.0]);
                 let shape = Shape::new(e, omega);
-                values[elements.k] = 0.1;
-                values[elements.shape[0]] = shape.sqrt_e_cos_omega;
-                values[elements.shape[1]] = shape.sqrt_e_sin_omega;
+                values.set(elements.k, 0.1);
+                values.orbit_mut(elements.planet).shape = Some(shape);
                 elements.set_period(&mut values, 4.93, CLOCK);
                 elements.set_conjunction(&mut values, 2_459_321.125, CLOCK);
                 assert!((elements.period_d(&values, CLOCK) - 4.93).abs() < 1e-12);
@@ -152,6 +187,10 @@ mod tests {
 
     #[test]
     fn every_parameter_of_an_orbit_belongs_to_one_planet() {
+        for (planet, elements) in Elements::PLANETS.iter().enumerate() {
+            assert_eq!(elements.planet, planet);
+            assert!(elements.all().iter().all(|p| Elements::of(*p) == Some(elements)));
+        }
         let orbital: Vec<Parameter> = Parameter::ALL.into_iter().filter(|p| p.is_orbital()).collect();
         let listed: Vec<Parameter> = Elements::PLANETS.iter().flat_map(Elements::all).collect();
         assert_eq!(orbital, listed);

@@ -1,6 +1,7 @@
-//! The parameters of a star, its planets and its spots: their table, priors and sampling coordinates, and what is quoted
-//! of an orbit (`docs/method.md` sections 1 and 5).
+//! The parameters of a star, its planets and its spots: their table, priors and sampling coordinates, and what is
+//! quoted of an orbit (`docs/method.md` sections 1 and 5).
 
+mod access;
 pub mod coordinates;
 pub mod elements;
 pub mod orbital;
@@ -8,10 +9,12 @@ pub mod parameters;
 pub mod prior;
 mod quantile;
 mod quoted;
+pub mod values;
 
 pub use coordinates::{FreeParameter, ParameterSpace, for_blind_search, period_prior};
 pub use elements::{Clock, Elements};
 pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths, quoted_definition};
-pub use parameters::{Parameter, ParameterValues};
-pub use prior::Prior;
+pub use parameters::{PARAMETERS, Parameter, Spec, Step, turning};
+pub use prior::{Prior, PriorKind};
 pub use quoted::Quoted;
+pub use values::{Element, FieldValues, OrbitValues, ParameterValues, StarValues};

@@ -17,13 +17,6 @@ pub(super) const UNKNOWN_PHASE: f64 = 0.288_675_134_594_812_9;
 /// Minimum masses below this (Jupiter masses) are also given in masses of the Earth.
 const SMALL_MJUP: f64 = 0.1;
 
-/// What phi is, in a line.
-pub const PHI: &str = "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity; 0: a \
-maximum at star.epoch_d";
-
-/// What a conjunction is whose time is a parameter.
-const NAMED_CONJUNCTION: &str = "time (d) of the inferior conjunction (planet in front) that its prior is on";
-
 /// A quantity of an orbit. The order is that of tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OrbitQuantity {
@@ -204,14 +197,7 @@ impl OrbitQuantities {
 
 /// What a parameter of an orbit is, in a line, where its name does not say it.
 pub fn definition(parameter: &str) -> Option<&'static str> {
-    match Parameter::from_name(parameter)? {
-        Parameter::Phi | Parameter::Phi2 => Some(PHI),
-        Parameter::Conjunction | Parameter::Conjunction2 => Some(NAMED_CONJUNCTION),
-        parameter if parameter.is_shape() => {
-            Some("of eccentricity e and argument of periastron omega of the star's orbit")
-        }
-        _ => None,
-    }
+    Parameter::from_name(parameter)?.spec().definition
 }
 
 /// The same of a quantity that follows from the parameters.

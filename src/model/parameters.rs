@@ -1,10 +1,14 @@
-//! The parameters that may be sampled: their names, units, and values at one point of parameter space.
+//! The parameters that may be sampled, and their table: a row each, with all that is true of one and of no other.
+//!
+//! Config, checks, schema, tables, plots, exports, sampling coordinates and numerical derivatives read it. A parameter
+//! is added as a variant of [`Parameter`], a row in the same place of [`PARAMETERS`], and the number of
+//! [`super::values`] that it stands for.
 
-use super::elements::Elements;
-use crate::star::{Motion, Rotation, StarState, Surface};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::collections::BTreeMap;
+use super::prior::PriorKind::{self, Isotropic, LogUniform, Normal, Periodic, Uniform, UnitDisc};
+use super::values::{Element, FieldValues, StarValues};
+use crate::star::Surface;
+use serde::{Deserialize, Serialize};
+use std::ops::Bound;
 
 /// One of the parameters that may be free. The order is that of every table and chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -63,167 +67,641 @@ pub enum Parameter {
     SpotLifetime,
 }
 
+/// A parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct Spec {
+    /// Which.
+    pub parameter: Parameter,
+    /// Its name in config, chain, tables and plots, which ends with the unit.
+    pub key: &'static str,
+    /// Unit of its values; `1` for a ratio.
+    pub unit: &'static str,
+    /// Its symbol, in LaTeX without dollars.
+    pub latex: &'static str,
+    /// The same in figures: cursive between asterisks, an index in `_{}`.
+    pub symbol: &'static str,
+    /// What it is: its description among the free parameters.
+    pub about: &'static str,
+    /// What it is, in a line below tables, where its name does not say it.
+    pub definition: Option<&'static str>,
+    /// Where its value stands in the config.
+    pub config_key: &'static str,
+    /// Description of the value there, in a section that is made from this table.
+    pub about_value: &'static str,
+    /// Which values make sense.
+    pub values: Interval,
+    /// Size beyond which a value is a slip of the pen, see [`most`].
+    pub most: f64,
+    /// Widest bounds of a prior.
+    pub widest: (f64, f64),
+    /// Kinds of priors that it may have.
+    pub priors: &'static [PriorKind],
+    /// Kind of the prior, over the widest bounds, where the config leaves it to the profiles.
+    pub usual_prior: Option<PriorKind>,
+    /// Its value where none is given.
+    pub usual: Option<f64>,
+    /// The coordinate that samplers move in.
+    pub scale: Scale,
+    /// Over what profiles change by a percent or so of their features, in that coordinate: what searches and first
+    /// trust regions are scaled with.
+    pub step: Step,
+    /// Step of the derivatives of profiles with respect to it.
+    pub difference: Step,
+    /// What it belongs to, and its number there.
+    pub role: Role,
+}
+
+/// An interval, which says of each end whether it belongs to it.
+pub type Interval = (Bound<f64>, Bound<f64>);
+
+/// The coordinate that samplers move in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// The value itself.
+    Linear,
+    /// Its logarithm.
+    Logarithmic,
+}
+
+/// How long a step is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// So long.
+    Fixed(f64),
+    /// So much of the value.
+    Relative(f64),
+    /// So many times the angular velocity that turns a map by a hundredth of a radian in half the time that it is seen.
+    Turn(f64),
+    /// That of a period over the rotation period: so much of an orbit in half the time base.
+    Ratio(f64),
+    /// The same of a period in days.
+    Period(f64),
+    /// So much of an orbit, in days.
+    Time(f64),
+}
+
+/// What a parameter belongs to, and how its number is read and written there.
+#[derive(Clone, Copy, Debug)]
+pub enum Role {
+    /// The orbit of planet 0 or 1.
+    Orbit(usize, Element),
+    /// Rotation, geometry and velocity of the star, which are always given.
+    Star(fn(&StarValues) -> &f64, fn(&mut StarValues, f64)),
+    /// The surface: in place of one of the star's settings, where it is given.
+    Surface(fn(&Surface) -> Option<&f64>, fn(&mut Surface, f64)),
+    /// The field of spots that is marginalised.
+    Field(fn(&FieldValues) -> Option<&f64>, fn(&mut FieldValues, f64)),
+}
+
+/// Angular velocity (rad/d) that turns a map by a hundredth of a radian in that time.
+pub fn turning(time_d: f64) -> f64 {
+    0.01 / time_d
+}
+
+/// Bounds of numbers that no star needs to exceed: beyond them they are slips of the pen, digits of a phase are lost,
+/// or the computation has no end.
+pub mod most {
+    /// Rotation velocity (km/s); velocity axes grow absurdly long beyond it.
+    pub const VSINI_KMS: f64 = 2000.0;
+    /// Any other velocity (km/s), up or down: that of light.
+    pub const VELOCITY_KMS: f64 = 3e5;
+    /// Times and periods (d), rotation cycles, and periods over each other: some millions of years.
+    pub const TIME: f64 = 1e9;
+    /// Angular velocity (rad/d), up or down: a rotation in less than a second.
+    pub const OMEGA_RAD_D: f64 = 1e6;
+}
+
+const INFINITE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
+const ABOVE_0: Interval = (Bound::Excluded(0.0), Bound::Unbounded);
+const ANY: Interval = (Bound::Unbounded, Bound::Unbounded);
+
+const fn from_to((low, high): (f64, f64)) -> Interval {
+    (Bound::Included(low), Bound::Included(high))
+}
+
+/// What rows have that say nothing else: a positive number of the star.
+const PLAIN: Spec = Spec {
+    parameter: Parameter::K,
+    key: "",
+    unit: "1",
+    latex: "",
+    symbol: "",
+    about: "",
+    definition: None,
+    config_key: "",
+    about_value: "",
+    values: ABOVE_0,
+    most: f64::INFINITY,
+    widest: POSITIVE,
+    priors: &[Uniform, LogUniform, Normal],
+    usual_prior: None,
+    usual: None,
+    scale: Scale::Linear,
+    step: Step::Fixed(0.02),
+    difference: Step::Relative(1e-3),
+    role: Role::Orbit(0, Element::Amplitude),
+};
+
+const AMPLITUDE: Spec = Spec {
+    unit: "km/s",
+    values: (Bound::Included(0.0), Bound::Unbounded),
+    most: most::VELOCITY_KMS,
+    usual: Some(0.0),
+    ..PLAIN
+};
+
+const RATIO: Spec = Spec { most: most::TIME, step: Step::Ratio(0.02), ..PLAIN };
+
+const PERIOD: Spec = Spec { unit: "d", most: most::TIME, step: Step::Period(0.02), ..PLAIN };
+
+const PHASE: Spec = Spec {
+    unit: "cycles",
+    definition: Some(
+        "part of an orbit (cycles) from star.epoch_d to the next maximum of the radial velocity; 0: a maximum at \
+         star.epoch_d",
+    ),
+    values: ANY,
+    widest: (0.0, 1.0),
+    priors: &[Periodic, Uniform],
+    usual: Some(0.0),
+    ..PLAIN
+};
+
+const CONJUNCTION: Spec = Spec {
+    unit: "d",
+    definition: Some("time (d) of the inferior conjunction (planet in front) that its prior is on"),
+    values: ANY,
+    most: most::TIME,
+    widest: INFINITE,
+    priors: &[Uniform, Normal],
+    step: Step::Time(0.02),
+    ..PLAIN
+};
+
+const SHAPE: Spec = Spec {
+    definition: Some("of eccentricity e and argument of periastron omega of the star's orbit"),
+    values: (Bound::Excluded(-1.0), Bound::Excluded(1.0)),
+    widest: (-1.0, 1.0),
+    priors: &[UnitDisc],
+    step: Step::Fixed(0.05),
+    ..PLAIN
+};
+
+/// A number of the field that may lie within these bounds.
+const fn field(bounds: (f64, f64), usual: f64, usual_prior: PriorKind) -> Spec {
+    Spec {
+        values: from_to(bounds),
+        widest: bounds,
+        usual: Some(usual),
+        usual_prior: Some(usual_prior),
+        step: Step::Fixed(0.05),
+        ..PLAIN
+    }
+}
+
+/// All parameters, in the order of [`Parameter`], of every table and chain.
+pub const PARAMETERS: [Spec; 26] = [
+    Spec {
+        parameter: Parameter::K,
+        key: "k_kms",
+        latex: "K",
+        symbol: "*K*",
+        about: "Semi-amplitude of the planet's orbit (km/s).",
+        config_key: "planet.k_kms",
+        about_value: "Semi-amplitude of the star's radial velocity (km/s), 0 or more.",
+        role: Role::Orbit(0, Element::Amplitude),
+        ..AMPLITUDE
+    },
+    Spec {
+        parameter: Parameter::PorbOverProt,
+        key: "porb_over_prot",
+        latex: r"P_\mathrm{orb}/P_\mathrm{rot}",
+        symbol: "*P*_{orb}/*P*_{rot}",
+        about: "Orbital period over the rotation period.",
+        config_key: "planet.porb_over_prot",
+        about_value: "Orbital period over the rotation period, above 0.",
+        usual: Some(2.0),
+        role: Role::Orbit(0, Element::Ratio),
+        ..RATIO
+    },
+    Spec {
+        parameter: Parameter::Period,
+        key: "period_d",
+        latex: r"P_\mathrm{orb}",
+        symbol: "*P*_{orb}",
+        about: "Orbital period (d), in place of `porb_over_prot`.",
+        config_key: "planet.period_d",
+        about_value: "Orbital period (d), above 0, in place of `porb_over_prot`.",
+        role: Role::Orbit(0, Element::Period),
+        ..PERIOD
+    },
+    Spec {
+        parameter: Parameter::Phi,
+        key: "phi",
+        latex: r"\phi",
+        symbol: "*φ*",
+        about: "Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's \
+                radial\nvelocity.",
+        config_key: "planet.phi",
+        about_value: "Orbital phase (cycles, 0 to 1): the part of an orbit from `star.epoch_d` (rotation cycle 0) to \
+                      the next maximum\nof the star's radial velocity. `phi` = 0 is a maximum at `star.epoch_d`.",
+        role: Role::Orbit(0, Element::Phase),
+        ..PHASE
+    },
+    Spec {
+        parameter: Parameter::Conjunction,
+        key: "t_conjunction_d",
+        latex: r"T_\mathrm{conj}",
+        symbol: "*T*_{conj}",
+        about: "Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in \
+                place of `phi`.\nA normal prior is an ephemeris: at the time of the data it must tell the phase to a \
+                tenth of an orbit.",
+        config_key: "planet.t_conjunction_d",
+        about_value: "Time of an inferior conjunction (planet in front; d, on the time scale of the observations), in \
+                      place of `phi`.",
+        role: Role::Orbit(0, Element::Conjunction),
+        ..CONJUNCTION
+    },
+    Spec {
+        parameter: Parameter::SqrtECosOmega,
+        key: "sqrt_e_cos_omega",
+        latex: r"\sqrt{e} \cos \omega",
+        symbol: "√*e* cos *ω*",
+        about: "Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's \
+                orbit; free\nwith `sqrt_e_sin_omega`, both with a unit-disc prior.",
+        config_key: "planet.sqrt_e_cos_omega",
+        about_value: "Square root of the eccentricity e times the cosine of the argument of periastron omega of the \
+                      star's orbit; a\ncircle if not given.",
+        role: Role::Orbit(0, Element::ShapeCos),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::SqrtESinOmega,
+        key: "sqrt_e_sin_omega",
+        latex: r"\sqrt{e} \sin \omega",
+        symbol: "√*e* sin *ω*",
+        about: "The same with the sine.",
+        config_key: "planet.sqrt_e_sin_omega",
+        about_value: "The same with the sine.",
+        role: Role::Orbit(0, Element::ShapeSin),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::K2,
+        key: "k2_kms",
+        latex: "K_2",
+        symbol: "*K*_{2}",
+        about: "Semi-amplitude of the orbit of a second planet (km/s).",
+        config_key: "planet.k2_kms",
+        about_value: "Semi-amplitude of the star's radial velocity by a second planet (km/s), 0 or more; without any \
+                      key of its there\nis none.",
+        role: Role::Orbit(1, Element::Amplitude),
+        ..AMPLITUDE
+    },
+    Spec {
+        parameter: Parameter::PorbOverProt2,
+        key: "porb2_over_prot",
+        latex: r"P_{\mathrm{orb},2}/P_\mathrm{rot}",
+        symbol: "*P*_{orb,2}/*P*_{rot}",
+        about: "Orbital period of the second planet over the rotation period.",
+        config_key: "planet.porb2_over_prot",
+        about_value: "Orbital period of the second planet over the rotation period, above 0.",
+        role: Role::Orbit(1, Element::Ratio),
+        ..RATIO
+    },
+    Spec {
+        parameter: Parameter::Period2,
+        key: "period2_d",
+        latex: r"P_{\mathrm{orb},2}",
+        symbol: "*P*_{orb,2}",
+        about: "Orbital period of the second planet (d), in place of `porb2_over_prot`.",
+        config_key: "planet.period2_d",
+        about_value: "Orbital period of the second planet (d), in place of `porb2_over_prot`.",
+        role: Role::Orbit(1, Element::Period),
+        ..PERIOD
+    },
+    Spec {
+        parameter: Parameter::Phi2,
+        key: "phi2",
+        latex: r"\phi_2",
+        symbol: "*φ*_{2}",
+        about: "Orbital phase of the second planet (cycles), as `phi`.",
+        config_key: "planet.phi2",
+        about_value: "Orbital phase of the second planet (cycles), as `phi`; 0 if not given.",
+        role: Role::Orbit(1, Element::Phase),
+        ..PHASE
+    },
+    Spec {
+        parameter: Parameter::Conjunction2,
+        key: "t_conjunction2_d",
+        latex: r"T_{\mathrm{conj},2}",
+        symbol: "*T*_{conj,2}",
+        about: "Time of one inferior conjunction of the second planet (d), as `t_conjunction_d`.",
+        config_key: "planet.t_conjunction2_d",
+        about_value: "Time of an inferior conjunction of the second planet (d), in place of `phi2`.",
+        role: Role::Orbit(1, Element::Conjunction),
+        ..CONJUNCTION
+    },
+    Spec {
+        parameter: Parameter::SqrtECosOmega2,
+        key: "sqrt_e2_cos_omega2",
+        latex: r"\sqrt{e_2} \cos \omega_2",
+        symbol: "√*e*_{2} cos *ω*_{2}",
+        about: "Of the second planet's orbit, as `sqrt_e_cos_omega`.",
+        config_key: "planet.sqrt_e2_cos_omega2",
+        about_value: "Of the second planet's orbit, as `sqrt_e_cos_omega`.",
+        role: Role::Orbit(1, Element::ShapeCos),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::SqrtESinOmega2,
+        key: "sqrt_e2_sin_omega2",
+        latex: r"\sqrt{e_2} \sin \omega_2",
+        symbol: "√*e*_{2} sin *ω*_{2}",
+        about: "Of the second planet's orbit, as `sqrt_e_sin_omega`.",
+        config_key: "planet.sqrt_e2_sin_omega2",
+        about_value: "Of the second planet's orbit, as `sqrt_e_sin_omega`.",
+        role: Role::Orbit(1, Element::ShapeSin),
+        ..SHAPE
+    },
+    Spec {
+        parameter: Parameter::OmegaEq,
+        key: "omega_eq_rad_d",
+        unit: "rad/d",
+        latex: r"\Omega_\mathrm{eq}",
+        symbol: "*Ω*_{eq}",
+        about: "Angular velocity of the equator (rad/d).",
+        config_key: "star.omega_eq_rad_d",
+        most: most::OMEGA_RAD_D,
+        step: Step::Turn(1.0),
+        difference: Step::Turn(1.0),
+        role: Role::Star(|star| &star.omega_eq_rad_d, |star, x| star.omega_eq_rad_d = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::DOmega,
+        key: "domega_rad_d",
+        unit: "rad/d",
+        latex: r"\mathrm{d}\Omega",
+        symbol: "d*Ω*",
+        about: "Angular velocity of the equator minus that of the pole (rad/d).",
+        config_key: "star.domega_rad_d",
+        values: ANY,
+        most: most::OMEGA_RAD_D,
+        widest: INFINITE,
+        step: Step::Turn(3.0),
+        difference: Step::Turn(3.0),
+        role: Role::Star(|star| &star.domega_rad_d, |star, x| star.domega_rad_d = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Inclination,
+        key: "inclination_deg",
+        unit: "deg",
+        latex: "i",
+        symbol: "*i*",
+        about: "Inclination (degrees).",
+        config_key: "star.inclination_deg",
+        values: (Bound::Excluded(0.0), Bound::Included(90.0)),
+        widest: (0.0, 90.0),
+        priors: &[Uniform, LogUniform, Normal, Isotropic],
+        step: Step::Fixed(0.5),
+        difference: Step::Fixed(0.5),
+        role: Role::Star(|star| &star.inclination_deg, |star, x| star.inclination_deg = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Vsini,
+        key: "vsini_kms",
+        unit: "km/s",
+        latex: r"v \sin i",
+        symbol: "*v* sin *i*",
+        about: "Projected equatorial rotation velocity (km/s).",
+        config_key: "star.vsini_kms",
+        values: (Bound::Excluded(0.0), Bound::Included(most::VSINI_KMS)),
+        step: Step::Relative(5e-4),
+        role: Role::Star(|star| &star.vsini_kms, |star, x| star.vsini_kms = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Vsys,
+        key: "vsys_kms",
+        unit: "km/s",
+        latex: r"v_\mathrm{sys}",
+        symbol: "*v*_{sys}",
+        about: "Systemic radial velocity (km/s).",
+        config_key: "star.vsys_kms",
+        values: ANY,
+        most: most::VELOCITY_KMS,
+        widest: INFINITE,
+        role: Role::Star(|star| &star.vsys_kms, |star, x| star.vsys_kms = x),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::LimbDarkening,
+        key: "limb_darkening",
+        latex: "u",
+        symbol: "*u*",
+        about: "First coefficient of the limb darkening, 0 to 1.",
+        config_key: "star.limb_darkening.coefficients",
+        values: from_to((0.0, 1.0)),
+        widest: (0.0, 1.0),
+        step: Step::Fixed(0.01),
+        // the model is smooth in those of the surface, but for 1e-7 of it where a narrower line needs another velocity
+        // grid
+        difference: Step::Fixed(0.02),
+        role: Role::Surface(|surface| surface.limb_darkening.as_ref(), |surface, x| surface.limb_darkening = Some(x)),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::LineSigma,
+        key: "line_sigma_kms",
+        unit: "km/s",
+        latex: r"\sigma_\mathrm{line}",
+        symbol: "*σ*_{line}",
+        about: "Standard deviation of the local line (km/s), before the spectrograph.",
+        config_key: "star.line.sigma_kms",
+        most: most::VELOCITY_KMS,
+        step: Step::Relative(0.01),
+        difference: Step::Relative(0.02),
+        role: Role::Surface(|surface| surface.line_sigma_kms.as_ref(), |surface, x| surface.line_sigma_kms = Some(x)),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::EquivalentWidth,
+        key: "equivalent_width_kms",
+        unit: "km/s",
+        latex: r"W_\mathrm{line}",
+        symbol: "*W*_{line}",
+        about: "Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a \
+                nuisance of\neach profile's own by the priors alone.",
+        config_key: "star.line.equivalent_width_kms",
+        most: most::VELOCITY_KMS,
+        step: Step::Relative(2e-3),
+        difference: Step::Relative(0.02),
+        role: Role::Surface(
+            |surface| surface.equivalent_width_kms.as_ref(),
+            |surface, x| surface.equivalent_width_kms = Some(x),
+        ),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::Contrast,
+        key: "contrast",
+        latex: "c",
+        symbol: "*c*",
+        about: "Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter \
+                than some\nvalue: the darker they are, the fewer a map needs, so that a flat prior ends at 0.",
+        config_key: "star.contrast",
+        values: (Bound::Included(0.0), Bound::Excluded(1.0)),
+        widest: (0.0, 1.0),
+        difference: Step::Fixed(0.02),
+        role: Role::Surface(|surface| surface.contrast.as_ref(), |surface, x| surface.contrast = Some(x)),
+        ..PLAIN
+    },
+    Spec {
+        parameter: Parameter::SpotAmplitude,
+        key: "spot_amplitude",
+        latex: r"\sigma_\mathrm{spot}",
+        symbol: "*σ*_{spot}",
+        about: "Standard deviation of the spots' filling factor before the data, with objective \
+                \"marginal-likelihood\".",
+        config_key: "imaging.spot_amplitude",
+        scale: Scale::Logarithmic,
+        role: Role::Field(|field| Some(&field.amplitude), |field, x| field.amplitude = x),
+        ..field((0.01, 1.5), 0.2, LogUniform)
+    },
+    Spec {
+        parameter: Parameter::SpotSlope,
+        key: "spot_slope",
+        latex: r"\alpha_\mathrm{spot}",
+        symbol: "*α*_{spot}",
+        about: "How fast the spots' power falls with the degree of the harmonics, with objective \
+                \"marginal-likelihood\".",
+        config_key: "imaging.spot_slope",
+        role: Role::Field(|field| Some(&field.slope), |field, x| field.slope = x),
+        ..field((0.0, 3.0), 1.5, Uniform)
+    },
+    Spec {
+        parameter: Parameter::SpotLifetime,
+        key: "spot_lifetime_d",
+        unit: "d",
+        latex: r"\tau_\mathrm{spot}",
+        symbol: "*τ*_{spot}",
+        about: "How long spots live (d), with objective \"marginal-likelihood\".",
+        config_key: "imaging.spot_lifetime_d",
+        scale: Scale::Logarithmic,
+        step: Step::Fixed(0.1),
+        role: Role::Field(|field| field.lifetime_d.as_ref(), |field, x| field.lifetime_d = Some(x)),
+        ..field((0.3, 3000.0), 36.0, LogUniform)
+    },
+];
+
 impl Parameter {
     /// All of them, in order.
-    pub const ALL: [Parameter; 26] = [
-        Parameter::K,
-        Parameter::PorbOverProt,
-        Parameter::Period,
-        Parameter::Phi,
-        Parameter::Conjunction,
-        Parameter::SqrtECosOmega,
-        Parameter::SqrtESinOmega,
-        Parameter::K2,
-        Parameter::PorbOverProt2,
-        Parameter::Period2,
-        Parameter::Phi2,
-        Parameter::Conjunction2,
-        Parameter::SqrtECosOmega2,
-        Parameter::SqrtESinOmega2,
-        Parameter::OmegaEq,
-        Parameter::DOmega,
-        Parameter::Inclination,
-        Parameter::Vsini,
-        Parameter::Vsys,
-        Parameter::LimbDarkening,
-        Parameter::LineSigma,
-        Parameter::EquivalentWidth,
-        Parameter::Contrast,
-        Parameter::SpotAmplitude,
-        Parameter::SpotSlope,
-        Parameter::SpotLifetime,
-    ];
+    pub const ALL: [Parameter; PARAMETERS.len()] = {
+        let mut all = [Parameter::K; PARAMETERS.len()];
+        let mut i = 0;
+        while i < all.len() {
+            all[i] = PARAMETERS[i].parameter;
+            i += 1;
+        }
+        all
+    };
 
     /// Those of the field of spots that is integrated over.
     pub const FIELD: [Parameter; 3] = [Parameter::SpotAmplitude, Parameter::SpotSlope, Parameter::SpotLifetime];
 
+    /// Its row of the table.
+    pub const fn spec(self) -> &'static Spec {
+        &PARAMETERS[self as usize]
+    }
+
     /// The name used in config, chain, tables and plots.
     pub fn name(self) -> &'static str {
-        match self {
-            Parameter::K => "k_kms",
-            Parameter::PorbOverProt => "porb_over_prot",
-            Parameter::Period => "period_d",
-            Parameter::Phi => "phi",
-            Parameter::Conjunction => "t_conjunction_d",
-            Parameter::SqrtECosOmega => "sqrt_e_cos_omega",
-            Parameter::SqrtESinOmega => "sqrt_e_sin_omega",
-            Parameter::K2 => "k2_kms",
-            Parameter::PorbOverProt2 => "porb2_over_prot",
-            Parameter::Period2 => "period2_d",
-            Parameter::Phi2 => "phi2",
-            Parameter::Conjunction2 => "t_conjunction2_d",
-            Parameter::SqrtECosOmega2 => "sqrt_e2_cos_omega2",
-            Parameter::SqrtESinOmega2 => "sqrt_e2_sin_omega2",
-            Parameter::OmegaEq => "omega_eq_rad_d",
-            Parameter::DOmega => "domega_rad_d",
-            Parameter::Inclination => "inclination_deg",
-            Parameter::Vsini => "vsini_kms",
-            Parameter::Vsys => "vsys_kms",
-            Parameter::LimbDarkening => "limb_darkening",
-            Parameter::LineSigma => "line_sigma_kms",
-            Parameter::EquivalentWidth => "equivalent_width_kms",
-            Parameter::Contrast => "contrast",
-            Parameter::SpotAmplitude => "spot_amplitude",
-            Parameter::SpotSlope => "spot_slope",
-            Parameter::SpotLifetime => "spot_lifetime_d",
-        }
+        self.spec().key
     }
 
     /// Unit of its values; `1` for a ratio.
     pub fn unit(self) -> &'static str {
-        match self {
-            Parameter::K | Parameter::K2 | Parameter::Vsini | Parameter::Vsys => "km/s",
-            Parameter::LineSigma | Parameter::EquivalentWidth => "km/s",
-            Parameter::PorbOverProt | Parameter::LimbDarkening | Parameter::Contrast => "1",
-            Parameter::SpotAmplitude | Parameter::SpotSlope => "1",
-            Parameter::PorbOverProt2 | Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => "1",
-            Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => "1",
-            Parameter::SpotLifetime => "d",
-            Parameter::Period | Parameter::Conjunction | Parameter::Period2 | Parameter::Conjunction2 => "d",
-            Parameter::Phi | Parameter::Phi2 => "cycles",
-            Parameter::OmegaEq | Parameter::DOmega => "rad/d",
-            Parameter::Inclination => "deg",
-        }
+        self.spec().unit
     }
 
     /// Its symbol, in LaTeX without dollars.
     pub fn latex(self) -> &'static str {
-        match self {
-            Parameter::K => "K",
-            Parameter::PorbOverProt => r"P_\mathrm{orb}/P_\mathrm{rot}",
-            Parameter::Period => r"P_\mathrm{orb}",
-            Parameter::Phi => r"\phi",
-            Parameter::Conjunction => r"T_\mathrm{conj}",
-            Parameter::SqrtECosOmega => r"\sqrt{e} \cos \omega",
-            Parameter::SqrtESinOmega => r"\sqrt{e} \sin \omega",
-            Parameter::K2 => "K_2",
-            Parameter::PorbOverProt2 => r"P_{\mathrm{orb},2}/P_\mathrm{rot}",
-            Parameter::Period2 => r"P_{\mathrm{orb},2}",
-            Parameter::Phi2 => r"\phi_2",
-            Parameter::Conjunction2 => r"T_{\mathrm{conj},2}",
-            Parameter::SqrtECosOmega2 => r"\sqrt{e_2} \cos \omega_2",
-            Parameter::SqrtESinOmega2 => r"\sqrt{e_2} \sin \omega_2",
-            Parameter::OmegaEq => r"\Omega_\mathrm{eq}",
-            Parameter::DOmega => r"\mathrm{d}\Omega",
-            Parameter::Inclination => "i",
-            Parameter::Vsini => r"v \sin i",
-            Parameter::Vsys => r"v_\mathrm{sys}",
-            Parameter::LimbDarkening => "u",
-            Parameter::LineSigma => r"\sigma_\mathrm{line}",
-            Parameter::EquivalentWidth => r"W_\mathrm{line}",
-            Parameter::Contrast => "c",
-            Parameter::SpotAmplitude => r"\sigma_\mathrm{spot}",
-            Parameter::SpotSlope => r"\alpha_\mathrm{spot}",
-            Parameter::SpotLifetime => r"\tau_\mathrm{spot}",
+        self.spec().latex
+    }
+
+    /// Widest bounds of its prior.
+    pub const fn widest(self) -> (f64, f64) {
+        self.spec().widest
+    }
+
+    /// Its value where none is given.
+    ///
+    /// # Panics
+    /// If the table has none.
+    pub const fn usual(self) -> f64 {
+        self.spec().usual.expect("a usual value")
+    }
+
+    /// The number of an orbit that it is.
+    fn element(self) -> Option<Element> {
+        match self.spec().role {
+            Role::Orbit(_, element) => Some(element),
+            _ => None,
         }
     }
 
     /// Whether it belongs to a planet's orbit.
     pub fn is_orbital(self) -> bool {
-        Elements::of(self).is_some()
+        self.element().is_some()
     }
 
     /// Whether it is a phase of an orbit, which has period 1.
     pub fn is_phase(self) -> bool {
-        matches!(self, Parameter::Phi | Parameter::Phi2)
+        self.element() == Some(Element::Phase)
     }
 
     /// Whether it is one of the two that say how eccentric an orbit is, and where its periastron.
     pub fn is_shape(self) -> bool {
-        Elements::of(self).is_some_and(|of| of.shape.contains(&self))
+        matches!(self.element(), Some(Element::ShapeCos | Element::ShapeSin))
     }
 
     /// Whether it is a semi-amplitude.
     pub fn is_amplitude(self) -> bool {
-        matches!(self, Parameter::K | Parameter::K2)
+        self.element() == Some(Element::Amplitude)
     }
 
     /// Whether it stands in place of another parameter, in other units: it is free in its name alone, and
-    /// [`ParameterValues`] hold the other.
+    /// [`super::ParameterValues`] hold the other.
     pub fn is_ephemeris(self) -> bool {
-        use Parameter::{Conjunction, Conjunction2, Period, Period2};
-        matches!(self, Period | Conjunction | Period2 | Conjunction2)
+        matches!(self.element(), Some(Element::Period | Element::Conjunction))
     }
 
     /// Whether it stands in place of one of the star's settings.
     pub fn is_surface(self) -> bool {
-        self >= Parameter::LimbDarkening && !self.is_of_field()
+        matches!(self.spec().role, Role::Surface(..))
     }
 
     /// Whether it says what is assumed of the spots where all maps are integrated over.
     pub fn is_of_field(self) -> bool {
-        Parameter::FIELD.contains(&self)
+        matches!(self.spec().role, Role::Field(..))
     }
 
     /// Whether values of all parameters may do without it.
     pub fn is_optional(self) -> bool {
-        let is_usual = matches!(self, Parameter::K | Parameter::PorbOverProt | Parameter::Phi);
-        self.is_surface() || self.is_of_field() || (self.is_orbital() && !is_usual)
+        match self.spec().role {
+            Role::Orbit(planet, Element::Amplitude | Element::Ratio | Element::Phase) => planet > 0,
+            Role::Star(..) => false,
+            Role::Orbit(..) | Role::Surface(..) | Role::Field(..) => true,
+        }
     }
 
     /// Whether samplers move in its logarithm.
     fn is_logarithmic(self) -> bool {
-        matches!(self, Parameter::SpotAmplitude | Parameter::SpotLifetime)
+        self.spec().scale == Scale::Logarithmic
     }
 
     /// The coordinate of its own that samplers move in, of a value; orbits have others
@@ -247,99 +725,32 @@ impl Parameter {
         self.is_orbital() || self == Parameter::Vsys
     }
 
+    /// Whether it is one of the star's own that change profiles by more than a shift.
+    pub fn is_stellar(self) -> bool {
+        !self.only_shifts() && !self.is_of_field()
+    }
+
     /// The parameter of that name.
     pub fn from_name(name: &str) -> Option<Parameter> {
         Parameter::ALL.into_iter().find(|p| p.name() == name)
     }
 }
 
-/// Values of all parameters in the units of their names, free or not; index by [`Parameter`]. Those of the surface are
-/// NaN where they are not given: they are those of the star's settings then. Those of the field are NaN where no maps
-/// are integrated over, the lifetime where spots live for ever. Those of a second planet are NaN where there is none,
-/// and those of eccentricity where the orbit is a circle. Periods in days and conjunctions are always NaN: what they
-/// stand for is there.
-#[derive(Clone, Copy, Debug)]
-pub struct ParameterValues(pub [f64; Parameter::ALL.len()]);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
 
-impl std::ops::Index<Parameter> for ParameterValues {
-    type Output = f64;
-    fn index(&self, p: Parameter) -> &f64 {
-        &self.0[p as usize]
-    }
-}
-
-impl std::ops::IndexMut<Parameter> for ParameterValues {
-    fn index_mut(&mut self, p: Parameter) -> &mut f64 {
-        &mut self.0[p as usize]
-    }
-}
-
-/// NaN, not given, is the same as NaN.
-impl PartialEq for ParameterValues {
-    fn eq(&self, other: &Self) -> bool {
-        Parameter::ALL.into_iter().all(|p| self.agrees(other, p))
-    }
-}
-
-impl ParameterValues {
-    /// Of the eight parameters of a circular orbit, rotation and systemic velocity; the surface is that of the star's
-    /// settings.
-    pub fn of_eight(eight: [f64; 8]) -> Self {
-        use Parameter::{DOmega, Inclination, K, OmegaEq, Phi, PorbOverProt, Vsini, Vsys};
-        let mut values = ParameterValues([f64::NAN; Parameter::ALL.len()]);
-        let names = [K, PorbOverProt, Phi, OmegaEq, DOmega, Inclination, Vsini, Vsys];
-        names.into_iter().zip(eight).for_each(|(p, value)| values[p] = value);
-        values
-    }
-
-    /// The value, if it is given.
-    pub fn given(&self, p: Parameter) -> Option<f64> {
-        (!p.is_optional() || !self[p].is_nan()).then_some(self[p])
-    }
-
-    /// Whether both have the same value of a parameter, or both none.
-    pub fn agrees(&self, other: &Self, p: Parameter) -> bool {
-        self.given(p) == other.given(p)
-    }
-
-    /// The orbits.
-    pub fn motion(&self) -> Motion {
-        let [first, second] = &Elements::PLANETS;
-        Motion { first: first.orbit(self), second: self.given(second.k).map(|_| second.orbit(self)) }
-    }
-
-    /// The physical state of star and planet they stand for.
-    pub fn state(&self) -> StarState {
-        StarState {
-            rotation: Rotation { omega_eq_rad_d: self[Parameter::OmegaEq], domega_rad_d: self[Parameter::DOmega] },
-            inclination: self[Parameter::Inclination].to_radians(),
-            vsini_kms: self[Parameter::Vsini],
-            vsys_kms: self[Parameter::Vsys],
-            motion: self.motion(),
-            surface: Surface {
-                limb_darkening: self.given(Parameter::LimbDarkening),
-                line_sigma_kms: self.given(Parameter::LineSigma),
-                equivalent_width_kms: self.given(Parameter::EquivalentWidth),
-                contrast: self.given(Parameter::Contrast),
-            },
+    #[test]
+    fn every_parameter_has_its_row_and_a_name_of_its_own() {
+        for (place, row) in PARAMETERS.iter().enumerate() {
+            assert_eq!(row.parameter as usize, place, "{}", row.key);
+            assert_eq!(Parameter::from_name(row.key), Some(row.parameter));
+            assert!(!row.latex.is_empty() && row.about.ends_with('.') && row.config_key.contains('.'), "{}", row.key);
         }
-    }
-}
-
-/// An object of name and value of those that are given, in the order of [`Parameter::ALL`].
-impl Serialize for ParameterValues {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(Parameter::ALL.iter().filter_map(|&p| Some((p.name(), self.given(p)?))))
-    }
-}
-
-impl<'de> Deserialize<'de> for ParameterValues {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let mut values = ParameterValues([f64::NAN; Parameter::ALL.len()]);
-        for (name, value) in BTreeMap::<String, f64>::deserialize(deserializer)? {
-            let parameter = Parameter::from_name(&name);
-            values[parameter.ok_or_else(|| D::Error::custom(format!("unknown parameter {name}")))?] = value;
-        }
-        Ok(values)
+        let symbols: BTreeSet<&str> = PARAMETERS.iter().map(|row| row.latex).collect();
+        assert_eq!(symbols.len(), PARAMETERS.len());
+        let field: Vec<Parameter> = Parameter::ALL.into_iter().filter(|p| p.is_of_field()).collect();
+        assert_eq!(field, Parameter::FIELD);
     }
 }

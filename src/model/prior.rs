@@ -3,6 +3,7 @@
 //! Every density is normalised over its own bounds.
 
 use rand::Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
@@ -50,6 +51,39 @@ pub enum Prior {
     },
     /// Constant density on the circle `[0, 1)`; any real number stands for its fractional part.
     Periodic,
+}
+
+/// Kinds of priors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PriorKind {
+    /// Constant between `min` and `max`.
+    Uniform,
+    /// Proportional to 1/x between `min` and `max`.
+    LogUniform,
+    /// A Gaussian of `mean` and `sd`, cut off at `min` and `max` if given.
+    Normal,
+    /// For `inclination_deg`: proportional to sin i, between `min` (0 if not given) and `max` (90).
+    Isotropic,
+    /// For `phi`: constant on the circle from 0 to 1.
+    Periodic,
+    /// For `sqrt_e_cos_omega` and `sqrt_e_sin_omega` together: constant on the disc in which the eccentricity is below
+    /// `max` (1 if not given), that is, any eccentricity up to there and any argument of periastron alike.
+    UnitDisc,
+}
+
+impl PriorKind {
+    /// Its name in the config.
+    pub fn name(self) -> &'static str {
+        match self {
+            PriorKind::Uniform => "uniform",
+            PriorKind::LogUniform => "log-uniform",
+            PriorKind::Normal => "normal",
+            PriorKind::Isotropic => "isotropic",
+            PriorKind::Periodic => "periodic",
+            PriorKind::UnitDisc => "unit-disc",
+        }
+    }
 }
 
 impl Prior {

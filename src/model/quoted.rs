@@ -67,7 +67,7 @@ impl Quoted {
 
     /// Whether it says more than what is free and what is fixed.
     fn follows(self, star: &OrbitQuantities, is_free: &dyn Fn(&[Parameter]) -> bool) -> bool {
-        let Elements { k, ratio, period, phi, conjunction, shape } = *self.elements();
+        let Elements { k, ratio, period, phi, conjunction, shape, .. } = *self.elements();
         let eccentric = is_free(&shape);
         match self.quantity {
             Period => is_free(&[ratio]),

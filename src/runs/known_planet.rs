@@ -61,13 +61,11 @@ fn verdict(
     // the planet in the place of the first one: velocities are counted from zero there
     let mut values = for_blind_search(config, &scene.settings.free);
     let free = |p| scene.settings.free.iter().any(|f| f.parameter == p);
-    for (to, from) in first.shape.into_iter().zip(of.shape) {
-        values[to] = if free(from) { f64::NAN } else { config[from] };
-    }
+    values.first.shape = config.orbit(of.planet).and_then(|orbit| orbit.shape).filter(|_| !free(of.shape[0]));
     first.set_period(&mut values, ephemeris.period_d[0], clock);
     first.set_conjunction(&mut values, ephemeris.conjunction_d[0], clock);
     let alone = amplitude(&found.planet_free.quadratic, &values);
-    values[first.k] = alone[0].max(0.0);
+    values.set(first.k, alone[0].max(0.0));
     let at = At { imager: &scene.imager, values, nuisances: &settings.nuisances };
     match settings.surface.model().linearise(at, Some(&found.planet_free)) {
         Ok(here) => {
@@ -147,7 +145,7 @@ mod tests {
         let gradient = &information * DVector::from_iterator(30, cycles.iter().map(|c| orbit.velocity_kms(*c)));
         let quadratic = VelocityQuadratic { cycles, gradient, information };
         first.set_conjunction(&mut values, 7.0, clock);
-        values[Parameter::K] = 0.1;
+        values.set(Parameter::K, 0.1);
         let [there, _] = amplitude(&quadratic, &values);
         let k = over_errors(&quadratic, &values, &ephemeris, clock).unwrap();
         let [mean, sd] = k.moments();

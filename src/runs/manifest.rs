@@ -135,10 +135,9 @@ impl Manifest {
         let elements = &Elements::PLANETS[quoted.planet];
         let mut values = settings.values;
         // an orbit that was simulated is a circle unless its shape is there
-        elements.shape.into_iter().for_each(|p| values[p] = 0.0);
-        for (p, value) in truth.iter().filter_map(|(name, value)| Some((Parameter::from_name(name)?, *value))) {
-            values[p] = value;
-        }
+        values.orbit_mut(elements.planet).shape = None;
+        let given = truth.iter().filter_map(|(name, value)| Some((Parameter::from_name(name)?, *value)));
+        given.filter(|(p, _)| !p.is_ephemeris()).for_each(|(p, value)| values.set(p, value));
         truth.get(elements.k.name()).filter(|k| **k != 0.0)?;
         self.orbit_quantities(settings).value(quoted.quantity, &elements.orbit(&values), Some(estimate))
     }

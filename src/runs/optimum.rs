@@ -197,7 +197,7 @@ fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<String, Estimate>, BTr
     let (mut derived, mut truth) = (BTreeMap::new(), BTreeMap::new());
     for quoted in quantities.of_free(&free) {
         let orbit = values.motion().first;
-        let found = match is_circle && values.given(Parameter::SqrtECosOmega).is_none() {
+        let found = match is_circle && values.get(Parameter::SqrtECosOmega).is_none() {
             true => quantities.estimate(quoted.quantity, &orbit.orbit, &covariance),
             false => {
                 let place = (scene.space.free(), &optimum.theta[..]);
@@ -207,7 +207,7 @@ fn derived(scene: &Scene, optimum: &Optimum) -> (BTreeMap<String, Estimate>, BTr
         let Some(found) = found else { continue };
         derived.insert(quoted.name().to_owned(), found);
         let elements = &Elements::PLANETS[quoted.planet];
-        let injected = scene.truth.filter(|truth| truth.given(elements.k).is_some_and(|k| k != 0.0));
+        let injected = scene.truth.filter(|truth| truth.get(elements.k).is_some_and(|k| k != 0.0));
         let injected = injected.map(|truth| elements.orbit(&truth));
         let injected = injected.and_then(|orbit| quantities.value(quoted.quantity, &orbit, Some(found.value)));
         truth.extend(injected.map(|value| (quoted.name().to_owned(), value)));

@@ -87,9 +87,9 @@ impl SurfaceRecord {
     /// static.
     pub fn values(&self, others: &ParameterValues) -> ParameterValues {
         let mut values = *others;
-        values[Parameter::SpotLifetime] = f64::NAN;
-        for p in Parameter::ALL {
-            values[p] = self.parameters().get(p.name()).copied().unwrap_or(values[p]);
+        values.field.iter_mut().for_each(|field| field.lifetime_d = None);
+        for p in Parameter::ALL.into_iter().filter(|p| !p.is_ephemeris()) {
+            self.parameters().get(p.name()).into_iter().for_each(|value| values.set(p, *value));
         }
         values
     }
@@ -123,7 +123,7 @@ impl From<FieldRecord> for SurfaceRecord {
 
 /// The values that are given, by name.
 pub fn by_name(values: &ParameterValues) -> BTreeMap<String, f64> {
-    Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.given(p)?))).collect()
+    Parameter::ALL.iter().filter_map(|&p| Some((p.name().to_string(), values.get(p)?))).collect()
 }
 
 #[cfg(test)]

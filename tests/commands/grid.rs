@@ -126,9 +126,9 @@ fn the_landscape_is_that_of_the_chain() {
     assert!(converged.len() > COUNT / 3, "{}", converged.len());
     for node in converged.iter().step_by(4) {
         let mut values = scene.settings.values;
-        values[Parameter::K] = node["k_kms"].as_f64().unwrap();
-        values[Parameter::PorbOverProt] = node["porb_over_prot"].as_f64().unwrap();
-        values[Parameter::Phi] = node["phi"].as_f64().unwrap();
+        values.set(Parameter::K, node["k_kms"].as_f64().unwrap());
+        values.set(Parameter::PorbOverProt, node["porb_over_prot"].as_f64().unwrap());
+        values.set(Parameter::Phi, node["phi"].as_f64().unwrap());
         let image = Reference::build(&scene.imager, values, 1.05).unwrap().solution;
         let expected = [
             ("spottedness", image.spottedness),

@@ -24,7 +24,7 @@ fn zero_points_add_their_variance_to_that_of_the_velocities() {
     json["imaging"]["pixels"] = 800.into();
     let scene = Scene::new(&Config::at(json.clone(), &path)).unwrap();
     let mut values = scene.settings.values;
-    values[Parameter::K] = 0.0;
+    values.set(Parameter::K, 0.0);
     let information = |imager: &Imager| {
         let reference = Reference::at_lambda(imager, values, 1.0).unwrap();
         Expansion::of(imager, &reference, &[]).information

@@ -88,10 +88,10 @@ pub fn truth(oracle: &Oracle) -> ParameterValues {
 pub fn whole_truth(oracle: &Oracle) -> ParameterValues {
     let mut values = truth(oracle);
     let LimbDarkening::Linear(u) = oracle.star.limb_darkening else { panic!() };
-    values[Parameter::LimbDarkening] = u;
-    values[Parameter::LineSigma] = oracle.json["spec"]["sigma_local"].as_f64().unwrap();
-    values[Parameter::EquivalentWidth] = oracle.star.line.equivalent_width_kms;
-    values[Parameter::Contrast] = oracle.star.contrast;
+    values.set(Parameter::LimbDarkening, u);
+    values.set(Parameter::LineSigma, oracle.json["spec"]["sigma_local"].as_f64().unwrap());
+    values.set(Parameter::EquivalentWidth, oracle.star.line.equivalent_width_kms);
+    values.set(Parameter::Contrast, oracle.star.contrast);
     values
 }
 
@@ -100,14 +100,14 @@ pub fn values(theta: &Value, rotation_period_d: f64) -> ParameterValues {
     let number = |key: &str| theta[key].as_f64().unwrap();
     let omega_eq = TAU / rotation_period_d * number("oeq");
     let mut values = ParameterValues::of_eight([0.0; 8]);
-    values[Parameter::K] = number("K");
-    values[Parameter::PorbOverProt] = number("P");
-    values[Parameter::Phi] = number("phi");
-    values[Parameter::OmegaEq] = omega_eq;
-    values[Parameter::DOmega] = number("gamma") * omega_eq;
-    values[Parameter::Inclination] = number("inc");
-    values[Parameter::Vsini] = number("vsini");
-    values[Parameter::Vsys] = number("vsys");
+    values.set(Parameter::K, number("K"));
+    values.set(Parameter::PorbOverProt, number("P"));
+    values.set(Parameter::Phi, number("phi"));
+    values.set(Parameter::OmegaEq, omega_eq);
+    values.set(Parameter::DOmega, number("gamma") * omega_eq);
+    values.set(Parameter::Inclination, number("inc"));
+    values.set(Parameter::Vsini, number("vsini"));
+    values.set(Parameter::Vsys, number("vsys"));
     values
 }
 

@@ -127,7 +127,8 @@ fn rotation_turns_the_map_of_a_season_from_its_own_middle() {
     known["imaging"]["objective"] = json!("entropy");
     let both = scene(&known);
     let mut values = both.settings.values;
-    (values[Parameter::K], values[Parameter::DOmega]) = (0.0, 0.08);
+    values.set(Parameter::K, 0.0);
+    values.set(Parameter::DOmega, 0.08);
     let state = values.state();
     let n = both.imager.grid.len();
     let map: Vec<f64> = (0..n).map(|p| 0.9 + 0.1 * (0.3 * p as f64).sin()).collect();

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 /// The image without a planet that a search begins with, and the parameters there.
 fn planet_free(oracle: &Oracle, imager: &Imager) -> (Reference, ParameterValues) {
     let mut alone = truth(oracle);
-    alone[Parameter::K] = 0.0;
+    alone.set(Parameter::K, 0.0);
     (Reference::provisional(imager, alone, 0.97).unwrap(), alone)
 }
 
@@ -48,7 +48,7 @@ fn wide(parameter: Parameter) -> Prior {
 
 /// ln L by full reconstructions to rounding error, at the lambda of `reference`.
 fn exact(imager: &Imager, reference: &Reference) -> impl Fn(&ParameterValues) -> f64 {
-    let given = |p: &Parameter| reference.values.given(*p).is_some();
+    let given = |p: &Parameter| reference.values.get(*p).is_some();
     let free: Vec<Parameter> = Parameter::ALL.into_iter().filter(given).collect();
     let space = space(imager, reference.values, &free);
     let posterior = Posterior::new(imager.clone(), space, ObjectiveKind::RegularisedLikelihood, reference.clone());
@@ -83,9 +83,9 @@ fn orbits(oracle: &Oracle, imager: &Imager) {
     let (mut worst, mut worst_near) = (0.0f64, 0.0f64);
     for _ in 0..30 {
         let mut orbit = alone;
-        orbit[Parameter::K] = 0.15 * rng.random::<f64>();
-        orbit[Parameter::PorbOverProt] = 0.5 + 3.5 * rng.random::<f64>();
-        orbit[Parameter::Phi] = rng.random();
+        orbit.set(Parameter::K, 0.15 * rng.random::<f64>());
+        orbit.set(Parameter::PorbOverProt, 0.5 + 3.5 * rng.random::<f64>());
+        orbit.set(Parameter::Phi, rng.random());
         let (full, quadratic) = (exact(&orbit) - none, expansion.log_likelihood_at(&orbit) - none);
         let [k, period, phi] = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi].map(|p| orbit[p]);
         println!("K {k:.3} P {period:.3} phi {phi:.3}: {full:9.3}, quadratic {quadratic:9.3}");
@@ -110,7 +110,7 @@ fn stellar_parameters_one_sigma_off() {
     let here = exact(&reference.values);
     let at = |moves: &[(Parameter, f64)]| {
         let mut values = reference.values;
-        moves.iter().for_each(|&(p, step)| values[p] += step);
+        moves.iter().for_each(|&(p, step)| values.set(p, values[p] + step));
         (exact(&values) - here, expansion.log_likelihood_at(&values) - here)
     };
     let step = |p: Parameter| match p {
@@ -132,7 +132,7 @@ fn stellar_parameters_one_sigma_off() {
         println!("{}: {} with all else fixed", p.name(), expansion.information[(i, i)].powf(-0.5));
     }
     let of_one_map: Vec<Parameter> =
-        Parameter::ALL.into_iter().filter(|p| reference.values.given(*p).is_some()).collect();
+        Parameter::ALL.into_iter().filter(|p| reference.values.get(*p).is_some()).collect();
     for (i, &a) in of_one_map.iter().enumerate() {
         for &b in &of_one_map[i..] {
             for sign in [-1.0, 1.0] {
@@ -278,7 +278,7 @@ fn a_posterior_that_counts_unresolved_spots() {
     let quadratic = |values: &ParameterValues| ln_density(values) - ln_density(&at);
     let with_k = |k_kms: f64| {
         let mut values = at;
-        values[Parameter::K] = k_kms;
+        values.set(Parameter::K, k_kms);
         values
     };
     for k_kms in [0.08, 0.09, 0.11, 0.12] {
@@ -306,7 +306,7 @@ fn unresolved_spots_magnify_nothing() {
     let oracle = oracle();
     let imager = imager(&oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2));
     let mut at = truth(&oracle);
-    at[Parameter::K] = 0.07;
+    at.set(Parameter::K, 0.07);
     let reference = Reference::build(&imager, at, 0.97).unwrap();
     let expansion = Expansion::of(&imager, &reference, &[]);
     let free = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];
@@ -317,9 +317,9 @@ fn unresolved_spots_magnify_nothing() {
     let mut above = 0;
     for _ in 0..2000 {
         let mut values = at;
-        values[Parameter::K] = rng.random_range(0.0..0.2);
-        values[Parameter::PorbOverProt] = rng.random_range(1.2..2.5);
-        values[Parameter::Phi] = rng.random_range(0.2..0.8);
+        values.set(Parameter::K, rng.random_range(0.0..0.2));
+        values.set(Parameter::PorbOverProt, rng.random_range(1.2..2.5));
+        values.set(Parameter::Phi, rng.random_range(0.2..0.8));
         let quadratic = expansion.log_likelihood_at(&values) - expansion.log_likelihood;
         let at = |beyond: f64| counted.log_likelihood(&values, here + quadratic + beyond);
         let gain = at(0.5) - at(0.0);

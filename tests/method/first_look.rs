@@ -46,11 +46,11 @@ fn with_line(
         line: LocalLine::gaussian(sigma_kms, 5.8),
     };
     let mut truth = ParameterValues::of_eight([0.0; 8]);
-    truth[Parameter::PorbOverProt] = 2.0;
-    truth[Parameter::OmegaEq] = std::f64::consts::TAU / 3.0;
-    truth[Parameter::Inclination] = rng.random_range(25.0..85.0);
-    truth[Parameter::Vsini] = vsini_kms;
-    truth[Parameter::Vsys] = VSYS_KMS;
+    truth.set(Parameter::PorbOverProt, 2.0);
+    truth.set(Parameter::OmegaEq, std::f64::consts::TAU / 3.0);
+    truth.set(Parameter::Inclination, rng.random_range(25.0..85.0));
+    truth.set(Parameter::Vsini, vsini_kms);
+    truth.set(Parameter::Vsys, VSYS_KMS);
     let reach = vsini_kms + beyond_kms;
     let simulation = Simulation {
         spots,

@@ -137,8 +137,8 @@ fn the_answer_does_not_depend_on_start_and_preconditioner() {
     let imager = imager(&oracle);
     let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
     let mut elsewhere = truth;
-    elsewhere[Parameter::K] = 0.13;
-    elsewhere[Parameter::Inclination] = 38.5;
+    elsewhere.set(Parameter::K, 0.13);
+    elsewhere.set(Parameter::Inclination, 38.5);
     let here = Reference::build(&imager, truth, 0.97).unwrap();
     let there = Reference::build(&imager, elsewhere, 0.97).unwrap();
     let mut problem = problem(&oracle, &imager);

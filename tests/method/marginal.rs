@@ -18,7 +18,7 @@ fn folder(star: &str) -> PathBuf {
 fn star(name: &str) -> (Scene, ParameterValues, Frequencies) {
     let scene = Scene::load(&folder(name).join("config.json")).unwrap();
     let mut values = scene.settings.values;
-    values[Parameter::K] = 0.0;
+    values.set(Parameter::K, 0.0);
     let rotation_period_d = scene.imager.star.rotation_period_d;
     let frequencies = Frequencies::new(&scene.imager.cycles(), rotation_period_d, FrequencySettings::default());
     (scene, values, frequencies.unwrap())
@@ -155,7 +155,7 @@ fn posterior(free: &[Parameter]) -> MarginalPosterior {
     let (scene, mut values, _) = star("slow-planet");
     let set = [(Parameter::K, 0.1), (Parameter::PorbOverProt, 1.65), (Parameter::Phi, 0.32)];
     let field = [(Parameter::SpotAmplitude, 0.24), (Parameter::SpotSlope, 0.53), (Parameter::SpotLifetime, 33.0)];
-    set.into_iter().chain(field).for_each(|(p, value)| values[p] = value);
+    set.into_iter().chain(field).for_each(|(p, value)| values.set(p, value));
     let wide = |parameter: Parameter| FreeParameter {
         parameter,
         prior: match parameter {
@@ -183,7 +183,7 @@ fn ln_z_is_that_of_its_expansion_in_star_and_field() {
         let sd = covariance[(expansion.profiles() + s, expansion.profiles() + s)].sqrt();
         for sign in [-1.0, 1.0] {
             let mut values = reference;
-            values[*p] = p.to_physical(p.to_sampling(reference[*p]) + sign * sd);
+            values.set(*p, p.to_physical(p.to_sampling(reference[*p]) + sign * sd));
             let (full, quadratic) = at(&values);
             println!("{}: sd {sd:.4}, {full:.3} {quadratic:.3}", p.name());
             // over a standard deviation, where ln Z falls by a half with all else free and by more with all else held:
@@ -199,7 +199,8 @@ fn an_orbit_by_the_quadratic_is_that_of_profiles_made_anew() {
     let anew = posterior(&[&ORBIT[..], &[Parameter::Vsini]].concat());
     let at = |posterior: &MarginalPosterior, k_kms: f64, phi: f64| {
         let mut values = posterior.reference().values;
-        (values[Parameter::K], values[Parameter::Phi]) = (k_kms, phi);
+        values.set(Parameter::K, k_kms);
+        values.set(Parameter::Phi, phi);
         posterior.likelihood(&posterior.space().theta_of(&values)).log_prob
     };
     for (k_kms, phi) in [(0.1, 0.32), (0.06, 0.25), (0.15, 0.4), (0.0, 0.32), (0.25, 0.32)] {

@@ -113,7 +113,7 @@ fn the_expansion_knows_of_them() {
     assert!((here - expansion.log_likelihood).abs() < 1e-4);
     for moves in [[0.02, 0.0, 0.0], [-0.02, 0.02, 0.01], [0.0, 0.015, -0.02]] {
         let mut values = reference.values;
-        free.iter().zip(moves).for_each(|(&p, step)| values[p] += step);
+        free.iter().zip(moves).for_each(|(&p, step)| values.set(p, values[p] + step));
         let (full, quadratic) = (exact(&values) - here, expansion.log_likelihood_at(&values) - here);
         // the third order, over steps of one or two standard deviations
         assert!((full - quadratic).abs() < 0.03 + 0.02 * full.abs(), "{moves:?}: {full} {quadratic}");
@@ -137,7 +137,7 @@ fn wandering(nuisances: bool) -> Scene {
 /// `K cos` and `K sin` of the orbit at its true period, from the planet-free image, with their errors.
 fn amplitudes(scene: &Scene) -> [(f64, f64); 2] {
     let mut alone = scene.settings.values;
-    alone[Parameter::K] = 0.0;
+    alone.set(Parameter::K, 0.0);
     let reference = Reference::provisional(&scene.imager, alone, 0.97).unwrap();
     let expansion = Expansion::of(&scene.imager, &reference, &[]);
     let x = DMatrix::from_fn(expansion.cycles.len(), 2, |k, c| {

@@ -5,7 +5,7 @@ use dimcmc::internals::maxent::SolverSettings;
 use dimcmc::internals::maxent::entropy::Entropy;
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
 use dimcmc::internals::sampling::log_density::{Gradient, LogDensity, Status};
-use dimcmc::internals::star::{Quadrature, SurfaceGrid};
+use dimcmc::internals::star::{Orbit, Quadrature, SurfaceGrid};
 use dimcmc::internals::surface::ObjectiveKind;
 use dimcmc::internals::surface::imaging::Imager;
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
@@ -21,7 +21,7 @@ fn setup(entropy: Option<Entropy>) -> (Imager, ParameterSpace, Reference) {
     let entropy = entropy.unwrap_or(Entropy::new(oracle.default_spot));
     let imager = Imager { entropy, ..imager(&oracle, grid) };
     let mut values = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
-    (values[Parameter::K], values[Parameter::PorbOverProt], values[Parameter::Phi]) = (0.088, 1.763, 0.486);
+    values.first.orbit = Orbit { k_kms: 0.088, porb_over_prot: 1.763, phi: 0.486 };
     let uniform = |parameter, min, max| FreeParameter { parameter, prior: Prior::Uniform { min, max } };
     let free = vec![
         uniform(Parameter::K, 0.0, 2.0),

@@ -29,7 +29,7 @@ fn scene() -> Scene {
 fn planned_information_is_that_of_dense_algebra() {
     let scene = scene();
     let (imager, mut values) = (&scene.imager, scene.settings.values);
-    values[Parameter::K] = 0.0;
+    values.set(Parameter::K, 0.0);
     let field = Field {
         spectrum: Spectrum { amplitude: 0.15, slope: 0.9, break_degree: 0.0 },
         kernel: Kernel::of(Lifetime::Days(5.0)),
@@ -54,11 +54,11 @@ fn dense(scene: &Scene, field: &Field, jitter_kms: f64, maps: &DMatrix<f64>, par
     let imager = &scene.imager;
     let basis = Basis::new(&imager.grid);
     let mut values = scene.settings.values;
-    values[Parameter::K] = 0.0;
+    values.set(Parameter::K, 0.0);
     let contrast = imager.star.contrast;
     let depths = |vsys: f64, maps: &DMatrix<f64>| {
         let mut values = values;
-        values[Parameter::Vsys] += vsys;
+        values.set(Parameter::Vsys, values[Parameter::Vsys] + vsys);
         let filling = (&basis.on_pixels * maps).add_scalar(MEAN_FILLING);
         let brightness = filling.map(|filling| 1.0 - (1.0 - contrast) * filling);
         DVector::from_vec(imager.response(&values.state()).depths_of_each(&brightness))

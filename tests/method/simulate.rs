@@ -38,7 +38,7 @@ fn profiles_and_activity_jitter_are_the_oracles() {
     }
     let without_planet = demo(|s| {
         s.snr = None;
-        s.truth.0[0] = 0.0;
+        s.truth.set(Parameter::K, 0.0);
     });
     let rv: Vec<f64> = without_planet.first_moments().iter().map(|rv| rv.value_kms).collect();
     let peak_to_peak = rv.iter().fold(f64::MIN, |a, x| a.max(*x)) - rv.iter().fold(f64::MAX, |a, x| a.min(*x));
@@ -281,7 +281,7 @@ fn profiles_of_a_changing_star_are_those_of_a_plain_sum() {
     let (simulation, settings) = demo_simulation();
     let (star, mut simulation) = (settings.star, simulation);
     let domega = 0.06;
-    simulation.truth[Parameter::DOmega] = domega;
+    simulation.truth.set(Parameter::DOmega, domega);
     simulation.snr = None;
     simulation.times_d = vec![17.0, 20.0, 21.3, 23.0];
     let stays = Spot { longitude: 4.0, latitude: 1.0, radius: 0.25, filling: 0.7, life: None };

@@ -63,7 +63,7 @@ fn the_contrast_has_an_upper_bound_alone() {
         json["parameters"] = json!({ "contrast": { "prior": "uniform", "min": 0.0, "max": 0.9 } });
     });
     let mut values = scene.settings.values;
-    values[Parameter::Contrast] = 0.2;
+    values.set(Parameter::Contrast, 0.2);
     let reference = Reference::provisional(&scene.imager, values, 0.97).unwrap();
     let kind = ObjectiveKind::RegularisedLikelihood;
     let posterior = Posterior::new(scene.imager.clone(), scene.space.clone(), kind, reference);

@@ -39,7 +39,7 @@ fn surrogate_with(k_kms: f64, period: Prior) -> (Surrogate, ParameterSpace) {
         prior(Parameter::Vsys, Prior::Normal { mean: 0.02, sd: 0.01, min: -0.01, max: 0.5 }),
     ];
     let mut values = truth(&oracle);
-    values[Parameter::K] = k_kms;
+    values.set(Parameter::K, k_kms);
     let (mid, base) = (imager.mid_cycle(), imager.time_base_cycles());
     let space = ParameterSpace::new(free, values, mid, base, oracle.star.rotation_period_d);
     let reference = Reference::provisional(&imager, values, 0.97).unwrap();

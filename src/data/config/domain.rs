@@ -1,34 +1,11 @@
 //! Which values and which priors each of the parameters may have.
 
 use super::error::Fault;
-use super::raw_parts::{PriorKind, PriorSection};
-use crate::model::{Parameter, Prior};
-use crate::surface::evolving_map;
-
-/// Where a value of the parameter stands in the config.
-pub(super) fn key(parameter: Parameter) -> String {
-    match parameter {
-        _ if parameter.is_orbital() => format!("planet.{}", parameter.name()),
-        Parameter::LimbDarkening => "star.limb_darkening.coefficients".into(),
-        Parameter::LineSigma => "star.line.sigma_kms".into(),
-        Parameter::EquivalentWidth => "star.line.equivalent_width_kms".into(),
-        _ if parameter.is_of_field() => format!("imaging.{}", parameter.name()),
-        _ => format!("star.{}", parameter.name()),
-    }
-}
-
-/// Bounds of numbers that no star needs to exceed: beyond them they are slips of the pen, digits of a phase are lost,
-/// or the computation has no end.
-pub(super) mod most {
-    /// Rotation velocity (km/s); velocity axes grow absurdly long beyond it.
-    pub const VSINI_KMS: f64 = 2000.0;
-    /// Any other velocity (km/s), up or down: that of light.
-    pub const VELOCITY_KMS: f64 = 3e5;
-    /// Times and periods (d), rotation cycles, and periods over each other: some millions of years.
-    pub const TIME: f64 = 1e9;
-    /// Angular velocity (rad/d), up or down: a rotation in less than a second.
-    pub const OMEGA_RAD_D: f64 = 1e6;
-}
+use super::raw_parts::PriorSection;
+pub(super) use crate::model::parameters::most;
+use crate::model::parameters::{Interval, Spec};
+use crate::model::{Parameter, Prior, PriorKind};
+use std::ops::{Bound, RangeBounds};
 
 /// Whether a number keeps within `most`, up or down.
 pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> {
@@ -40,56 +17,36 @@ pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> 
 
 /// Whether a value makes sense at all, whatever the prior.
 pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result<(), Fault> {
-    let (fine, allowed) = match parameter {
-        Parameter::K | Parameter::K2 => (value >= 0.0, "0 or more"),
-        Parameter::PorbOverProt | Parameter::PorbOverProt2 => (value > 0.0, "above 0"),
-        Parameter::Period | Parameter::Period2 | Parameter::OmegaEq => (value > 0.0, "above 0"),
-        _ if parameter.is_shape() => (value.abs() < 1.0, "above -1 and below 1"),
-        Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => unreachable!("shapes"),
-        Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => unreachable!("shapes"),
-        Parameter::Conjunction | Parameter::Conjunction2 => (true, "finite"),
-        Parameter::LineSigma | Parameter::EquivalentWidth => (value > 0.0, "above 0"),
-        Parameter::LimbDarkening => ((0.0..=1.0).contains(&value), "from 0 to 1"),
-        Parameter::Contrast => ((0.0..1.0).contains(&value), "0 or more and below 1"),
-        Parameter::Vsini => (value > 0.0 && value <= most::VSINI_KMS, "above 0 and up to 2000"),
-        Parameter::Inclination => (value > 0.0 && value <= 90.0, "above 0 and up to 90"),
-        Parameter::Phi | Parameter::Phi2 | Parameter::DOmega | Parameter::Vsys => (true, "finite"),
-        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => {
-            let (low, high) = evolving_map::bounds(parameter);
-            return match (low..=high).contains(&value) {
-                true => Ok(()),
-                false => Err(Fault::new(key, format!("{value} must be from {low} to {high}"))),
-            };
-        }
-    };
-    if !(fine && value.is_finite()) {
-        return Err(Fault::new(key, format!("{value} must be {allowed}")));
+    let Spec { values, most, .. } = parameter.spec();
+    match values.contains(&value) && value.is_finite() {
+        true => check_size(key, value, *most),
+        false => Err(Fault::new(key, format!("{value} must be {}", words(values)))),
     }
-    match parameter {
-        Parameter::K | Parameter::K2 | Parameter::Vsys => check_size(key, value, most::VELOCITY_KMS),
-        Parameter::LineSigma | Parameter::EquivalentWidth => check_size(key, value, most::VELOCITY_KMS),
-        Parameter::PorbOverProt | Parameter::PorbOverProt2 => check_size(key, value, most::TIME),
-        _ if parameter.is_ephemeris() => check_size(key, value, most::TIME),
-        Parameter::OmegaEq | Parameter::DOmega => check_size(key, value, most::OMEGA_RAD_D),
-        _ => Ok(()),
+}
+
+fn words(interval: &Interval) -> String {
+    let low = match interval.0 {
+        Bound::Included(low) => Some(format!("{low} or more")),
+        Bound::Excluded(low) => Some(format!("above {low}")),
+        Bound::Unbounded => None,
+    };
+    let high = match interval.1 {
+        Bound::Included(high) => Some(format!("up to {high}")),
+        Bound::Excluded(high) => Some(format!("below {high}")),
+        Bound::Unbounded => None,
+    };
+    match (interval, low, high) {
+        ((Bound::Included(low), Bound::Included(high)), ..) => format!("from {low} to {high}"),
+        (_, Some(low), Some(high)) => format!("{low} and {high}"),
+        (_, low, high) => low.or(high).unwrap_or("finite".into()),
     }
 }
 
 /// Widest bounds of a prior.
 fn domain(parameter: Parameter, phi_free: bool) -> (f64, f64) {
-    match parameter {
-        Parameter::K | Parameter::K2 if !phi_free => (f64::NEG_INFINITY, f64::INFINITY),
-        Parameter::K | Parameter::PorbOverProt | Parameter::Period => (0.0, f64::INFINITY),
-        Parameter::K2 | Parameter::PorbOverProt2 | Parameter::Period2 => (0.0, f64::INFINITY),
-        Parameter::OmegaEq | Parameter::Vsini => (0.0, f64::INFINITY),
-        Parameter::SqrtECosOmega | Parameter::SqrtESinOmega => (-1.0, 1.0),
-        Parameter::SqrtECosOmega2 | Parameter::SqrtESinOmega2 => (-1.0, 1.0),
-        Parameter::Conjunction | Parameter::Conjunction2 => (f64::NEG_INFINITY, f64::INFINITY),
-        Parameter::LineSigma | Parameter::EquivalentWidth => (0.0, f64::INFINITY),
-        Parameter::Phi | Parameter::Phi2 | Parameter::LimbDarkening | Parameter::Contrast => (0.0, 1.0),
-        Parameter::Inclination => (0.0, 90.0),
-        Parameter::DOmega | Parameter::Vsys => (f64::NEG_INFINITY, f64::INFINITY),
-        Parameter::SpotAmplitude | Parameter::SpotSlope | Parameter::SpotLifetime => evolving_map::bounds(parameter),
+    match parameter.is_amplitude() && !phi_free {
+        true => (f64::NEG_INFINITY, f64::INFINITY),
+        false => parameter.widest(),
     }
 }
 
@@ -153,45 +110,30 @@ impl Reader<'_> {
         }
     }
 
-    fn kind_name(&self) -> &'static str {
-        match self.section.prior {
-            PriorKind::Uniform => "uniform",
-            PriorKind::LogUniform => "log-uniform",
-            PriorKind::Normal => "normal",
-            PriorKind::Isotropic => "isotropic",
-            PriorKind::Periodic => "periodic",
-            PriorKind::UnitDisc => "unit-disc",
-        }
-    }
-
     fn check_kind(&self) -> Result<(), Fault> {
-        let only = match (self.section.prior, self.parameter) {
-            (PriorKind::Isotropic, p) if p != Parameter::Inclination => {
-                "an isotropic prior is for inclination_deg only"
-            }
-            (PriorKind::Periodic, p) if !p.is_phase() => "a periodic prior is for phi only",
-            (PriorKind::Normal | PriorKind::LogUniform, p) if p.is_phase() => "phi takes a periodic or a uniform prior",
-            (PriorKind::UnitDisc, p) if !p.is_shape() => {
-                "a unit-disc prior is for sqrt_e_cos_omega and sqrt_e_sin_omega only"
-            }
-            (kind, p) if p.is_shape() && kind != PriorKind::UnitDisc => {
-                "sqrt_e_cos_omega and sqrt_e_sin_omega take a unit-disc prior"
-            }
-            (PriorKind::LogUniform, Parameter::Conjunction | Parameter::Conjunction2) => {
-                "the time of a conjunction takes a normal or a uniform prior"
-            }
-            _ => return Ok(()),
+        let (kind, takes) = (self.section.prior, self.parameter.spec().priors);
+        if takes.contains(&kind) {
+            return Ok(());
+        }
+        let only = match kind {
+            PriorKind::Isotropic => "an isotropic prior is for inclination_deg only",
+            PriorKind::Periodic => "a periodic prior is for phi only",
+            PriorKind::UnitDisc => "a unit-disc prior is for sqrt_e_cos_omega and sqrt_e_sin_omega only",
+            _ if takes.contains(&PriorKind::Periodic) => "phi takes a periodic or a uniform prior",
+            _ if takes.contains(&PriorKind::UnitDisc) => "sqrt_e_cos_omega and sqrt_e_sin_omega take a unit-disc prior",
+            _ => "the time of a conjunction takes a normal or a uniform prior",
         };
         Err(self.fault("prior", only))
     }
 
     fn needed(&self, name: &str) -> Result<f64, Fault> {
-        self.field(name).ok_or_else(|| self.fault(name, format!("missing, a {} prior needs it", self.kind_name())))
+        self.field(name)
+            .ok_or_else(|| self.fault(name, format!("missing, a {} prior needs it", self.section.prior.name())))
     }
 
     fn refuse(&self, names: &[&str]) -> Result<(), Fault> {
         match names.iter().find(|name| self.field(name).is_some()) {
-            Some(name) => Err(self.fault(name, format!("not for this prior ({})", self.kind_name()))),
+            Some(name) => Err(self.fault(name, format!("not for this prior ({})", self.section.prior.name()))),
             None => Ok(()),
         }
     }

@@ -1,9 +1,11 @@
 //! A config to be written: the keys that a first config of an observed star has, in the order and layout in which
 //! people read them. Defaults that nobody asked about are left to the program.
 
-use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Planet, Star};
-use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
+use super::per_parameter::{PerParameter, Planet};
+use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
+use super::raw_parts::{ObservationsSection, PriorSection};
 use super::{Automatic, EquivalentWidth, ImagingSettings, VelocityJitter};
+use crate::model::{Parameter, PriorKind};
 use crate::surface::ObjectiveKind;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -94,12 +96,11 @@ impl Draft {
             schema: self.schema.clone(),
             star: self.star(),
             instrument: Instrument { resolving_power: Some(self.resolving_power) },
-            planet: Planet {
-                k_kms: self.orbit.0,
-                porb_over_prot: self.orbit.1,
-                phi: self.orbit.2,
-                ..Planet::default()
-            },
+            planet: Planet::of([
+                (Parameter::K, self.orbit.0),
+                (Parameter::PorbOverProt, self.orbit.1),
+                (Parameter::Phi, self.orbit.2),
+            ]),
             observations: ObservationsSection {
                 path: Some(self.observations.clone()),
                 velocity_range_kms: Some(self.velocity_range_kms.into()),
@@ -109,13 +110,15 @@ impl Draft {
                 ..ObservationsSection::default()
             },
             imaging: self.imaging.clone(),
-            parameters: PerParameter {
-                k_kms: Some(bounded(PriorKind::Uniform, (0.0, self.k_max_kms))),
-                porb_over_prot: Some(bounded(PriorKind::LogUniform, self.porb_over_prot_range)),
-                phi: Some(PriorSection { prior: PriorKind::Periodic, min: None, max: None, mean: None, sd: None }),
-                vsys_kms: Some(bounded(PriorKind::Uniform, self.vsys_range_kms)),
-                ..PerParameter::default()
-            },
+            parameters: PerParameter::from_iter([
+                (Parameter::K, bounded(PriorKind::Uniform, (0.0, self.k_max_kms))),
+                (Parameter::PorbOverProt, bounded(PriorKind::LogUniform, self.porb_over_prot_range)),
+                (
+                    Parameter::Phi,
+                    PriorSection { prior: PriorKind::Periodic, min: None, max: None, mean: None, sd: None },
+                ),
+                (Parameter::Vsys, bounded(PriorKind::Uniform, self.vsys_range_kms)),
+            ]),
         }
     }
 

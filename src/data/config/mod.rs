@@ -13,6 +13,7 @@ mod identity;
 mod jitter;
 mod listed;
 mod number_or_word;
+mod per_parameter;
 mod photometry;
 mod raw;
 mod raw_parts;

@@ -1,12 +1,13 @@
 //! The config as users write it: names, units and defaults. Doc comments here are the descriptions of the JSON Schema.
 //!
-//! Fields of `PerParameter` and the observations are in `raw_parts`.
+//! Those of planets and parameters are in `per_parameter`, the observations in `raw_parts`.
 
 use super::EquivalentWidth;
 use super::data_sets::DataSets;
 use super::listed::Listed;
+use super::per_parameter::{PerParameter, Planet};
 use super::photometry::PhotometrySection;
-use super::raw_parts::{Grid, PerParameter, PlanSection, PriorSection};
+use super::raw_parts::{Grid, PlanSection, PriorSection};
 use super::{ImagingSettings, SamplerSettings};
 use crate::model::Parameter;
 use schemars::JsonSchema;
@@ -49,6 +50,25 @@ pub(super) struct Config {
     /// The landscape that `dimcmc grid` computes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<Grid>,
+}
+
+impl Config {
+    /// Whether a parameter has a prior or an axis.
+    pub fn is_free(&self, parameter: Parameter) -> bool {
+        self.parameters.has(parameter) || self.has_axis(parameter)
+    }
+
+    /// The number of the star at a dotted key; `None` where a word stands there.
+    pub fn number_at(&self, key: &str) -> Option<f64> {
+        let star = serde_json::to_value(&self.star).expect("a section of the config is JSON");
+        let path = key.strip_prefix("star.").expect("a key of the star").split('.');
+        path.fold(Some(&star), |section, name| section?.get(name))?.as_f64()
+    }
+
+    /// Whether it has an axis.
+    pub fn has_axis(&self, parameter: Parameter) -> bool {
+        self.grid.as_ref().is_some_and(|grid| grid.axes.has(parameter))
+    }
 }
 
 /// The star. Where a parameter is free, its value here is the start.
@@ -162,97 +182,4 @@ pub(super) struct Instrument {
     /// no instrumental broadening.
     #[serde(default)]
     pub resolving_power: Option<f64>,
-}
-
-/// Period over rotation period where none is given.
-pub(super) const DEFAULT_PORB_OVER_PROT: f64 = 2.0;
-
-/// The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a parameter is
-/// free, its value here is the start.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct Planet {
-    /// Semi-amplitude of the star's radial velocity (km/s), 0 or more.
-    pub k_kms: f64,
-    /// Orbital period over the rotation period, above 0.
-    pub porb_over_prot: f64,
-    /// Orbital phase (cycles, 0 to 1): the part of an orbit from `star.epoch_d` (rotation cycle 0) to the next maximum
-    /// of the star's radial velocity. `phi` = 0 is a maximum at `star.epoch_d`.
-    pub phi: f64,
-    /// Orbital period (d), above 0, in place of `porb_over_prot`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub period_d: Option<f64>,
-    /// Time of an inferior conjunction (planet in front; d, on the time scale of the observations), in place of `phi`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub t_conjunction_d: Option<f64>,
-    /// Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's orbit; a
-    /// circle if not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e_cos_omega: Option<f64>,
-    /// The same with the sine.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e_sin_omega: Option<f64>,
-    /// Semi-amplitude of the star's radial velocity by a second planet (km/s), 0 or more; without any key of its there
-    /// is none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub k2_kms: Option<f64>,
-    /// Orbital period of the second planet over the rotation period, above 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub porb2_over_prot: Option<f64>,
-    /// Orbital period of the second planet (d), in place of `porb2_over_prot`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub period2_d: Option<f64>,
-    /// Orbital phase of the second planet (cycles), as `phi`; 0 if not given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub phi2: Option<f64>,
-    /// Time of an inferior conjunction of the second planet (d), in place of `phi2`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub t_conjunction2_d: Option<f64>,
-    /// Of the second planet's orbit, as `sqrt_e_cos_omega`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e2_cos_omega2: Option<f64>,
-    /// Of the second planet's orbit, as `sqrt_e_sin_omega`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e2_sin_omega2: Option<f64>,
-}
-
-impl Planet {
-    /// A value that may be left out.
-    pub fn given(&self, parameter: Parameter) -> Option<f64> {
-        match parameter {
-            Parameter::Period => self.period_d,
-            Parameter::Conjunction => self.t_conjunction_d,
-            Parameter::SqrtECosOmega => self.sqrt_e_cos_omega,
-            Parameter::SqrtESinOmega => self.sqrt_e_sin_omega,
-            Parameter::K2 => self.k2_kms,
-            Parameter::PorbOverProt2 => self.porb2_over_prot,
-            Parameter::Period2 => self.period2_d,
-            Parameter::Phi2 => self.phi2,
-            Parameter::Conjunction2 => self.t_conjunction2_d,
-            Parameter::SqrtECosOmega2 => self.sqrt_e2_cos_omega2,
-            Parameter::SqrtESinOmega2 => self.sqrt_e2_sin_omega2,
-            _ => None,
-        }
-    }
-}
-
-impl Default for Planet {
-    fn default() -> Self {
-        Planet {
-            k_kms: 0.0,
-            porb_over_prot: DEFAULT_PORB_OVER_PROT,
-            phi: 0.0,
-            period_d: None,
-            t_conjunction_d: None,
-            sqrt_e_cos_omega: None,
-            sqrt_e_sin_omega: None,
-            k2_kms: None,
-            porb2_over_prot: None,
-            period2_d: None,
-            phi2: None,
-            t_conjunction2_d: None,
-            sqrt_e2_cos_omega2: None,
-            sqrt_e2_sin_omega2: None,
-        }
-    }
 }

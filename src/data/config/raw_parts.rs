@@ -3,179 +3,15 @@
 use super::automatic::Automatic;
 use super::data_sets::ZeroPoint;
 use super::jitter::VelocityJitter;
+use super::per_parameter::PerParameter;
 use super::raw::Line;
 use crate::data::simulate::{RandomSpots, Schedule};
-use crate::model::Parameter;
+use crate::model::PriorKind;
 use crate::surface::calibration::noise::Weights;
 use crate::surface::nuisances::LineAndContinuum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-
-/// One optional entry for each parameter that may be free.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "PerParameter_{T}")]
-pub(super) struct PerParameter<T> {
-    /// Semi-amplitude of the planet's orbit (km/s).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub k_kms: Option<T>,
-    /// Orbital period over the rotation period.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub porb_over_prot: Option<T>,
-    /// Orbital period (d), in place of `porb_over_prot`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub period_d: Option<T>,
-    /// Orbital phase (cycles): the part of an orbit from `star.epoch_d` to the next maximum of the star's radial
-    /// velocity.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub phi: Option<T>,
-    /// Time of one inferior conjunction (planet in front; d, on the time scale of the observations), in place of `phi`.
-    /// A normal prior is an ephemeris: at the time of the data it must tell the phase to a tenth of an orbit.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub t_conjunction_d: Option<T>,
-    /// Square root of the eccentricity e times the cosine of the argument of periastron omega of the star's orbit; free
-    /// with `sqrt_e_sin_omega`, both with a unit-disc prior.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e_cos_omega: Option<T>,
-    /// The same with the sine.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e_sin_omega: Option<T>,
-    /// Semi-amplitude of the orbit of a second planet (km/s).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub k2_kms: Option<T>,
-    /// Orbital period of the second planet over the rotation period.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub porb2_over_prot: Option<T>,
-    /// Orbital period of the second planet (d), in place of `porb2_over_prot`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub period2_d: Option<T>,
-    /// Orbital phase of the second planet (cycles), as `phi`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub phi2: Option<T>,
-    /// Time of one inferior conjunction of the second planet (d), as `t_conjunction_d`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub t_conjunction2_d: Option<T>,
-    /// Of the second planet's orbit, as `sqrt_e_cos_omega`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e2_cos_omega2: Option<T>,
-    /// Of the second planet's orbit, as `sqrt_e_sin_omega`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sqrt_e2_sin_omega2: Option<T>,
-    /// Angular velocity of the equator (rad/d).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub omega_eq_rad_d: Option<T>,
-    /// Angular velocity of the equator minus that of the pole (rad/d).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub domega_rad_d: Option<T>,
-    /// Inclination (degrees).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub inclination_deg: Option<T>,
-    /// Projected equatorial rotation velocity (km/s).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub vsini_kms: Option<T>,
-    /// Systemic radial velocity (km/s).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub vsys_kms: Option<T>,
-    /// First coefficient of the limb darkening, 0 to 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub limb_darkening: Option<T>,
-    /// Standard deviation of the local line (km/s), before the spectrograph.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub line_sigma_kms: Option<T>,
-    /// Equivalent width of the local line (km/s): a scale of the depth of all profiles, told apart from a nuisance of
-    /// each profile's own by the priors alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub equivalent_width_kms: Option<T>,
-    /// Brightness of a spot over that of the photosphere, 0 to 1. Data only say that spots are not brighter than some
-    /// value: the darker they are, the fewer a map needs, so that a flat prior ends at 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub contrast: Option<T>,
-    /// Standard deviation of the spots' filling factor before the data, with objective "marginal-likelihood".
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub spot_amplitude: Option<T>,
-    /// How fast the spots' power falls with the degree of the harmonics, with objective "marginal-likelihood".
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub spot_slope: Option<T>,
-    /// How long spots live (d), with objective "marginal-likelihood".
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub spot_lifetime_d: Option<T>,
-}
-
-impl<T> Default for PerParameter<T> {
-    fn default() -> Self {
-        PerParameter {
-            k_kms: None,
-            porb_over_prot: None,
-            phi: None,
-            period_d: None,
-            t_conjunction_d: None,
-            sqrt_e_cos_omega: None,
-            sqrt_e_sin_omega: None,
-            k2_kms: None,
-            porb2_over_prot: None,
-            period2_d: None,
-            phi2: None,
-            t_conjunction2_d: None,
-            sqrt_e2_cos_omega2: None,
-            sqrt_e2_sin_omega2: None,
-            omega_eq_rad_d: None,
-            domega_rad_d: None,
-            inclination_deg: None,
-            vsini_kms: None,
-            vsys_kms: None,
-            limb_darkening: None,
-            line_sigma_kms: None,
-            equivalent_width_kms: None,
-            contrast: None,
-            spot_amplitude: None,
-            spot_slope: None,
-            spot_lifetime_d: None,
-        }
-    }
-}
-
-impl<T> PerParameter<T> {
-    /// The entry of one parameter.
-    pub fn slot(&mut self, parameter: Parameter) -> &mut Option<T> {
-        match parameter {
-            Parameter::K => &mut self.k_kms,
-            Parameter::PorbOverProt => &mut self.porb_over_prot,
-            Parameter::Phi => &mut self.phi,
-            Parameter::Period => &mut self.period_d,
-            Parameter::Conjunction => &mut self.t_conjunction_d,
-            Parameter::SqrtECosOmega => &mut self.sqrt_e_cos_omega,
-            Parameter::SqrtESinOmega => &mut self.sqrt_e_sin_omega,
-            Parameter::K2 => &mut self.k2_kms,
-            Parameter::PorbOverProt2 => &mut self.porb2_over_prot,
-            Parameter::Period2 => &mut self.period2_d,
-            Parameter::Phi2 => &mut self.phi2,
-            Parameter::Conjunction2 => &mut self.t_conjunction2_d,
-            Parameter::SqrtECosOmega2 => &mut self.sqrt_e2_cos_omega2,
-            Parameter::SqrtESinOmega2 => &mut self.sqrt_e2_sin_omega2,
-            Parameter::OmegaEq => &mut self.omega_eq_rad_d,
-            Parameter::DOmega => &mut self.domega_rad_d,
-            Parameter::Inclination => &mut self.inclination_deg,
-            Parameter::Vsini => &mut self.vsini_kms,
-            Parameter::Vsys => &mut self.vsys_kms,
-            Parameter::LimbDarkening => &mut self.limb_darkening,
-            Parameter::LineSigma => &mut self.line_sigma_kms,
-            Parameter::EquivalentWidth => &mut self.equivalent_width_kms,
-            Parameter::Contrast => &mut self.contrast,
-            Parameter::SpotAmplitude => &mut self.spot_amplitude,
-            Parameter::SpotSlope => &mut self.spot_slope,
-            Parameter::SpotLifetime => &mut self.spot_lifetime_d,
-        }
-    }
-}
-
-impl<T: Clone> PerParameter<T> {
-    /// The entries that are there, in the order of [`Parameter::ALL`].
-    pub fn entries(&self) -> Vec<(Parameter, T)> {
-        let mut all = self.clone();
-        Parameter::ALL.into_iter().filter_map(|p| Some((p, all.slot(p).take()?))).collect()
-    }
-}
 
 /// A prior. Which of the other keys belong to it depends on its kind.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -203,25 +39,6 @@ impl PriorSection {
     pub fn even(prior: PriorKind, (min, max): (f64, f64)) -> Self {
         PriorSection { prior, min: Some(min), max: Some(max), mean: None, sd: None }
     }
-}
-
-/// Kinds of priors.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum PriorKind {
-    /// Constant between `min` and `max`.
-    Uniform,
-    /// Proportional to 1/x between `min` and `max`.
-    LogUniform,
-    /// A Gaussian of `mean` and `sd`, cut off at `min` and `max` if given.
-    Normal,
-    /// For `inclination_deg`: proportional to sin i, between `min` (0 if not given) and `max` (90).
-    Isotropic,
-    /// For `phi`: constant on the circle from 0 to 1.
-    Periodic,
-    /// For `sqrt_e_cos_omega` and `sqrt_e_sin_omega` together: constant on the disc in which the eccentricity is below
-    /// `max` (1 if not given), that is, any eccentricity up to there and any argument of periastron alike.
-    UnitDisc,
 }
 
 /// The line profiles of a data set: either `path` (with its options), or `simulate`.

@@ -1,10 +1,10 @@
 //! From the config as written to [`Settings`]: checks, defaults that depend on other keys, units.
 
-use super::domain::{check_value, key, resolve_prior};
+use super::domain::{check_value, resolve_prior};
 use super::error::Fault;
 use super::identity::fingerprint;
 use super::raw::Config;
-use super::raw_parts::{PriorKind, PriorSection};
+use super::raw_parts::PriorSection;
 use super::resolve_grid::resolve_grid;
 use super::resolve_orbits::{check_orbits, resolve_orbits, start_of};
 use super::resolve_photometry::resolve_photometry;
@@ -16,7 +16,6 @@ use super::{Automatic, Hyperparameter, ImagingSettings, Settings, VelocityJitter
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
 use crate::surface::ObjectiveKind;
-use crate::surface::evolving_map;
 use crate::surface::nuisances::LineAndContinuum;
 use std::path::Path;
 
@@ -34,7 +33,7 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
-    let mut values = values(&mut raw, &star)?;
+    let mut values = values(&raw, &star)?;
     raw.plan.as_ref().map_or(Ok(()), check_plan)?;
     let sets = resolve_sets(&mut raw, &star, &values, path)?;
     let light_curves = resolve_photometry(&raw, path)?;
@@ -45,14 +44,14 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let free = resolve_free(&mut raw, &mut values, clock)?;
     check_orbits(&free, &values, clock, raw.star.mass_msun)?;
     resolve_sampler(&mut raw, free.len())?;
-    if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.given(Parameter::Contrast).is_some() {
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && values.get(Parameter::Contrast).is_some() {
         return Err(Fault::new(
             "parameters.contrast",
             "has no effect on a bright-and-dark map, which holds the brightness itself",
         ));
     }
     let grid = raw.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
-    if raw.imaging.brightness == BrightnessModel::BrightAndDark && raw.parameters.contrast.is_some() {
+    if raw.imaging.brightness == BrightnessModel::BrightAndDark && raw.parameters.has(Parameter::Contrast) {
         let problem = "an image of bright and dark pixels knows no spots: contrast has no effect";
         return Err(Fault::new("parameters.contrast", problem));
     }
@@ -90,38 +89,22 @@ fn resolve_jitter(raw: &mut Config) -> VelocityJitter {
 }
 
 /// The parameters as the config gives them; those of the surface where they are free or on an axis.
-fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, Fault> {
-    let free = Parameter::ALL.map(|p| {
-        let axis = raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(p).is_some());
-        axis || raw.parameters.slot(p).is_some()
-    });
-    let (star, planet) = (&raw.star, &raw.planet);
+fn values(raw: &Config, resolved: &StarSettings) -> Result<ParameterValues, Fault> {
     let mut values = ParameterValues::of_eight([0.0; 8]);
-    for parameter in Parameter::ALL {
-        if parameter.is_of_field() || (parameter.is_surface() && !free[parameter as usize]) {
-            continue;
-        }
-        values[parameter] = match parameter {
-            Parameter::K => planet.k_kms,
-            Parameter::PorbOverProt => planet.porb_over_prot,
-            Parameter::Phi => planet.phi,
-            _ if parameter.is_orbital() => continue,
-            // Filled in by `resolve_star`.
-            Parameter::OmegaEq => star.omega_eq_rad_d.unwrap_or(f64::NAN),
-            Parameter::DOmega => star.domega_rad_d,
-            Parameter::Inclination => star.inclination_deg,
-            Parameter::Vsini => star.vsini_kms,
-            Parameter::Vsys => star.vsys_kms,
+    let needed = |p: &Parameter| !p.is_optional() || (p.is_surface() && raw.is_free(*p));
+    for parameter in Parameter::ALL.into_iter().filter(needed) {
+        let key = parameter.spec().config_key;
+        let value = match parameter {
             Parameter::LimbDarkening => resolved.limb_darkening.coefficients().0,
-            Parameter::LineSigma => star.line.sigma_kms,
-            Parameter::EquivalentWidth if resolved.line.equivalent_width_kms.is_nan() => {
-                return Err(Fault::new(key(parameter), "auto is no start of a free parameter, give a number"));
-            }
-            Parameter::EquivalentWidth => resolved.line.equivalent_width_kms,
             Parameter::Contrast => resolved.contrast,
-            _ => unreachable!("passed over"),
+            _ if parameter.is_orbital() => raw.planet.get(parameter).expect("the planet has what is usual"),
+            _ => match raw.number_at(key) {
+                Some(value) => value,
+                None => return Err(Fault::new(key, "auto is no start of a free parameter, give a number")),
+            },
         };
-        check_value(parameter, values[parameter], &key(parameter))?;
+        check_value(parameter, value, key)?;
+        values.set(parameter, value);
     }
     resolve_orbits(raw, &mut values, resolved)?;
     Ok(values)
@@ -130,26 +113,27 @@ fn values(raw: &mut Config, resolved: &StarSettings) -> Result<ParameterValues, 
 /// Priors of the free parameters, with their defaults filled into `raw`, and their starts checked (and wrapped) in
 /// `values`.
 fn resolve_free(raw: &mut Config, values: &mut ParameterValues, clock: Clock) -> Result<Vec<FreeParameter>, Fault> {
-    let entries = raw.parameters.entries();
+    let entries = raw.parameters.clone();
     let mut free = Vec::new();
-    for (parameter, mut section) in entries.clone() {
-        let phi_free = Elements::of(parameter).is_some_and(|of| entries.iter().any(|(p, _)| *p == of.phi));
+    for (parameter, section) in entries.entries() {
+        let mut section = section.clone();
+        let phi_free = Elements::of(parameter).is_some_and(|of| entries.has(of.phi));
         let prior = resolve_prior(parameter, &section, phi_free)?;
         let start = prior.wrap(start_of(parameter, &prior, values, clock));
         if !prior.log_density(start).is_finite() {
             let (min, max) = prior.bounds();
             let problem = format!("{start} is outside its prior, [{min}, {max}] by parameters.{}", parameter.name());
-            return Err(Fault::new(key(parameter), problem));
+            return Err(Fault::new(parameter.spec().config_key, problem));
         }
         if !parameter.is_ephemeris() {
-            values[parameter] = start;
+            values.set(parameter, start);
         }
         if !matches!(prior, Prior::Periodic | Prior::Disc { .. }) {
             let (min, max) = prior.bounds();
             section.min = min.is_finite().then_some(min);
             section.max = max.is_finite().then_some(max);
         }
-        *raw.parameters.slot(parameter) = Some(section);
+        raw.parameters.set(parameter, section);
         free.push(FreeParameter { parameter, prior });
     }
     match without_planet(&free, values) {
@@ -176,12 +160,11 @@ pub(super) fn without_planet(
 fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), Fault> {
     let imaging = &raw.imaging;
     let integrated = imaging.objective == ObjectiveKind::MarginalLikelihood;
-    let something_is_free = !raw.parameters.entries().is_empty();
+    let something_is_free = !raw.parameters.is_empty();
     let given = [imaging.spot_amplitude, imaging.spot_slope, imaging.spot_lifetime_d];
     for (parameter, given) in Parameter::FIELD.into_iter().zip(given) {
         let name = parameter.name();
-        let axis = raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(parameter).is_some());
-        let prior = raw.parameters.slot(parameter).is_some();
+        let (axis, prior) = (raw.has_axis(parameter), raw.parameters.has(parameter));
         let wanted = [(prior, "parameters"), (axis, "grid.axes"), (!given.is_default(), "imaging")];
         if let Some((_, section)) = wanted.into_iter().find(|(is_there, _)| *is_there && !integrated) {
             return Err(Fault::new(format!("{section}.{name}"), OF_INTEGRATED_MAPS));
@@ -198,14 +181,12 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
             Hyperparameter::Static => {}
             Hyperparameter::Known(value) => {
                 check_value(parameter, value, &format!("imaging.{name}"))?;
-                values[parameter] = value;
+                values.set(parameter, value);
             }
             Hyperparameter::Fitted => {
-                values[parameter] = evolving_map::usual_value(parameter);
-                if something_is_free && !prior {
-                    let kind =
-                        if parameter == Parameter::SpotSlope { PriorKind::Uniform } else { PriorKind::LogUniform };
-                    *raw.parameters.slot(parameter) = Some(PriorSection::even(kind, evolving_map::bounds(parameter)));
+                values.set(parameter, parameter.usual());
+                if let Some(kind) = parameter.spec().usual_prior.filter(|_| something_is_free && !prior) {
+                    raw.parameters.set(parameter, PriorSection::even(kind, parameter.widest()));
                 }
             }
         }

@@ -21,15 +21,15 @@ pub(super) fn resolve_grid(
     values: &ParameterValues,
 ) -> Result<GridSettings, Fault> {
     let axes = section.axes.entries();
-    if !(1..=3).contains(&axes.len()) {
-        return Err(Fault::new("grid.axes", format!("{} axes must be 1 to 3", axes.len())));
+    if !(1..=3).contains(&axes.clone().count()) {
+        return Err(Fault::new("grid.axes", format!("{} axes must be 1 to 3", axes.count())));
     }
-    let total = axes.iter().fold(1usize, |product, (_, (_, _, nodes))| product.saturating_mul(*nodes));
+    let total = axes.clone().fold(1usize, |product, (_, (_, _, nodes))| product.saturating_mul(*nodes));
     if total > MOST_NODES {
         return Err(Fault::new("grid.axes", format!("{total} nodes exceed {MOST_NODES}")));
     }
     let mut settings = GridSettings { grid: Grid { axes: Vec::new() }, free: Vec::new() };
-    for (parameter, (min, max, nodes)) in axes {
+    for (parameter, &(min, max, nodes)) in axes {
         let name = parameter.name().to_string();
         let axis = Axis { name, min, max, nodes, periodic: parameter.is_phase() };
         if parameter.is_ephemeris() {

@@ -106,11 +106,12 @@ fn simulation(
         return Err(Fault::new(at("correlated_bins"), problem));
     }
     let mut truth = *values;
-    for (parameter, value) in section.truth.entries() {
+    let given = section.truth.entries().map(|(parameter, value)| (parameter, *value));
+    for (parameter, value) in given.clone() {
         check_value(parameter, value, &at(&format!("truth.{}", parameter.name())))?;
     }
     let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
-    Elements::write(&mut truth, section.truth.entries().into_iter(), clock);
+    Elements::write(&mut truth, given, clock);
     if truth.motion().orbits().any(|planet| !(planet.shape.eccentricity() < 1.0 && planet.orbit.porb_over_prot > 0.0)) {
         return Err(Fault::new(at("truth"), "is no orbit: each planet needs a period, and an eccentricity below 1"));
     }

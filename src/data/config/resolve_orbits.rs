@@ -1,106 +1,91 @@
 //! The orbits: which planets there are, ephemerides in place of period and phase, eccentricity, and whether two planets
 //! can last.
 
-use super::domain::{check_value, key};
+use super::domain::check_value;
 use super::error::Fault;
-use super::raw::{Config, DEFAULT_PORB_OVER_PROT};
+use super::raw::Config;
 use super::resolve::positive;
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{StarSettings, stability};
 
 /// Fills the orbits into `values`, where K, period and phase of the planet are as in the config: eccentricities, the
 /// second planet, and what ephemerides stand for.
-pub(super) fn resolve_orbits(raw: &mut Config, values: &mut ParameterValues, star: &StarSettings) -> Result<(), Fault> {
+pub(super) fn resolve_orbits(raw: &Config, values: &mut ParameterValues, star: &StarSettings) -> Result<(), Fault> {
     let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
     let [first, second] = &Elements::PLANETS;
     // phase and conjunction, or ratio and period, exclude each other
-    let usual = (raw.planet.porb_over_prot != DEFAULT_PORB_OVER_PROT, raw.planet.phi != 0.0);
-    let both = [
-        (usual.0, first.ratio, first.period),
-        (usual.1, first.phi, first.conjunction),
-        (raw.planet.porb2_over_prot.is_some(), second.ratio, second.period),
-        (raw.planet.phi2.is_some(), second.phi, second.conjunction),
-    ];
-    for (given, internal, named) in both {
+    let both = [first, second].into_iter().flat_map(|of| [(of.ratio, of.period), (of.phi, of.conjunction)]);
+    for (internal, named) in both {
         let either = |section: &str| {
             let problem = format!("give either {} or {}, not both", named.name(), internal.name());
             Fault::new(format!("{section}.{}", named.name()), problem)
         };
-        if given && raw.planet.given(named).is_some() {
+        if raw.planet.tells(internal) && raw.planet.get(named).is_some() {
             return Err(either("planet"));
         }
-        if raw.parameters.slot(internal).is_some() && raw.parameters.slot(named).is_some() {
+        if raw.parameters.has(internal) && raw.parameters.has(named) {
             return Err(either("parameters"));
         }
     }
     for of in &Elements::PLANETS {
-        let is_free = of.all().map(|p| raw.parameters.slot(p).is_some() || has_axis(raw, p));
-        let is_there =
-            of == first || of.all().iter().any(|p| raw.planet.given(*p).is_some()) || is_free.contains(&true);
-        if is_there {
+        let is_named = |p: Parameter| raw.planet.get(p).is_some() || raw.is_free(p);
+        if of == first || of.all().into_iter().any(is_named) {
             resolve_orbit(raw, of, values, clock)?;
         }
     }
     Ok(())
 }
 
-fn has_axis(raw: &mut Config, p: Parameter) -> bool {
-    raw.grid.as_mut().is_some_and(|grid| grid.axes.slot(p).is_some())
-}
-
 /// Where eccentricities that are free begin, in units of the square root of the largest.
 const START_SHAPE: [f64; 2] = [0.2, 0.1];
 
-fn resolve_orbit(
-    raw: &mut Config,
-    of: &'static Elements,
-    values: &mut ParameterValues,
-    clock: Clock,
-) -> Result<(), Fault> {
+fn resolve_orbit(raw: &Config, of: &Elements, values: &mut ParameterValues, clock: Clock) -> Result<(), Fault> {
     let [first, _] = &Elements::PLANETS;
-    let given = |p: Parameter, raw: &Config| -> Result<Option<f64>, Fault> {
-        let value = raw.planet.given(p);
-        value.map_or(Ok(()), |value| check_value(p, value, &key(p)))?;
+    let given = |p: Parameter| -> Result<Option<f64>, Fault> {
+        let value = raw.planet.get(p);
+        value.map_or(Ok(()), |value| check_value(p, value, p.spec().config_key))?;
         Ok(value)
     };
     // where the config says nothing a search begins in the middle of the prior
-    let mut start = |p: Parameter| -> Result<Option<f64>, Fault> {
-        let middle = raw.parameters.slot(p).as_ref().and_then(|section| {
+    let start = |p: Parameter| -> Result<Option<f64>, Fault> {
+        let middle = raw.parameters.get(p).and_then(|section| {
             section.mean.or_else(|| section.min.zip(section.max).map(|(min, max)| 0.5 * (min + max)))
         });
-        Ok(given(p, raw)?.or(middle))
+        Ok(given(p)?.or(middle))
     };
     let (period, conjunction) = (start(of.period)?, start(of.conjunction)?);
     if of != first {
-        values[of.k] = given(of.k, raw)?.unwrap_or(0.0);
-        let named = raw.parameters.slot(of.ratio).is_some() || has_axis(raw, of.ratio);
-        values[of.ratio] = match given(of.ratio, raw)? {
-            Some(ratio) => ratio,
-            None if period.is_some() => f64::NAN,
+        values.set(of.k, given(of.k)?.unwrap_or(of.k.usual()));
+        match given(of.ratio)? {
+            Some(ratio) => values.set(of.ratio, ratio),
+            None if period.is_some() => {}
             None => {
-                let what = if named { "the start of its period" } else { "its period" };
+                let what = if raw.is_free(of.ratio) { "the start of its period" } else { "its period" };
                 let problem = format!("missing: a second planet needs {what}, here or as {}", of.period.name());
-                return Err(Fault::new(key(of.ratio), problem));
+                return Err(Fault::new(of.ratio.spec().config_key, problem));
             }
-        };
-        values[of.phi] = given(of.phi, raw)?.unwrap_or(0.0);
+        }
+        values.set(of.phi, given(of.phi)?.unwrap_or(of.phi.usual()));
     }
-    let free = of.shape.map(|p| raw.parameters.slot(p).is_some());
-    let shape = [given(of.shape[0], raw)?, given(of.shape[1], raw)?];
-    let any = shape.iter().any(Option::is_some) || free.contains(&true) || of.shape.iter().any(|p| has_axis(raw, *p));
+    let free = of.shape.map(|p| raw.parameters.has(p));
+    let shape = [given(of.shape[0])?, given(of.shape[1])?];
+    let any = shape.iter().any(Option::is_some) || of.shape.iter().any(|p| raw.is_free(*p));
     if any {
         // where it is looked for a search does not begin at the circle, which is a saddle
-        let largest = raw.parameters.slot(of.shape[0]).as_ref().and_then(|section| section.max).unwrap_or(1.0);
+        let largest = raw.parameters.get(of.shape[0]).and_then(|section| section.max).unwrap_or(1.0);
         let begin = if free == [true, true] && shape == [None, None] {
             START_SHAPE.map(|x| x * largest.abs().min(1.0).sqrt())
         } else {
             [0.0; 2]
         };
         let given = shape.into_iter().zip(begin).map(|(value, begin)| value.unwrap_or(begin));
-        of.shape.into_iter().zip(given).for_each(|(p, value)| values[p] = value);
+        of.shape.into_iter().zip(given).for_each(|(p, value)| values.set(p, value));
         let e = of.shape(values).eccentricity();
         if e >= 1.0 {
-            return Err(Fault::new(key(of.shape[0]), format!("makes an eccentricity of {e}, it must be below 1")));
+            return Err(Fault::new(
+                of.shape[0].spec().config_key,
+                format!("makes an eccentricity of {e}, it must be below 1"),
+            ));
         }
     }
     if let [true, false] | [false, true] = free {
@@ -109,21 +94,20 @@ fn resolve_orbit(
         return Err(Fault::new(format!("parameters.{}", here.name()), problem));
     }
     if let Some(period_d) = period {
-        positive(&key(of.period), period_d)?;
+        positive(of.period.spec().config_key, period_d)?;
         of.set_period(values, period_d, clock);
-        check_value(of.ratio, values[of.ratio], &key(of.period))?;
+        check_value(of.ratio, values[of.ratio], of.period.spec().config_key)?;
     }
     if let Some(time_d) = conjunction {
         of.set_conjunction(values, time_d, clock);
-        let is_free = |p: Parameter, raw: &mut Config| raw.parameters.slot(p).is_some() || has_axis(raw, p);
-        let moves = [of.period, of.ratio, of.shape[0], of.shape[1]].into_iter().find(|p| is_free(*p, raw));
-        if let Some(moving) = moves.filter(|_| !is_free(of.conjunction, raw)) {
+        let moves = [of.period, of.ratio, of.shape[0], of.shape[1]].into_iter().find(|p| raw.is_free(*p));
+        if let Some(moving) = moves.filter(|_| !raw.is_free(of.conjunction)) {
             let problem = format!(
                 "is fixed while {} is free: give parameters.{} a normal prior with its error",
                 moving.name(),
                 of.conjunction.name()
             );
-            return Err(Fault::new(key(of.conjunction), problem));
+            return Err(Fault::new(of.conjunction.spec().config_key, problem));
         }
     }
     Ok(())
@@ -131,11 +115,10 @@ fn resolve_orbit(
 
 /// Where a free parameter starts.
 pub(super) fn start_of(parameter: Parameter, prior: &Prior, values: &ParameterValues, clock: Clock) -> f64 {
-    let start = match Elements::of(parameter) {
-        Some(of) if of.period == parameter => of.period_d(values, clock),
-        Some(of) if of.conjunction == parameter => of.conjunction_d(values, clock, prior.centre()),
-        _ => return values[parameter],
-    };
+    let start = Elements::value(parameter, prior, values, clock).expect("a value where a parameter is free");
+    if !parameter.is_ephemeris() {
+        return start;
+    }
     // what rounding has moved over a bound
     let (min, max) = prior.bounds();
     let rounding = 1e-12 * start.abs();
@@ -167,7 +150,7 @@ pub(super) fn check_orbits(
             let e = of.shape(values).eccentricity();
             if e > max_eccentricity {
                 let problem = format!("makes an eccentricity of {e}, above that of its prior, {max_eccentricity}");
-                return Err(Fault::new(key(of.shape[0]), problem));
+                return Err(Fault::new(of.shape[0].spec().config_key, problem));
             }
         }
         if let Some(Prior::Uniform { min, max }) = prior(of.conjunction) {
@@ -191,7 +174,10 @@ pub(super) fn check_orbits(
     if let Some(second) = motion.second
         && let Err(unstable) = stability::check(&motion.first, &second, clock.rotation_period_d, mass_msun)
     {
-        return Err(Fault::new(key(Parameter::PorbOverProt2), format!("{unstable}, at the values of the config")));
+        return Err(Fault::new(
+            Parameter::PorbOverProt2.spec().config_key,
+            format!("{unstable}, at the values of the config"),
+        ));
     }
     Ok(())
 }

@@ -114,7 +114,7 @@ fn star_of(
     let section = &raw.observations.sections[s];
     let ObservationsSection { line, wavelength_nm, contrast, resolving_power, .. } = section;
     let mut own = raw.star.clone();
-    let held = |parameter: Parameter, name: &str| match values.given(parameter) {
+    let held = |parameter: Parameter, name: &str| match values.get(parameter) {
         Some(_) if parameter.is_surface() => {
             let problem = format!("parameters.{} is free, and is that of all data sets", parameter.name());
             Err(Fault::new(format!("{key}.{name}"), problem))
@@ -180,7 +180,7 @@ fn of_one_star(raw: &Config, sets: &mut [DataSetSettings]) -> Result<(), Fault> 
             ("spots", !own.spots.is_empty()),
             ("random_spots", own.random_spots.is_some()),
             ("faculae", !own.faculae.is_empty()),
-            ("truth", !own.truth.entries().is_empty()),
+            ("truth", !own.truth.is_empty()),
         ];
         if let Some((name, _)) = given.iter().find(|(_, given)| *given && s > 0) {
             let problem = format!("all data sets see one star: that is for {}.simulate", sets[0].key);

@@ -59,7 +59,7 @@ impl Change {
         let Patient { settings, .. } = patient;
         let mut all: Vec<Change> = VSINI.map(Change::Vsini).into();
         all.extend(LINE_WIDTH.map(Change::LineWidth));
-        if settings.sets[0].star.line.gamma_kms == 0.0 && settings.values.given(Parameter::LineSigma).is_none() {
+        if settings.sets[0].star.line.gamma_kms == 0.0 && settings.values.get(Parameter::LineSigma).is_none() {
             all.extend(WINGS.map(|(gamma, sigma)| Change::Wings(gamma, sigma)));
         }
         if settings.imaging.brightness == BrightnessModel::Spots {
@@ -67,7 +67,7 @@ impl Change {
         }
         all.extend(PERIOD.map(Change::Period));
         if settings.sets[0].equivalent_width != EquivalentWidth::Auto
-            && settings.values.given(Parameter::EquivalentWidth).is_none()
+            && settings.values.get(Parameter::EquivalentWidth).is_none()
         {
             all.push(Change::MeasuredStrength);
         }
@@ -151,11 +151,11 @@ impl Change {
         let mut changed = patient.clone();
         let settings = &mut changed.settings;
         match self {
-            Change::Vsini(factor) => settings.values[Parameter::Vsini] *= factor,
+            Change::Vsini(factor) => settings.values.star.vsini_kms *= factor,
             Change::LineWidth(factor) => {
                 settings.sets[0].star.line.sigma_kms *= factor;
-                if settings.values.given(Parameter::LineSigma).is_some() {
-                    settings.values[Parameter::LineSigma] *= factor;
+                if settings.values.get(Parameter::LineSigma).is_some() {
+                    settings.values.set(Parameter::LineSigma, settings.values[Parameter::LineSigma] * factor);
                 }
             }
             Change::Wings(gamma, sigma) => {
@@ -166,7 +166,7 @@ impl Change {
             }
             Change::BrightAndDark => settings.imaging.brightness = BrightnessModel::BrightAndDark,
             // the orbit, if there is one, keeps its period in days
-            Change::Period(factor) => settings.values[Parameter::OmegaEq] /= factor,
+            Change::Period(factor) => settings.values.star.omega_eq_rad_d /= factor,
             Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::Auto,
             Change::Level(level) => changed.observations = changed.observations.over_continuum(*level),
             Change::Offsets => {
@@ -212,7 +212,7 @@ fn before_spectrograph(total_kms: f64, instrument_kms: f64) -> f64 {
 fn local_sigma(patient: &Patient) -> f64 {
     let line = &patient.settings.sets[0].star.line;
     let local = (line.sigma_kms.powi(2) - line.instrumental_sigma_kms.powi(2)).max(0.0).sqrt();
-    let sigma = patient.settings.values.given(Parameter::LineSigma).unwrap_or(local);
+    let sigma = patient.settings.values.get(Parameter::LineSigma).unwrap_or(local);
     (100.0 * sigma).round() / 100.0
 }
 

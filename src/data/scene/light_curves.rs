@@ -8,7 +8,6 @@ use crate::data::simulate::Simulation;
 use crate::field::Lifetime;
 use crate::model::Parameter;
 use crate::star::observation::Observations;
-use crate::surface::evolving_map::usual_value;
 use crate::surface::photometry::{Flux, FluxBin, LightCurve, bin_width_d};
 use sha2::{Digest, Sha256};
 
@@ -89,7 +88,7 @@ pub(super) fn near(settings: &Settings, observations: &Observations) -> Result<V
     let lifetime_d = match settings.known_field().lifetime {
         Some(Lifetime::Static) => f64::INFINITY,
         Some(Lifetime::Days(days)) => days,
-        None => usual_value(Parameter::SpotLifetime),
+        None => Parameter::SpotLifetime.usual(),
     };
     let times_d = observations.times_d();
     let mut curves = Vec::new();

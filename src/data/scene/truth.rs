@@ -108,9 +108,9 @@ impl Scene {
     #[doc(hidden)]
     pub fn named_truth(&self) -> Option<BTreeMap<String, f64>> {
         let truth = self.truth?;
-        let own = Parameter::ALL.into_iter().filter_map(|p| Some((p, truth.given(p)?)));
-        let named = self.space.free().iter().map(|f| f.parameter).zip(self.space.theta_of(&truth));
-        let named = named.filter(|(p, value)| p.is_ephemeris() && value.is_finite());
+        let own = Parameter::ALL.into_iter().filter_map(|p| Some((p, truth.get(p)?)));
+        let named = self.space.free().iter().filter(|f| f.parameter.is_ephemeris());
+        let named = named.filter_map(|f| Some((f.parameter, self.space.value_among(f, &truth)?)));
         Some(own.chain(named).map(|(p, value)| (p.name().to_owned(), value)).collect())
     }
 }

@@ -10,42 +10,28 @@ const PHASE_UNIT: &str = "cycles to max. RV";
 
 /// Symbol and unit of a parameter by its name in files; the name itself if it is another one.
 pub fn symbol(name: &str) -> (&str, &'static str) {
-    match Parameter::from_name(name) {
-        Some(Parameter::K) => ("*K*", "km/s"),
-        Some(Parameter::PorbOverProt) => ("*P*_{orb}/*P*_{rot}", ""),
-        Some(Parameter::Phi) => ("*φ*", PHASE_UNIT),
-        Some(Parameter::Period) => ("*P*_{orb}", "d"),
-        Some(Parameter::Conjunction) => ("*T*_{conj}", "d"),
-        Some(Parameter::SqrtECosOmega) => ("√*e* cos *ω*", ""),
-        Some(Parameter::SqrtESinOmega) => ("√*e* sin *ω*", ""),
-        Some(Parameter::K2) => ("*K*_{2}", "km/s"),
-        Some(Parameter::PorbOverProt2) => ("*P*_{orb,2}/*P*_{rot}", ""),
-        Some(Parameter::Period2) => ("*P*_{orb,2}", "d"),
-        Some(Parameter::Phi2) => ("*φ*_{2}", PHASE_UNIT),
-        Some(Parameter::Conjunction2) => ("*T*_{conj,2}", "d"),
-        Some(Parameter::SqrtECosOmega2) => ("√*e*_{2} cos *ω*_{2}", ""),
-        Some(Parameter::SqrtESinOmega2) => ("√*e*_{2} sin *ω*_{2}", ""),
-        Some(Parameter::OmegaEq) => ("*Ω*_{eq}", "rad/d"),
-        Some(Parameter::DOmega) => ("d*Ω*", "rad/d"),
-        Some(Parameter::Inclination) => ("*i*", "°"),
-        Some(Parameter::Vsini) => ("*v* sin *i*", "km/s"),
-        Some(Parameter::Vsys) => ("*v*_{sys}", "km/s"),
-        Some(Parameter::LimbDarkening) => ("*u*", ""),
-        Some(Parameter::LineSigma) => ("*σ*_{line}", "km/s"),
-        Some(Parameter::EquivalentWidth) => ("*W*_{line}", "km/s"),
-        Some(Parameter::Contrast) => ("*c*", ""),
-        Some(Parameter::SpotAmplitude) => ("*σ*_{spot}", ""),
-        Some(Parameter::SpotSlope) => ("*α*_{spot}", ""),
-        Some(Parameter::SpotLifetime) => ("*τ*_{spot}", "d"),
-        None if name == "t_max_rv_d" => ("*T*_{max RV}", "d"),
-        None if name == "eccentricity" => ("*e*", ""),
-        None if name == "omega_deg" => ("*ω*", "°"),
-        None if name == "t_max_rv2_d" => ("*T*_{max RV,2}", "d"),
-        None if name == "msini2_mjup" => ("*M*_{2} sin *i*", "*M*_{Jup}"),
-        None if name == "eccentricity2" => ("*e*_{2}", ""),
-        None if name == "omega2_deg" => ("*ω*_{2}", "°"),
-        None if name == "msini_mjup" => ("*M* sin *i*", "*M*_{Jup}"),
-        None => (name, ""),
+    if let Some(parameter) = Parameter::from_name(name) {
+        return (parameter.spec().symbol, unit(parameter));
+    }
+    match name {
+        "t_max_rv_d" => ("*T*_{max RV}", "d"),
+        "eccentricity" => ("*e*", ""),
+        "omega_deg" => ("*ω*", "°"),
+        "t_max_rv2_d" => ("*T*_{max RV,2}", "d"),
+        "msini2_mjup" => ("*M*_{2} sin *i*", "*M*_{Jup}"),
+        "eccentricity2" => ("*e*_{2}", ""),
+        "omega2_deg" => ("*ω*_{2}", "°"),
+        "msini_mjup" => ("*M* sin *i*", "*M*_{Jup}"),
+        name => (name, ""),
+    }
+}
+
+fn unit(parameter: Parameter) -> &'static str {
+    match parameter.unit() {
+        "1" => "",
+        "deg" => "°",
+        "cycles" => PHASE_UNIT,
+        unit => unit,
     }
 }
 

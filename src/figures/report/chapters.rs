@@ -68,8 +68,8 @@ pub(super) fn tone(good: bool) -> Tone {
 /// The parameters that are given, and the injected ones where they are known.
 pub(super) fn parameters(values: &ParameterValues, truth: Option<&ParameterValues>) -> Table {
     let row = |parameter: Parameter| {
-        let mut row = vec![label(parameter.name()), number(values.given(parameter)?, 4)];
-        row.extend(truth.map(|truth| number(truth.given(parameter), 4)));
+        let mut row = vec![label(parameter.name()), number(values.get(parameter)?, 4)];
+        row.extend(truth.map(|truth| number(truth.get(parameter), 4)));
         Some(row)
     };
     let head: &[&str] = if truth.is_some() { &["parameter", "value", "injected"] } else { &["parameter", "value"] };
@@ -89,7 +89,7 @@ fn simulation(truth: &Truth) -> Chapter {
 
 fn search(file: &PeriodogramFile) -> Chapter {
     let best = &file.best;
-    let injected = |parameter: Parameter| file.truth.as_ref().and_then(|truth| truth.given(parameter));
+    let injected = |parameter: Parameter| file.truth.as_ref().and_then(|truth| truth.get(parameter));
     let row = |name: &str, value: f64, sigma: Option<f64>, truth: Option<f64>| {
         let digits = digits_of(sigma, 3);
         vec![label(name), number(value, digits), number(sigma, digits), number(truth, digits)]

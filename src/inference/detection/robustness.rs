@@ -55,9 +55,9 @@ pub fn robustness(
 ) -> Robustness {
     let peak = &found.best;
     let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
-    values[Parameter::K] = peak.orbit.k_kms;
-    values[Parameter::PorbOverProt] = peak.porb_over_prot;
-    values[Parameter::Phi] = peak.orbit.phi;
+    values.set(Parameter::K, peak.orbit.k_kms);
+    values.set(Parameter::PorbOverProt, peak.porb_over_prot);
+    values.set(Parameter::Phi, peak.orbit.phi);
     let times_d = imager.times_d();
     let mut nights = nights(&times_d, NIGHT_GAP_D);
     nights.retain(|night| times_d.len() - night.len() >= FEWEST);

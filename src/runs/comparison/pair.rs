@@ -131,9 +131,10 @@ fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_
     }
     let of_both = |p: &Parameter| same_method || !p.is_of_field();
     let fixed = |p: &Parameter| of_both(p) && !manifest.names.iter().any(|name| name == p.name());
-    let differ = |p: &Parameter| !settings.values.agrees(&grid_settings.values, *p);
+    let differ = |p: &Parameter| settings.values.get(*p) != grid_settings.values.get(*p);
     if let Some(p) = Parameter::ALL.into_iter().filter(fixed).find(differ) {
-        let (first, second) = (settings.values[p], grid_settings.values[p]);
+        let number = |of: &Settings| of.values.get(p).map_or("nothing".to_owned(), |value| value.to_string());
+        let (first, second) = (number(settings), number(grid_settings));
         return Some(format!("{} is fixed at {first} in the run and at {second} in the landscape", p.name()));
     }
     if run.data_sha256 != grid.data_sha256 {

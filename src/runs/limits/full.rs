@@ -125,7 +125,7 @@ impl WholeWay {
             let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();
             let star = scene.injected(&whole, &orbits).ok()?;
             let mut values = for_blind_search(star.settings.values, &star.settings.free);
-            values[Parameter::K] = 0.0;
+            values.set(Parameter::K, 0.0);
             let at = At { imager: &star.imager, values, nuisances: &settings.detection.nuisances };
             let here = settings.detection.surface.model().linearise(at, None).ok()?;
             let search = Search::new(&here.quadratic, &settings.frequencies, settings.detection.search).ok()?;

@@ -66,7 +66,7 @@ impl<'a> Shortcut<'a> {
         mut values: ParameterValues,
         settings: &'a LimitSettings,
     ) -> Result<Self, SurfaceError> {
-        values[Parameter::K] = 0.0;
+        values.set(Parameter::K, 0.0);
         let surface = settings.detection.surface.model();
         let nuisances = &settings.detection.nuisances;
         let at = At { imager, values, nuisances };

@@ -6,8 +6,8 @@ use crate::field::{FieldError, Lifetime};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{Frequencies, orbits};
 use crate::surface::Known;
+use crate::surface::evolving_map::Basis;
 use crate::surface::evolving_map::fit::usual;
-use crate::surface::evolving_map::{Basis, usual_value};
 use crate::surface::imaging::{Imager, ZeroPointPrior};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -42,10 +42,10 @@ pub fn hold(
     frequencies: Option<&Frequencies>,
 ) -> Result<Vec<HeldZeroPoint>, FieldError> {
     let basis = Basis::rough(&imager.grid);
-    let lifetime = known.lifetime.unwrap_or(Lifetime::Days(usual_value(Parameter::SpotLifetime)));
+    let lifetime = known.lifetime.unwrap_or(Lifetime::Days(Parameter::SpotLifetime.usual()));
     let known = Known { lifetime: Some(lifetime), ..known };
     let mut values = values;
-    values[Parameter::K] = 0.0;
+    values.set(Parameter::K, 0.0);
     let mut held = vec![HeldZeroPoint { value_kms: 0.0, sigma_kms: PRIOR_KMS }; imager.zero_points.len()];
     let mut near = None;
     for _ in 0..ROUNDS {
@@ -57,9 +57,9 @@ pub fn hold(
             found.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))
         });
         if let Some((frequency, orbit)) = orbit {
-            values[Parameter::K] = orbit.k_kms;
-            values[Parameter::PorbOverProt] = 1.0 / frequency;
-            values[Parameter::Phi] = orbit.phi;
+            values.set(Parameter::K, orbit.k_kms);
+            values.set(Parameter::PorbOverProt, 1.0 / frequency);
+            values.set(Parameter::Phi, orbit.phi);
         }
         let known_velocities = marginal.known_zero_points(imager, &basis, &[])?;
         let step = known_velocities.coordinates(&values) - &known_velocities.centre;

@@ -179,7 +179,7 @@ fn shortened(
 }
 
 fn without_planet(mut values: ParameterValues) -> ParameterValues {
-    values[Parameter::K] = 0.0;
+    values.set(Parameter::K, 0.0);
     values
 }
 
@@ -200,8 +200,8 @@ fn with_best_orbit(
         .filter_map(|trial| Some((trial.frequency, trial.orbit?)))
         .max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
     let Some((frequency, orbit)) = best else { return Ok(without_planet(values)) };
-    values[Parameter::K] = orbit.k_kms;
-    values[Parameter::PorbOverProt] = 1.0 / frequency;
-    values[Parameter::Phi] = orbit.phi;
+    values.set(Parameter::K, orbit.k_kms);
+    values.set(Parameter::PorbOverProt, 1.0 / frequency);
+    values.set(Parameter::Phi, orbit.phi);
     Ok(values)
 }

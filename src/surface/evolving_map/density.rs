@@ -1,6 +1,6 @@
 //! The marginal posterior behind the interface of all surface models, and what is written of its reference.
 
-use super::{Held, MarginalPosterior, bounds};
+use super::{Held, MarginalPosterior};
 use crate::model::{Parameter, ParameterSpace};
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity as _};
 use crate::surface::density::{Density, SurfaceDensity, UnresolvedSpotsError};
@@ -52,7 +52,7 @@ impl FieldRecord {
         /// Nearer than this part a bound is reached.
         const REACHED: f64 = 0.01;
         let on_bound = |p: &Parameter| {
-            let (value, (low, high)) = (*self.parameters.get(p.name())?, bounds(*p));
+            let (value, (low, high)) = (*self.parameters.get(p.name())?, p.widest());
             let near = |bound: f64| (value / bound - 1.0).abs() < REACHED;
             let bound = [low, high].into_iter().find(|bound| near(*bound))?;
             Some(match (p, bound == high) {

@@ -159,7 +159,7 @@ impl Design {
             let h = parameter.map_or(VELOCITY_STEP_KMS, |p| stellar_step(p, values, time_base_d));
             let at = |h: f64| {
                 let mut values = *values;
-                values[parameter.unwrap_or(Parameter::Vsys)] += h;
+                values.set(parameter.unwrap_or(Parameter::Vsys), values[parameter.unwrap_or(Parameter::Vsys)] + h);
                 self.displaced(imager, parameter, &values).depths_of_each(brightness)
             };
             let (above, below) = (at(h), at(-h));

@@ -124,7 +124,7 @@ impl MarginalPosterior {
     fn displaced(&self, moves: &[(Parameter, f64)], slopes: Option<&[Parameter]>) -> Result<Displaced, FieldError> {
         let mut values = self.reference.values;
         for (p, h) in moves {
-            values[*p] = p.to_physical(p.to_sampling(values[*p]) + h);
+            values.set(*p, p.to_physical(p.to_sampling(values[*p]) + h));
         }
         let star = moves.iter().any(|(p, _)| STELLAR.contains(p));
         let here: Marginal = self.marginal_at(values, star)?;
@@ -142,7 +142,7 @@ impl MarginalPosterior {
 
     /// Where the profiles leave a parameter of the field open its prior stands in, by itself.
     fn close(&self, parameter: Parameter, at: usize, information: &mut nalgebra::DMatrix<f64>) {
-        let (low, high) = super::bounds(parameter);
+        let (low, high) = parameter.widest();
         let width = parameter.to_sampling(high) - parameter.to_sampling(low);
         let least = (OPEN * width / 12.0_f64.sqrt()).powi(-2);
         if information[(at, at)] < least {

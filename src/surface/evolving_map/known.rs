@@ -6,27 +6,15 @@ use crate::model::{Parameter, Prior};
 use serde::{Deserialize, Serialize};
 
 /// Bounds of amplitude, slope and lifetime (d).
-pub(super) const BOUNDS: [(f64, f64); 3] = [(0.01, 1.5), (0.0, 3.0), (0.3, 3000.0)];
+pub(super) const BOUNDS: [(f64, f64); 3] =
+    [Parameter::FIELD[0].widest(), Parameter::FIELD[1].widest(), Parameter::FIELD[2].widest()];
 
 /// Where searches start: usual ones.
-pub(super) const USUAL: [f64; 3] = [0.2, 1.5, 36.0];
+pub(super) const USUAL: [f64; 3] =
+    [Parameter::FIELD[0].usual(), Parameter::FIELD[1].usual(), Parameter::FIELD[2].usual()];
 
 /// Degree below which the spectrum of spots is flat: those of 10 to 25 deg, here and there.
 const BREAK_DEGREE: f64 = 7.0;
-
-/// Bounds of a parameter of the field, in the units of its name.
-pub fn bounds(parameter: Parameter) -> (f64, f64) {
-    BOUNDS[place_of(parameter)]
-}
-
-/// A usual value of a parameter of the field.
-pub fn usual_value(parameter: Parameter) -> f64 {
-    USUAL[place_of(parameter)]
-}
-
-fn place_of(parameter: Parameter) -> usize {
-    Parameter::FIELD.iter().position(|p| *p == parameter).expect("a parameter of the field")
-}
 
 /// What is known of the field beforehand; what is `None` is fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -111,7 +111,7 @@ impl Marginal {
             let h = stellar_step(*parameter, &self.values, time_base_d);
             let [above, below] = [h, -h].map(|h| {
                 let mut values = self.values;
-                values[*parameter] += h;
+                values.set(*parameter, values[*parameter] + h);
                 Light::new(imager, basis, &values.state()).fluxes(maps.as_view())
             });
             slopes.iter_mut().enumerate().for_each(|(k, own)| own[1 + s] = (above[k] - below[k]) / (2.0 * h));

@@ -36,7 +36,7 @@ pub use density::FieldRecord;
 pub use design::{Basis, Design};
 pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
-pub use known::{Known, bounds, usual_value};
+pub use known::Known;
 pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
 pub use planned::Planned;
@@ -44,7 +44,7 @@ pub use posterior::{LN_EVIDENCE, MarginalPosterior};
 pub use surface::EvolvingMap;
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};
-use crate::model::{Parameter, ParameterValues};
+use crate::model::{FieldValues, Parameter, ParameterValues};
 use crate::surface::imaging::Imager;
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
@@ -82,7 +82,7 @@ impl Assumed {
     pub fn of(values: &ParameterValues, Held { break_degree, jitter_kms }: Held) -> Self {
         let (amplitude, slope) = (values[Parameter::SpotAmplitude], values[Parameter::SpotSlope]);
         let spectrum = Spectrum { amplitude, slope, break_degree };
-        let lifetime = values.given(Parameter::SpotLifetime).map_or(Lifetime::Static, Lifetime::Days);
+        let lifetime = values.get(Parameter::SpotLifetime).map_or(Lifetime::Static, Lifetime::Days);
         Assumed { field: Field { spectrum, kernel: Kernel::of(lifetime) }, jitter_kms }
     }
 
@@ -94,9 +94,8 @@ impl Assumed {
     /// `values` with this field among them.
     fn among(&self, mut values: ParameterValues) -> ParameterValues {
         let Field { spectrum, kernel } = self.field;
-        values[Parameter::SpotAmplitude] = spectrum.amplitude;
-        values[Parameter::SpotSlope] = spectrum.slope;
-        values[Parameter::SpotLifetime] = kernel.lifetime.days().unwrap_or(f64::NAN);
+        let Spectrum { amplitude, slope, .. } = spectrum;
+        values.field = Some(FieldValues { amplitude, slope, lifetime_d: kernel.lifetime.days() });
         values
     }
 }

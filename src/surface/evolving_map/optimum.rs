@@ -146,7 +146,7 @@ fn without_planet(space: &ParameterSpace, theta: &[f64]) -> ParameterValues {
     let mut values = space.values_at(theta);
     for of in &Elements::PLANETS {
         if space.free().iter().any(|f| f.parameter == of.k) {
-            values[of.k] = 0.0;
+            values.set(of.k, 0.0);
         }
     }
     values

@@ -41,7 +41,7 @@ impl<'a> Planned<'a> {
         nuisances: &'a [Nuisance],
         taken: Option<&'a Marginal>,
     ) -> Self {
-        values[Parameter::K] = 0.0;
+        values.set(Parameter::K, 0.0);
         let basis = Basis::new(&imager.grid);
         let design = Design::new(imager, &basis, &values.state());
         Planned { imager, assumed, nuisances, taken, values, basis, design }

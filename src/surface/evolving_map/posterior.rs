@@ -122,10 +122,8 @@ impl MarginalPosterior {
 
     /// `values` with the orbit and systemic velocity of the reference.
     pub(super) fn at_reference_velocities(&self, mut values: ParameterValues) -> ParameterValues {
-        for p in Parameter::ALL.into_iter().filter(|p| p.only_shifts()) {
-            values[p] = self.reference.values[p];
-        }
-        values
+        values.star.vsys_kms = self.reference.values.star.vsys_kms;
+        values.with_orbits_of(&self.reference.values)
     }
 
     /// ln Z at `theta` (physical coordinates), whatever the prior says, with itself beside it.

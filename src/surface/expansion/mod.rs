@@ -15,25 +15,18 @@ use crate::surface::static_map::Reference;
 use model::DisplacedModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::sync::LazyLock;
 
 pub use marginal::{Nuisance, nuisances};
 pub use model::{VELOCITY_STEP_KMS, stellar_step, velocity_slopes};
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.
-pub const STELLAR: [Parameter; 8] = [
-    Parameter::OmegaEq,
-    Parameter::DOmega,
-    Parameter::Inclination,
-    Parameter::Vsini,
-    Parameter::LimbDarkening,
-    Parameter::LineSigma,
-    Parameter::EquivalentWidth,
-    Parameter::Contrast,
-];
+pub static STELLAR: LazyLock<Vec<Parameter>> =
+    LazyLock::new(|| Parameter::ALL.into_iter().filter(|p| p.is_stellar()).collect());
 
 /// Those of the star's own parameters that are free.
 pub fn free_stellar(free: &[FreeParameter]) -> Vec<Parameter> {
-    STELLAR.into_iter().filter(|p| free.iter().any(|f| f.parameter == *p)).collect()
+    STELLAR.iter().copied().filter(|p| free.iter().any(|f| f.parameter == *p)).collect()
 }
 
 /// The regularised likelihood to second order. Coordinates: the velocity of each profile (km/s; orbit and systemic

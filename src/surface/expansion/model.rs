@@ -3,7 +3,7 @@
 //! A shift of all profiles at once gives every profile's own derivative, because no profile sees another's velocity.
 
 use crate::maxent::Problem;
-use crate::model::{Parameter, ParameterValues};
+use crate::model::{Parameter, ParameterValues, Step, turning};
 use crate::numerics::vector::Portable;
 use crate::star::Response;
 use crate::surface::imaging::{Imager, ImagingProblem};
@@ -17,16 +17,11 @@ pub const VELOCITY_STEP_KMS: f64 = 0.02;
 
 /// Step of a stellar parameter: large enough that so many pixels come into sight at the limb that they do so smoothly.
 pub fn stellar_step(parameter: Parameter, values: &ParameterValues, time_base_d: f64) -> f64 {
-    // angle (rad) that the star turns by in half the time base
-    let turn = 0.01 / (0.5 * time_base_d).max(1e-3);
-    match parameter {
-        Parameter::OmegaEq => turn,
-        Parameter::DOmega => 3.0 * turn,
-        Parameter::Inclination => 0.5,
-        // the model is smooth in these, but for 1e-7 of it where a narrower line needs another velocity grid
-        Parameter::LimbDarkening | Parameter::Contrast => 0.02,
-        Parameter::LineSigma | Parameter::EquivalentWidth => 0.02 * values[parameter],
-        _ => 1e-3 * values[parameter],
+    match parameter.spec().difference {
+        Step::Fixed(step) => step,
+        Step::Relative(part) => part * values[parameter],
+        Step::Turn(times) => times * turning((0.5 * time_base_d).max(1e-3)),
+        Step::Ratio(_) | Step::Period(_) | Step::Time(_) => unreachable!("orbits are displaced by velocities"),
     }
 }
 
@@ -235,7 +230,7 @@ fn shifted(imager: &Imager, response: &Response, values: &ParameterValues, h: f6
 
 fn moved(values: &ParameterValues, moves: &[(Parameter, f64)]) -> ParameterValues {
     let mut values = *values;
-    moves.iter().for_each(|&(p, h)| values[p] += h);
+    moves.iter().for_each(|&(p, h)| values.set(p, values[p] + h));
     values
 }
 

@@ -54,7 +54,7 @@ impl SpotsCounted {
         let reference = posterior.reference();
         let entropy = Expansion::of(posterior.imager(), reference, &free_stellar(free));
         let mut without_planet = reference.values;
-        without_planet[Parameter::K] = 0.0;
+        without_planet.set(Parameter::K, 0.0);
         // an orbit that stands for unresolved spots makes them look small
         let size = [reference.values, without_planet]
             .iter()
@@ -234,7 +234,7 @@ mod tests {
             // at the height, and a little before and beyond it
             for part in [0.98, 1.0, 1.02] {
                 if top > 0.0 {
-                    values[Parameter::K] *= part * top;
+                    values.set(Parameter::K, values[Parameter::K] * (part * top));
                 }
                 let quadratic = counted.entropy.log_likelihood_at(&values) + 3.0;
                 let at = |beyond: f64| counted.log_likelihood(&values, 7.0 + quadratic + beyond);

@@ -55,7 +55,7 @@ impl Posterior {
     pub fn new(imager: Imager, space: ParameterSpace, kind: ObjectiveKind, reference: Reference) -> Self {
         // the reference's pixels serve only if its fixed parameters are those of the space
         let here = space.values_at(&space.theta_of(&reference.values));
-        let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.agrees(&reference.values, p))
+        let velocities_only = Parameter::ALL.iter().all(|&p| p.only_shifts() || here.get(p) == reference.values.get(p))
             && space.free().iter().all(|f| f.parameter.only_shifts());
         let settings = SolverSettings::default();
         let nearby = (!velocities_only).then(|| Arc::new(imager.nearby(&here.state())));
@@ -304,7 +304,7 @@ impl Posterior {
 pub fn is_physical(imager: &Imager, values: &ParameterValues, theta: &[f64]) -> bool {
     let pole_over_equator = 1.0 - values[Parameter::DOmega] / values[Parameter::OmegaEq];
     let fastest = values[Parameter::Vsini] * pole_over_equator.abs().max(1.0);
-    if !Parameter::ALL.iter().filter_map(|&p| values.given(p)).chain(theta.iter().copied()).all(f64::is_finite) {
+    if !Parameter::ALL.iter().filter_map(|&p| values.get(p)).chain(theta.iter().copied()).all(f64::is_finite) {
         return false;
     }
     let state = values.state();

@@ -80,7 +80,7 @@ impl LinearModel {
         if !space.free().iter().any(|f| f.parameter == Parameter::Vsys) {
             offset.rows_mut(0, n).add_scalar_mut(fixed[Parameter::Vsys]);
         }
-        for of in Elements::PLANETS.iter().filter(|of| !is_free(of) && fixed.given(of.k).is_some_and(|k| k != 0.0)) {
+        for of in Elements::PLANETS.iter().filter(|of| !is_free(of) && fixed.get(of.k).is_some_and(|k| k != 0.0)) {
             let planet = of.orbit(&fixed);
             offset.iter_mut().zip(&expansion.cycles).for_each(|(v, cycle)| *v += planet.velocity_kms(*cycle));
         }

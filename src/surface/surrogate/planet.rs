@@ -146,11 +146,10 @@ impl Planet {
     /// The orbit of K = 1 with that conjunction.
     fn unit(&self, at: &Nonlinear) -> Eccentric {
         let mut values = self.fixed;
-        values[self.of.ratio] = at.period;
+        values.set(self.of.ratio, at.period);
         if self.shape.is_some() {
             let shape = Shape::new(at.e, at.angle);
-            values[self.of.shape[0]] = shape.sqrt_e_cos_omega;
-            values[self.of.shape[1]] = shape.sqrt_e_sin_omega;
+            values.orbit_mut(self.of.planet).shape = Some(shape);
         }
         self.of.set_conjunction(&mut values, at.conjunction_d, self.clock);
         let planet = self.of.orbit(&values);

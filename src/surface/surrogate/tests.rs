@@ -59,10 +59,13 @@ const KINDS: [&[Parameter]; 5] = [
 fn space(kind: &[Parameter]) -> ParameterSpace {
     let mut values = ParameterValues::of_eight([0.1, 1.7, 0.3, 2.0, 0.0, 40.0, 40.0, 0.0]);
     if kind.contains(&K2) {
-        (values[K2], values[PorbOverProt2], values[Phi2]) = (0.06, 3.1, 0.8);
+        values.set(K2, 0.06);
+        values.set(PorbOverProt2, 3.1);
+        values.set(Phi2, 0.8);
     }
     if kind.contains(&SqrtECosOmega) {
-        (values[SqrtECosOmega], values[SqrtESinOmega]) = (0.3, 0.4);
+        values.set(SqrtECosOmega, 0.3);
+        values.set(SqrtESinOmega, 0.4);
     }
     ParameterSpace::new(kind.iter().copied().map(free).collect(), values, MID, SPAN, 3.0).of_star(1000.0, None)
 }

@@ -162,7 +162,7 @@ fn image(imager: &Imager, values: ParameterValues, chi2_target: f64) -> Result<R
 fn unspotted_slopes(imager: &Imager, values: &ParameterValues) -> Vec<f64> {
     let depths = |h: f64| {
         let mut values = *values;
-        values[Parameter::Vsys] += h;
+        values.set(Parameter::Vsys, values[Parameter::Vsys] + h);
         imager.response(&values.state()).depths(&vec![1.0; imager.grid.len()])
     };
     let (above, below) = (depths(STEP_KMS), depths(-STEP_KMS));
