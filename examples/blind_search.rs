@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = DetectionSettings {
         search: SearchSettings { draws: 10_000, seed: 1 },
         spots,
-        ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), Vec::new())
+        ..DetectionSettings::of(scene.chi2_target, Vec::new())
     };
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let values = scene.settings.values;

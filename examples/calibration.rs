@@ -81,7 +81,7 @@ fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
 
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
     let settings = DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target.value(),
+        chi2_target: scene.chi2_target,
         nuisances: Vec::new(),
         search: SearchSettings { draws, seed: 1 },
         eccentric: false,

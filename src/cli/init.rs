@@ -3,6 +3,7 @@
 use super::output::ConfigFile;
 use super::{Failure, Global, console, progress};
 use crate::data::config::ConfigError;
+use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
 use crate::data::io::{atomic, lsd};
@@ -130,7 +131,7 @@ impl KnownArgs {
 
     /// Why there is no proposal; by its option where a value is at fault that was given by one.
     pub fn failure(&self, error: ProposalError) -> Failure {
-        if let ProposalError::Config(ConfigError::Key { key, problem, .. }) = &error {
+        if let ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })) = &error {
             let at_fault =
                 |given: &str| key == given || key.strip_prefix(given).is_some_and(|rest| rest.starts_with('.'));
             let option = self.options().into_iter().find(|(_, value, given, _)| value.is_some() && at_fault(given));

@@ -114,7 +114,7 @@ fn whole_way(
         return Ok(Vec::new());
     }
     let way = WholeWay::new(scene, shortcut);
-    let search = way.searcher().map_err(Failure::of)?;
+    let search = way.searcher(scene.clone());
     let brief = Brief::Injections(Box::new(way)).to_bytes();
     let meter = Meter::new(global, orbits.len());
     signals.defer();
@@ -144,7 +144,7 @@ fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
     })?;
     Ok(LimitSettings {
         detection: DetectionSettings {
-            chi2_target: scene.settings.imaging.chi2_target.value(),
+            chi2_target: scene.chi2_target,
             nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
             search: SearchSettings { draws: args.draws as usize, seed: args.seed },
             eccentric: false,

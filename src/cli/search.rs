@@ -2,7 +2,7 @@
 
 use super::{Failure, Global, progress};
 use crate::data::scene::Scene;
-use crate::inference::search::{Found, Progress, SearchSettings, find};
+use crate::inference::search::{Found, Progress, find};
 use crate::model::ParameterSpace;
 use std::path::Path;
 use std::time::Instant;
@@ -12,7 +12,7 @@ pub fn search(global: &Global, path: &Path, scene: &Scene, space: &ParameterSpac
     let spinner = progress::bar(global, None, "searching");
     let began = Instant::now();
     let report = |progress| spinner.set_message(message(progress, began.elapsed().as_secs_f64()));
-    let found = find(&scene.imager, space, SearchSettings::new(&scene.settings), &report);
+    let found = find(&scene.imager, space, scene.search_settings(), &report);
     spinner.finish_and_clear();
     found.map_err(|e| Failure::search(path, e))
 }

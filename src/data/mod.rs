@@ -6,7 +6,9 @@
 //! [`init`] and [`import`] write a first config, [`diagnosis`] tries out why a model does not fit. `io` also holds the
 //! formats of what is written, a file each.
 
+pub mod calibrated;
 pub mod config;
+pub mod dataset;
 pub mod diagnosis;
 pub mod ephemeris;
 pub mod import;

@@ -6,7 +6,6 @@
 //! place. The search itself runs on the regularised likelihood, which needs no target and is smooth everywhere; a last
 //! climb is on the objective asked for.
 
-use crate::data::config::{ImagingSettings, Settings};
 use crate::field::FieldError;
 use crate::inference::detection::Detection;
 use crate::inference::surrogate::Surrogate;
@@ -40,16 +39,9 @@ pub struct SearchSettings {
 }
 
 impl SearchSettings {
-    /// The search that a config asks for.
-    pub fn new(settings: &Settings) -> Self {
-        let ImagingSettings { chi2_target, objective, .. } = settings.imaging;
-        SearchSettings {
-            chi2_target: chi2_target.value(),
-            objective,
-            known: settings.known_field(),
-            other_starts: OTHER_STARTS,
-            seed: settings.sampler.seed,
-        }
+    /// The search that is usual.
+    pub fn new(chi2_target: f64, objective: ObjectiveKind, known: Known, seed: u64) -> Self {
+        SearchSettings { chi2_target, objective, known, other_starts: OTHER_STARTS, seed }
     }
 }
 

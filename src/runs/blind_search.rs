@@ -57,7 +57,7 @@ impl BlindSearch {
         let frequencies = Frequencies::new(&scene.imager.cycles(), rotation_period_d, FrequencySettings::default())?;
         let settings = DetectionSettings {
             spots: scene.spots(),
-            ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), nuisances(&scene.settings.free))
+            ..DetectionSettings::of(scene.chi2_target, nuisances(&scene.settings.free))
         };
         let values = for_blind_search(scene.settings.values, &scene.settings.free);
         let anew;

@@ -163,7 +163,7 @@ fn wrong_with_the_model(scene: &Scene) -> Option<String> {
 
 /// Why no map of `scene` fits, by trying.
 fn diagnosis(scene: &Scene) -> Option<Diagnosis> {
-    Diagnosis::of(scene, scene.whole_over_continuum().as_ref())
+    Diagnosis::of(scene)
 }
 
 fn of_changing(fit: &ChangingFit) -> Vec<(&'static str, String)> {

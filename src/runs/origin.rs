@@ -234,7 +234,7 @@ impl Origin {
         let imager = scene.imager.clone();
         let (density, what, then, now) = match &self.reference {
             ReferenceRecord::Image(then) => {
-                let reference = Reference::build(&imager, values, scene.settings.imaging.chi2_target.value())?;
+                let reference = Reference::build(&imager, values, scene.chi2_target)?;
                 let now = reference.solution.image.lambda;
                 let posterior = Posterior::new(imager, space, scene.settings.imaging.objective, reference);
                 (Density::Mapped(Box::new(posterior)), "lambda", then.lambda, now)

@@ -44,7 +44,7 @@ impl PeriodogramOptions {
 
     fn settings(&self, scene: &Scene) -> DetectionSettings {
         DetectionSettings {
-            chi2_target: scene.settings.imaging.chi2_target.value(),
+            chi2_target: scene.chi2_target,
             nuisances: if self.fixed { Vec::new() } else { nuisances(&scene.settings.free) },
             search: SearchSettings { draws: self.draws, seed: self.seed },
             eccentric: self.eccentric,

@@ -97,11 +97,12 @@ impl Simulated {
             return Err(SimulateError::ObservedLight { config: settings.path, key: curve.key.clone() });
         }
         let scene = Scene::new(config)?;
-        let light = |curve: &LightCurveSettings| Ok((format!("{}.csv", curve.name), scene.light_curve(curve)?));
-        let light_curves = scene.settings.light_curves.iter().map(light).collect::<Result<_, SceneError>>()?;
+        let light =
+            |(curve, measured): (&LightCurveSettings, &Vec<Flux>)| (format!("{}.csv", curve.name), measured.clone());
+        let light_curves = settings.light_curves.iter().zip(&scene.data.light_curves).map(light).collect();
         let set = |(s, simulation): (usize, Simulation)| SimulatedSet {
             name: settings.sets[s].name.clone(),
-            observations: Observations { profiles: scene.observations.profiles[scene.imager.profiles_of(s)].to_vec() },
+            observations: scene.data.sets[s].observations.clone(),
             truth: scene.truth_of(&simulation),
             simulation,
         };

@@ -5,7 +5,7 @@
 use crate::desk::interrupt;
 use crate::desk::{Desk, dimcmc, kill, says, text, two_spots};
 use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::inference::search::{SearchSettings, find};
+use dimcmc::internals::inference::search::find;
 use dimcmc::internals::model::Parameter;
 use dimcmc::internals::sampling::log_density::{LogDensity, Status};
 use dimcmc::internals::surface::static_map::{Posterior, Reference};
@@ -78,12 +78,7 @@ fn copy(desk: &Desk, from: &str, to: &str) {
 
 /// The posterior that `sample` would draw from.
 fn sampled(scene: &Scene) -> Posterior {
-    find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ())
-        .unwrap()
-        .posterior
-        .mapped()
-        .unwrap()
-        .clone()
+    find(&scene.imager, &scene.space, scene.search_settings(), &|_| ()).unwrap().posterior.mapped().unwrap().clone()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! profiles that are noisier weigh less, and everything after it is as with the same numbers written down.
 
 use crate::desk::{Desk, says, star};
-use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::data::io::lsd;
 use dimcmc::internals::star::observation::Observations;
 use serde_json::{Value, json};
 
@@ -19,7 +19,7 @@ fn desk(change: impl Fn(&mut Observations)) -> Desk {
     }));
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
     let list = desk.path("data").join("observations.txt");
-    let mut observations = lsd::read(&list, &ReadOptions::default()).unwrap().observations;
+    let mut observations = lsd::read(&list).unwrap().observations;
     change(&mut observations);
     lsd::write(&desk.path("data"), &observations).unwrap();
     desk.set("/observations", observed("auto", "quoted"));

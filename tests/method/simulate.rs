@@ -1,9 +1,10 @@
 //! Simulated observations and first-moment velocities, against the oracle's star and against statistics.
 
 use crate::common::{self, numbers, oracle};
+use dimcmc::internals::data::calibrated::fingerprint;
 use dimcmc::internals::data::config::{self, Config};
 use dimcmc::internals::data::io::provenance::Season;
-use dimcmc::internals::data::scene::{Scene, fingerprint};
+use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::data::simulate::{RandomSpots, SIGMA_WITHOUT_NOISE, Simulation};
 use dimcmc::internals::model::Parameter;
 use dimcmc::internals::star::observation::{Observations, Profile};

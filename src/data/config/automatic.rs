@@ -15,11 +15,11 @@ pub enum Automatic {
 }
 
 impl Automatic {
-    /// The number; NaN where it is still to be measured.
-    pub fn value(self) -> f64 {
+    /// The number, where it is one.
+    pub fn number(self) -> Option<f64> {
         match self {
-            Automatic::Fixed(value) => value,
-            Automatic::Auto => f64::NAN,
+            Automatic::Fixed(number) => Some(number),
+            Automatic::Auto => None,
         }
     }
 }
@@ -33,10 +33,7 @@ impl NumberOrWord for Automatic {
     }
 
     fn number(self) -> Option<f64> {
-        match self {
-            Automatic::Fixed(number) => Some(number),
-            _ => None,
-        }
+        Automatic::number(self)
     }
 }
 

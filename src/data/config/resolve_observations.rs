@@ -6,7 +6,6 @@ use super::raw_parts::{ObservationsSection, SimulateSection, VelocitySection};
 use super::resolve::{automatic, check_nuisances, check_pixels, positive};
 use super::resolve_simulation::{facula, spots, times_d};
 use super::{Automatic, ObservationSource, VelocityJitter};
-use crate::data::io::lsd::ReadOptions;
 use crate::data::simulate::Simulation;
 use crate::model::{Clock, Elements, ParameterValues};
 use crate::star::StarSettings;
@@ -54,10 +53,10 @@ pub(super) fn resolve_observations(
     if path.as_os_str().is_empty() {
         return Err(Fault::new(at("path"), "is empty"));
     }
-    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Fixed(ReadOptions::default().sigma_scale));
+    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Fixed(1.0));
     automatic(&at("sigma_scale"), sigma_scale)?;
     let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
-    let sigma_scale = if errors.measured { 1.0 } else { sigma_scale.value() };
+    let sigma_scale = sigma_scale.number().unwrap_or(1.0);
     for end in section.velocity_range_kms.into_iter().flatten() {
         check_size(&at("velocity_range_kms"), end, most::VELOCITY_KMS)?;
     }
@@ -73,9 +72,9 @@ pub(super) fn resolve_observations(
         let problem = format!("first velocity {min} must be below last velocity {max}");
         return Err(Fault::new(at("velocity_range_kms"), problem));
     }
-    let options = ReadOptions { velocity_range_kms: section.velocity_range_kms.map(Into::into), sigma_scale };
+    let velocity_range_kms = section.velocity_range_kms.map(Into::into);
     let path = config.parent().unwrap_or(Path::new("")).join(path);
-    Ok(ObservationSource::Files { path, options, continuum_level, errors })
+    Ok(ObservationSource::Files { path, velocity_range_kms, sigma_scale, continuum_level, errors })
 }
 
 fn simulation(

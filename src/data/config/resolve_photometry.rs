@@ -48,8 +48,6 @@ pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<Ligh
             segment_gap_d: section.segment_gap_d,
             sigma_scale: section.sigma_scale,
             exclude: section.exclude.clone(),
-            left_out: 0,
-            binned: None,
             key,
         });
     }

@@ -54,7 +54,6 @@ pub(super) fn resolve_sets(
             source,
             nuisances: section.nuisances.or(raw.imaging.nuisances),
             zero_point: section.zero_point_kms,
-            held: None,
             exclude: section.exclude.clone(),
             key,
         });

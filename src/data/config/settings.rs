@@ -3,20 +3,16 @@
 use super::data_sets::ZeroPoint;
 use super::spots::Hyperparameter;
 use super::{Automatic, ConfigError, EquivalentWidth, PlanSection, SamplerSettings, SimulatedLight, VelocityJitter};
-use crate::data::io::lsd::ReadOptions;
 use crate::data::simulate::Simulation;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
 use crate::model::{FreeParameter, Parameter, ParameterValues};
 use crate::sampling::landscape::Grid;
-use crate::star::observation::Observations;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN, velocity_grid};
-use crate::star::{Band, BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
+use crate::star::{Band, BrightnessModel, StarSettings};
 use crate::surface::evolving_map::Known;
-use crate::surface::evolving_map::zero_points::HeldZeroPoint;
 use crate::surface::nuisances::LineAndContinuum;
 use crate::surface::objective::{ObjectiveKind, UnresolvedSpots};
-use crate::surface::photometry::LightCurve;
 use crate::surface::static_map::noise::ErrorSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -63,8 +59,7 @@ pub struct DataSetSettings {
     pub key: String,
     /// Its name.
     pub name: String,
-    /// The star as it sees it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through
-    /// [`Settings::star_for`].
+    /// The star as it sees it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: see [`star_for`](crate::data::calibrated::star_for).
     pub star: StarSettings,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
@@ -74,8 +69,6 @@ pub struct DataSetSettings {
     pub nuisances: Option<LineAndContinuum>,
     /// Velocity that all profiles have too much.
     pub zero_point: ZeroPoint,
-    /// Where one that is fitted is held, once it is known.
-    pub held: Option<HeldZeroPoint>,
     /// Windows of time (d) whose profiles are left out.
     pub exclude: Vec<[f64; 2]>,
 }
@@ -107,10 +100,6 @@ pub struct LightCurveSettings {
     pub sigma_scale: f64,
     /// Windows `[start, end]` (d) whose measurements are left out.
     pub exclude: Vec<[f64; 2]>,
-    /// How many these are, once it is read.
-    pub left_out: usize,
-    /// The bins, once it is read.
-    pub binned: Option<LightCurve>,
 }
 
 /// Where a light curve comes from.
@@ -131,8 +120,10 @@ pub enum ObservationSource {
     Files {
         /// The list, relative to the working directory.
         path: PathBuf,
-        /// Cut and scaling, by 1 where that is left to the observations.
-        options: ReadOptions,
+        /// First and last velocity to use (km/s, after subtraction of VRAD); all bins if `None`.
+        velocity_range_kms: Option<(f64, f64)>,
+        /// Factor on every sigma, 1 where that is left to the observations.
+        sigma_scale: f64,
         /// Level of the continuum in the files: what is read is divided by it.
         continuum_level: f64,
         /// What the observations are to say of their errors.
@@ -255,61 +246,6 @@ impl Settings {
         self.grid.as_ref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
     }
 
-    /// The star as a data `set` sees it, its equivalent width measured on its `observations` if that is
-    /// [`EquivalentWidth::Auto`].
-    ///
-    /// # Errors
-    /// If the equivalent width so measured is not positive.
-    pub fn star_for(&self, set: &DataSetSettings, observations: &Observations) -> Result<StarSettings, ConfigError> {
-        let mut star = set.star.clone();
-        if set.equivalent_width == EquivalentWidth::Auto {
-            let beside = match set.nuisances.is_some_and(|priors| priors.continuum_offset > 0.0) {
-                true => self.above_its_continuum(&star, observations),
-                false => None,
-            };
-            let width = beside.unwrap_or_else(|| observations.mean_equivalent_width_kms());
-            if !(width.is_finite() && width > 0.0) {
-                let of = if self.sets.len() > 1 { format!(" for {}", set.key) } else { String::new() };
-                let problem = format!("auto gives {width} km/s{of}: the observed profiles are no absorption line");
-                return Err(self.fault("star.line.equivalent_width_kms", &problem));
-            }
-            star.line.equivalent_width_kms = width;
-            if beside.is_none() && star.line.gamma_kms > 0.0 {
-                // wings beyond the profiles count too
-                star.line.equivalent_width_kms = width / share_observed(&star, &self.values, observations);
-            }
-        }
-        Ok(star)
-    }
-
-    /// Equivalent width (km/s) of the line below the continuum that each profile has beside it, wherever that is;
-    /// `None` where the profiles do not reach into it. What an unspotted star loses by the same measure, wings under
-    /// the continuum, is allowed for.
-    fn above_its_continuum(&self, star: &StarSettings, observations: &Observations) -> Option<f64> {
-        let reach_kms = self.values[Parameter::Vsini] + BESIDE * star.line.sigma_kms;
-        let mut unit = star.clone();
-        unit.line.equivalent_width_kms = 1.0;
-        let model = unspotted(&unit, &self.values, observations);
-        let (mut observed, mut expected, mut first) = (0.0, 0.0, 0);
-        for profile in &observations.profiles {
-            let bins = profile.intensity.len();
-            let centre = self.values[Parameter::Vsys];
-            let distance = |j: usize| profile.velocity_kms(j) - centre;
-            let area = |depth: &dyn Fn(usize) -> f64| {
-                let side = |sign: f64| {
-                    let beyond: Vec<f64> = (0..bins).filter(|j| sign * distance(*j) > reach_kms).map(depth).collect();
-                    (beyond.len() >= FEWEST_BESIDE).then(|| beyond.iter().sum::<f64>() / beyond.len() as f64)
-                };
-                let continuum = 0.5 * (side(-1.0)? + side(1.0)?);
-                Some((0..bins).map(|j| depth(j) - continuum).sum::<f64>())
-            };
-            observed += area(&|j| 1.0 - profile.intensity[j])?;
-            expected += area(&|j| model[first + j])?;
-            first += bins;
-        }
-        Some(observed / expected)
-    }
-
     /// Whether profiles of `star` in velocity bins of `step_kms` can be computed at `values`.
     ///
     /// # Errors
@@ -409,23 +345,4 @@ impl Settings {
     pub fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }
-}
-
-/// Bins farther than this many local line widths beyond vsini are taken for continuum, and so many of them on a side
-/// will do.
-const BESIDE: f64 = 2.0;
-const FEWEST_BESIDE: usize = 2;
-
-/// How much of its line an unspotted star shows within the velocities of `observations`.
-fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
-    let depths = unspotted(star, values, observations);
-    let areas = depths.iter().sum::<f64>() * observations.step_kms() / observations.profiles.len() as f64;
-    areas / star.line.equivalent_width_kms
-}
-
-/// Depths of an unspotted star in all bins of `observations`.
-fn unspotted(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> Vec<f64> {
-    const PIXELS: usize = 2000;
-    let grid = SurfaceGrid::equal_area(PIXELS, Quadrature::Gauss2x2);
-    Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()])
 }

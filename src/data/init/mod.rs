@@ -13,15 +13,15 @@ mod values;
 
 pub use ledger::{Entry, Source};
 
-use crate::data::config::{ConfigError, Draft, EquivalentWidth};
-use crate::data::io::lsd::{self, DataSet, LsdError, ReadOptions};
+use crate::data::config::{Draft, EquivalentWidth};
+use crate::data::dataset::SceneError;
+use crate::data::io::lsd;
 use crate::inference::first_look::LookError;
 use crate::numerics::units::gaussian_as_wide_as_voigt;
 use crate::star::BrightnessModel;
 use crate::surface::objective::ObjectiveKind;
 use ledger::Ledger;
 use std::path::{Path, PathBuf};
-use trial::Profiles;
 use values::Values;
 
 /// A value with who gave it: an option, or a line of a file.
@@ -107,9 +107,9 @@ pub struct Proposal {
 /// Why there is no proposal: one line that names the file at fault.
 #[derive(Debug, thiserror::Error)]
 pub enum ProposalError {
-    /// The list or a profile.
+    /// The list or a profile, or a given value that makes no sense.
     #[error(transparent)]
-    Observations(#[from] LsdError),
+    Scene(#[from] SceneError),
     /// The profiles show no star.
     #[error("{}: {error}", .list.display())]
     Look {
@@ -118,9 +118,6 @@ pub enum ProposalError {
         /// What is wrong with them.
         error: LookError,
     },
-    /// A given value makes no sense.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
     /// The model is nowhere near the profiles.
     #[error("{}: no map fits unless the errors are {factor:.1} times as large: {reason}", .list.display())]
     OutOfReach {
@@ -147,25 +144,24 @@ pub enum ProposalError {
 /// # Errors
 /// Profiles that cannot be read or show no line, given values that make no sense or are far from what the profiles say.
 pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Proposal, ProposalError> {
-    let read = |options: &ReadOptions| lsd::read_listed(place.list, place.list_bytes, options);
-    let DataSet { observations: mut whole, remarks, .. } = read(&ReadOptions::default())?;
+    let profiles = lsd::read_listed(place.list, place.list_bytes).map_err(SceneError::from)?;
+    let mut whole = profiles.observations.clone();
     let mut ledger = Ledger::default();
     let look = |error| ProposalError::Look { list: place.list.into(), error };
     let values = Values::measure(&mut whole, known, &mut ledger).map_err(look)?;
-    let range = ReadOptions { velocity_range_kms: Some(values.velocity_range_kms), ..ReadOptions::default() };
-    let cut = read(&range)?.observations.over_continuum(values.continuum_level.unwrap_or(1.0));
+    let cut = profiles.within(Some(values.velocity_range_kms), 1.0).map_err(SceneError::from)?;
+    let cut = cut.over_continuum(values.continuum_level.unwrap_or(1.0));
     let mut draft = values.draft(&cut, known, &mut ledger);
     draft.observations.clone_from(&place.list_in_config);
     draft.schema.clone_from(&place.schema);
-    let mut notes: Vec<String> = remarks.into_iter().map(|remark| format!("profiles: {remark}")).collect();
+    let mut notes: Vec<String> = profiles.remarks.iter().map(|remark| format!("profiles: {remark}")).collect();
     notes.extend(values.notes(known));
     notes.iter().for_each(|note| say(note));
-    let profiles = Profiles { whole: &whole, cut: &cut };
     // one map that does not change has the sharper eye for what is wrong with a model
-    let mut trial = trial::run(&mut draft, place, profiles, &values, known)?;
+    let mut trial = trial::run(&mut draft, place, &profiles, &values, known)?;
     draft.imaging.objective = known.objective();
     if draft.rotation_period_d.is_some() && known.objective() == ObjectiveKind::MarginalLikelihood {
-        trial.errors = trial::errors(&draft, place.config, profiles)?;
+        trial.errors = trial::errors(&draft, place.config, &profiles)?;
     }
     values::note_objective(&draft, known, trial.change.as_ref(), &mut ledger);
     notes.extend(trial.notes(&draft));

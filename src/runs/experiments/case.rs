@@ -13,7 +13,7 @@ use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::scene::Scene;
 use crate::inference::detection::{Detection, DetectionSettings, Spots};
 use crate::inference::search;
-use crate::inference::search::{Found, SearchError, SearchSettings};
+use crate::inference::search::{Found, SearchError};
 use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
 use crate::runs::grid_scan::{GridScan, GridScanError, PARABOLOID};
@@ -108,7 +108,7 @@ impl Case {
         let ends = found.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok());
         let mut outcome = Outcome {
             truth: scene.truth.map(|values| by_name(&values)).unwrap_or_default(),
-            chi2_target: scene.settings.imaging.chi2_target.value(),
+            chi2_target: scene.chi2_target,
             lambda_data: image.map_or(f64::NAN, |image| image.image.lambda * data),
             spottedness: image.map_or(f64::NAN, |image| image.spottedness),
             search_reconstructions: ends.map(|end| end.evaluations).sum::<usize>() + found.optimum.evaluations,
@@ -159,12 +159,11 @@ impl Nodes {
 
 /// The star of a config, and the best parameters there; its target chi2 is raised if it is out of reach.
 pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found), ExperimentError> {
-    let found =
-        |scene: Scene| match search::find(&scene.imager, &scene.space, SearchSettings::new(&scene.settings), &|_| ()) {
-            Ok(found) => Ok(Ok((scene, found))),
-            Err(SearchError::Reference(error)) => Ok(Err(error)),
-            Err(error) => Err(error),
-        };
+    let found = |scene: Scene| match search::find(&scene.imager, &scene.space, scene.search_settings(), &|_| ()) {
+        Ok(found) => Ok(Ok((scene, found))),
+        Err(SearchError::Reference(error)) => Ok(Err(error)),
+        Err(error) => Err(error),
+    };
     let mut last = match found(Scene::new(&Config::at(config.clone(), path))?)? {
         Ok(found) => return Ok(found),
         Err(error) => error,
@@ -173,7 +172,7 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
         return Err(last.into());
     }
     let first = Scene::new(&Config::at(config.clone(), path))?;
-    let target = first.settings.imaging.chi2_target.value();
+    let target = first.chi2_target;
     let reached = Reference::provisional(&first.imager, first.settings.values, target)?.solution.chi2;
     let reached = reached / first.imager.data.depth.len() as f64;
     for factor in ABOVE_REACHED {
@@ -262,7 +261,7 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), ExperimentEr
     let imager = &scene.imager;
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
-        chi2_target: scene.settings.imaging.chi2_target.value(),
+        chi2_target: scene.chi2_target,
         nuisances: nuisances(&scene.settings.free),
         search: PeriodSearch { draws, seed: 1 },
         eccentric: false,

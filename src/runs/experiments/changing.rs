@@ -146,10 +146,8 @@ impl Star {
         let imager = &scene.imager;
         let frequencies =
             Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
-        let settings = DetectionSettings {
-            spots: scene.spots(),
-            ..DetectionSettings::of(scene.settings.imaging.chi2_target.value(), Vec::new())
-        };
+        let settings =
+            DetectionSettings { spots: scene.spots(), ..DetectionSettings::of(scene.chi2_target, Vec::new()) };
         let mut found = Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?;
         let change = found.change.take().and_then(Result::ok);
         let remarks = found.remarks(&Evidence { imager, settings: &settings, robustness: None, misfit: &[] });

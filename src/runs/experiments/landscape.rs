@@ -5,7 +5,6 @@ use super::laboratory::{ExperimentError, Laboratory};
 use super::report::{Drawn, Report};
 use super::star::{paper, with};
 use crate::inference::search;
-use crate::inference::search::SearchSettings;
 use crate::model::Parameter;
 use crate::runs::comparison::{Comparison, Pair};
 use crate::sampling::landscape::{Axis, Grid, Node, Rule};
@@ -51,7 +50,7 @@ pub(super) fn landscape(laboratory: &Laboratory) -> Result<Report, ExperimentErr
         (laboratory.report)(&format!("R3: slice at the injected {fixed}"));
         let others = AXES.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, a)| axis(a, along_slice));
         let free: Vec<_> = scene.settings.free.iter().filter(|f| f.parameter.name() != fixed).copied().collect();
-        let settings = SearchSettings::new(&scene.settings);
+        let settings = scene.search_settings();
         let found = search::find(&scene.imager, &scene.space_of(&free), settings, &|_| ())?;
         let grid = Grid { axes: others.collect() };
         let (route, survey) =
