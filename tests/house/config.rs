@@ -93,7 +93,7 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 #[test]
 fn lo_peg_resolves() {
     let settings = config::load(&shipped("lopeg.json")).unwrap();
-    assert_eq!(settings.sets[0].equivalent_width, EquivalentWidth::Auto);
+    assert_eq!(settings.sets[0].equivalent_width, EquivalentWidth::AUTO);
     let ObservationSource::Files { path, velocity_range_kms, sigma_scale, .. } = &settings.sets[0].source else {
         panic!()
     };

@@ -21,11 +21,11 @@ pub(super) fn zero_points(
 ) -> Result<(Option<ZeroPoints>, Option<MeasuredJitter>), ConfigError> {
     let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
     let (sd_kms, measured) = match jitter {
-        VelocityJitter::Known(0.0) => return Ok((None, None)),
+        VelocityJitter::Number(0.0) => return Ok((None, None)),
         // it is counted with the field
         _ if settings.imaging.objective == ObjectiveKind::MarginalLikelihood => return Ok((None, None)),
-        VelocityJitter::Known(sd_kms) => (sd_kms, None),
-        VelocityJitter::Fitted => {
+        VelocityJitter::Number(sd_kms) => (sd_kms, None),
+        VelocityJitter::Word(_) => {
             let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;
             (measured.value_kms, Some(measured))
         }
@@ -86,7 +86,7 @@ pub(super) fn measured(
         let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);
         measured.count_residuals(settings.values, with_factor)?.map_err(fault)?;
         let moved = (measured.sigma_scale.unwrap_or(1.0) / then).ln().abs();
-        if settings.velocity_jitter != VelocityJitter::Fitted || moved < SETTLED.1 {
+        if !settings.velocity_jitter.is_word() || moved < SETTLED.1 {
             break;
         }
     }

@@ -44,9 +44,9 @@ pub fn imager(
     }
     for (set, DataSetSettings { zero_point, .. }) in sets.iter().enumerate() {
         match *zero_point {
-            ZeroPoint::Known(0.0) => {}
-            ZeroPoint::Known(kms) => imager.move_set(set, kms),
-            ZeroPoint::Fitted => {
+            ZeroPoint::Number(0.0) => {}
+            ZeroPoint::Number(kms) => imager.move_set(set, kms),
+            ZeroPoint::Word(_) => {
                 imager.zero_points.push(ZeroPointPrior { set, mean_kms: 0.0, sd_kms: zero_points::PRIOR_KMS });
             }
         }

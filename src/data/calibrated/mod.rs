@@ -11,9 +11,7 @@ mod strength;
 pub use imager::imager;
 pub use strength::star_for;
 
-use crate::data::config::{
-    Automatic, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter, ZeroPoint,
-};
+use crate::data::config::{Automatic, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter};
 use crate::data::dataset::{Dataset, ProfileSet, SceneError};
 use crate::data::ephemeris::Ephemeris;
 use crate::data::io::lsd::LsdError;
@@ -89,7 +87,7 @@ impl Calibrated {
                     name: set.name.clone(),
                     profiles: part.profiles.len(),
                     errors,
-                    zero_point: if set.zero_point == ZeroPoint::Fitted { held.next() } else { None },
+                    zero_point: if set.zero_point.is_word() { held.next() } else { None },
                 };
                 measured.sets = settings.sets.iter().zip(&parts).zip(errors).map(of_set).collect();
             }
@@ -108,7 +106,7 @@ impl Calibrated {
         let mut imager = imager(settings, &settings.sets, &parts, &self.measured.seasons)?;
         imager.light_curves = self.imager.light_curves;
         imager.data.correlated_bins = self.imager.data.correlated_bins;
-        let jitter = self.measured.velocity_jitter.as_ref().map(|measured| VelocityJitter::Known(measured.value_kms));
+        let jitter = self.measured.velocity_jitter.as_ref().map(|measured| VelocityJitter::Number(measured.value_kms));
         let jitter = jitter.unwrap_or(settings.velocity_jitter);
         let (zero_points, _) = errors::zero_points(settings, &imager, jitter, self.chi2_target)?;
         let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
@@ -151,8 +149,8 @@ fn remarks(settings: &Settings, data: &Dataset) -> Vec<String> {
 fn chi2_target(settings: &Settings, imager: &Imager) -> Result<(f64, Option<ChosenTarget>), ConfigError> {
     let correlated_bins = imager.data.correlated_bins;
     match settings.imaging.chi2_target {
-        Automatic::Fixed(target) => Ok((target / correlated_bins, None)),
-        Automatic::Auto => {
+        Automatic::Number(target) => Ok((target / correlated_bins, None)),
+        Automatic::Word(_) => {
             let chosen = target::choose(imager, settings.values, correlated_bins)
                 .map_err(|e| settings.fault("imaging.chi2_target", &e.to_string()))?;
             Ok((chosen.value, Some(chosen)))

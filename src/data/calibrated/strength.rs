@@ -1,6 +1,6 @@
 //! The strength of the local line where a config leaves it to the profiles: the area that they have.
 
-use crate::data::config::{ConfigError, DataSetSettings, EquivalentWidth, Settings};
+use crate::data::config::{ConfigError, DataSetSettings, Settings};
 use crate::model::{Parameter, ParameterValues};
 use crate::star::observation::Observations;
 use crate::star::{Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
@@ -11,7 +11,7 @@ const BESIDE: f64 = 2.0;
 const FEWEST_BESIDE: usize = 2;
 
 /// The star as a data `set` sees it, its equivalent width measured on its `observations` if that is
-/// [`EquivalentWidth::Auto`].
+/// "auto".
 ///
 /// # Errors
 /// If the equivalent width so measured is not positive.
@@ -21,7 +21,7 @@ pub fn star_for(
     observations: &Observations,
 ) -> Result<StarSettings, ConfigError> {
     let mut star = set.star.clone();
-    if set.equivalent_width == EquivalentWidth::Auto {
+    if set.equivalent_width.is_word() {
         let beside = match set.nuisances.is_some_and(|priors| priors.continuum_offset > 0.0) {
             true => above_its_continuum(&star, &settings.values, observations),
             false => None,

@@ -4,15 +4,13 @@
 //! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for),
 //! and every error names the file and the key.
 
-mod automatic;
 mod data_sets;
 mod domain;
 mod draft;
 mod error;
 mod identity;
-mod jitter;
 mod listed;
-mod number_or_word;
+mod number_or;
 mod photometry;
 mod raw;
 mod raw_parts;
@@ -26,17 +24,14 @@ mod resolve_sets;
 mod resolve_simulation;
 mod resolve_star;
 mod settings;
-mod spots;
 mod suggest;
 mod written;
 
 pub use crate::sampling::ensemble::SamplerSettings;
-pub use automatic::Automatic;
-pub use data_sets::ZeroPoint;
 pub use draft::Draft;
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
-pub use jitter::VelocityJitter;
+pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
 pub use photometry::SimulatedLight;
 pub use raw_parts::PlanSection;
 pub use resolve_grid::MOST_NODES;
@@ -44,13 +39,9 @@ pub use settings::{
     DataSetSettings, GridSettings, ImagingSettings, LightCurveSettings, LightSource, ObservationSource, SEASON_GAP_D,
     Settings,
 };
-pub use spots::Hyperparameter;
 pub use written::Config;
 
 use std::path::Path;
-
-/// Equivalent width of the local line; automatic: the mean area of the observed profiles.
-pub type EquivalentWidth = Automatic;
 
 /// Reads and resolves the config at `path`. Paths in it start from its folder.
 ///

@@ -1,8 +1,6 @@
 //! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
 
-use super::automatic::Automatic;
-use super::data_sets::ZeroPoint;
-use super::jitter::VelocityJitter;
+use super::number_or::{Automatic, VelocityJitter, ZeroPoint};
 use super::raw::Line;
 use crate::data::simulate::{RandomSpots, Schedule};
 use crate::model::Parameter;

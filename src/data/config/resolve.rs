@@ -3,6 +3,7 @@
 use super::domain::{check_value, key, resolve_prior};
 use super::error::Fault;
 use super::identity::fingerprint;
+use super::number_or::OfField;
 use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
@@ -79,7 +80,7 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
 /// or for planets.
 fn resolve_jitter(raw: &mut Config) -> VelocityJitter {
     let integrated = raw.imaging.objective == ObjectiveKind::MarginalLikelihood;
-    let usual = if integrated { VelocityJitter::Fitted } else { VelocityJitter::default() };
+    let usual = if integrated { VelocityJitter::FITTED } else { VelocityJitter::default() };
     let sections = &mut raw.observations.sections;
     let jitter = sections[0].velocity_jitter_kms.unwrap_or(usual);
     // that of all data sets
@@ -188,19 +189,19 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
         }
         match given {
             _ if !integrated => {}
-            Hyperparameter::Static if parameter != Parameter::SpotLifetime => {
+            Hyperparameter::Word(OfField::Static) if parameter != Parameter::SpotLifetime => {
                 return Err(Fault::new(format!("imaging.{name}"), "only spot_lifetime_d may be \"static\""));
             }
-            Hyperparameter::Static if prior || axis => {
+            Hyperparameter::Word(OfField::Static) if prior || axis => {
                 let problem = "\"static\" spots live for ever, and their lifetime cannot be free";
                 return Err(Fault::new(format!("imaging.{name}"), problem));
             }
-            Hyperparameter::Static => {}
-            Hyperparameter::Known(value) => {
+            Hyperparameter::Word(OfField::Static) => {}
+            Hyperparameter::Number(value) => {
                 check_value(parameter, value, &format!("imaging.{name}"))?;
                 values[parameter] = value;
             }
-            Hyperparameter::Fitted => {
+            Hyperparameter::Word(OfField::Fitted) => {
                 values[parameter] = evolving_map::usual_value(parameter);
                 if something_is_free && !prior {
                     let kind =
@@ -229,12 +230,12 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));
     }
-    if imaging.nuisances.is_some() && imaging.chi2_target == Automatic::Auto {
+    if imaging.nuisances.is_some() && imaging.chi2_target.is_word() {
         let problem =
             "auto goes by velocities that nuisances of line and continuum take up: give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
-    if !jitter.is_default() && imaging.chi2_target == Automatic::Auto {
+    if !jitter.is_default() && imaging.chi2_target.is_word() {
         let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
                        give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
@@ -270,8 +271,8 @@ pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
 /// Positive, or left to the observations.
 pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
     match value {
-        Automatic::Fixed(value) => positive(key, value),
-        Automatic::Auto => Ok(()),
+        Automatic::Number(value) => positive(key, value),
+        Automatic::Word(_) => Ok(()),
     }
 }
 

@@ -26,7 +26,7 @@ pub(super) fn resolve_observations(
     config: &Path,
 ) -> Result<ObservationSource, Fault> {
     let at = |field: &str| format!("{key}.{field}");
-    if let Some(VelocityJitter::Known(kms)) = section.velocity_jitter_kms {
+    if let Some(VelocityJitter::Number(kms)) = section.velocity_jitter_kms {
         check_jitter(&at("velocity_jitter_kms"), kms)?;
     }
     let path = match (&section.path, &section.simulate) {
@@ -53,9 +53,9 @@ pub(super) fn resolve_observations(
     if path.as_os_str().is_empty() {
         return Err(Fault::new(at("path"), "is empty"));
     }
-    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Fixed(1.0));
+    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Number(1.0));
     automatic(&at("sigma_scale"), sigma_scale)?;
-    let errors = ErrorSettings { measured: sigma_scale == Automatic::Auto, weights: section.weights };
+    let errors = ErrorSettings { measured: sigma_scale.is_word(), weights: section.weights };
     let sigma_scale = sigma_scale.number().unwrap_or(1.0);
     for end in section.velocity_range_kms.into_iter().flatten() {
         check_size(&at("velocity_range_kms"), end, most::VELOCITY_KMS)?;

@@ -1,7 +1,7 @@
 //! The data sets of a config: what each says of itself, and what only one of them may say.
 
-use super::data_sets::ZeroPoint;
 use super::error::Fault;
+use super::number_or::ZeroPoint;
 use super::raw::{Config, Instrument};
 use super::raw_parts::ObservationsSection;
 use super::resolve::check_nuisances;
@@ -9,7 +9,7 @@ use super::resolve_observations::resolve_observations;
 use super::resolve_seasons::check_windows;
 use super::resolve_simulation::{spots, times_d};
 use super::resolve_star::resolve_star;
-use super::{Automatic, DataSetSettings, ObservationSource};
+use super::{DataSetSettings, ObservationSource};
 use crate::model::{Parameter, ParameterValues};
 use crate::star::{BrightnessModel, StarSettings};
 use crate::surface::objective::ObjectiveKind;
@@ -41,7 +41,7 @@ pub(super) fn resolve_sets(
             let name = |name: &str| format!("{key}.nuisances.{name}");
             check_nuisances(priors, ["continuum_offset", "continuum_slope", "equivalent_width"].map(name))?;
         }
-        if let ZeroPoint::Known(kms) = section.zero_point_kms
+        if let ZeroPoint::Number(kms) = section.zero_point_kms
             && (kms.is_nan() || kms.abs() > LARGEST_ZERO_POINT_KMS)
         {
             let problem = format!("{kms} must be from -{LARGEST_ZERO_POINT_KMS} to {LARGEST_ZERO_POINT_KMS} km/s");
@@ -69,11 +69,11 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
     let objective = raw.imaging.objective;
     for (s, section) in sections.iter().enumerate() {
         let key = raw.observations.key(s);
-        if sections.len() == 1 && section.zero_point_kms == ZeroPoint::Fitted {
+        if sections.len() == 1 && section.zero_point_kms.is_word() {
             let problem = "of one data set alone the zero point is the systemic velocity: see star.vsys_kms";
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
-        if section.zero_point_kms == ZeroPoint::Fitted && objective != ObjectiveKind::MarginalLikelihood {
+        if section.zero_point_kms.is_word() && objective != ObjectiveKind::MarginalLikelihood {
             let problem = format!(
                 "with {:?} a map would follow a wrong zero point: give a number (km/s), or take \
                  imaging.objective \"marginal-likelihood\", which integrates it out",
@@ -81,7 +81,7 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
             );
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
-        if section.nuisances.is_some() && raw.imaging.chi2_target == Automatic::Auto {
+        if section.nuisances.is_some() && raw.imaging.chi2_target.is_word() {
             let problem = format!("auto goes by velocities that {key}.nuisances take up: give a number, such as 0.97");
             return Err(Fault::new("imaging.chi2_target", problem));
         }

@@ -116,11 +116,11 @@ fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> 
         return Err(Fault::new("instrument.resolving_power", "the line becomes infinitely broad"));
     }
     let equivalent_width_kms = match line.equivalent_width_kms {
-        EquivalentWidth::Fixed(width) => {
+        EquivalentWidth::Number(width) => {
             positive("star.line.equivalent_width_kms", width)?;
             width
         }
-        EquivalentWidth::Auto => f64::NAN,
+        EquivalentWidth::Word(_) => f64::NAN,
     };
     Ok(LocalLine { sigma_kms, instrumental_sigma_kms: instrumental, gamma_kms, equivalent_width_kms })
 }

@@ -1,8 +1,7 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
-use super::data_sets::ZeroPoint;
-use super::spots::Hyperparameter;
-use super::{Automatic, ConfigError, EquivalentWidth, PlanSection, SamplerSettings, SimulatedLight, VelocityJitter};
+use super::number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
+use super::{ConfigError, PlanSection, SamplerSettings, SimulatedLight};
 use crate::data::simulate::Simulation;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
@@ -23,7 +22,7 @@ use std::path::PathBuf;
 pub struct Settings {
     /// The config file.
     pub path: PathBuf,
-    /// The star, whatever data sets say of it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN.
+    /// The star, whatever data sets say of it. With [`EquivalentWidth`] "auto" the equivalent width of its line is NaN.
     pub star: StarSettings,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
@@ -59,7 +58,7 @@ pub struct DataSetSettings {
     pub key: String,
     /// Its name.
     pub name: String,
-    /// The star as it sees it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: see [`star_for`](crate::data::calibrated::star_for).
+    /// The star as it sees it. With [`EquivalentWidth`] "auto" the equivalent width of its line is NaN: see [`star_for`](crate::data::calibrated::star_for).
     pub star: StarSettings,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
@@ -191,14 +190,14 @@ impl Default for ImagingSettings {
             pixels: 2000,
             brightness: BrightnessModel::default(),
             default_spot: 1e-4,
-            chi2_target: Automatic::Fixed(0.97),
+            chi2_target: Automatic::Number(0.97),
             objective: ObjectiveKind::default(),
             season_gap_d: None,
             seasons: Vec::new(),
-            spot_amplitude: Hyperparameter::Fitted,
-            spot_slope: Hyperparameter::Fitted,
+            spot_amplitude: Hyperparameter::Word(OfField::Fitted),
+            spot_slope: Hyperparameter::Word(OfField::Fitted),
             spot_break_degree: None,
-            spot_lifetime_d: Hyperparameter::Fitted,
+            spot_lifetime_d: Hyperparameter::Word(OfField::Fitted),
             unresolved_spots: UnresolvedSpots::default(),
             nuisances: None,
         }
@@ -324,20 +323,17 @@ impl Settings {
         let ImagingSettings { spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.imaging;
         let priors = Parameter::FIELD.map(|p| self.free.iter().find(|f| f.parameter == p).map(|f| f.prior));
         // a number beside a prior is where a chain starts
-        let number = |i: usize, given: Hyperparameter| given.known().filter(|_| priors[i].is_none());
+        let number = |i: usize, given: Hyperparameter| given.number().filter(|_| priors[i].is_none());
         Known {
             amplitude: number(0, spot_amplitude),
             slope: number(1, spot_slope),
             break_degree: self.imaging.spot_break_degree,
             lifetime: match spot_lifetime_d {
-                Hyperparameter::Static => Some(Lifetime::Static),
+                Hyperparameter::Word(OfField::Static) => Some(Lifetime::Static),
                 days => number(2, days).map(Lifetime::Days),
             },
             priors,
-            jitter_kms: match self.velocity_jitter {
-                VelocityJitter::Known(kms) => Some(kms),
-                VelocityJitter::Fitted => None,
-            },
+            jitter_kms: self.velocity_jitter.number(),
         }
     }
 

@@ -79,9 +79,7 @@ impl Change {
             all.push(Change::BrightAndDark);
         }
         all.extend(PERIOD.map(Change::Period));
-        if settings.sets[0].equivalent_width != EquivalentWidth::Auto
-            && settings.values.given(Parameter::EquivalentWidth).is_none()
-        {
+        if !settings.sets[0].equivalent_width.is_word() && settings.values.given(Parameter::EquivalentWidth).is_none() {
             all.push(Change::MeasuredStrength);
         }
         all.extend(level(patient).map(Change::Level));
@@ -180,7 +178,7 @@ impl Change {
             Change::BrightAndDark => settings.imaging.brightness = BrightnessModel::BrightAndDark,
             // the orbit, if there is one, keeps its period in days
             Change::Period(factor) => settings.values[Parameter::OmegaEq] /= factor,
-            Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::Auto,
+            Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::AUTO,
             Change::Level(level) => changed.observations = changed.observations.over_continuum(*level),
             Change::Offsets => {
                 let offsets = LineAndContinuum { continuum_offset: OFFSET, ..Default::default() };

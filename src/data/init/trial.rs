@@ -98,7 +98,7 @@ pub(super) fn run(
     if draft.rotation_period_d.is_none() {
         let stand_in = Draft {
             rotation_period_d: Some(STAND_IN_D),
-            sigma_scale: Automatic::Fixed(1.0),
+            sigma_scale: Automatic::Number(1.0),
             velocity_jitter: VelocityJitter::default(),
             ..draft.clone()
         };
@@ -198,8 +198,7 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Att
         Ok(scene) => scene,
         // what is measured, not what is given
         Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })))
-            if key == "observations.sigma_scale"
-                || key == JITTER && draft.velocity_jitter != VelocityJitter::Fitted =>
+            if key == "observations.sigma_scale" || key == JITTER && !draft.velocity_jitter.is_word() =>
         {
             let reached = Err(format!("{key}: {problem}"));
             return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
@@ -232,7 +231,7 @@ fn search(
 ) -> Result<bool, ProposalError> {
     let measured = tried.and_then(|scene| scene.measured.errors.as_ref());
     let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
-    let sigma_scale = by_continuum.map_or(draft.sigma_scale, Automatic::Fixed);
+    let sigma_scale = by_continuum.map_or(draft.sigma_scale, Automatic::Number);
     let scene = scene(&Draft { sigma_scale, ..draft.clone() }, config, profiles)?;
     let found = match scene.optimise() {
         Ok(found) => found,

@@ -152,9 +152,9 @@ impl Values {
             equivalent_width: equivalent_width(cut, known, ledger),
             resolving_power: self.resolving_power,
             velocity_range_kms: self.velocity_range_kms,
-            sigma_scale: known.sigma_scale.as_ref().map_or(Automatic::Auto, |given| Automatic::Fixed(given.value)),
+            sigma_scale: known.sigma_scale.as_ref().map_or(Automatic::AUTO, |given| Automatic::Number(given.value)),
             continuum_level: self.continuum_level,
-            velocity_jitter: VelocityJitter::Fitted,
+            velocity_jitter: VelocityJitter::FITTED,
             imaging: ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) },
             orbit: (0.0, porb_over_prot, 0.0),
             porb_over_prot_range,
@@ -228,11 +228,11 @@ impl Values {
     pub fn note_jitter(jitter: VelocityJitter, ledger: &mut Ledger) {
         const KEY: &str = "observations.velocity_jitter_kms";
         match jitter {
-            VelocityJitter::Fitted => {
+            VelocityJitter::Word(_) => {
                 let remark = "measured by every command: zero points of single profiles, counted as noise";
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
             }
-            VelocityJitter::Known(kms) => {
+            VelocityJitter::Number(kms) => {
                 let remark = "the profiles do not tell how much their zero points scatter";
                 ledger.note(KEY, kms, "km/s", Source::Assumed, remark);
             }
@@ -317,13 +317,13 @@ pub(super) fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, S
 
 fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> EquivalentWidth {
     let auto = format!("{:.3} km/s in this range", cut.mean_equivalent_width_kms());
-    let value = known.equivalent_width.as_ref().map_or(EquivalentWidth::Auto, |given| given.value);
+    let value = known.equivalent_width.as_ref().map_or(EquivalentWidth::AUTO, |given| given.value);
     let (source, by) = origin(&known.equivalent_width, "");
     let (shown, unit, remark) = match value {
-        EquivalentWidth::Auto => {
+        EquivalentWidth::Word(_) => {
             ("auto".to_owned(), "", [by, auto].join(if source == Source::Given { "; " } else { "" }))
         }
-        EquivalentWidth::Fixed(width) => (width.to_string(), "km/s", format!("{by}; the profiles have {auto}")),
+        EquivalentWidth::Number(width) => (width.to_string(), "km/s", format!("{by}; the profiles have {auto}")),
     };
     ledger.note("star.line.equivalent_width_kms", shown, unit, source, remark);
     value
@@ -342,7 +342,7 @@ fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
         ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());
     }
     if let Some(given) = &known.chi2_target {
-        imaging.chi2_target = Automatic::Fixed(given.value);
+        imaging.chi2_target = Automatic::Number(given.value);
         ledger.note("imaging.chi2_target", given.value, "", Source::Given, given.by.as_str());
     }
     imaging
