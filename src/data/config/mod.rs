@@ -28,12 +28,13 @@ mod suggest;
 mod written;
 
 pub use crate::sampling::ensemble::SamplerSettings;
-pub use draft::Draft;
+pub use draft::{Draft, Sought};
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
 pub use photometry::SimulatedLight;
-pub use raw_parts::PlanSection;
+pub use raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
+pub use raw_parts::{ObservationsSection, PlanSection};
 pub use resolve_grid::MOST_NODES;
 pub use settings::{
     DataSetSettings, GridSettings, ImagingSettings, LightCurveSettings, LightSource, ObservationSource, SEASON_GAP_D,

@@ -54,7 +54,7 @@ pub(super) struct Config {
 /// The star. Where a parameter is free, its value here is the start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Star {
+pub struct Star {
     /// Rotation period (d), above 0; rotation cycles and `porb_over_prot` refer to it.
     pub rotation_period_d: f64,
     /// Time of rotation cycle 0 (d), on the time scale of the observations.
@@ -103,7 +103,7 @@ fn default_wavelength_nm() -> f64 {
 /// The line of one surface element, before the spectrograph broadens it.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Line {
+pub struct Line {
     /// Shape of the line.
     #[serde(default)]
     pub shape: LineShape,
@@ -120,7 +120,7 @@ pub(super) struct Line {
 /// Shape of the local line.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum LineShape {
+pub enum LineShape {
     /// A Gaussian.
     #[default]
     Gaussian,
@@ -131,7 +131,7 @@ pub(super) enum LineShape {
 /// Limb darkening. The intensity must stay positive on the whole disc.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct LimbDarkeningSection {
+pub struct LimbDarkeningSection {
     /// Law, in the cosine `mu` of the angle to the line of sight.
     pub law: LimbLaw,
     /// One coefficient for the linear law, two for the quadratic one.
@@ -147,7 +147,7 @@ impl Default for LimbDarkeningSection {
 /// Limb-darkening law.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum LimbLaw {
+pub enum LimbLaw {
     /// `1 - u (1 - mu)`, u from 0 to 1.
     Linear,
     /// `1 - a (1 - mu) - b (1 - mu)^2`.
@@ -157,7 +157,7 @@ pub(super) enum LimbLaw {
 /// The spectrograph.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Instrument {
+pub struct Instrument {
     /// Resolving power, above 0: the instrumental profile is a Gaussian of full width c/R at half maximum. Without it,
     /// no instrumental broadening.
     #[serde(default)]

@@ -225,7 +225,7 @@ pub(super) enum PriorKind {
 /// The line profiles of a data set: either `path` (with its options), or `simulate`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ObservationsSection {
+pub struct ObservationsSection {
     /// Name of the data set, in results, and the folder that `dimcmc simulate` writes it to: letters, digits, `-`, `_`
     /// and `.`. "set1", "set2", ... if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -283,7 +283,7 @@ pub(super) struct ObservationsSection {
     /// Simulated profiles of the star and planet of this config. Of several data sets the first one has the spots, for
     /// all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub simulate: Option<SimulateSection>,
+    pub(super) simulate: Option<SimulateSection>,
 }
 
 /// Profiles that are planned beside those of `observations`, for the command `plan` alone.

@@ -58,7 +58,8 @@ pub struct DataSetSettings {
     pub key: String,
     /// Its name.
     pub name: String,
-    /// The star as it sees it. With [`EquivalentWidth`] "auto" the equivalent width of its line is NaN: see [`star_for`](crate::data::calibrated::star_for).
+    /// The star as it sees it; see [`star_for`](crate::data::calibrated::star_for) for one whose line is as strong as
+    /// the profiles say: here its equivalent width is NaN.
     pub star: StarSettings,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,

@@ -152,7 +152,7 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     let cut = profiles.within(Some(values.velocity_range_kms), 1.0).map_err(SceneError::from)?;
     let cut = cut.over_continuum(values.continuum_level.unwrap_or(1.0));
     let mut draft = values.draft(&cut, known, &mut ledger);
-    draft.observations.clone_from(&place.list_in_config);
+    draft.observations.path = Some(place.list_in_config.clone());
     draft.schema.clone_from(&place.schema);
     let mut notes: Vec<String> = profiles.remarks.iter().map(|remark| format!("profiles: {remark}")).collect();
     notes.extend(values.notes(known));
@@ -160,17 +160,17 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     // one map that does not change has the sharper eye for what is wrong with a model
     let mut trial = trial::run(&mut draft, place, &profiles, &values, known)?;
     draft.imaging.objective = known.objective();
-    if draft.rotation_period_d.is_some() && known.objective() == ObjectiveKind::MarginalLikelihood {
+    if draft.star.rotation_period_d.is_finite() && known.objective() == ObjectiveKind::MarginalLikelihood {
         trial.errors = trial::errors(&draft, place.config, &profiles)?;
     }
     values::note_objective(&draft, known, trial.change.as_ref(), &mut ledger);
     notes.extend(trial.notes(&draft));
     values.note_errors(known, trial.errors.as_ref(), &mut ledger);
-    Values::note_jitter(draft.velocity_jitter, &mut ledger);
+    Values::note_jitter(&draft, &mut ledger);
     if trial.measured_vsini {
         ledger.replace(
             "star.vsini_kms",
-            draft.vsini_kms,
+            draft.star.vsini_kms,
             "flanks of the mean profile, in place of the given one: see the note",
         );
     }

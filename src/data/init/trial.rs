@@ -4,7 +4,7 @@
 use super::digits::rounded;
 use super::values::Values;
 use super::{Known, Place, ProposalError, to_json};
-use crate::data::config::{self, Automatic, ConfigError, Draft, ImagingSettings, VelocityJitter};
+use crate::data::config::{self, Automatic, ConfigError, Draft, VelocityJitter};
 use crate::data::dataset::{Dataset, ProfileSet, SceneError};
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::scene::Scene;
@@ -95,26 +95,24 @@ pub(super) fn run(
 ) -> Result<Trial, ProposalError> {
     let mut trial =
         Trial { end: End::Untried, errors: None, diagnosis: None, change: None, orbit: false, measured_vsini: false };
-    if draft.rotation_period_d.is_none() {
-        let stand_in = Draft {
-            rotation_period_d: Some(STAND_IN_D),
-            sigma_scale: Automatic::Number(1.0),
-            velocity_jitter: VelocityJitter::default(),
-            ..draft.clone()
-        };
+    if !draft.star.rotation_period_d.is_finite() {
+        let mut stand_in = draft.clone().with_jitter(VelocityJitter::default());
+        stand_in.star.rotation_period_d = STAND_IN_D;
+        stand_in.observations.sigma_scale = Some(Automatic::Number(1.0));
         scene(&stand_in, config, profiles)?;
         return Ok(trial);
     }
     let mut attempt = match attempt_of(draft, config, profiles) {
         // few profiles do not tell how much their zero points scatter
         Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, .. }))) if key == JITTER => {
-            draft.velocity_jitter = VelocityJitter::default();
+            *draft = draft.clone().with_jitter(VelocityJitter::default());
             attempt_of(draft, config, profiles)?
         }
         attempt => attempt?,
     };
     if attempt.misfits && values.is_another_star(known) {
-        let measured = Draft { vsini_kms: rounded(values.look.unspotted.vsini_kms, 1), ..draft.clone() };
+        let mut measured = draft.clone();
+        measured.star.vsini_kms = rounded(values.look.unspotted.vsini_kms, 1);
         let other = attempt_of(&measured, config, profiles)?;
         if other.misfit < AS_GOOD * attempt.misfit {
             (*draft, attempt, trial.measured_vsini) = (measured, other, true);
@@ -169,8 +167,9 @@ pub(super) fn errors(
 }
 
 fn integrated(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Scene, ProposalError> {
-    let imaging = ImagingSettings { objective: ObjectiveKind::MarginalLikelihood, ..draft.imaging.clone() };
-    scene(&Draft { imaging, ..draft.clone() }, config, profiles)
+    let mut draft = draft.clone();
+    draft.imaging.objective = ObjectiveKind::MarginalLikelihood;
+    scene(&draft, config, profiles)
 }
 
 /// That the star changes, if it does.
@@ -198,7 +197,8 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Att
         Ok(scene) => scene,
         // what is measured, not what is given
         Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })))
-            if key == "observations.sigma_scale" || key == JITTER && !draft.velocity_jitter.is_word() =>
+            if key == "observations.sigma_scale"
+                || key == JITTER && draft.observations.velocity_jitter_kms != Some(VelocityJitter::FITTED) =>
         {
             let reached = Err(format!("{key}: {problem}"));
             return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
@@ -231,8 +231,11 @@ fn search(
 ) -> Result<bool, ProposalError> {
     let measured = tried.and_then(|scene| scene.measured.errors.as_ref());
     let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
-    let sigma_scale = by_continuum.map_or(draft.sigma_scale, Automatic::Number);
-    let scene = scene(&Draft { sigma_scale, ..draft.clone() }, config, profiles)?;
+    let mut with_its_errors = draft.clone();
+    if let Some(scale) = by_continuum {
+        with_its_errors.observations.sigma_scale = Some(Automatic::Number(scale));
+    }
+    let scene = scene(&with_its_errors, config, profiles)?;
     let found = match scene.optimise() {
         Ok(found) => found,
         // what matters is that there is no map
@@ -240,11 +243,14 @@ fn search(
     };
     let best = scene.space.values_at(&found.optimum.theta);
     // rounding does not lead out of the priors
-    let within = |parameter, (min, max): (f64, f64)| rounded(best[parameter], 4).clamp(min, max);
-    let k = within(Parameter::K, (0.0, draft.k_max_kms));
-    let period = within(Parameter::PorbOverProt, draft.porb_over_prot_range);
-    draft.orbit = (k, period, rounded(best[Parameter::Phi], 4).rem_euclid(1.0));
-    draft.vsys_kms = within(Parameter::Vsys, draft.vsys_range_kms);
+    let within = |parameter: Parameter| {
+        let prior = scene.space.free().iter().find(|free| free.parameter == parameter).map(|free| free.prior.bounds());
+        let (min, max) = prior.expect("orbit and systemic velocity of a draft are free");
+        rounded(best[parameter], 4).clamp(min, max)
+    };
+    let phi = rounded(best[Parameter::Phi], 4).rem_euclid(1.0);
+    *draft = draft.clone().with_orbit((within(Parameter::K), within(Parameter::PorbOverProt), phi));
+    draft.star.vsys_kms = within(Parameter::Vsys);
     Ok(true)
 }
 
@@ -260,7 +266,7 @@ impl Trial {
             format!(
                 "no map fits with the given vsini, and one does much better with that of the mean profile, which is \
                 written: {} km/s",
-                draft.vsini_kms
+                draft.star.vsini_kms
             )
         });
         let misfit = self.diagnosis.as_ref().map(|diagnosis| {
