@@ -1,8 +1,10 @@
 //! A config to be written: the keys that a first config of an observed star has, in the order and layout in which
 //! people read them. Defaults that nobody asked about are left to the program.
 
-use super::raw::{Instrument, Planet, Star};
-use super::raw_parts::{ObservationsSection, PerParameter, PriorKind, PriorSection};
+use super::data_sets::ObservationsSection;
+use super::raw::Planet;
+use super::raw_parts::{PerParameter, PriorKind, PriorSection};
+use super::star::{Instrument, Star};
 use super::{ImagingSettings, VelocityJitter};
 use crate::model::Parameter;
 use crate::surface::objective::ObjectiveKind;

@@ -4,6 +4,7 @@
 //! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for),
 //! and every error names the file and the key.
 
+mod checks;
 mod data_sets;
 mod domain;
 mod draft;
@@ -16,30 +17,29 @@ mod raw;
 mod raw_parts;
 mod resolve;
 mod resolve_grid;
-mod resolve_observations;
 mod resolve_orbits;
 mod resolve_photometry;
-mod resolve_seasons;
 mod resolve_sets;
 mod resolve_simulation;
 mod resolve_star;
 mod settings;
-mod suggest;
+mod star;
 mod written;
 
 pub use crate::sampling::ensemble::SamplerSettings;
+pub use data_sets::ObservationsSection;
 pub use draft::{Draft, Sought};
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
 pub use photometry::SimulatedLight;
-pub use raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
-pub use raw_parts::{ObservationsSection, PlanSection};
+pub use raw_parts::PlanSection;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{
     DataSetSettings, GridSettings, ImagingSettings, LightCurveSettings, LightSource, ObservationSource, SEASON_GAP_D,
     Settings,
 };
+pub use star::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 pub use written::Config;
 
 use std::path::Path;

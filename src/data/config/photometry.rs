@@ -1,7 +1,7 @@
 //! `photometry`: light curves as users write them. Doc comments here are the descriptions of the JSON Schema.
 
 use super::listed::Section;
-use super::raw::LimbDarkeningSection;
+use super::star::LimbDarkeningSection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;

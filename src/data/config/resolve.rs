@@ -1,5 +1,6 @@
 //! From the config as written to [`Settings`]: checks, defaults that depend on other keys, units.
 
+use super::checks::{automatic, check_nuisances, check_pixels, check_windows};
 use super::domain::{check_value, key, resolve_prior};
 use super::error::Fault;
 use super::identity::fingerprint;
@@ -7,17 +8,15 @@ use super::number_or::OfField;
 use super::raw::Config;
 use super::raw_parts::{PriorKind, PriorSection};
 use super::resolve_grid::resolve_grid;
-use super::resolve_orbits::{check_orbits, resolve_orbits, start_of};
+use super::resolve_orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use super::resolve_photometry::resolve_photometry;
-use super::resolve_seasons::check_seasons;
 use super::resolve_sets::resolve_sets;
 use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
-use super::{Automatic, Hyperparameter, ImagingSettings, Settings, VelocityJitter};
+use super::{Hyperparameter, ImagingSettings, Settings, VelocityJitter};
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
 use crate::surface::evolving_map;
-use crate::surface::nuisances::LineAndContinuum;
 use crate::surface::objective::ObjectiveKind;
 use std::path::Path;
 
@@ -29,9 +28,6 @@ const FEW_WALKERS: usize = 16;
 
 /// What is said of spots where one map is found.
 const OF_INTEGRATED_MAPS: &str = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
-
-/// Fewest and most pixels of an image or a simulated star.
-pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
@@ -163,15 +159,6 @@ fn resolve_free(raw: &mut Config, values: &mut ParameterValues, clock: Clock) ->
     }
 }
 
-/// A free parameter of an orbit of which K is fixed at 0.
-pub(super) fn without_planet(
-    free: &[FreeParameter],
-    values: &ParameterValues,
-) -> Option<(Parameter, &'static Elements)> {
-    let no_planet = |of: &Elements| values[of.k] == 0.0 && free.iter().all(|f| f.parameter != of.k);
-    free.iter().find_map(|f| Some((f.parameter, Elements::of(f.parameter).filter(|of| no_planet(of))?)))
-}
-
 /// What is said of the spots has a meaning where they are integrated out, and lies within the bounds of a fit. What is
 /// left to the profiles is free in a chain: with a weak prior, all over those bounds.
 fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), Fault> {
@@ -249,30 +236,31 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
     automatic("imaging.chi2_target", imaging.chi2_target)
 }
 
-/// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
-pub(super) fn check_nuisances(priors: &LineAndContinuum, keys: [String; 3]) -> Result<(), Fault> {
-    match keys.iter().zip(priors.numbers()).find(|(_, sd)| !(0.0..=10.0).contains(sd)) {
-        Some((key, sd)) => Err(Fault::new(key, format!("{sd} must be from 0 to 10"))),
+/// What tells the seasons apart.
+fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
+    const GAP: &str = "imaging.season_gap_d";
+    let ImagingSettings { season_gap_d: gap, seasons, objective, .. } = imaging;
+    let given = [(gap.is_some(), GAP), (!seasons.is_empty(), "imaging.seasons")].map(|(is, key)| is.then_some(key));
+    match (given, *objective) {
+        ([Some(key), _] | [None, Some(key)], ObjectiveKind::MarginalLikelihood) => {
+            let problem = "leave it out: with imaging.objective \"marginal-likelihood\" spots change all the time, \
+                           and seasons need no maps of their own";
+            return Err(Fault::new(key, problem));
+        }
+        ([Some(_), Some(key)], _) => return Err(Fault::new(key, "stands in place of season_gap_d: give one of them")),
+        _ => {}
+    }
+    if let Some(gap) = gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
+        return Err(Fault::new(GAP, format!("{gap} must be above 0")));
+    }
+    check_windows(seasons, "imaging.seasons")?;
+    match seasons.windows(2).position(|two| two[1][0] <= two[0][1]) {
         None => Ok(()),
-    }
-}
-
-pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
-    if PIXELS.contains(&pixels) {
-        return Ok(());
-    }
-    Err(Fault::new(key, format!("{pixels} must be from {} to {}", PIXELS.start(), PIXELS.end())))
-}
-
-pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
-    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
-}
-
-/// Positive, or left to the observations.
-pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
-    match value {
-        Automatic::Number(value) => positive(key, value),
-        Automatic::Word(_) => Ok(()),
+        Some(k) => {
+            let [[_, end], [start, _]] = [seasons[k], seasons[k + 1]];
+            let problem = format!("begins at {start} d, and imaging.seasons[{k}] ends only at {end} d");
+            Err(Fault::new(format!("imaging.seasons[{}]", k + 1), problem))
+        }
     }
 }
 

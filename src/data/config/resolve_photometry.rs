@@ -1,12 +1,10 @@
 //! The light curves of a config.
 
+use super::checks::{check_windows, names, positive};
 use super::domain::{check_size, most};
 use super::error::Fault;
 use super::photometry::{PhotometrySection, SimulatedLight};
 use super::raw::Config;
-use super::resolve::positive;
-use super::resolve_seasons::check_windows;
-use super::resolve_sets::names;
 use super::resolve_star::{contrast, limb_darkening};
 use super::{LightCurveSettings, LightSource};
 use crate::star::Band;

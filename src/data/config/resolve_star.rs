@@ -1,10 +1,10 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
 use super::EquivalentWidth;
+use super::checks::positive;
 use super::domain::{check_size, most};
 use super::error::Fault;
-use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
-use super::resolve::positive;
+use super::star::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
 use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use std::f64::consts::TAU;
