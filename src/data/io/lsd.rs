@@ -8,23 +8,28 @@ mod axis;
 mod error;
 mod layout;
 mod level;
+mod list;
 mod names;
+mod row;
 mod text;
 mod times;
 mod writing;
 
 pub use error::LsdError;
+pub use list::{Label, files};
 pub use times::LONGEST_D;
 pub use writing::{is_written, write, write_as, write_numbers};
 
 use crate::star::observation::{Observations, Profile};
 use axis::Axis;
 use level::Given;
+use list::{Entry, list_bytes, parse_list};
+use row::shown;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use text::{MIN_BINS, RawProfile, shown};
+use text::{MIN_BINS, RawProfile};
 
 /// The profiles of a data set as they are in their files, with what the list says of each.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,32 +58,6 @@ impl ProfileSet {
         let profiles = self.observations.profiles.iter().zip(&self.labels).map(cut).collect::<Result<_, _>>()?;
         Ok(Observations { profiles })
     }
-}
-
-/// What a list says of a profile beside its time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Label {
-    /// Its file, as the list names it.
-    pub file: String,
-    /// Where that is; `None` for profiles that are in no file.
-    pub path: Option<PathBuf>,
-    /// Velocity that is subtracted from its axis (km/s).
-    pub vrad_kms: f64,
-}
-
-impl From<Entry> for Label {
-    fn from(Entry { file, path, vrad_kms, .. }: Entry) -> Self {
-        Label { file, path: Some(path), vrad_kms }
-    }
-}
-
-/// One line of the list.
-struct Entry {
-    line: usize,
-    file: String,
-    path: PathBuf,
-    time_d: f64,
-    vrad_kms: f64,
 }
 
 /// Reads the list at `list` and all profiles it names.
@@ -191,16 +170,6 @@ impl Found {
     }
 }
 
-/// The list at `list` and the profiles that it names, as far as it can be read.
-pub fn files(list: &Path) -> Vec<PathBuf> {
-    let entries = list_bytes(list).and_then(|bytes| parse_list(list, &String::from_utf8_lossy(&bytes)));
-    std::iter::once(list.to_owned()).chain(entries.into_iter().flatten().map(|entry| entry.path)).collect()
-}
-
-fn list_bytes(list: &Path) -> Result<Vec<u8>, LsdError> {
-    std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })
-}
-
 /// How often the profile at each path was opened by this process. A profile is read once in a command: tests count.
 static OPENED: Mutex<BTreeMap<PathBuf, usize>> = Mutex::new(BTreeMap::new());
 
@@ -217,27 +186,6 @@ fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {
         profile: entry.path.clone(),
         source,
     })
-}
-
-fn parse_list(list: &Path, text: &str) -> Result<Vec<Entry>, LsdError> {
-    let folder = list.parent().unwrap_or(Path::new(""));
-    let mut entries = Vec::new();
-    for (line, text) in text.lines().enumerate().map(|(k, text)| (k + 1, text)) {
-        let fields: Vec<&str> = text.split_whitespace().take_while(|f| !f.starts_with('#')).collect();
-        let fail = |problem| LsdError::Line { path: list.into(), line, problem };
-        let number = |name: &str, field: &str| match field.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(fail(format!("{name} {} is not a finite number", shown(field)))),
-        };
-        let (file, time_d, vrad_kms) = match fields[..] {
-            [] => continue,
-            [file, time] => (file, number("time", time)?, 0.0),
-            [file, time, vrad] => (file, number("time", time)?, number("radial velocity", vrad)?),
-            _ => return Err(fail(format!("{} columns where FILE TIME_DAYS [VRAD_KMS] is due", fields.len()))),
-        };
-        entries.push(Entry { line, file: file.to_owned(), path: folder.join(file), time_d, vrad_kms });
-    }
-    Ok(entries)
 }
 
 /// What of a profile lies within the velocity range, errors scaled.

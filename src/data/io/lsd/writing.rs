@@ -1,7 +1,8 @@
 //! Observations as files: a list and its profiles, which reading gives back.
 
-use super::super::atomic;
-use super::{Label, LsdError};
+use super::error::LsdError;
+use super::list::Label;
+use crate::data::io::atomic;
 use crate::star::observation::{Observations, Profile};
 use std::fmt::Write as _;
 use std::path::Path;
