@@ -2,8 +2,9 @@
 //! with the best orbit that a search finds, and what is likely to be wrong if none does.
 
 use super::digits::rounded;
+use super::known::Known;
+use super::proposal::{Place, ProposalError, to_json};
 use super::values::Values;
-use super::{Known, Place, ProposalError, to_json};
 use crate::data::config::{self, Automatic, ConfigError, Draft, VelocityJitter};
 use crate::data::dataset::{Dataset, ProfileSet, SceneError};
 use crate::data::diagnosis::{Diagnosis, Reason};

@@ -1,8 +1,9 @@
 //! The values of a proposal: measured, given, or assumed.
 
 use super::digits::{rounded, significant};
-use super::ledger::{Ledger, Source};
-use super::{Given, Known, line};
+use super::known::{Given, Known};
+use super::ledger::{Ledger, Source, origin};
+use super::line;
 use crate::data::config::{
     Automatic, Draft, EquivalentWidth, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape,
     ObservationsSection, Sought, Star, VelocityJitter,
@@ -320,13 +321,6 @@ impl Values {
             )
         });
         vsini.into_iter().chain(domega).chain(few).collect()
-    }
-}
-
-pub(super) fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, String) {
-    match given {
-        Some(given) => (Source::Given, given.by.clone()),
-        None => (Source::Data, otherwise.to_owned()),
     }
 }
 
