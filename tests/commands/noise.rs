@@ -234,3 +234,27 @@ fn the_target_is_where_velocities_stop_shrinking() {
     desk.succeed(&["map", "config.json", "--out", "again"]);
     assert_eq!(desk.read("map/fit.json"), desk.read("again/fit.json"));
 }
+
+/// Whatever is measured on them, and whoever needs them in their whole width.
+#[test]
+fn a_profile_is_opened_once_in_a_command() {
+    let desk = desk(|_| ());
+    let config = desk.path("config.json");
+    let opened =
+        || -> Vec<usize> { (0..20).map(|k| lsd::times_opened(&desk.path(&format!("data/p{k:03}.prof")))).collect() };
+    let orbit = ["--k-kms", "0.1", "--porb-over-prot", "2", "--phi", "0"];
+    for (command, options) in [
+        ("map", &[][..]),
+        ("periodogram", &["--draws", "100"]),
+        ("limits", &["--periods", "2", "--full", "2", "--draws", "100"]),
+        ("inject", &orbit),
+    ] {
+        let before = opened();
+        let out = desk.path(command);
+        let paths = ["dimcmc", "-q", command, config.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        // in this process, which counts
+        let code = dimcmc::command_line(paths.iter().chain(options).map(Into::into));
+        assert_eq!(code, 0, "{command}");
+        assert!(opened().iter().zip(before).all(|(after, before)| after - before == 1), "{command}: {:?}", opened());
+    }
+}

@@ -5,13 +5,11 @@ use super::data_sets::ObservationsSection;
 use super::raw::Planet;
 use super::raw_parts::{PerParameter, PriorKind, PriorSection};
 use super::star::{Instrument, Star};
+use super::written::compact;
 use super::{ImagingSettings, VelocityJitter};
 use crate::model::Parameter;
 use crate::surface::objective::ObjectiveKind;
 use serde::Serialize;
-
-/// Longest line of a config that is written.
-const WIDTH: usize = 110;
 
 /// A config of observations from files with the orbit and the systemic velocity free: its sections in their order.
 #[derive(Clone, Debug, Serialize)]
@@ -93,60 +91,5 @@ impl Draft {
         let jitter = &mut draft.observations.velocity_jitter_kms;
         *jitter = jitter.filter(|jitter| integrated || !jitter.is_default());
         Ok(compact(&serde_json::to_string_pretty(&draft)?))
-    }
-}
-
-/// Indented JSON with every object and list that fits on one line put on one line, but for the outermost.
-pub(super) fn compact(pretty: &str) -> String {
-    let lines: Vec<&str> = pretty.lines().collect();
-    let indent = |line: &str| line.len() - line.trim_start().len();
-    let (mut text, mut k) = (String::new(), 0);
-    while k < lines.len() {
-        let opens = k > 0 && lines[k].ends_with(['{', '[']);
-        let closes = |j: &usize| opens && indent(lines[*j]) == indent(lines[k]);
-        let whole = (k + 1..lines.len()).find(closes).map(|end| (end, joined(&lines[k..=end])));
-        match whole.filter(|(_, line)| line.chars().count() <= WIDTH) {
-            Some((end, line)) => {
-                text += &line;
-                k = end + 1;
-            }
-            None => {
-                text += lines[k];
-                k += 1;
-            }
-        }
-        text.push('\n');
-    }
-    text
-}
-
-/// An object or a list on one line: braces with a space inside, brackets without.
-fn joined(lines: &[&str]) -> String {
-    let mut line = lines[0].to_string();
-    for next in &lines[1..] {
-        let next = next.trim_start();
-        let tight = line.ends_with('[') || next.starts_with(']');
-        line += if tight { "" } else { " " };
-        line += next;
-    }
-    line
-}
-
-#[cfg(test)]
-mod tests {
-    use super::compact;
-
-    #[test]
-    fn what_fits_stands_on_one_line() {
-        let long = "x".repeat(100);
-        let value =
-            serde_json::json!({ "a": { "b": [1, 2], "c": "{" }, "d": [], "e": { "f": long, "g": { "h": null } } });
-        let text = compact(&serde_json::to_string_pretty(&value).unwrap());
-        let expected = format!(
-            "{{\n  \"a\": {{ \"b\": [1, 2], \"c\": \"{{\" }},\n  \"d\": [],\n  \"e\": {{\n    \"f\": \"{long}\",\n    \
-             \"g\": {{ \"h\": null }}\n  }}\n}}\n"
-        );
-        assert_eq!(text, expected);
-        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value);
     }
 }

@@ -1,8 +1,9 @@
 //! The config: JSON as users write it, or a [`Config`] built in code -> checked, resolved [`Settings`]; and its JSON
 //! Schema.
 //!
-//! Unknown keys are refused, defaults are written once (in `raw`, `raw_parts`, and beside the algorithm they are for),
-//! and every error names the file and the key.
+//! As written: `raw` and its sections (`star`, `data_sets`, `photometry`, `raw_parts`), which are read and written.
+//! Checked: `resolve` and its parts make `settings` of it. Unknown keys are refused, defaults are written once (in the
+//! sections, and beside the algorithm they are for), and every error names the file and the key.
 
 mod checks;
 mod data_sets;
@@ -40,39 +41,7 @@ pub use settings::{
     Settings,
 };
 pub use star::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
-pub use written::Config;
-
-use std::path::Path;
-
-/// Reads and resolves the config at `path`. Paths in it start from its folder.
-///
-/// # Errors
-/// A file that cannot be read, is not JSON, or has a key that is unknown, missing, or does not make sense.
-pub fn load(path: &Path) -> Result<Settings, ConfigError> {
-    let bytes = std::fs::read(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
-    from_json(&bytes, path)
-}
-
-/// Resolves a config already read; `path` is what errors name and whose folder paths start from.
-///
-/// # Errors
-/// As [`load`], but for reading.
-pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
-    let mut deserializer = serde_json::Deserializer::from_slice(without_mark(json));
-    let raw = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
-    deserializer.end().map_err(|e| ConfigError::json(path, &e))?;
-    resolve::resolve(raw, path).map_err(|fault| fault.within(path))
-}
-
-/// Editors on Windows put a byte-order mark first.
-fn without_mark(json: &[u8]) -> &[u8] {
-    json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)
-}
-
-/// A config as text, laid out for people.
-pub fn to_text(config: &serde_json::Value) -> String {
-    draft::compact(&format!("{config:#}"))
-}
+pub use written::{Config, from_json, to_text};
 
 /// The JSON Schema of the config, as it ships in `configs/dimcmc.schema.json`.
 pub fn schema() -> String {
