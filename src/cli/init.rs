@@ -6,7 +6,7 @@ use crate::data::config::ConfigError;
 use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
-use crate::data::io::{atomic, lsd};
+use crate::data::io::{FileError, atomic, lsd};
 use crate::numerics::text::shown;
 use crate::star::BrightnessModel;
 use crate::surface::objective::ObjectiveKind;
@@ -149,7 +149,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check(None)?;
     let list = &args.observations;
     args.output.spare(&lsd::files(list), None)?;
-    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.clone(), source })?;
+    let bytes = std::fs::read(list).map_err(|source| LsdError::from(FileError::Read { path: list.clone(), source }))?;
     let place = Place {
         config: args.output.path(),
         list,

@@ -20,6 +20,7 @@ pub use list::{Label, files};
 pub use times::LONGEST_D;
 pub use writing::{is_written, write, write_as, write_numbers};
 
+use crate::data::io::FileError;
 use crate::star::observation::{Observations, Profile};
 use axis::Axis;
 use level::Given;
@@ -53,7 +54,7 @@ impl ProfileSet {
     pub fn within(&self, range_kms: Option<(f64, f64)>, sigma_scale: f64) -> Result<Observations, LsdError> {
         let cut = |(profile, label): (&Profile, &Label)| {
             let path = || label.path.clone().unwrap_or_else(|| label.file.clone().into());
-            cut(profile, range_kms, sigma_scale).map_err(|problem| LsdError::File { path: path(), problem })
+            cut(profile, range_kms, sigma_scale).map_err(|problem| LsdError::from(FileError::of(&path(), problem)))
         };
         let profiles = self.observations.profiles.iter().zip(&self.labels).map(cut).collect::<Result<_, _>>()?;
         Ok(Observations { profiles })
@@ -77,7 +78,7 @@ pub fn read_listed(list: &Path, bytes: &[u8]) -> Result<ProfileSet, LsdError> {
     let entries = parse_list(list, &String::from_utf8_lossy(bytes))?;
     // a list that is none, a profile for one, is told of by what it names
     entries.iter().filter(|entry| !entry.path.exists()).try_for_each(|entry| read_profile(list, entry).map(drop))?;
-    times::check(&entries).map_err(|(line, problem)| LsdError::Line { path: list.into(), line, problem })?;
+    times::check(&entries).map_err(|(line, problem)| FileError::Line { path: list.into(), line, problem })?;
     read_entries(list, bytes, entries)
 }
 
@@ -101,8 +102,8 @@ fn read_entries(list: &Path, bytes: &[u8], entries: Vec<Entry>) -> Result<Profil
         let bytes = read_profile(list, entry)?;
         hash.update(&bytes);
         let raw = text::parse(&String::from_utf8_lossy(&bytes)).map_err(|fault| match fault.line {
-            0 => LsdError::File { path: entry.path.clone(), problem: fault.problem },
-            line => LsdError::Line { path: entry.path.clone(), line, problem: fault.problem },
+            0 => FileError::of(&entry.path, fault.problem),
+            line => FileError::Line { path: entry.path.clone(), line, problem: fault.problem },
         })?;
         let (first_path, axis) = *first.get_or_insert((&entry.path, raw.axis));
         if !axis.agrees_with(&raw.axis) {
@@ -123,7 +124,7 @@ fn read_entries(list: &Path, bytes: &[u8], entries: Vec<Entry>) -> Result<Profil
         });
     }
     match profiles.is_empty() {
-        true => Err(LsdError::File { path: list.into(), problem: "lists no profile".into() }),
+        true => Err(FileError::of(list, "lists no profile").into()),
         false => Ok(ProfileSet {
             observations: Observations { profiles },
             sha256: Some(format!("{:x}", hash.finalize())),

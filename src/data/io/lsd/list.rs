@@ -2,6 +2,7 @@
 
 use super::error::LsdError;
 use super::row::shown;
+use crate::data::io::FileError;
 use std::path::{Path, PathBuf};
 
 /// What a list says of a profile beside its time.
@@ -38,7 +39,7 @@ pub fn files(list: &Path) -> Vec<PathBuf> {
 
 /// The content of the list at `list`.
 pub(super) fn list_bytes(list: &Path) -> Result<Vec<u8>, LsdError> {
-    std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })
+    std::fs::read(list).map_err(|source| FileError::Read { path: list.into(), source }.into())
 }
 
 /// The lines of a list of that content.
@@ -47,7 +48,7 @@ pub(super) fn parse_list(list: &Path, text: &str) -> Result<Vec<Entry>, LsdError
     let mut entries = Vec::new();
     for (line, text) in text.lines().enumerate().map(|(k, text)| (k + 1, text)) {
         let fields: Vec<&str> = text.split_whitespace().take_while(|f| !f.starts_with('#')).collect();
-        let fail = |problem| LsdError::Line { path: list.into(), line, problem };
+        let fail = |problem| LsdError::from(FileError::Line { path: list.into(), line, problem });
         let number = |name: &str, field: &str| match field.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
             _ => Err(fail(format!("{name} {} is not a finite number", shown(field)))),
