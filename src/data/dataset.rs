@@ -156,11 +156,7 @@ fn light_curves(settings: &Settings) -> Result<Vec<Vec<Flux>>, SceneError> {
     let of = |curve: &LightCurveSettings| match &curve.source {
         LightSource::File(path) => Ok(light_curve::read(path)?),
         LightSource::Simulate(light) => {
-            let simulation = |set: &'_ DataSetSettings| match &set.source {
-                ObservationSource::Simulate(simulation) => Some(simulation.clone()),
-                ObservationSource::Files { .. } => None,
-            };
-            let simulations: Vec<Simulation> = settings.sets.iter().filter_map(simulation).collect();
+            let simulations: Vec<&Simulation> = settings.sets.iter().filter_map(DataSetSettings::simulation).collect();
             let times = || simulations.iter().flat_map(|simulation| &simulation.times_d).copied();
             let first = times().fold(f64::INFINITY, f64::min);
             let count = ((times().fold(f64::NEG_INFINITY, f64::max) - first) / light.cadence_d).floor() + 1.0;

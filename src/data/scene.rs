@@ -4,7 +4,7 @@
 mod truth;
 
 use crate::data::calibrated::{Calibrated, of_sets};
-use crate::data::config::{Config, ConfigError, ObservationSource, Settings};
+use crate::data::config::{Config, ConfigError, Settings};
 use crate::data::dataset::{Dataset, in_memory};
 use crate::data::io::provenance::{Measured, Provenance};
 use crate::inference::detection::Spots;
@@ -105,10 +105,7 @@ impl Scene {
 
     fn calibrated(settings: Settings, data: Arc<Dataset>, calibrated: Calibrated) -> Self {
         let Calibrated { observations, sha256, measured, chi2_target, imager } = calibrated;
-        let truth = settings.sets.iter().find_map(|set| match &set.source {
-            ObservationSource::Simulate(simulation) => Some(simulation.truth),
-            ObservationSource::Files { .. } => None,
-        });
+        let truth = settings.sets[0].simulation().map(|simulation| simulation.truth);
         let space = space(&settings.free, &settings, &imager);
         Scene { settings, data, observations, data_sha256: sha256, truth, measured, chi2_target, imager, space }
     }

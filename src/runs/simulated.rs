@@ -1,6 +1,6 @@
 //! What `simulate` makes: profiles of a spotted star with a planet, one data set or several, and the truth behind them.
 
-use crate::data::config::{Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource};
+use crate::data::config::{Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::light_curve;
 use crate::data::io::lsd::{self, LsdError};
@@ -85,10 +85,7 @@ impl Simulated {
     /// [`SimulateError`].
     pub fn of(config: &Config) -> Result<Self, SimulateError> {
         let settings = config.settings()?;
-        let simulation = |set: &DataSetSettings| match &set.source {
-            ObservationSource::Simulate(simulation) => Some(simulation.clone()),
-            ObservationSource::Files { .. } => None,
-        };
+        let simulation = |set: &DataSetSettings| set.simulation().cloned();
         let Some(simulations) = settings.sets.iter().map(simulation).collect::<Option<Vec<_>>>() else {
             return Err(SimulateError::Nothing { config: settings.path, key: settings.sets[0].key.clone() });
         };

@@ -146,11 +146,11 @@ fn is_zero(x: &f64) -> bool {
     *x == 0.0
 }
 
-fn one() -> f64 {
+pub(super) fn one() -> f64 {
     1.0
 }
 
-fn is_one(x: &f64) -> bool {
+pub(super) fn is_one(x: &f64) -> bool {
     *x == 1.0
 }
 
@@ -158,7 +158,7 @@ fn default_snr() -> Option<f64> {
     Some(1000.0)
 }
 
-fn default_seed() -> u64 {
+pub(super) fn default_seed() -> u64 {
     1
 }
 

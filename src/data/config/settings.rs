@@ -74,6 +74,14 @@ pub struct DataSetSettings {
 }
 
 impl DataSetSettings {
+    /// What is simulated.
+    pub fn simulation(&self) -> Option<&Simulation> {
+        match &self.source {
+            ObservationSource::Simulate(simulation) => Some(simulation),
+            ObservationSource::Files { .. } => None,
+        }
+    }
+
     /// Level of the continuum in its files.
     pub fn continuum_level(&self) -> f64 {
         match self.source {
