@@ -132,7 +132,7 @@ impl Case {
         // of the config as it is written, which is what ranks know: not with the start moved to the truth
         let Settings { resolved, path, .. } = scene(free, Size::pixels(pixels)).settings;
         let scene = Scene::new(&Config::at(resolved.clone(), &path)).unwrap();
-        let settings = SearchSettings { other_starts: 0, ..scene.settings.search() };
+        let settings = SearchSettings { other_starts: 0, ..scene.search_settings() };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let task = Task::new(&scene, &Origin::of(&scene, &found), scene.space.names(), Asked::LogProbability);
         let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();

@@ -83,7 +83,7 @@ fn frequencies(imager: &Imager) -> Result<Frequencies, Failure> {
 
 fn detect(scene: &Scene, imager: &Imager, draws: usize) -> Result<Detection, Failure> {
     let settings = DetectionSettings {
-        surface: SurfaceSettings::spottedness(scene.settings.imaging.chi2_target.value()),
+        surface: SurfaceSettings::spottedness(scene.chi2_target),
         nuisances: Vec::new(),
         search: SearchSettings { draws, seed: 1 },
         eccentric: false,

@@ -199,8 +199,8 @@ fn injected(laboratory: &Laboratory, base: &Value, orbit: Orbit, name: &str) -> 
     let config = folder.join("base.json");
     std::fs::write(&config, base.to_string())?;
     let scene = Scene::load(&config)?;
-    let (whole, labels) = scene.whole()?;
-    lsd::write_as(&folder, &inject(&whole, &scene.imager.star, &[orbit]), &labels, "with an orbit put in")?;
+    let injected = inject(&scene.whole(), &scene.imager.star, &[orbit]);
+    lsd::write_as(&folder, &injected, &scene.data.sets[0].labels, "with an orbit put in")?;
     Ok(std::path::absolute(folder.join("observations.txt"))?)
 }
 

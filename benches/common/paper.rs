@@ -1,7 +1,7 @@
 //! The paper's setup (Petit et al. 2015, section 2) at any size: a spotted star with a planet, 50 profiles over three
 //! rotations in 57 bins; three or seven free parameters.
 
-use dimcmc::internals::data::config::{self, ObservationSource};
+use dimcmc::internals::data::config::Config;
 use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::inference::search::{self, SearchSettings};
 use dimcmc::internals::runs::pool::Target as Density;
@@ -66,11 +66,12 @@ pub fn scene(free: Free, size: Size) -> Scene {
     simulate["velocity_kms"]["step"] = json!(size.step_kms);
     let spacing = 3.0 / size.profiles as f64;
     simulate["cycles"] = (0..size.profiles).map(|k| json!(k as f64 * spacing)).collect();
-    let mut settings = config::from_json(config.to_string().as_bytes(), &path).unwrap();
-    let ObservationSource::Simulate(simulation) = settings.sets[0].source.clone() else { panic!("{}", path.display()) };
-    settings.values = simulation.truth;
-    let observations = simulation.observe(&settings.star);
-    Scene::of(settings, observations).unwrap()
+    let truth = simulate["truth"].as_object().cloned().unwrap_or_default();
+    for (name, value) in truth {
+        let section = if config["star"].get(&name).is_some() || name == "omega_eq_rad_d" { "star" } else { "planet" };
+        config[section][&name] = value;
+    }
+    Scene::new(&Config::at(config, &path)).unwrap()
 }
 
 /// The star as injected.
@@ -130,7 +131,7 @@ pub struct Bulk {
 impl Bulk {
     /// The posterior around its maximum, where a search from the injected values has put the reference.
     pub fn new(scene: &Scene, points: usize) -> Self {
-        let settings = SearchSettings { other_starts: 0, ..scene.settings.search() };
+        let settings = SearchSettings { other_starts: 0, ..scene.search_settings() };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let draw = StartDraw {
             centre: &found.optimum.theta,

@@ -92,7 +92,7 @@ pub fn filtered(laboratory: &Laboratory) -> Result<Report, Failure> {
         (laboratory.report)(&format!("R2, {name}"));
         let scene = scene(laboratory, &changes)?;
         let settings = &scene.settings;
-        let target = settings.imaging.chi2_target.value();
+        let target = scene.chi2_target;
         // without its planet a star may not be fitted that well: then as well as it can be without turning noise into
         // spots
         let reference = Reference::build(&scene.imager, settings.values, target)

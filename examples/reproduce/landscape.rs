@@ -49,7 +49,7 @@ pub fn landscape(laboratory: &Laboratory) -> Result<Report, Failure> {
         (laboratory.report)(&format!("R3: slice at the injected {fixed}"));
         let others = AXES.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, a)| axis(a, along_slice));
         let free: Vec<_> = scene.settings.free.iter().filter(|f| f.parameter.name() != fixed).copied().collect();
-        let settings = scene.settings.search();
+        let settings = scene.search_settings();
         let found = search::find(&scene.imager, &scene.space_of(&free), settings, &|_| ())?;
         let grid = Grid { axes: others.collect() };
         let (route, survey) =

@@ -3,9 +3,10 @@
 use super::output::ConfigFile;
 use super::{Failure, Global, console, progress};
 use crate::data::config::ConfigError;
+use crate::data::dataset::SceneError;
 use crate::data::init::{Given, Known, Place, Proposal, ProposalError, propose};
 use crate::data::io::lsd::LsdError;
-use crate::data::io::{atomic, lsd};
+use crate::data::io::{FileError, atomic, lsd};
 use crate::numerics::text::shown;
 use crate::star::BrightnessModel;
 use crate::surface::ObjectiveKind;
@@ -130,7 +131,7 @@ impl KnownArgs {
 
     /// Why there is no proposal; by its option where a value is at fault that was given by one.
     pub fn failure(&self, error: ProposalError) -> Failure {
-        if let ProposalError::Config(ConfigError::Key { key, problem, .. }) = &error {
+        if let ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })) = &error {
             let at_fault =
                 |given: &str| key == given || key.strip_prefix(given).is_some_and(|rest| rest.starts_with('.'));
             let option = self.options().into_iter().find(|(_, value, given, _)| value.is_some() && at_fault(given));
@@ -148,7 +149,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check(None)?;
     let list = &args.observations;
     args.output.spare(&lsd::files(list), None)?;
-    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.clone(), source })?;
+    let bytes = std::fs::read(list).map_err(|source| LsdError::from(FileError::Read { path: list.clone(), source }))?;
     let place = Place {
         config: args.output.path(),
         list,

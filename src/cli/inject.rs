@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use super::report_lines::Report;
+use crate::data::calibrated::of_sets;
 use crate::data::config::{self, DataSetSettings, Settings};
 use crate::data::io::truth::InjectedTruth;
 use crate::data::io::{atomic, lsd, truth};
@@ -57,10 +58,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         args.output
             .spare_below(&folder_of(set), &scene.files(), |name| lsd::is_written(name) || name == truth::FILE)?;
     }
-    let (whole, labels) = scene.whole()?;
+    let whole = scene.whole();
     let orbit = orbit(args, &whole)?;
     let star = &scene.imager.star;
-    let injected = inject(&whole, star, &[orbit]);
+    let injected = of_sets(&scene.imager, &inject(&whole, star, &[orbit]));
     let config = scene.settings.with_observations(|set| format!("{}observations.txt", folder_of(set)));
     let velocity_kms: Vec<f64> =
         whole.profiles.iter().map(|profile| orbit.velocity_kms(star.cycle(profile.time_d))).collect();
@@ -68,11 +69,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let folder = args.output.create()?;
     for (s, set) in scene.settings.sets.iter().enumerate() {
         let of_set = scene.imager.profiles_of(s);
-        let own = Observations { profiles: injected.profiles[of_set.clone()].to_vec() };
+        let own = &injected[s];
         let folder = folder.join(folder_of(set));
         let failed = |e| Failure::failed(format!("{}: cannot be created: {e}", folder.display()));
         std::fs::create_dir_all(&folder).map_err(failed)?;
-        lsd::write_as(&folder, &own, &labels[of_set.clone()], "with an orbit put in")?;
+        lsd::write_as(&folder, own, &scene.data.sets[s].labels, "with an orbit put in")?;
         let truth = InjectedTruth {
             injected: orbit,
             before: scene.truth,
@@ -84,7 +85,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     atomic::write(&folder.join(CONFIG), config::to_text(&config).as_bytes())?;
     let mut report = Report::default()
-        .line("profiles", format!("{}, shifted by up to {largest:.4} km/s", labels.len()))
+        .line("profiles", format!("{}, shifted by up to {largest:.4} km/s", whole.profiles.len()))
         .line("orbit", format!("K {} km/s, Porb/Prot {}, phi {}", orbit.k_kms, orbit.porb_over_prot, orbit.phi));
     for note in outside(&scene.settings, &orbit) {
         report = report.line("note", note);

@@ -115,7 +115,7 @@ fn whole_way(
         return Ok(Vec::new());
     }
     let way = WholeWay::new(scene, shortcut);
-    let search = way.searcher().map_err(Failure::of)?;
+    let search = way.searcher(scene.clone());
     let brief = Brief::Injections(Box::new(way)).to_bytes();
     let meter = Meter::new(global, orbits.len());
     signals.defer();

@@ -12,7 +12,7 @@ pub fn search(global: &Global, path: &Path, scene: &Scene, space: &ParameterSpac
     let spinner = progress::bar(global, None, "searching");
     let began = Instant::now();
     let report = |progress| spinner.set_message(message(progress, began.elapsed().as_secs_f64()));
-    let found = find(&scene.imager, space, scene.settings.search(), &report);
+    let found = find(&scene.imager, space, scene.search_settings(), &report);
     spinner.finish_and_clear();
     found.map_err(|e| Failure::search(path, e))
 }

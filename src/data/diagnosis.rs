@@ -8,12 +8,13 @@
 
 mod change;
 
-use crate::data::scene::{self, Scene};
+use crate::data::scene::Scene;
 use crate::star::observation::Observations;
 use crate::surface::calibration::noise::{FITTED, chi2_at, factor_to_fit};
 use change::{Change, Patient};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Pixels of the maps: enough to see whether a change helps.
 const PIXELS: usize = 500;
@@ -76,14 +77,13 @@ pub struct Tried {
 }
 
 impl Diagnosis {
-    /// Of a scene that no map fits as well as its errors promise, by trying; `whole` are its profiles in their whole
-    /// width, in units of their continuum, if they are at hand. `None` where there is no map at all, and of several
-    /// data sets.
-    pub fn of(scene: &Scene, whole: Option<&Observations>) -> Option<Self> {
+    /// Of a scene that no map fits as well as its errors promise, by trying. `None` where there is no map at all, and of
+    /// several data sets.
+    pub fn of(scene: &Scene) -> Option<Self> {
         if scene.settings.sets.len() > 1 {
             return None;
         }
-        let patient = patient(scene, whole);
+        let patient = patient(scene);
         let unchanged = factor(&patient, 1.0)?;
         let relative = |changes: &[Change]| -> Vec<Option<f64>> {
             changes.par_iter().map(|change| relative_chi2(&patient, change, unchanged)).collect()
@@ -134,7 +134,7 @@ impl Diagnosis {
 }
 
 /// What is examined: coarse maps of the scene, with errors as the continuum has them where that was measured.
-fn patient<'a>(scene: &Scene, whole: Option<&'a Observations>) -> Patient<'a> {
+fn patient(scene: &Scene) -> Patient {
     let mut settings = scene.settings.clone();
     settings.imaging.pixels = settings.imaging.pixels.min(PIXELS);
     let (mut scale, mut correlated_bins) = (1.0, 1.0);
@@ -146,7 +146,8 @@ fn patient<'a>(scene: &Scene, whole: Option<&'a Observations>) -> Patient<'a> {
     }
     let mut observations = scene.observations.clone();
     scale_errors(&mut observations, scale);
-    Patient { settings, observations, whole, correlated_bins }
+    let whole = Arc::new(scene.whole_over_continuum());
+    Patient { settings, observations, whole, seasons: scene.measured.seasons.clone(), correlated_bins }
 }
 
 fn scale_errors(observations: &mut Observations, factor: f64) {
@@ -158,7 +159,7 @@ fn factor(patient: &Patient, start: f64) -> Option<f64> {
     let imager = |factor: f64| {
         let mut observations = patient.observations.clone();
         scale_errors(&mut observations, start * factor);
-        scene::imager(&patient.settings, &[observations])
+        patient.imager(observations)
     };
     factor_to_fit(patient.settings.values, patient.correlated_bins, imager).ok()?.ok().map(|found| start * found)
 }
@@ -173,7 +174,7 @@ fn helps(unchanged: f64, changed: f64) -> bool {
 fn relative_chi2(patient: &Patient, change: &Change, unchanged: f64) -> Option<f64> {
     let mut changed = change.applied(patient)?;
     scale_errors(&mut changed.observations, unchanged);
-    let imager = scene::imager(&changed.settings, &[changed.observations]).ok()?;
+    let imager = changed.imager(changed.observations.clone()).ok()?;
     chi2_at(&imager, changed.settings.values, changed.correlated_bins).ok().map(|chi2| chi2 / FITTED)
 }
 

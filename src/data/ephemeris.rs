@@ -2,6 +2,7 @@
 
 use crate::data::config::{ConfigError, Settings};
 use crate::model::{Clock, Elements, Parameter, Prior, period_prior};
+use crate::star::observation::Observations;
 
 /// Largest error of the phase at the time of the data (orbital cycles).
 pub const LARGEST_PHASE_ERROR: f64 = 0.1;
@@ -43,7 +44,10 @@ impl Ephemeris {
     ///
     /// # Errors
     /// A config that names the conjunction.
-    pub fn check(settings: &Settings, [first, last]: [f64; 2]) -> Result<(), ConfigError> {
+    pub fn check(settings: &Settings, parts: &[Observations]) -> Result<(), ConfigError> {
+        let times = || parts.iter().flat_map(Observations::times_d);
+        let ends = times().reduce(f64::min).zip(times().reduce(f64::max));
+        let Some((first, last)) = ends else { return Ok(()) };
         for ephemeris in Elements::PLANETS.iter().filter_map(|of| Ephemeris::of(settings, of)) {
             let worst = if ephemeris.phase_error(first) > ephemeris.phase_error(last) { first } else { last };
             let error = ephemeris.phase_error(worst);

@@ -104,8 +104,8 @@ fn known(input: &Input, line: Option<&LocalLineFile>) -> Known {
         known.line_sigma_kms = given(digits(line.sigma_kms(), 1e-4));
         known.line_gamma_kms = line.gamma_kms().and_then(|gamma| given(digits(gamma, 1e-4).max(1e-4)));
         let width = match input.measured_strength.value {
-            true => EquivalentWidth::Auto,
-            false => EquivalentWidth::Fixed(digits(line.equivalent_width_kms(), 1e-4)),
+            true => EquivalentWidth::AUTO,
+            false => EquivalentWidth::Number(digits(line.equivalent_width_kms(), 1e-4)),
         };
         known.equivalent_width = Some(Given { value: width, by: here });
     }

@@ -110,7 +110,7 @@ fn tried(star: &Star, pool: &Pool) -> Result<End, Box<dyn Error>> {
         }
         Run::resume(&scene, folder, None, pool)?
     } else {
-        let settings = scene.settings.search();
+        let settings = scene.search_settings();
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ())?;
         Run::in_memory(&scene, found, StartFrom::Optimum, pool)?.kept_in(folder, true)?
     };
@@ -189,7 +189,7 @@ pub fn learn(brief: &[u8]) -> Result<crate::runs::cluster::Answer<'static>, crat
             Box::new(move |question, _| answer(question))
         }
         Brief::Injections(way) => {
-            let search = way.searcher()?;
+            let search = way.searcher(way.scene()?);
             Box::new(move |question, _| {
                 search(&orbit_from_bytes(question).expect("a rank of this very program asks")).to_bytes()
             })

@@ -122,7 +122,7 @@ impl<'a> Maps<'a> {
 
 /// Why no map of `scene` fits, by trying.
 fn diagnosis(scene: &Scene) -> Option<Diagnosis> {
-    Diagnosis::of(scene, scene.whole_over_continuum().as_ref())
+    Diagnosis::of(scene)
 }
 
 /// The numbers of the maps.

@@ -1,6 +1,6 @@
 //! What `simulate` makes: profiles of a spotted star with a planet, one data set or several, and the truth behind them.
 
-use crate::data::config::{Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource};
+use crate::data::config::{Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::light_curve;
 use crate::data::io::lsd::{self, LsdError};
@@ -85,10 +85,7 @@ impl Simulated {
     /// [`SimulateError`].
     pub fn of(config: &Config) -> Result<Self, SimulateError> {
         let settings = config.settings()?;
-        let simulation = |set: &DataSetSettings| match &set.source {
-            ObservationSource::Simulate(simulation) => Some(simulation.clone()),
-            ObservationSource::Files { .. } => None,
-        };
+        let simulation = |set: &DataSetSettings| set.simulation().cloned();
         let Some(simulations) = settings.sets.iter().map(simulation).collect::<Option<Vec<_>>>() else {
             return Err(SimulateError::Nothing { config: settings.path, key: settings.sets[0].key.clone() });
         };
@@ -97,11 +94,12 @@ impl Simulated {
             return Err(SimulateError::ObservedLight { config: settings.path, key: curve.key.clone() });
         }
         let scene = Scene::new(config)?;
-        let light = |curve: &LightCurveSettings| Ok((format!("{}.csv", curve.name), scene.light_curve(curve)?));
-        let light_curves = scene.settings.light_curves.iter().map(light).collect::<Result<_, SceneError>>()?;
+        let light =
+            |(curve, measured): (&LightCurveSettings, &Vec<Flux>)| (format!("{}.csv", curve.name), measured.clone());
+        let light_curves = settings.light_curves.iter().zip(&scene.data.light_curves).map(light).collect();
         let set = |(s, simulation): (usize, Simulation)| SimulatedSet {
             name: settings.sets[s].name.clone(),
-            observations: Observations { profiles: scene.observations.profiles[scene.imager.profiles_of(s)].to_vec() },
+            observations: scene.data.sets[s].observations.clone(),
             truth: scene.truth_of(&simulation),
             simulation,
         };

@@ -67,26 +67,9 @@ impl Observations {
         Ok(())
     }
 
-    /// The bins whose centres lie between two velocities (km/s), both included.
-    ///
-    /// # Errors
-    /// A profile that has none there, in words.
-    pub fn within(&self, (low, high): (f64, f64)) -> Result<Self, String> {
-        let cut = |(k, profile): (usize, &Profile)| {
-            let inside = |j: &usize| (low..=high).contains(&profile.velocity_kms(*j));
-            let mut bins = (0..profile.intensity.len()).filter(inside);
-            let first = bins.next().ok_or_else(|| format!("profile {k} has no bin from {low} to {high} km/s"))?;
-            let bins = first..bins.next_back().unwrap_or(first) + 1;
-            Ok(Profile {
-                time_d: profile.time_d,
-                first_velocity_kms: profile.velocity_kms(first),
-                step_kms: profile.step_kms,
-                intensity: profile.intensity[bins.clone()].to_vec(),
-                sigma: profile.sigma[bins].to_vec(),
-            })
-        };
-        let profiles = self.profiles.iter().enumerate().map(cut).collect::<Result<_, String>>()?;
-        Ok(Observations { profiles })
+    /// Those of several data sets, one after the other.
+    pub fn joined(parts: Vec<Observations>) -> Self {
+        Observations { profiles: parts.into_iter().flat_map(|part| part.profiles).collect() }
     }
 
     /// Width of the bins of the first profile (km/s), which all profiles of a data set share; NaN where there is none.

@@ -78,7 +78,7 @@ fn copy(desk: &Desk, from: &str, to: &str) {
 
 /// The posterior that `sample` would draw from.
 fn sampled(scene: &Scene) -> Posterior {
-    let found = find(&scene.imager, &scene.space, scene.settings.search(), &|_| ()).unwrap();
+    let found = find(&scene.imager, &scene.space, scene.search_settings(), &|_| ()).unwrap();
     Posterior::behind(&*found.posterior).unwrap().clone()
 }
 

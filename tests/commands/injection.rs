@@ -2,7 +2,7 @@
 //! other commands make of it.
 
 use crate::desk::{Desk, says, star};
-use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::data::io::lsd;
 use dimcmc::internals::star::observation::Observations;
 use serde_json::{Value, json};
 
@@ -27,7 +27,7 @@ fn desk(snr: Value) -> Desk {
 }
 
 fn read(desk: &Desk, folder: &str) -> Observations {
-    lsd::read(&desk.path(folder).join("observations.txt"), &ReadOptions::default()).unwrap().observations
+    lsd::read(&desk.path(folder).join("observations.txt")).unwrap().observations
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! profiles that are noisier weigh less, and everything after it is as with the same numbers written down.
 
 use crate::desk::{Desk, says, star};
-use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::data::io::lsd;
 use dimcmc::internals::star::observation::Observations;
 use serde_json::{Value, json};
 
@@ -19,7 +19,7 @@ fn desk(change: impl Fn(&mut Observations)) -> Desk {
     }));
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
     let list = desk.path("data").join("observations.txt");
-    let mut observations = lsd::read(&list, &ReadOptions::default()).unwrap().observations;
+    let mut observations = lsd::read(&list).unwrap().observations;
     change(&mut observations);
     lsd::write(&desk.path("data"), &observations).unwrap();
     desk.set("/observations", observed("auto", "quoted"));
@@ -233,4 +233,28 @@ fn the_target_is_where_velocities_stop_shrinking() {
     assert_eq!(fit["config"]["imaging"]["chi2_target"], "auto");
     desk.succeed(&["map", "config.json", "--out", "again"]);
     assert_eq!(desk.read("map/fit.json"), desk.read("again/fit.json"));
+}
+
+/// Whatever is measured on them, and whoever needs them in their whole width.
+#[test]
+fn a_profile_is_opened_once_in_a_command() {
+    let desk = desk(|_| ());
+    let config = desk.path("config.json");
+    let opened =
+        || -> Vec<usize> { (0..20).map(|k| lsd::times_opened(&desk.path(&format!("data/p{k:03}.prof")))).collect() };
+    let orbit = ["--k-kms", "0.1", "--porb-over-prot", "2", "--phi", "0"];
+    for (command, options) in [
+        ("map", &[][..]),
+        ("periodogram", &["--draws", "100"]),
+        ("limits", &["--periods", "2", "--full", "2", "--draws", "100"]),
+        ("inject", &orbit),
+    ] {
+        let before = opened();
+        let out = desk.path(command);
+        let paths = ["dimcmc", "-q", command, config.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        // in this process, which counts
+        let code = dimcmc::command_line(paths.iter().chain(options).map(Into::into));
+        assert_eq!(code, 0, "{command}");
+        assert!(opened().iter().zip(before).all(|(after, before)| after - before == 1), "{command}: {:?}", opened());
+    }
 }

@@ -19,11 +19,11 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     (
         "inference",
         &["first_look", "evidence", "detection", "surrogate", "search"],
-        &["numerics", "star", "maxent", "field", "planets", "sampling", "model", "surface", "data"],
+        &["numerics", "star", "maxent", "field", "planets", "sampling", "model", "surface"],
     ),
     (
         "data",
-        &["simulate", "io", "config", "ephemeris", "scene", "diagnosis", "init", "import"],
+        &["simulate", "io", "config", "dataset", "ephemeris", "calibrated", "scene", "diagnosis", "init", "import"],
         &["numerics", "star", "maxent", "field", "planets", "sampling", "model", "surface", "inference"],
     ),
     (

@@ -1,10 +1,15 @@
 //! Configs: those that ship resolve, their resolved form is stable, and every mistake gets one line that names file and
 //! key.
 
-use dimcmc::internals::data::config::{self, EquivalentWidth, ObservationSource, Settings};
+use dimcmc::internals::data::calibrated::star_for;
+use dimcmc::internals::data::config::{self, Config, ConfigError, EquivalentWidth, ObservationSource, Settings};
 use dimcmc::internals::model::{Parameter, Prior};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+
+fn load(path: &Path) -> Result<Settings, ConfigError> {
+    Config::load(path)?.settings()
+}
 
 fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name)
@@ -43,7 +48,7 @@ fn message(config: &Value) -> String {
 
 #[test]
 fn the_demo_resolves() {
-    let settings = config::load(&shipped("demo.json")).unwrap();
+    let settings = load(&shipped("demo.json")).unwrap();
     let parameters: Vec<Parameter> = settings.free.iter().map(|f| f.parameter).collect();
     assert_eq!(parameters, [Parameter::K, Parameter::PorbOverProt, Parameter::Phi]);
     assert_eq!(settings.free[2].prior, Prior::Periodic);
@@ -63,10 +68,10 @@ fn the_demo_resolves() {
 
 #[test]
 fn the_seven_dimensional_config_starts_off_the_truth() {
-    let settings = config::load(&shipped("paper_7d.json")).unwrap();
+    let settings = load(&shipped("paper_7d.json")).unwrap();
     assert_eq!(settings.free.len(), 7);
     let ObservationSource::Simulate(simulation) = &settings.sets[0].source else { panic!() };
-    let demo = config::load(&shipped("demo.json")).unwrap();
+    let demo = load(&shipped("demo.json")).unwrap();
     assert_eq!(simulation.truth, demo.values);
     // Widths of `docs/method.md` section 5; gamma times Omega_eq for the shear.
     let sigma = [0.0106, 0.073, 0.041, 0.00038 * 2.0944, 0.00093 * 2.0944, 0.46, 0.022];
@@ -79,8 +84,8 @@ fn the_seven_dimensional_config_starts_off_the_truth() {
 
 #[test]
 fn the_landscape_of_the_paper_is_of_the_same_data() {
-    let settings = config::load(&shipped("paper_grid.json")).unwrap();
-    let seven = config::load(&shipped("paper_7d.json")).unwrap();
+    let settings = load(&shipped("paper_grid.json")).unwrap();
+    let seven = load(&shipped("paper_7d.json")).unwrap();
     assert_eq!((&settings.sets[0].source, &settings.star), (&seven.sets[0].source, &seven.star));
     let ObservationSource::Simulate(simulation) = &settings.sets[0].source else { panic!() };
     assert_eq!(settings.values, simulation.truth);
@@ -91,15 +96,19 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 
 #[test]
 fn lo_peg_resolves() {
-    let settings = config::load(&shipped("lopeg.json")).unwrap();
-    assert_eq!(settings.sets[0].equivalent_width, EquivalentWidth::Auto);
-    let ObservationSource::Files { path, options, .. } = &settings.sets[0].source else { panic!() };
+    let settings = load(&shipped("lopeg.json")).unwrap();
+    assert_eq!(settings.sets[0].equivalent_width, EquivalentWidth::AUTO);
+    let ObservationSource::Files { path, velocity_range_kms, sigma_scale, .. } = &settings.sets[0].source else {
+        panic!()
+    };
     assert!(path.ends_with("configs/../../shared/data/lopeg/observations.txt"));
-    assert_eq!((options.velocity_range_kms, options.sigma_scale), (Some((-68.0, 68.0)), 1.0));
+    assert_eq!((*velocity_range_kms, *sigma_scale), (Some((-68.0, 68.0)), 1.0));
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
-        let data = dimcmc::internals::data::io::lsd::read(list, options).unwrap().observations;
-        assert!((settings.star_for(&settings.sets[0], &data).unwrap().line.equivalent_width_kms - 2.6700).abs() < 1e-3);
+        let data = dimcmc::internals::data::io::lsd::read(list).unwrap().within(*velocity_range_kms, 1.0).unwrap();
+        assert!(
+            (star_for(&settings, &settings.sets[0], &data).unwrap().line.equivalent_width_kms - 2.6700).abs() < 1e-3
+        );
     }
 }
 
@@ -456,7 +465,7 @@ fn text_that_is_no_config() {
             .starts_with("x.json: unknown key star.a\\n\\u{7}b: must be one of ")
     );
     assert!(error(&b"[".repeat(100_000)).len() < 500);
-    let absent = config::load(Path::new("/nowhere/x.json")).unwrap_err().to_string();
+    let absent = load(Path::new("/nowhere/x.json")).unwrap_err().to_string();
     assert!(absent.starts_with("/nowhere/x.json: cannot read: No such file"), "{absent}");
 }
 

@@ -250,7 +250,7 @@ fn configs_resolve() {
     for entry in std::fs::read_dir(root().join("configs")).unwrap() {
         let path = entry.unwrap().path();
         if !path.to_str().unwrap().ends_with("schema.json") {
-            config::load(&path).unwrap().require_free().unwrap();
+            config::Config::load(&path).unwrap().settings().unwrap().require_free().unwrap();
         }
     }
 }

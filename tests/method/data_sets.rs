@@ -178,16 +178,15 @@ fn the_misfit_of_maps_has_its_gradient_where_contrasts_differ() {
 #[test]
 fn a_zero_point_that_is_not_known_is_found_and_held() {
     let both = scene(&config());
-    let HeldZeroPoint { value_kms, sigma_kms } = both.settings.sets[1].held.expect("a zero point");
+    let HeldZeroPoint { value_kms, sigma_kms } = both.measured.sets[1].zero_point.expect("a zero point");
     println!("{value_kms} +- {sigma_kms}");
     assert!(sigma_kms < 0.1 && (value_kms - OFFSET_KMS).abs() < 3.0 * sigma_kms, "{value_kms} +- {sigma_kms}");
-    assert!(both.settings.sets[0].held.is_none());
+    assert!(both.measured.sets[0].zero_point.is_none());
     assert_eq!(both.observations.profiles.len(), 16);
     assert_eq!(both.imager.profiles_of(1), 8..16);
     // an orbit put in finds the zero point held, and does not look for it again
-    let whole = both.whole().unwrap().0;
-    let injected = both.injected(&whole, &[]).unwrap();
-    assert_eq!(injected.settings.sets[1].held, both.settings.sets[1].held);
+    let injected = both.injected(&[]).unwrap();
+    assert_eq!(injected.measured, both.measured);
     let firsts = |scene: &Scene| scene.imager.profiles().map(|profile| profile.1).collect::<Vec<f64>>();
     // held in one step rather than in several
     assert!(firsts(&injected).iter().zip(firsts(&both)).all(|(a, b)| (a - b).abs() < 1e-12));

@@ -1,12 +1,8 @@
 //! LSD profiles in and out: the real formats, round trips, and one clear line for everything that can be wrong.
 
-use dimcmc::internals::data::io::lsd::{self, ReadOptions};
+use dimcmc::internals::data::io::lsd;
 use dimcmc::internals::star::observation::{Observations, Profile};
 use std::path::{Path, PathBuf};
-
-fn options(range: Option<(f64, f64)>) -> ReadOptions {
-    ReadOptions { velocity_range_kms: range, ..ReadOptions::default() }
-}
 
 /// Two profiles of 11 bins and their list.
 fn folder() -> tempfile::TempDir {
@@ -23,20 +19,24 @@ fn profile(bins: usize) -> String {
     format!("title\n {bins} 2\n{rows}")
 }
 
-fn read(dir: &Path, options: &ReadOptions) -> Result<Observations, String> {
-    lsd::read(&dir.join("observations.txt"), options).map(|d| d.observations).map_err(|e| e.to_string())
+/// First and last velocity used.
+type Range = Option<(f64, f64)>;
+
+fn read(dir: &Path, range: Range, sigma_scale: f64) -> Result<Observations, String> {
+    let used = lsd::read(&dir.join("observations.txt")).and_then(|all| all.within(range, sigma_scale));
+    used.map_err(|e| e.to_string())
 }
 
 /// The message for a folder in which `file` was changed, without the path of the folder.
 fn message(file: &str, change: impl Fn(String) -> String) -> String {
-    message_with(file, change, &options(None))
+    message_with(file, change, None)
 }
 
-fn message_with(file: &str, change: impl Fn(String) -> String, options: &ReadOptions) -> String {
+fn message_with(file: &str, change: impl Fn(String) -> String, range: Range) -> String {
     let dir = folder();
     let path = dir.path().join(file);
     std::fs::write(&path, change(std::fs::read_to_string(&path).unwrap())).unwrap();
-    let message = read(dir.path(), options).unwrap_err();
+    let message = read(dir.path(), range, 1.0).unwrap_err();
     assert!(!message.contains('\n'), "{message}");
     message.replace(&format!("{}/", dir.path().display()), "")
 }
@@ -44,7 +44,7 @@ fn message_with(file: &str, change: impl Fn(String) -> String, options: &ReadOpt
 #[test]
 fn vrad_is_subtracted_before_the_cut() {
     let dir = folder();
-    let read = read(dir.path(), &ReadOptions { velocity_range_kms: Some((-5.4, 5.4)), sigma_scale: 0.5 }).unwrap();
+    let read = read(dir.path(), Some((-5.4, 5.4)), 0.5).unwrap();
     assert_eq!(read.times_d(), [1.5, 2.5]);
     assert!((read.step_kms() - 1.8).abs() < 1e-12);
     let [a, b] = &read.profiles[..] else { panic!() };
@@ -67,7 +67,7 @@ fn what_is_written_reads_back() {
     let written = Observations { profiles: profiles.collect() };
     let dir = tempfile::tempdir().unwrap();
     lsd::write(dir.path(), &written).unwrap();
-    let back = read(dir.path(), &options(Some((-50.4, 50.4)))).unwrap();
+    let back = read(dir.path(), Some((-50.4, 50.4)), 1.0).unwrap();
     assert!((back.step_kms() - 1.8).abs() < 1e-9);
     for (w, b) in written.profiles.iter().zip(&back.profiles) {
         assert_eq!(w.time_d, b.time_d);
@@ -82,12 +82,12 @@ fn what_is_written_reads_back() {
 fn the_fingerprint_is_that_of_the_bytes() {
     let dir = folder();
     let list = dir.path().join("observations.txt");
-    let hash = |options: &ReadOptions| lsd::read(&list, options).unwrap().sha256;
-    let before = hash(&options(None));
+    let hash = || lsd::read(&list).unwrap().sha256.unwrap();
+    let before = hash();
     assert_eq!(before.len(), 64);
-    assert_eq!(before, hash(&options(Some((-5.4, 5.4)))));
+    assert_eq!(before, hash());
     std::fs::write(dir.path().join("b.prof"), profile(11).replace("title", "other")).unwrap();
-    assert_ne!(before, hash(&options(None)));
+    assert_ne!(before, hash());
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn faults_of_the_list_name_its_line() {
         assert!(message.starts_with(expected), "{message}");
     }
     assert_eq!(message(list, |_| "# nothing\n\n".into()), "observations.txt: lists no profile");
-    let absent = lsd::read(&PathBuf::from("/nowhere/observations.txt"), &options(None)).unwrap_err().to_string();
+    let absent = lsd::read(&PathBuf::from("/nowhere/observations.txt")).unwrap_err().to_string();
     assert!(absent.starts_with("/nowhere/observations.txt: cannot read: No such file"), "{absent}");
 }
 
@@ -139,7 +139,7 @@ fn faults_of_a_profile_name_its_line() {
 
 #[test]
 fn a_velocity_range_must_hold_five_bins() {
-    let with = |lo, hi| message_with("b.prof", |text| text, &options(Some((lo, hi))));
+    let with = |lo, hi| message_with("b.prof", |text| text, Some((lo, hi)));
     assert_eq!(
         with(-3.0, 3.0),
         "a.prof: velocity range [-3, 3] km/s holds 3 bins, at least 5 are needed; the data reach \
@@ -178,7 +178,7 @@ fn no_text_makes_it_panic() {
         std::fs::write(dir.path().join("a.prof"), &mutated).unwrap();
         std::fs::write(dir.path().join("b.prof"), &base).unwrap();
         std::fs::write(dir.path().join("observations.txt"), "a.prof 0\nb.prof 1\n").unwrap();
-        if let Err(message) = read(dir.path(), &options(Some((-6.0, 6.0)))) {
+        if let Err(message) = read(dir.path(), Some((-6.0, 6.0)), 1.0) {
             assert!(!message.contains('\n'), "{message}");
         }
     }
@@ -187,7 +187,7 @@ fn no_text_makes_it_panic() {
 #[test]
 fn the_oracle_s_profiles_are_read() {
     let list = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/oracle/observations.txt");
-    let data = lsd::read(&list, &options(Some((-50.4, 50.4)))).unwrap().observations;
+    let data = lsd::read(&list).unwrap().within(Some((-50.4, 50.4)), 1.0).unwrap();
     assert_eq!((data.profiles.len(), data.len()), (50, 50 * 57));
     assert_eq!(data.profiles[1].time_d, 0.18);
 }
@@ -224,15 +224,15 @@ fn times_that_are_not_days_of_one_count_are_refused_by_line() {
         (&[2456886.4], 1, "the only profile of the list"),
     ];
     for (times, line, expected) in cases {
-        let message = read(listed(&list_of(times)).path(), &options(None)).unwrap_err();
+        let message = read(listed(&list_of(times)).path(), None, 1.0).unwrap_err();
         assert!(message.contains(&format!("observations.txt:{line}: ")) && message.contains(expected), "{message}");
         assert!(!message.contains('\n'), "{message}");
     }
     for twice in ["a.prof 1.5\nb.prof 2.5\na.prof 3.5\n", "a.prof 1.5\nb.prof 2.5\n./a.prof 3.5 -1.0\n"] {
-        let message = read(listed(twice).path(), &options(None)).unwrap_err();
+        let message = read(listed(twice).path(), None, 1.0).unwrap_err();
         assert!(message.contains("observations.txt:3: ") && message.contains("a.prof is listed in line 1 already"));
     }
-    let message = read(listed("a.prof 0 -19800\nb.prof 1 -19800\n").path(), &options(None)).unwrap_err();
+    let message = read(listed("a.prof 0 -19800\nb.prof 1 -19800\n").path(), None, 1.0).unwrap_err();
     assert!(message.contains("observations.txt:1: radial velocity -1.98e4 is beyond sense in km/s"), "{message}");
 }
 
@@ -242,11 +242,11 @@ fn times_that_people_have_are_taken() {
     let cases: [&[f64]; 6] =
         [&[0.0, 0.18], &[-3.5, 0.0, 700.0], &[2456886.4, 2456901.6], &[56886.4, 58886.4], &season[..2], &season];
     for times in &cases[..5] {
-        read(listed(&list_of(times)).path(), &options(None)).unwrap();
+        read(listed(&list_of(times)).path(), None, 1.0).unwrap();
     }
     // once a year is no way to observe a rotating star, but with a second visit in one of the years it is taken
     let visited: Vec<f64> = season.iter().copied().chain([2450003.0]).collect();
-    read(listed(&list_of(&visited)).path(), &options(None)).unwrap();
+    read(listed(&list_of(&visited)).path(), None, 1.0).unwrap();
 }
 
 /// A line of 41 bins, `I`, `sigma` and `V` at each, by what writes one row.
@@ -260,14 +260,14 @@ fn line(row: impl Fn(f64, f64, f64) -> String) -> String {
 }
 
 /// A data set of `text` and the same one at another time.
-fn read_text(text: impl AsRef<[u8]>) -> Result<lsd::DataSet, String> {
+fn read_text(text: impl AsRef<[u8]>) -> Result<lsd::ProfileSet, String> {
     let dir = tempfile::tempdir().unwrap();
     for name in ["a.lsd", "b.lsd"] {
         std::fs::write(dir.path().join(name), text.as_ref()).unwrap();
     }
     let list = dir.path().join("observations.txt");
     std::fs::write(&list, "a.lsd 0\nb.lsd 1\n").unwrap();
-    lsd::read(&list, &options(None)).map_err(|e| e.to_string().replace(&format!("{}/", dir.path().display()), ""))
+    lsd::read(&list).map_err(|e| e.to_string().replace(&format!("{}/", dir.path().display()), ""))
 }
 
 /// LSDpy, SpecpolFlow, iLSD and CSV, as their sources write them, and what people do to them.
@@ -370,7 +370,7 @@ fn faults_of_other_formats_name_their_line() {
 fn the_profiles_of_lo_peg_are_read() {
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
-        let data = lsd::read(list, &options(Some((-90.0, 90.0)))).unwrap().observations;
+        let data = lsd::read(list).unwrap().within(Some((-90.0, 90.0)), 1.0).unwrap();
         assert_eq!((data.profiles.len(), data.profiles[0].intensity.len()), (16, 100));
         assert!((data.mean_equivalent_width_kms() - 2.7175).abs() < 1e-3);
     }

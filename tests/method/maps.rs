@@ -26,18 +26,21 @@ fn config(spots: &serde_json::Value, cycles: &[f64]) -> Config {
 }
 
 /// Where profiles are given there is nothing to simulate.
-fn with_profiles(profiles: Observations, jitter_kms: f64) -> Scene {
+fn of_profiles(jitter_kms: f64) -> Config {
     let star = json!({
         "rotation_period_d": 1.0, "inclination_deg": 50.0, "vsini_kms": 25.0, "contrast": 0.1,
         "line": { "sigma_kms": 2.5, "equivalent_width_kms": 5.8 }
     });
-    let config = Config::default()
+    Config::default()
         .with("star", star)
         .with("observations.path", "profiles")
         .with("observations.velocity_jitter_kms", jitter_kms)
         .with("imaging.pixels", 300)
-        .with("imaging.objective", "marginal-likelihood");
-    Scene::with_profiles(&config, profiles).unwrap()
+        .with("imaging.objective", "marginal-likelihood")
+}
+
+fn with_profiles(profiles: Observations) -> Scene {
+    Scene::with_profiles(&of_profiles(0.0), profiles).unwrap()
 }
 
 /// Of a spot at longitude 40 that fades, and one at longitude 220 that grows, at a share of the time between.
@@ -57,7 +60,7 @@ fn changing_star() -> (Scene, [Vec<f64>; 2]) {
     let scenes: Vec<Scene> = (0..cycles.len()).map(of).collect();
     let truth = [0, last].map(|k| scenes[k].true_spot_filling().unwrap());
     let profiles = scenes.iter().map(|scene| scene.observations.profiles[0].clone()).collect();
-    (with_profiles(Observations { profiles }, 0.0), truth)
+    (with_profiles(Observations { profiles }), truth)
 }
 
 /// Of the upper half of the star and a little more: what is below is hardly seen.
@@ -120,10 +123,8 @@ fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
     let whole = Scene::new(&whole).unwrap();
     let truth = whole.true_spot_filling().unwrap();
     let fit = |jitter_kms: f64| {
-        let mut scene = with_profiles(whole.observations.clone(), 0.0);
-        scene.settings.imaging.spot_lifetime_d = dimcmc::internals::data::config::Hyperparameter::Static;
-        scene.settings.imaging.spot_slope = dimcmc::internals::data::config::Hyperparameter::Known(0.9);
-        scene.settings.velocity_jitter = dimcmc::internals::data::config::VelocityJitter::Known(jitter_kms);
+        let config = of_profiles(jitter_kms).with("imaging.spot_lifetime_d", "static").with("imaging.spot_slope", 0.9);
+        let scene = Scene::with_profiles(&config, whole.observations.clone()).unwrap();
         let fit = scene.maps(None).unwrap();
         let like = correlation(&seen(&scene, map_at(&fit, 0)), &seen(&scene, &truth));
         (fit, like)
@@ -145,7 +146,7 @@ fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
 fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
     // profiles of a faster star: no spots explain them
     let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 40.0).with("observations.simulate.snr", 5000.0);
-    let scene = with_profiles(Scene::new(&other).unwrap().observations, 0.0);
+    let scene = with_profiles(Scene::new(&other).unwrap().observations);
     let status = |times: Option<&[f64]>| scene.maps(times).map(|_| ()).map_err(|error| error.status());
     assert_eq!(status(None), Err(Some("not-settled")));
     for times in [&[][..], &[f64::NAN], &[1.0, f64::INFINITY], &[2.0, 1.0, 2.0], &[1e13]] {
@@ -154,6 +155,6 @@ fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
     assert!(matches!(scene.maps(Some(&[])), Err(NoMaps::Times(_))));
     // of one that is less fast maps are found, and said to be no good
     let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 32.0).with("observations.simulate.snr", 5000.0);
-    let fit = with_profiles(Scene::new(&other).unwrap().observations, 0.0).maps(None).unwrap();
+    let fit = with_profiles(Scene::new(&other).unwrap().observations).maps(None).unwrap();
     assert!(fit.warnings.iter().any(|warning| warning.contains("do not explain the profiles")), "{:?}", fit.warnings);
 }

@@ -1,9 +1,10 @@
 //! Simulated observations and first-moment velocities, against the oracle's star and against statistics.
 
 use crate::common::{self, numbers, oracle};
-use dimcmc::internals::data::config::{self, Config};
+use dimcmc::internals::data::calibrated::fingerprint;
+use dimcmc::internals::data::config::{self, Config, ConfigError, Settings};
 use dimcmc::internals::data::io::provenance::Season;
-use dimcmc::internals::data::scene::{Scene, fingerprint};
+use dimcmc::internals::data::scene::Scene;
 use dimcmc::internals::data::simulate::{RandomSpots, SIGMA_WITHOUT_NOISE, Simulation};
 use dimcmc::internals::model::Parameter;
 use dimcmc::internals::star::observation::{Observations, Profile};
@@ -13,9 +14,13 @@ use serde_json::json;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
+fn load(path: &Path) -> Result<Settings, ConfigError> {
+    Config::load(path)?.settings()
+}
+
 /// The demo's star, which is the oracle's, with `change` made to its simulation.
 fn demo(change: impl Fn(&mut Simulation)) -> Observations {
-    let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
+    let settings = load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
     let config::ObservationSource::Simulate(mut simulation) = settings.sets[0].source.clone() else { panic!() };
     change(&mut simulation);
     simulation.observe(&settings.star)
@@ -110,7 +115,7 @@ fn zero_points_are_velocities_of_their_own() {
             s.velocity_jitter_kms = jitter;
         })
     };
-    let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
+    let settings = load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
     let config::ObservationSource::Simulate(simulation) = settings.sets[0].source.clone() else { panic!() };
     assert!(simulation.zero_points_kms().is_empty());
     let zero_points = Simulation { velocity_jitter_kms: 0.5, ..simulation }.zero_points_kms();
@@ -181,7 +186,7 @@ fn brightness_of_spots_and_faculae() {
     let disc = |longitude: f64| Disc { longitude, latitude: 0.3, radius: 0.4 };
     let spot = |longitude: f64, filling: f64| Spot { longitude, latitude: 0.3, radius: 0.4, filling, life: None };
     let facula = |longitude: f64, excess: f64| Facula { disc: disc(longitude), excess };
-    let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
+    let settings = load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
     let config::ObservationSource::Simulate(mut simulation) = settings.sets[0].source.clone() else { panic!() };
     let grid = SurfaceGrid::equal_area(2000, Quadrature::Gauss2x2);
     simulation.spots = vec![spot(1.0, 0.6), spot(3.0, 1.0)];
@@ -228,7 +233,7 @@ fn passing(peak_d: f64, lifetime_d: f64, winding: f64) -> Spot {
 }
 
 fn demo_simulation() -> (Simulation, config::Settings) {
-    let settings = config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
+    let settings = load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json")).unwrap();
     let config::ObservationSource::Simulate(simulation) = settings.sets[0].source.clone() else { panic!() };
     (simulation, settings)
 }

@@ -38,7 +38,7 @@ fn a_surface_other_than_the_configs_is_found() {
             "equivalent_width_kms": uniform(3.0, 9.0),
         });
     });
-    let found = search::find(&scene.imager, &scene.space, scene.settings.search(), &|_| ()).unwrap();
+    let found = search::find(&scene.imager, &scene.space, scene.search_settings(), &|_| ()).unwrap();
     let optimum = &found.optimum;
     let names = scene.space.names();
     assert_eq!(names, ["limb_darkening", "line_sigma_kms", "equivalent_width_kms"]);

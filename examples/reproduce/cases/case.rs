@@ -84,7 +84,7 @@ impl Case {
         let ends = found.attempts.iter().filter_map(|attempt| attempt.end.as_ref().ok());
         let mut outcome = Outcome {
             truth: scene.truth.map(|values| by_name(&values)).unwrap_or_default(),
-            chi2_target: Some(scene.settings.imaging.chi2_target.value()),
+            chi2_target: Some(scene.chi2_target),
             lambda_data: image.map(|image| image.image.lambda * data),
             spottedness: image.map(|image| image.spottedness),
             search_reconstructions: ends.map(|end| end.evaluations).sum::<usize>() + found.optimum.evaluations,
@@ -143,7 +143,7 @@ impl Nodes {
 
 /// The star of a config, and the best parameters there; its target chi2 is raised if it is out of reach.
 pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found), Failure> {
-    let found = |scene: Scene| match search::find(&scene.imager, &scene.space, scene.settings.search(), &|_| ()) {
+    let found = |scene: Scene| match search::find(&scene.imager, &scene.space, scene.search_settings(), &|_| ()) {
         Ok(found) => Ok(Ok((scene, found))),
         Err(SearchError::Reference(error)) => Ok(Err(error)),
         Err(error) => Err(Failure::from(error)),
@@ -156,7 +156,7 @@ pub fn search(config: &Value, path: &Path, pool: &Pool) -> Result<(Scene, Found)
         return Err(last.into());
     }
     let first = Scene::new(&Config::at(config.clone(), path))?;
-    let target = first.settings.imaging.chi2_target.value();
+    let target = first.chi2_target;
     let reached = Reference::provisional(&first.imager, first.settings.values, target)?.solution.chi2;
     let reached = reached / first.imager.data.depth.len() as f64;
     for factor in ABOVE_REACHED {
@@ -238,10 +238,7 @@ fn periodogram(scene: &Scene, draws: usize) -> Result<(Route, f64), Failure> {
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
     let settings = DetectionSettings {
         search: PeriodSearch { draws, seed: 1 },
-        ..DetectionSettings::of(
-            SurfaceSettings::spottedness(scene.settings.imaging.chi2_target.value()),
-            nuisances(&scene.settings.free),
-        )
+        ..DetectionSettings::of(SurfaceSettings::spottedness(scene.chi2_target), nuisances(&scene.settings.free))
     };
     let found = Detection::find(imager, scene.settings.values, frequencies, &settings, &|_| ())?;
     let (peak, orbit) = (&found.best, &found.best.orbit);

@@ -1,7 +1,6 @@
 //! What can be wrong with a config: one line each, naming the file and the key. Serde's words are turned into the
 //! user's here.
 
-use super::suggest::nearest;
 use crate::numerics::text::escaped;
 use std::path::{Path, PathBuf};
 
@@ -117,6 +116,17 @@ fn hint(given: &str, message: &str) -> String {
     }
 }
 
+/// Similarity (Jaro-Winkler, which favours a common beginning) from which a name is worth suggesting.
+const SIMILAR: f64 = 0.75;
+
+/// The candidate most like `given`, whatever the case, if one is.
+fn nearest<'a>(given: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    let given = given.to_lowercase();
+    let similarity = |name: &str| strsim::jaro_winkler(&given, &name.to_lowercase());
+    let best = candidates.iter().map(|name| (similarity(name), *name)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.0 >= SIMILAR).then_some(best.1)
+}
+
 /// `invalid type: string "a", expected f64` -> `expected a number, found string "a"`.
 fn in_the_users_words(message: &str) -> String {
     let Some((found, expected)) = message.rsplit_once(", expected ") else {
@@ -162,4 +172,25 @@ fn one_line(text: &str) -> String {
         short.push_str("...");
     }
     short
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+
+    #[test]
+    fn near_names_are_found_and_far_ones_not() {
+        let names = crate::model::Parameter::ALL.map(|p| p.name());
+        for (given, expected) in [
+            ("vsinni_kms", Some("vsini_kms")),
+            ("K_kms", Some("k_kms")),
+            ("k", Some("k_kms")),
+            ("porb_over_rot", Some("porb_over_prot")),
+            ("inclination", Some("inclination_deg")),
+            ("gamma", None),
+            ("", None),
+        ] {
+            assert_eq!(nearest(given, &names), expected, "{given}");
+        }
+    }
 }

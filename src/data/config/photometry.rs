@@ -1,7 +1,8 @@
 //! `photometry`: light curves as users write them. Doc comments here are the descriptions of the JSON Schema.
 
+use super::data_sets::{default_seed, is_one, one};
 use super::listed::Section;
-use super::raw::LimbDarkeningSection;
+use super::star::LimbDarkeningSection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -67,16 +68,4 @@ impl Section for PhotometrySection {
 
 fn default_gap_d() -> f64 {
     3.0
-}
-
-fn one() -> f64 {
-    1.0
-}
-
-fn is_one(x: &f64) -> bool {
-    *x == 1.0
-}
-
-fn default_seed() -> u64 {
-    1
 }

@@ -1,13 +1,14 @@
 //! The config as users write it: names, units and defaults. Doc comments here are the descriptions of the JSON Schema.
 //!
-//! Those of planets and parameters are in `per_parameter`, the observations in `raw_parts`.
+//! Those of planets and parameters are in `per_parameter`; sections of their own in `star`, `data_sets`, `photometry`
+//! and `raw_parts`.
 
-use super::EquivalentWidth;
 use super::data_sets::DataSets;
 use super::listed::Listed;
 use super::per_parameter::{PerParameter, Planet};
 use super::photometry::PhotometrySection;
 use super::raw_parts::{Grid, PlanSection, PriorSection};
+use super::star::{Instrument, Star};
 use super::{ImagingSettings, SamplerSettings};
 use crate::model::Parameter;
 use schemars::JsonSchema;
@@ -69,117 +70,4 @@ impl Config {
     pub fn has_axis(&self, parameter: Parameter) -> bool {
         self.grid.as_ref().is_some_and(|grid| grid.axes.has(parameter))
     }
-}
-
-/// The star. Where a parameter is free, its value here is the start.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Star {
-    /// Rotation period (d), above 0; rotation cycles and `porb_over_prot` refer to it.
-    pub rotation_period_d: f64,
-    /// Time of rotation cycle 0 (d), on the time scale of the observations.
-    #[serde(default)]
-    pub epoch_d: f64,
-    /// Inclination of the rotation axis to the line of sight (degrees), above 0 and up to 90.
-    pub inclination_deg: f64,
-    /// Projected equatorial rotation velocity (km/s), above 0 and up to 2000.
-    pub vsini_kms: f64,
-    /// Systemic radial velocity (km/s) that remains after the subtraction of each profile's VRAD.
-    #[serde(default)]
-    pub vsys_kms: f64,
-    /// Angular velocity of the equator (rad/d), above 0; 2 pi / `rotation_period_d` if not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub omega_eq_rad_d: Option<f64>,
-    /// Differential rotation: angular velocity of the equator minus that of the pole (rad/d).
-    #[serde(default)]
-    pub domega_rad_d: f64,
-    /// Mass of the star (solar masses), 0.01 to 200: with it the minimum mass M sin i of the planet is given. It
-    /// decides nothing else, and may be added to a run that is there; but two planets must be stable by it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mass_msun: Option<f64>,
-    /// Limb darkening; linear with coefficient 0.65 if not given.
-    #[serde(default)]
-    pub limb_darkening: LimbDarkeningSection,
-    /// Temperature of the photosphere (K). Give both temperatures, or `contrast`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub photosphere_k: Option<f64>,
-    /// Temperature of the spots (K), below that of the photosphere.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub spot_k: Option<f64>,
-    /// Wavelength (nm) at which the temperatures give the brightness of a spot.
-    #[serde(default = "default_wavelength_nm")]
-    pub wavelength_nm: f64,
-    /// Brightness of a spot over that of the photosphere, in [0, 1); instead of the two temperatures.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub contrast: Option<f64>,
-    /// The line of one surface element.
-    pub line: Line,
-}
-
-fn default_wavelength_nm() -> f64 {
-    550.0
-}
-
-/// The line of one surface element, before the spectrograph broadens it.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Line {
-    /// Shape of the line.
-    #[serde(default)]
-    pub shape: LineShape,
-    /// Standard deviation (km/s) of the Gaussian, above 0.
-    pub sigma_kms: f64,
-    /// Of a Voigt profile: half width at half depth (km/s) of the Lorentzian, above 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gamma_kms: Option<f64>,
-    /// Equivalent width (km/s), wings and all, above 0, or "auto": the mean area of the observed profiles, for
-    /// observations from files.
-    pub equivalent_width_kms: EquivalentWidth,
-}
-
-/// Shape of the local line.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum LineShape {
-    /// A Gaussian.
-    #[default]
-    Gaussian,
-    /// A Gaussian convolved with a Lorentzian, whose wings reach through the whole velocity range.
-    Voigt,
-}
-
-/// Limb darkening. The intensity must stay positive on the whole disc.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LimbDarkeningSection {
-    /// Law, in the cosine `mu` of the angle to the line of sight.
-    pub law: LimbLaw,
-    /// One coefficient for the linear law, two for the quadratic one.
-    pub coefficients: Vec<f64>,
-}
-
-impl Default for LimbDarkeningSection {
-    fn default() -> Self {
-        LimbDarkeningSection { law: LimbLaw::Linear, coefficients: vec![0.65] }
-    }
-}
-
-/// Limb-darkening law.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum LimbLaw {
-    /// `1 - u (1 - mu)`, u from 0 to 1.
-    Linear,
-    /// `1 - a (1 - mu) - b (1 - mu)^2`.
-    Quadratic,
-}
-
-/// The spectrograph.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Instrument {
-    /// Resolving power, above 0: the instrumental profile is a Gaussian of full width c/R at half maximum. Without it,
-    /// no instrumental broadening.
-    #[serde(default)]
-    pub resolving_power: Option<f64>,
 }

@@ -1,17 +1,10 @@
-//! More of the config as users write it: observations, priors, grid axes, and the types they are made of.
+//! More of the config as users write it: priors, plan, grid axes, and the types they are made of.
 
-use super::automatic::Automatic;
-use super::data_sets::ZeroPoint;
-use super::jitter::VelocityJitter;
 use super::per_parameter::PerParameter;
-use super::raw::Line;
-use crate::data::simulate::{RandomSpots, Schedule};
+use crate::data::simulate::Schedule;
 use crate::model::PriorKind;
-use crate::surface::calibration::noise::Weights;
-use crate::surface::nuisances::LineAndContinuum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 
 /// A prior. Which of the other keys belong to it depends on its kind.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -41,70 +34,6 @@ impl PriorSection {
     }
 }
 
-/// The line profiles of a data set: either `path` (with its options), or `simulate`.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ObservationsSection {
-    /// Name of the data set, in results, and the folder that `dimcmc simulate` writes it to: letters, digits, `-`, `_`
-    /// and `.`. "set1", "set2", ... if not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// The list of profiles, `FILE TIME_DAYS [VRAD_KMS]` a line, relative to the folder of this config. Times are days,
-    /// of the middle of each exposure, all counted from one zero point: BJD_TDB, whole or less a constant. Velocities
-    /// are barycentric: those of the profiles, or what VRAD, which is subtracted from them, makes of them. Without the
-    /// correction the Earth's motion, up to 30 km/s, looks like an orbit.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub path: Option<PathBuf>,
-    /// With `path`: first and last velocity used (km/s), after subtraction of VRAD; without it, all.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub velocity_range_kms: Option<[f64; 2]>,
-    /// With `path`: factor on the standard errors of the profiles, above 0; 1 if not given. "auto": the larger of what
-    /// the scatter of the continuum says and what a map at the config's values leaves over.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sigma_scale: Option<Automatic>,
-    /// With `path`: level of the continuum in the files, from 0.5 to 2; 1 if not given. Intensities and standard errors
-    /// are divided by it as they are read.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub continuum_level: Option<f64>,
-    /// With `path`: how the profiles are weighted against each other.
-    #[serde(default, skip_serializing_if = "Weights::is_default")]
-    pub weights: Weights,
-    /// Standard deviation (km/s) of the profiles' velocity zero points, one Gaussian number a profile, which is noise
-    /// beside that of the bins. It should be small against the width of the local line. "fitted": as large as the
-    /// profiles say; by one map, at the config's values, before anything else. If not given, "fitted" with the
-    /// objective "marginal-likelihood", and 0 with others.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub velocity_jitter_kms: Option<VelocityJitter>,
-    /// Resolving power of this set's spectrograph, in place of `instrument.resolving_power`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub resolving_power: Option<f64>,
-    /// Local line of this set, in place of `star.line`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub line: Option<Line>,
-    /// Wavelength (nm) of this set, at which the temperatures give the brightness of a spot, in place of
-    /// `star.wavelength_nm`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub wavelength_nm: Option<f64>,
-    /// Brightness of a spot over that of the photosphere in this set, in place of what the star has.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub contrast: Option<f64>,
-    /// Line and continuum of each profile of this set, in place of `imaging.nuisances`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub nuisances: Option<LineAndContinuum>,
-    /// Velocity (km/s) that all profiles of this set have too much, one number; 0 if not given. "fitted", for one of
-    /// several sets: integrated out, with a Gaussian prior of 3 km/s around 0; in maps it is held where it is most
-    /// probable.
-    #[serde(default, skip_serializing_if = "ZeroPoint::is_default")]
-    pub zero_point_kms: ZeroPoint,
-    /// With `path`: windows of time `[start, end]` (d), transits for example: profiles within are left out.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub exclude: Vec<[f64; 2]>,
-    /// Simulated profiles of the star and planet of this config. Of several data sets the first one has the spots, for
-    /// all.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub simulate: Option<SimulateSection>,
-}
-
 /// Profiles that are planned beside those of `observations`, for the command `plan` alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -119,111 +48,6 @@ pub struct PlanSection {
     /// Signal-to-noise ratio of each bin, above 0; that of the observed profiles, if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub snr: Option<f64>,
-}
-
-/// Simulated profiles.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SimulateSection {
-    /// Hard-edged circular spots `[longitude, latitude, radius, filling]`: degrees, and the filling factor from 0 to 1.
-    /// The larger filling counts where they overlap. Two more numbers let a spot come and go, `[longitude, latitude,
-    /// radius, filling, peak, lifetime]`: the time of its largest area, when it has that radius and is round, and the
-    /// full width at half maximum of its area, which grows linearly and falls again over twice as long (d). Longitudes
-    /// are counted at `epoch_d`.
-    #[serde(default)]
-    #[schemars(inner(length(min = 4, max = 6)))]
-    pub spots: Vec<Vec<f64>>,
-    /// Spots drawn at random, beside those that are listed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub random_spots: Option<RandomSpots>,
-    /// Hard-edged circular faculae `[longitude, latitude, radius, excess]`: degrees, and by how much they are brighter
-    /// than the photosphere, in units of it, above 0 and up to 10. They brighten what spots leave free: where a spot of
-    /// filling s overlaps, the excess is multiplied by 1 - s. The larger excess counts where faculae overlap.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub faculae: Vec<[f64; 4]>,
-    /// Rotation cycles of the profiles, counted from `epoch_d`; this or `schedule`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cycles: Option<Vec<f64>>,
-    /// Times of the profiles drawn at random, in place of `cycles`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub schedule: Option<Schedule>,
-    /// Velocity bins.
-    pub velocity_kms: VelocitySection,
-    /// Signal-to-noise ratio of each bin, above 0; null for no noise (standard errors as for 1000).
-    #[serde(default = "default_snr")]
-    pub snr: Option<f64>,
-    /// Seed of the noise.
-    #[serde(default = "default_seed")]
-    pub seed: u64,
-    /// Pixels of the star that is simulated, 100 to 2,000,000; more than of the image, for honesty.
-    #[serde(default = "default_simulation_pixels")]
-    pub pixels: usize,
-    /// What is wrong with each profile by itself, drawn with the same seed; nothing if not given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub continuum: Option<ContinuumSection>,
-    /// Standard deviation (km/s), from 0 to 100, of the velocity zero points: one Gaussian number a profile, drawn with
-    /// the same seed and added to its velocity; 0 if not given.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub velocity_jitter_kms: f64,
-    /// Velocity (km/s), from -100 to 100, that is added to all profiles; 0 if not given.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub zero_point_kms: f64,
-    /// Over how many bins the noise is correlated, from 1 (white noise, if not given) to 1000: c makes correlations of
-    /// ((c - 1) / (c + 1))^m at a distance of m bins, which add up to c. The variance of a bin stays.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
-    pub correlated_bins: f64,
-    /// Values of parameters that are simulated in place of those under `star` and `planet`, so that the start of an
-    /// inference may be wrong.
-    #[serde(default)]
-    pub truth: PerParameter<f64>,
-}
-
-fn is_zero(x: &f64) -> bool {
-    *x == 0.0
-}
-
-fn one() -> f64 {
-    1.0
-}
-
-fn is_one(x: &f64) -> bool {
-    *x == 1.0
-}
-
-fn default_snr() -> Option<f64> {
-    Some(1000.0)
-}
-
-fn default_seed() -> u64 {
-    1
-}
-
-fn default_simulation_pixels() -> usize {
-    20_000
-}
-
-/// Wandering line and continuum: standard deviations, from 0 to 10, of one Gaussian number a profile.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct ContinuumSection {
-    /// Level of the continuum, in its own units.
-    pub offset: f64,
-    /// Slope of the continuum: by how much it is higher at the last bin than in the middle.
-    pub slope: f64,
-    /// Equivalent width of the line, relative.
-    pub equivalent_width: f64,
-}
-
-/// Centres of the velocity bins: `min`, `min + step`, ... up to `max` (km/s).
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct VelocitySection {
-    /// First velocity (km/s).
-    pub min: f64,
-    /// Last velocity (km/s).
-    pub max: f64,
-    /// Width of a bin (km/s), above 0.
-    pub step: f64,
 }
 
 /// The landscape that `dimcmc grid` computes: ln L of the reconstructions, without priors. All parameters without an

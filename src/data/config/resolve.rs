@@ -1,22 +1,22 @@
 //! From the config as written to [`Settings`]: checks, defaults that depend on other keys, units.
 
+use super::checks::{automatic, check_nuisances, check_pixels, check_windows};
 use super::domain::{check_value, resolve_prior};
 use super::error::Fault;
 use super::identity::fingerprint;
+use super::number_or::OfField;
 use super::raw::Config;
 use super::raw_parts::PriorSection;
 use super::resolve_grid::resolve_grid;
-use super::resolve_orbits::{check_orbits, resolve_orbits, start_of};
+use super::resolve_orbits::{check_orbits, resolve_orbits, start_of, without_planet};
 use super::resolve_photometry::resolve_photometry;
-use super::resolve_seasons::check_seasons;
 use super::resolve_sets::resolve_sets;
 use super::resolve_simulation::check_plan;
 use super::resolve_star::resolve_star;
-use super::{Automatic, Hyperparameter, ImagingSettings, Settings, VelocityJitter};
+use super::{Hyperparameter, ImagingSettings, Settings, VelocityJitter};
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{BrightnessModel, StarSettings};
 use crate::surface::ObjectiveKind;
-use crate::surface::nuisances::LineAndContinuum;
 use std::path::Path;
 
 /// Largest degree of a break: harmonics go to 36.
@@ -27,9 +27,6 @@ const FEW_WALKERS: usize = 16;
 
 /// What is said of spots where one map is found.
 const OF_INTEGRATED_MAPS: &str = "it has no meaning but with imaging.objective \"marginal-likelihood\"";
-
-/// Fewest and most pixels of an image or a simulated star.
-pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 
 pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut raw.star, &raw.instrument)?;
@@ -77,8 +74,8 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
 /// The velocity jitter, its default filled in. A field takes zero points that nobody told it of for spots that change
 /// or for planets.
 fn resolve_jitter(raw: &mut Config) -> VelocityJitter {
-    let integrated = raw.imaging.objective == ObjectiveKind::MarginalLikelihood;
-    let usual = if integrated { VelocityJitter::Fitted } else { VelocityJitter::default() };
+    let integrated = raw.imaging.objective.evolves();
+    let usual = if integrated { VelocityJitter::FITTED } else { VelocityJitter::default() };
     let sections = &mut raw.observations.sections;
     let jitter = sections[0].velocity_jitter_kms.unwrap_or(usual);
     // that of all data sets
@@ -146,20 +143,11 @@ fn resolve_free(raw: &mut Config, values: &mut ParameterValues, clock: Clock) ->
     }
 }
 
-/// A free parameter of an orbit of which K is fixed at 0.
-pub(super) fn without_planet(
-    free: &[FreeParameter],
-    values: &ParameterValues,
-) -> Option<(Parameter, &'static Elements)> {
-    let no_planet = |of: &Elements| values[of.k] == 0.0 && free.iter().all(|f| f.parameter != of.k);
-    free.iter().find_map(|f| Some((f.parameter, Elements::of(f.parameter).filter(|of| no_planet(of))?)))
-}
-
 /// What is said of the spots has a meaning where they are integrated out, and lies within the bounds of a fit. What is
 /// left to the profiles is free in a chain: with a weak prior, all over those bounds.
 fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), Fault> {
     let imaging = &raw.imaging;
-    let integrated = imaging.objective == ObjectiveKind::MarginalLikelihood;
+    let integrated = imaging.objective.evolves();
     let something_is_free = !raw.parameters.is_empty();
     let given = [imaging.spot_amplitude, imaging.spot_slope, imaging.spot_lifetime_d];
     for (parameter, given) in Parameter::FIELD.into_iter().zip(given) {
@@ -171,19 +159,19 @@ fn resolve_field(raw: &mut Config, values: &mut ParameterValues) -> Result<(), F
         }
         match given {
             _ if !integrated => {}
-            Hyperparameter::Static if parameter != Parameter::SpotLifetime => {
+            Hyperparameter::Word(OfField::Static) if parameter != Parameter::SpotLifetime => {
                 return Err(Fault::new(format!("imaging.{name}"), "only spot_lifetime_d may be \"static\""));
             }
-            Hyperparameter::Static if prior || axis => {
+            Hyperparameter::Word(OfField::Static) if prior || axis => {
                 let problem = "\"static\" spots live for ever, and their lifetime cannot be free";
                 return Err(Fault::new(format!("imaging.{name}"), problem));
             }
-            Hyperparameter::Static => {}
-            Hyperparameter::Known(value) => {
+            Hyperparameter::Word(OfField::Static) => {}
+            Hyperparameter::Number(value) => {
                 check_value(parameter, value, &format!("imaging.{name}"))?;
                 values.set(parameter, value);
             }
-            Hyperparameter::Fitted => {
+            Hyperparameter::Word(OfField::Fitted) => {
                 values.set(parameter, parameter.usual());
                 if let Some(kind) = parameter.spec().usual_prior.filter(|_| something_is_free && !prior) {
                     raw.parameters.set(parameter, PriorSection::even(kind, parameter.widest()));
@@ -199,7 +187,7 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
     check_seasons(imaging)?;
     if let Some(degree) = imaging.spot_break_degree {
         const KEY: &str = "imaging.spot_break_degree";
-        if imaging.objective != ObjectiveKind::MarginalLikelihood {
+        if !imaging.objective.evolves() {
             return Err(Fault::new(KEY, OF_INTEGRATED_MAPS));
         }
         if !(0.0..=MOST_BREAK_DEGREE).contains(&degree) {
@@ -210,12 +198,12 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));
     }
-    if imaging.nuisances.is_some() && imaging.chi2_target == Automatic::Auto {
+    if imaging.nuisances.is_some() && imaging.chi2_target.is_word() {
         let problem =
             "auto goes by velocities that nuisances of line and continuum take up: give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
-    if !jitter.is_default() && imaging.chi2_target == Automatic::Auto {
+    if !jitter.is_default() && imaging.chi2_target.is_word() {
         let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
                        give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
@@ -229,30 +217,31 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
     automatic("imaging.chi2_target", imaging.chi2_target)
 }
 
-/// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
-pub(super) fn check_nuisances(priors: &LineAndContinuum, keys: [String; 3]) -> Result<(), Fault> {
-    match keys.iter().zip(priors.numbers()).find(|(_, sd)| !(0.0..=10.0).contains(sd)) {
-        Some((key, sd)) => Err(Fault::new(key, format!("{sd} must be from 0 to 10"))),
+/// What tells the seasons apart.
+fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
+    const GAP: &str = "imaging.season_gap_d";
+    let ImagingSettings { season_gap_d: gap, seasons, objective, .. } = imaging;
+    let given = [(gap.is_some(), GAP), (!seasons.is_empty(), "imaging.seasons")].map(|(is, key)| is.then_some(key));
+    match (given, *objective) {
+        ([Some(key), _] | [None, Some(key)], ObjectiveKind::MarginalLikelihood) => {
+            let problem = "leave it out: with imaging.objective \"marginal-likelihood\" spots change all the time, \
+                           and seasons need no maps of their own";
+            return Err(Fault::new(key, problem));
+        }
+        ([Some(_), Some(key)], _) => return Err(Fault::new(key, "stands in place of season_gap_d: give one of them")),
+        _ => {}
+    }
+    if let Some(gap) = gap.filter(|gap| gap.is_nan() || *gap <= 0.0) {
+        return Err(Fault::new(GAP, format!("{gap} must be above 0")));
+    }
+    check_windows(seasons, "imaging.seasons")?;
+    match seasons.windows(2).position(|two| two[1][0] <= two[0][1]) {
         None => Ok(()),
-    }
-}
-
-pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
-    if PIXELS.contains(&pixels) {
-        return Ok(());
-    }
-    Err(Fault::new(key, format!("{pixels} must be from {} to {}", PIXELS.start(), PIXELS.end())))
-}
-
-pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
-    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
-}
-
-/// Positive, or left to the observations.
-pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
-    match value {
-        Automatic::Fixed(value) => positive(key, value),
-        Automatic::Auto => Ok(()),
+        Some(k) => {
+            let [[_, end], [start, _]] = [seasons[k], seasons[k + 1]];
+            let problem = format!("begins at {start} d, and imaging.seasons[{k}] ends only at {end} d");
+            Err(Fault::new(format!("imaging.seasons[{}]", k + 1), problem))
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::GridSettings;
 use super::domain::check_value;
 use super::error::Fault;
 use super::raw_parts::Grid as GridSection;
-use super::resolve::without_planet;
+use super::resolve_orbits::without_planet;
 use crate::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use crate::sampling::landscape::{Axis, Grid};
 

@@ -1,10 +1,10 @@
 //! The orbits: which planets there are, ephemerides in place of period and phase, eccentricity, and whether two planets
 //! can last.
 
+use super::checks::positive;
 use super::domain::check_value;
 use super::error::Fault;
 use super::raw::Config;
-use super::resolve::positive;
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{StarSettings, stability};
 
@@ -188,4 +188,13 @@ fn shortest(prior: &Prior) -> f64 {
         Prior::Normal { mean, sd, min, .. } => min.max(mean - 4.0 * sd),
         _ => prior.bounds().0,
     }
+}
+
+/// A free parameter of an orbit of which K is fixed at 0.
+pub(super) fn without_planet(
+    free: &[FreeParameter],
+    values: &ParameterValues,
+) -> Option<(Parameter, &'static Elements)> {
+    let no_planet = |of: &Elements| values[of.k] == 0.0 && free.iter().all(|f| f.parameter != of.k);
+    free.iter().find_map(|f| Some((f.parameter, Elements::of(f.parameter).filter(|of| no_planet(of))?)))
 }

@@ -1,16 +1,13 @@
 //! The light curves of a config.
 
+use super::checks::{check_windows, names, positive};
 use super::domain::{check_size, most};
 use super::error::Fault;
 use super::photometry::{PhotometrySection, SimulatedLight};
 use super::raw::Config;
-use super::resolve::positive;
-use super::resolve_seasons::check_windows;
-use super::resolve_sets::names;
 use super::resolve_star::{contrast, limb_darkening};
 use super::{LightCurveSettings, LightSource};
 use crate::star::Band;
-use crate::surface::ObjectiveKind;
 use std::path::Path;
 
 /// Longest gap within a segment (d): level and slope do not hold for longer.
@@ -19,7 +16,7 @@ const LONGEST_GAP_D: f64 = 1000.0;
 /// Resolves the light curves of `raw`. `config` is the config's path, whose folder paths start from.
 pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<LightCurveSettings>, Fault> {
     let Some(photometry) = &raw.photometry else { return Ok(Vec::new()) };
-    if raw.imaging.objective != ObjectiveKind::MarginalLikelihood {
+    if !raw.imaging.objective.evolves() {
         let problem = format!(
             "imaging.objective {:?} does not know of light curves: they take \"marginal-likelihood\"",
             raw.imaging.objective.name()
@@ -48,8 +45,6 @@ pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<Ligh
             segment_gap_d: section.segment_gap_d,
             sigma_scale: section.sigma_scale,
             exclude: section.exclude.clone(),
-            left_out: 0,
-            binned: None,
             key,
         });
     }

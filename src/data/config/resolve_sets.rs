@@ -1,25 +1,25 @@
 //! The data sets of a config: what each says of itself, and what only one of them may say.
 
-use super::data_sets::ZeroPoint;
+use super::checks::{automatic, check_nuisances, check_windows, names};
+use super::data_sets::ObservationsSection;
+use super::domain::{check_size, most};
 use super::error::Fault;
-use super::raw::{Config, Instrument};
-use super::raw_parts::ObservationsSection;
-use super::resolve::check_nuisances;
-use super::resolve_observations::resolve_observations;
-use super::resolve_seasons::check_windows;
-use super::resolve_simulation::{spots, times_d};
+use super::number_or::{Automatic, EquivalentWidth, VelocityJitter, ZeroPoint};
+use super::raw::Config;
+use super::resolve_simulation::{check_jitter, simulation, spots, times_d};
 use super::resolve_star::resolve_star;
-use super::{Automatic, DataSetSettings, ObservationSource};
+use super::star::Instrument;
+use super::{DataSetSettings, ObservationSource};
 use crate::model::{Parameter, ParameterValues};
 use crate::star::{BrightnessModel, StarSettings};
-use crate::surface::ObjectiveKind;
+use crate::surface::calibration::noise::ErrorSettings;
 use std::path::Path;
 
 /// Zero points beyond it (km/s) are a mistake.
 const LARGEST_ZERO_POINT_KMS: f64 = 100.0;
 
-/// Longest name of a set.
-const LONGEST_NAME: usize = 40;
+/// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
+const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// Resolves all data sets of `raw`, the star's own settings being `star`. `config` is the config's path, whose folder
 /// paths start from.
@@ -36,12 +36,12 @@ pub(super) fn resolve_sets(
         let (star, equivalent_width) = star_of(raw, s, &key, star, values)?;
         let section = &mut raw.observations.sections[s];
         check_windows(&section.exclude, &format!("{key}.exclude"))?;
-        let source = resolve_observations(section, &key, &star, values, config)?;
+        let source = source(section, &key, &star, values, config)?;
         if let Some(priors) = &section.nuisances {
             let name = |name: &str| format!("{key}.nuisances.{name}");
             check_nuisances(priors, ["continuum_offset", "continuum_slope", "equivalent_width"].map(name))?;
         }
-        if let ZeroPoint::Known(kms) = section.zero_point_kms
+        if let ZeroPoint::Number(kms) = section.zero_point_kms
             && (kms.is_nan() || kms.abs() > LARGEST_ZERO_POINT_KMS)
         {
             let problem = format!("{kms} must be from -{LARGEST_ZERO_POINT_KMS} to {LARGEST_ZERO_POINT_KMS} km/s");
@@ -54,7 +54,6 @@ pub(super) fn resolve_sets(
             source,
             nuisances: section.nuisances.or(raw.imaging.nuisances),
             zero_point: section.zero_point_kms,
-            held: None,
             exclude: section.exclude.clone(),
             key,
         });
@@ -70,11 +69,11 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
     let objective = raw.imaging.objective;
     for (s, section) in sections.iter().enumerate() {
         let key = raw.observations.key(s);
-        if sections.len() == 1 && section.zero_point_kms == ZeroPoint::Fitted {
+        if sections.len() == 1 && section.zero_point_kms.is_word() {
             let problem = "of one data set alone the zero point is the systemic velocity: see star.vsys_kms";
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
-        if section.zero_point_kms == ZeroPoint::Fitted && objective != ObjectiveKind::MarginalLikelihood {
+        if section.zero_point_kms.is_word() && !objective.evolves() {
             let problem = format!(
                 "with {:?} a map would follow a wrong zero point: give a number (km/s), or take \
                  imaging.objective \"marginal-likelihood\", which integrates it out",
@@ -82,7 +81,7 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
             );
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
-        if section.nuisances.is_some() && raw.imaging.chi2_target == Automatic::Auto {
+        if section.nuisances.is_some() && raw.imaging.chi2_target.is_word() {
             let problem = format!("auto goes by velocities that {key}.nuisances take up: give a number, such as 0.97");
             return Err(Fault::new("imaging.chi2_target", problem));
         }
@@ -103,6 +102,66 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
     Ok(())
 }
 
+/// Where the profiles of the data set at `key` come from; fills the default of its `sigma_scale`.
+fn source(
+    section: &mut ObservationsSection,
+    key: &str,
+    star: &StarSettings,
+    values: &ParameterValues,
+    config: &Path,
+) -> Result<ObservationSource, Fault> {
+    let at = |field: &str| format!("{key}.{field}");
+    if let Some(VelocityJitter::Number(kms)) = section.velocity_jitter_kms {
+        check_jitter(&at("velocity_jitter_kms"), kms)?;
+    }
+    let path = match (&section.path, &section.simulate) {
+        (Some(path), None) => path,
+        (None, Some(simulate)) => {
+            let file_only = [
+                ("velocity_range_kms", section.velocity_range_kms.is_some()),
+                ("sigma_scale", section.sigma_scale.is_some()),
+                ("continuum_level", section.continuum_level.is_some()),
+                ("weights", !section.weights.is_default()),
+                ("exclude", !section.exclude.is_empty()),
+            ];
+            if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
+                return Err(Fault::new(at(name), "for observations from files only"));
+            }
+            if star.line.equivalent_width_kms.is_nan() {
+                return Err(Fault::new("star.line.equivalent_width_kms", "auto is for observations from files only"));
+            }
+            return Ok(ObservationSource::Simulate(simulation(simulate, star, values, key)?));
+        }
+        (Some(_), Some(_)) => return Err(Fault::new(key, "give either path or simulate, not both")),
+        (None, None) => return Err(Fault::new(key, "give path (of the list of profiles) or simulate")),
+    };
+    if path.as_os_str().is_empty() {
+        return Err(Fault::new(at("path"), "is empty"));
+    }
+    let sigma_scale = *section.sigma_scale.get_or_insert(Automatic::Number(1.0));
+    automatic(&at("sigma_scale"), sigma_scale)?;
+    let errors = ErrorSettings { measured: sigma_scale.is_word(), weights: section.weights };
+    let sigma_scale = sigma_scale.number().unwrap_or(1.0);
+    for end in section.velocity_range_kms.into_iter().flatten() {
+        check_size(&at("velocity_range_kms"), end, most::VELOCITY_KMS)?;
+    }
+    let continuum_level = section.continuum_level.unwrap_or(1.0);
+    if !CONTINUUM_LEVELS.contains(&continuum_level) {
+        let (min, max) = (CONTINUUM_LEVELS.start(), CONTINUUM_LEVELS.end());
+        let problem = format!("{continuum_level} must be from {min} to {max}");
+        return Err(Fault::new(at("continuum_level"), problem));
+    }
+    if let Some([min, max]) = section.velocity_range_kms
+        && min >= max
+    {
+        let problem = format!("first velocity {min} must be below last velocity {max}");
+        return Err(Fault::new(at("velocity_range_kms"), problem));
+    }
+    let velocity_range_kms = section.velocity_range_kms.map(Into::into);
+    let path = config.parent().unwrap_or(Path::new("")).join(path);
+    Ok(ObservationSource::Files { path, velocity_range_kms, sigma_scale, continuum_level, errors })
+}
+
 /// The star as a set sees it: with its own line, spot contrast and resolving power, where it has any.
 fn star_of(
     raw: &Config,
@@ -110,7 +169,7 @@ fn star_of(
     key: &str,
     star: &StarSettings,
     values: &ParameterValues,
-) -> Result<(StarSettings, super::EquivalentWidth), Fault> {
+) -> Result<(StarSettings, EquivalentWidth), Fault> {
     let section = &raw.observations.sections[s];
     let ObservationsSection { line, wavelength_nm, contrast, resolving_power, .. } = section;
     let mut own = raw.star.clone();
@@ -149,22 +208,6 @@ fn star_of(
         Fault::new(format!("{key}.{name}"), fault.problem)
     })?;
     Ok((star, equivalent_width))
-}
-
-/// Names are folders and files of `simulate`, and labels: of things that stand at these keys and have these names.
-pub(super) fn names(all: &[(&str, &str)]) -> Result<(), Fault> {
-    for (s, (key, name)) in all.iter().enumerate() {
-        let fault = |problem: String| Err(Fault::new(format!("{key}.name"), problem));
-        let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) || name.starts_with('.') {
-            let problem = format!("{name:?} must be 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'");
-            return fault(problem);
-        }
-        if let Some((other, _)) = all[..s].iter().find(|(_, other)| other.eq_ignore_ascii_case(name)) {
-            return fault(format!("{name:?} is the name of {other} already: each needs its own"));
-        }
-    }
-    Ok(())
 }
 
 /// Of several simulated sets the first has the star: its spots are those of all.

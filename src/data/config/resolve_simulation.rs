@@ -1,20 +1,108 @@
 //! A simulated star's spots and the times at which it is observed: listed, or drawn at random.
 
-use super::domain::{check_size, most};
+use super::checks::{check_nuisances, check_pixels, positive, within};
+use super::data_sets::{SimulateSection, VelocitySection};
+use super::domain::{check_size, check_value, most};
 use super::error::Fault;
-use super::raw_parts::{PlanSection, SimulateSection};
-use super::resolve::positive;
-use crate::data::simulate::{RandomSpots, Schedule};
-use crate::model::{Parameter, ParameterValues};
+use super::raw_parts::PlanSection;
+use crate::data::simulate::{RandomSpots, Schedule, Simulation};
+use crate::model::{Clock, Elements, Parameter, ParameterValues};
 use crate::star::{Disc, Facula, Life, Spot, StarSettings};
+use crate::surface::nuisances::LineAndContinuum;
 
 /// More drawn at random are a mistake: nights times profiles, and spots.
 const MOST_PROFILES: usize = 10_000;
 const MOST_SPOTS: f64 = 10_000.0;
 
+/// Velocity zero points that scatter by more (km/s) are a mistake: profiles would be seen as the wrong part of a line.
+const LARGEST_JITTER_KMS: f64 = 100.0;
+
+pub(super) fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
+    match (0.0..=LARGEST_JITTER_KMS).contains(&kms) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{kms} must be from 0 to {LARGEST_JITTER_KMS} km/s"))),
+    }
+}
+
 /// Where a key of the simulation of a data set stands.
 fn at(set: &str, field: &str) -> String {
     format!("{set}.simulate.{field}")
+}
+
+/// The simulation of the data set at the key `set`, of a `star` whose parameters have these `values`.
+pub(super) fn simulation(
+    section: &SimulateSection,
+    star: &StarSettings,
+    values: &ParameterValues,
+    set: &str,
+) -> Result<Simulation, Fault> {
+    let at = |field: &str| at(set, field);
+    let faculae = section.faculae.iter().enumerate().map(|(k, f)| facula(f, &at(&format!("faculae[{k}]"))));
+    let times_d = times_d(section, star, set)?;
+    if let Some(snr) = section.snr {
+        positive(&at("snr"), snr)?;
+    }
+    check_pixels(&at("pixels"), section.pixels)?;
+    let continuum = section
+        .continuum
+        .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
+    check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
+    check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
+    if section.zero_point_kms.is_nan() || section.zero_point_kms.abs() > LARGEST_JITTER_KMS {
+        let problem =
+            format!("{} must be from -{LARGEST_JITTER_KMS} to {LARGEST_JITTER_KMS} km/s", section.zero_point_kms);
+        return Err(Fault::new(at("zero_point_kms"), problem));
+    }
+    if !(section.correlated_bins >= 1.0 && section.correlated_bins <= MOST_CORRELATED_BINS) {
+        let problem = format!("{} must be from 1 (white noise) to {MOST_CORRELATED_BINS}", section.correlated_bins);
+        return Err(Fault::new(at("correlated_bins"), problem));
+    }
+    let mut truth = *values;
+    for (parameter, value) in section.truth.entries() {
+        check_value(parameter, *value, &at(&format!("truth.{}", parameter.name())))?;
+    }
+    let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
+    Elements::write(&mut truth, section.truth.entries().map(|(parameter, value)| (parameter, *value)), clock);
+    if truth.motion().orbits().any(|planet| !(planet.shape.eccentricity() < 1.0 && planet.orbit.porb_over_prot > 0.0)) {
+        return Err(Fault::new(at("truth"), "is no orbit: each planet needs a period, and an eccentricity below 1"));
+    }
+    Ok(Simulation {
+        spots: spots(section, star, &truth, &times_d, set)?,
+        faculae: faculae.collect::<Result<_, _>>()?,
+        truth,
+        times_d,
+        first_velocity_kms: section.velocity_kms.min,
+        step_kms: section.velocity_kms.step,
+        bins: bins(&section.velocity_kms, &at("velocity_kms"))?,
+        snr: section.snr,
+        seed: section.seed,
+        pixels: section.pixels,
+        continuum,
+        velocity_jitter_kms: section.velocity_jitter_kms,
+        zero_point_kms: section.zero_point_kms,
+        correlated_bins: section.correlated_bins,
+    })
+}
+
+/// Noise that is correlated over more bins is a mistake.
+const MOST_CORRELATED_BINS: f64 = 1000.0;
+
+/// Number of velocity bins; the last lies at or below `max`.
+fn bins(axis: &VelocitySection, key: &str) -> Result<usize, Fault> {
+    const LEAST: f64 = 5.0;
+    const MOST: f64 = 100_000.0;
+    positive(&format!("{key}.step"), axis.step)?;
+    check_size(&format!("{key}.min"), axis.min, most::VELOCITY_KMS)?;
+    check_size(&format!("{key}.max"), axis.max, most::VELOCITY_KMS)?;
+    if axis.min >= axis.max {
+        return Err(Fault::new(format!("{key}.min"), format!("{} must be below max, which is {}", axis.min, axis.max)));
+    }
+    // Where max is meant to be a bin, rounding must not lose it.
+    let bins = ((axis.max - axis.min) / axis.step + 1e-6).floor() + 1.0;
+    if !(LEAST..=MOST).contains(&bins) {
+        return Err(Fault::new(format!("{key}.step"), format!("makes {bins} bins, they must be {LEAST} to {MOST}")));
+    }
+    Ok(bins as usize)
 }
 
 /// Times of the profiles (d).
@@ -163,13 +251,6 @@ fn random_spots(
 /// Spots drawn at random are not smaller than this (degrees): no pixel would see them.
 const SMALLEST_DEG: f64 = 0.01;
 
-fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), Fault> {
-    match (low..=high).contains(&value) {
-        true => Ok(()),
-        false => Err(Fault::new(key, format!("{value} must be from {low} to {high}"))),
-    }
-}
-
 /// Most brightness that a facula may add, in units of the photosphere's.
 const LARGEST_EXCESS: f64 = 10.0;
 
@@ -201,7 +282,7 @@ fn spot(numbers: &[f64], star: &StarSettings, truth: &ParameterValues, key: &str
     Ok(Spot { longitude, latitude, radius, filling, life: life.transpose()? })
 }
 
-pub(super) fn facula(&[longitude, latitude, radius, excess]: &[f64; 4], key: &str) -> Result<Facula, Fault> {
+fn facula(&[longitude, latitude, radius, excess]: &[f64; 4], key: &str) -> Result<Facula, Fault> {
     let disc = disc([longitude, latitude, radius], key)?;
     match excess > 0.0 && excess <= LARGEST_EXCESS {
         true => Ok(Facula { disc, excess }),

@@ -1,10 +1,10 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
 use super::EquivalentWidth;
+use super::checks::positive;
 use super::domain::{check_size, most};
 use super::error::Fault;
-use super::raw::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
-use super::resolve::positive;
+use super::star::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
 use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use std::f64::consts::TAU;
@@ -116,11 +116,11 @@ fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> 
         return Err(Fault::new("instrument.resolving_power", "the line becomes infinitely broad"));
     }
     let equivalent_width_kms = match line.equivalent_width_kms {
-        EquivalentWidth::Fixed(width) => {
+        EquivalentWidth::Number(width) => {
             positive("star.line.equivalent_width_kms", width)?;
             width
         }
-        EquivalentWidth::Auto => f64::NAN,
+        EquivalentWidth::Word(_) => f64::NAN,
     };
     Ok(LocalLine { sigma_kms, instrumental_sigma_kms: instrumental, gamma_kms, equivalent_width_kms })
 }

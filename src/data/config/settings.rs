@@ -1,23 +1,17 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
-use super::data_sets::ZeroPoint;
-use super::spots::Hyperparameter;
-use super::{Automatic, ConfigError, EquivalentWidth, PlanSection, SamplerSettings, SimulatedLight, VelocityJitter};
-use crate::data::io::lsd::ReadOptions;
+use super::number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
+use super::{ConfigError, PlanSection, SamplerSettings, SimulatedLight};
 use crate::data::simulate::Simulation;
 use crate::field::Lifetime;
-use crate::inference::search::SearchSettings;
 use crate::maxent::entropy::Entropy;
 use crate::model::{FreeParameter, Parameter, ParameterValues};
 use crate::sampling::landscape::Grid;
-use crate::star::observation::Observations;
 use crate::star::response::{MOST_NODES, MOST_STEPS_PER_BIN, velocity_grid};
-use crate::star::{Band, BrightnessModel, Quadrature, Response, Sampling, StarSettings, SurfaceGrid};
+use crate::star::{Band, BrightnessModel, StarSettings};
+use crate::surface::Known;
 use crate::surface::calibration::noise::ErrorSettings;
-use crate::surface::calibration::offsets::HeldZeroPoint;
 use crate::surface::nuisances::LineAndContinuum;
-use crate::surface::photometry::LightCurve;
-use crate::surface::{Known, SurfaceSettings};
 use crate::surface::{ObjectiveKind, UnresolvedSpots};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,7 +22,7 @@ use std::path::PathBuf;
 pub struct Settings {
     /// The config file.
     pub path: PathBuf,
-    /// The star, whatever data sets say of it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN.
+    /// The star, whatever data sets say of it. With [`EquivalentWidth`] "auto" the equivalent width of its line is NaN.
     pub star: StarSettings,
     /// Mass of the star (solar masses), for the minimum mass of the planet.
     pub mass_msun: Option<f64>,
@@ -64,8 +58,8 @@ pub struct DataSetSettings {
     pub key: String,
     /// Its name.
     pub name: String,
-    /// The star as it sees it. With [`EquivalentWidth::Auto`] the equivalent width of its line is NaN: go through
-    /// [`Settings::star_for`].
+    /// The star as it sees it; see [`star_for`](crate::data::calibrated::star_for) for one whose line is as strong as
+    /// the profiles say: here its equivalent width is NaN.
     pub star: StarSettings,
     /// Where the equivalent width of the line comes from.
     pub equivalent_width: EquivalentWidth,
@@ -75,13 +69,19 @@ pub struct DataSetSettings {
     pub nuisances: Option<LineAndContinuum>,
     /// Velocity that all profiles have too much.
     pub zero_point: ZeroPoint,
-    /// Where one that is fitted is held, once it is known.
-    pub held: Option<HeldZeroPoint>,
     /// Windows of time (d) whose profiles are left out.
     pub exclude: Vec<[f64; 2]>,
 }
 
 impl DataSetSettings {
+    /// What is simulated.
+    pub fn simulation(&self) -> Option<&Simulation> {
+        match &self.source {
+            ObservationSource::Simulate(simulation) => Some(simulation),
+            ObservationSource::Files { .. } => None,
+        }
+    }
+
     /// Level of the continuum in its files.
     pub fn continuum_level(&self) -> f64 {
         match self.source {
@@ -108,10 +108,6 @@ pub struct LightCurveSettings {
     pub sigma_scale: f64,
     /// Windows `[start, end]` (d) whose measurements are left out.
     pub exclude: Vec<[f64; 2]>,
-    /// How many these are, once it is read.
-    pub left_out: usize,
-    /// The bins, once it is read.
-    pub binned: Option<LightCurve>,
 }
 
 /// Where a light curve comes from.
@@ -132,8 +128,10 @@ pub enum ObservationSource {
     Files {
         /// The list, relative to the working directory.
         path: PathBuf,
-        /// Cut and scaling, by 1 where that is left to the observations.
-        options: ReadOptions,
+        /// First and last velocity to use (km/s, after subtraction of VRAD); all bins if `None`.
+        velocity_range_kms: Option<(f64, f64)>,
+        /// Factor on every sigma, 1 where that is left to the observations.
+        sigma_scale: f64,
         /// Level of the continuum in the files: what is read is divided by it.
         continuum_level: f64,
         /// What the observations are to say of their errors.
@@ -201,14 +199,14 @@ impl Default for ImagingSettings {
             pixels: 2000,
             brightness: BrightnessModel::default(),
             default_spot: 1e-4,
-            chi2_target: Automatic::Fixed(0.97),
+            chi2_target: Automatic::Number(0.97),
             objective: ObjectiveKind::default(),
             season_gap_d: None,
             seasons: Vec::new(),
-            spot_amplitude: Hyperparameter::Fitted,
-            spot_slope: Hyperparameter::Fitted,
+            spot_amplitude: Hyperparameter::Word(OfField::Fitted),
+            spot_slope: Hyperparameter::Word(OfField::Fitted),
             spot_break_degree: None,
-            spot_lifetime_d: Hyperparameter::Fitted,
+            spot_lifetime_d: Hyperparameter::Word(OfField::Fitted),
             unresolved_spots: UnresolvedSpots::default(),
             nuisances: None,
         }
@@ -254,61 +252,6 @@ impl Settings {
     /// If the config has no `grid`.
     pub fn require_grid(&self) -> Result<&GridSettings, ConfigError> {
         self.grid.as_ref().ok_or_else(|| self.fault("grid", "missing, a landscape needs its axes"))
-    }
-
-    /// The star as a data `set` sees it, its equivalent width measured on its `observations` if that is
-    /// [`EquivalentWidth::Auto`].
-    ///
-    /// # Errors
-    /// If the equivalent width so measured is not positive.
-    pub fn star_for(&self, set: &DataSetSettings, observations: &Observations) -> Result<StarSettings, ConfigError> {
-        let mut star = set.star.clone();
-        if set.equivalent_width == EquivalentWidth::Auto {
-            let beside = match set.nuisances.is_some_and(|priors| priors.continuum_offset > 0.0) {
-                true => self.above_its_continuum(&star, observations),
-                false => None,
-            };
-            let width = beside.unwrap_or_else(|| observations.mean_equivalent_width_kms());
-            if !(width.is_finite() && width > 0.0) {
-                let of = if self.sets.len() > 1 { format!(" for {}", set.key) } else { String::new() };
-                let problem = format!("auto gives {width} km/s{of}: the observed profiles are no absorption line");
-                return Err(self.fault("star.line.equivalent_width_kms", &problem));
-            }
-            star.line.equivalent_width_kms = width;
-            if beside.is_none() && star.line.gamma_kms > 0.0 {
-                // wings beyond the profiles count too
-                star.line.equivalent_width_kms = width / share_observed(&star, &self.values, observations);
-            }
-        }
-        Ok(star)
-    }
-
-    /// Equivalent width (km/s) of the line below the continuum that each profile has beside it, wherever that is;
-    /// `None` where the profiles do not reach into it. What an unspotted star loses by the same measure, wings under
-    /// the continuum, is allowed for.
-    fn above_its_continuum(&self, star: &StarSettings, observations: &Observations) -> Option<f64> {
-        let reach_kms = self.values[Parameter::Vsini] + BESIDE * star.line.sigma_kms;
-        let mut unit = star.clone();
-        unit.line.equivalent_width_kms = 1.0;
-        let model = unspotted(&unit, &self.values, observations);
-        let (mut observed, mut expected, mut first) = (0.0, 0.0, 0);
-        for profile in &observations.profiles {
-            let bins = profile.intensity.len();
-            let centre = self.values[Parameter::Vsys];
-            let distance = |j: usize| profile.velocity_kms(j) - centre;
-            let area = |depth: &dyn Fn(usize) -> f64| {
-                let side = |sign: f64| {
-                    let beyond: Vec<f64> = (0..bins).filter(|j| sign * distance(*j) > reach_kms).map(depth).collect();
-                    (beyond.len() >= FEWEST_BESIDE).then(|| beyond.iter().sum::<f64>() / beyond.len() as f64)
-                };
-                let continuum = 0.5 * (side(-1.0)? + side(1.0)?);
-                Some((0..bins).map(|j| depth(j) - continuum).sum::<f64>())
-            };
-            observed += area(&|j| 1.0 - profile.intensity[j])?;
-            expected += area(&|j| model[first + j])?;
-            first += bins;
-        }
-        Some(observed / expected)
     }
 
     /// Whether profiles of `star` in velocity bins of `step_kms` can be computed at `values`.
@@ -384,36 +327,22 @@ impl Settings {
         first["simulate"].get("faculae").cloned()
     }
 
-    /// What is assumed of the spots.
-    pub fn surface(&self) -> SurfaceSettings {
-        let ImagingSettings { objective, chi2_target, .. } = self.imaging;
-        SurfaceSettings { objective, chi2_target: chi2_target.value(), field: Some(self.known_field()) }
-    }
-
-    /// The search for the best parameters.
-    pub fn search(&self) -> SearchSettings {
-        SearchSettings::of(self.surface(), self.sampler.seed)
-    }
-
     /// What is known of the field of spots before the profiles, where maps are integrated over.
     pub fn known_field(&self) -> Known {
         let ImagingSettings { spot_amplitude, spot_slope, spot_lifetime_d, .. } = self.imaging;
         let priors = Parameter::FIELD.map(|p| self.free.iter().find(|f| f.parameter == p).map(|f| f.prior));
         // a number beside a prior is where a chain starts
-        let number = |i: usize, given: Hyperparameter| given.known().filter(|_| priors[i].is_none());
+        let number = |i: usize, given: Hyperparameter| given.number().filter(|_| priors[i].is_none());
         Known {
             amplitude: number(0, spot_amplitude),
             slope: number(1, spot_slope),
             break_degree: self.imaging.spot_break_degree,
             lifetime: match spot_lifetime_d {
-                Hyperparameter::Static => Some(Lifetime::Static),
+                Hyperparameter::Word(OfField::Static) => Some(Lifetime::Static),
                 days => number(2, days).map(Lifetime::Days),
             },
             priors,
-            jitter_kms: match self.velocity_jitter {
-                VelocityJitter::Known(kms) => Some(kms),
-                VelocityJitter::Fitted => None,
-            },
+            jitter_kms: self.velocity_jitter.number(),
         }
     }
 
@@ -421,23 +350,4 @@ impl Settings {
     pub fn fault(&self, key: &str, problem: &str) -> ConfigError {
         ConfigError::Key { path: self.path.clone(), key: key.into(), problem: problem.into() }
     }
-}
-
-/// Bins farther than this many local line widths beyond vsini are taken for continuum, and so many of them on a side
-/// will do.
-const BESIDE: f64 = 2.0;
-const FEWEST_BESIDE: usize = 2;
-
-/// How much of its line an unspotted star shows within the velocities of `observations`.
-fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
-    let depths = unspotted(star, values, observations);
-    let areas = depths.iter().sum::<f64>() * observations.step_kms() / observations.profiles.len() as f64;
-    areas / star.line.equivalent_width_kms
-}
-
-/// Depths of an unspotted star in all bins of `observations`.
-fn unspotted(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> Vec<f64> {
-    const PIXELS: usize = 2000;
-    let grid = SurfaceGrid::equal_area(PIXELS, Quadrature::Gauss2x2);
-    Response::new(&grid, star, &values.state(), &Sampling::of(observations)).depths(&vec![1.0; grid.len()])
 }

@@ -1,12 +1,17 @@
-//! A config before it is checked: read from JSON, or built in code key by key.
+//! A config before it is checked: read from JSON, or built in code key by key; how it is laid out as text, and the way
+//! to what is checked.
 
-use super::{ConfigError, Settings, from_json, to_text, without_mark};
+use super::resolve::resolve;
+use super::{ConfigError, Settings};
 use crate::model::{Parameter, Prior};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// What errors name where a config was not read from a file; paths in it start from the working directory.
 const NO_FILE: &str = "config";
+
+/// Longest line of a config as text.
+const WIDTH: usize = 110;
 
 /// A config: star, observations, image, free parameters and sampler, by the keys of `docs/reference/config.md`.
 ///
@@ -123,5 +128,81 @@ impl Config {
     #[doc(hidden)]
     pub fn settings(&self) -> Result<Settings, ConfigError> {
         from_json(self.json.to_string().as_bytes(), &self.path)
+    }
+}
+
+/// Resolves a config in JSON; `path` is what errors name and whose folder paths in it start from.
+///
+/// # Errors
+/// What is not JSON, or has a key that is unknown, missing, or does not make sense.
+pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
+    let mut deserializer = serde_json::Deserializer::from_slice(without_mark(json));
+    let raw = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
+    deserializer.end().map_err(|e| ConfigError::json(path, &e))?;
+    resolve(raw, path).map_err(|fault| fault.within(path))
+}
+
+/// Editors on Windows put a byte-order mark first.
+fn without_mark(json: &[u8]) -> &[u8] {
+    json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)
+}
+
+/// A config as text, laid out for people.
+pub fn to_text(config: &Value) -> String {
+    compact(&format!("{config:#}"))
+}
+
+/// Indented JSON with every object and list that fits on one line put on one line, but for the outermost.
+pub(super) fn compact(pretty: &str) -> String {
+    let lines: Vec<&str> = pretty.lines().collect();
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let (mut text, mut k) = (String::new(), 0);
+    while k < lines.len() {
+        let opens = k > 0 && lines[k].ends_with(['{', '[']);
+        let closes = |j: &usize| opens && indent(lines[*j]) == indent(lines[k]);
+        let whole = (k + 1..lines.len()).find(closes).map(|end| (end, joined(&lines[k..=end])));
+        match whole.filter(|(_, line)| line.chars().count() <= WIDTH) {
+            Some((end, line)) => {
+                text += &line;
+                k = end + 1;
+            }
+            None => {
+                text += lines[k];
+                k += 1;
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// An object or a list on one line: braces with a space inside, brackets without.
+fn joined(lines: &[&str]) -> String {
+    let mut line = lines[0].to_string();
+    for next in &lines[1..] {
+        let next = next.trim_start();
+        let tight = line.ends_with('[') || next.starts_with(']');
+        line += if tight { "" } else { " " };
+        line += next;
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::compact;
+
+    #[test]
+    fn what_fits_stands_on_one_line() {
+        let long = "x".repeat(100);
+        let value =
+            serde_json::json!({ "a": { "b": [1, 2], "c": "{" }, "d": [], "e": { "f": long, "g": { "h": null } } });
+        let text = compact(&serde_json::to_string_pretty(&value).unwrap());
+        let expected = format!(
+            "{{\n  \"a\": {{ \"b\": [1, 2], \"c\": \"{{\" }},\n  \"d\": [],\n  \"e\": {{\n    \"f\": \"{long}\",\n    \
+             \"g\": {{ \"h\": null }}\n  }}\n}}\n"
+        );
+        assert_eq!(text, expected);
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&text).unwrap(), value);
     }
 }

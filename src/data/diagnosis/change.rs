@@ -1,11 +1,15 @@
 //! One thing about a star or its profiles that may be wrong, put otherwise.
 
 use super::Reason;
-use crate::data::config::{EquivalentWidth, Settings};
+use crate::data::calibrated;
+use crate::data::config::{ConfigError, EquivalentWidth, Settings};
+use crate::data::io::provenance::Season;
 use crate::model::Parameter;
 use crate::star::BrightnessModel;
 use crate::star::observation::{Observations, Profile};
+use crate::surface::imaging::Imager;
 use crate::surface::nuisances::LineAndContinuum;
+use std::sync::Arc;
 
 /// Factors on vsini, the width of the local line and the rotation period.
 const VSINI: [f64; 8] = [0.7, 0.8, 0.9, 0.97, 1.03, 1.1, 1.25, 1.4];
@@ -22,11 +26,13 @@ const REACH_SIGMAS: f64 = 3.0;
 
 /// Settings with the observations that they are held against.
 #[derive(Clone)]
-pub(super) struct Patient<'a> {
+pub(super) struct Patient {
     pub settings: Settings,
     pub observations: Observations,
     /// The profiles in their whole width.
-    pub whole: Option<&'a Observations>,
+    pub whole: Arc<Observations>,
+    /// The seasons that have maps of their own.
+    pub seasons: Vec<Season>,
     pub correlated_bins: f64,
 }
 
@@ -53,6 +59,13 @@ pub(super) enum Change {
     Range(f64, f64),
 }
 
+impl Patient {
+    /// What these observations, at the patient's times, are imaged with.
+    pub fn imager(&self, observations: Observations) -> Result<Imager, ConfigError> {
+        calibrated::imager(&self.settings, &self.settings.sets, &[observations], &self.seasons)
+    }
+}
+
 impl Change {
     /// All that may be tried first.
     pub fn all(patient: &Patient) -> Vec<Change> {
@@ -66,9 +79,7 @@ impl Change {
             all.push(Change::BrightAndDark);
         }
         all.extend(PERIOD.map(Change::Period));
-        if settings.sets[0].equivalent_width != EquivalentWidth::Auto
-            && settings.values.get(Parameter::EquivalentWidth).is_none()
-        {
+        if !settings.sets[0].equivalent_width.is_word() && settings.values.get(Parameter::EquivalentWidth).is_none() {
             all.push(Change::MeasuredStrength);
         }
         all.extend(level(patient).map(Change::Level));
@@ -147,7 +158,7 @@ impl Change {
     }
 
     /// The patient with it; `None` where that makes no sense.
-    pub fn applied<'a>(&self, patient: &Patient<'a>) -> Option<Patient<'a>> {
+    pub fn applied(&self, patient: &Patient) -> Option<Patient> {
         let mut changed = patient.clone();
         let settings = &mut changed.settings;
         match self {
@@ -167,7 +178,7 @@ impl Change {
             Change::BrightAndDark => settings.imaging.brightness = BrightnessModel::BrightAndDark,
             // the orbit, if there is one, keeps its period in days
             Change::Period(factor) => settings.values.star.omega_eq_rad_d /= factor,
-            Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::Auto,
+            Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::AUTO,
             Change::Level(level) => changed.observations = changed.observations.over_continuum(*level),
             Change::Offsets => {
                 let offsets = LineAndContinuum { continuum_offset: OFFSET, ..Default::default() };
@@ -226,7 +237,7 @@ fn line(patient: &Patient) -> (f64, f64) {
 fn level(patient: &Patient) -> Option<f64> {
     const FEWEST: usize = 2;
     const OFF: f64 = 1e-3;
-    let profiles = patient.whole.unwrap_or(&patient.observations);
+    let profiles = &*patient.whole;
     let (centre, reach) = line(patient);
     let side = |sign: f64| {
         let beside = |profile: &Profile| -> Vec<f64> {
@@ -253,14 +264,14 @@ fn range(patient: &Patient) -> Option<(f64, f64)> {
     let to = profiles.iter().map(last).fold(f64::INFINITY, f64::min);
     let narrow = from > centre - reach + step || to < centre + reach - step;
     let wide = from < centre - WIDE * reach || to > centre + WIDE * reach;
-    (narrow && patient.whole.is_some() || wide).then_some((centre - reach, centre + reach))
+    (narrow || wide).then_some((centre - reach, centre + reach))
 }
 
 /// The observations within other velocities, errors scaled as those that are used.
 fn within(patient: &Patient, from: f64, to: f64) -> Option<Observations> {
     const FEWEST: usize = 5;
     let step = patient.observations.step_kms();
-    let source = patient.whole.unwrap_or(&patient.observations);
+    let source = &*patient.whole;
     let cut = |(profile, used): (&Profile, &Profile)| {
         let inside = |j: &usize| (from..=to).contains(&profile.velocity_kms(*j));
         let bins: Vec<usize> = (0..profile.intensity.len()).filter(inside).collect();

@@ -1,7 +1,6 @@
-//! Values with their sources, and the table of them.
+//! Values with their sources.
 
-use super::{Given, Proposal};
-use crate::numerics::text::{Align, columns};
+use super::known::Given;
 
 /// Where a value came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,9 +16,9 @@ pub enum Source {
 }
 
 impl Source {
-    const ALL: [Source; 4] = [Source::Data, Source::Given, Source::Assumed, Source::Missing];
+    pub(super) const ALL: [Source; 4] = [Source::Data, Source::Given, Source::Assumed, Source::Missing];
 
-    fn title(self) -> &'static str {
+    pub(super) fn title(self) -> &'static str {
         match self {
             Source::Data => "from the profiles",
             Source::Given => "given",
@@ -46,7 +45,7 @@ pub struct Entry {
 
 impl Entry {
     /// Where its section stands in a config.
-    fn section(&self) -> usize {
+    pub(super) fn section(&self) -> usize {
         const SECTIONS: [&str; 6] = ["star", "instrument", "planet", "observations", "imaging", "parameters"];
         let section = self.key.split('.').next();
         SECTIONS.iter().position(|name| section == Some(name)).unwrap_or(SECTIONS.len())
@@ -96,30 +95,10 @@ impl Ledger {
     }
 }
 
-impl Proposal {
-    /// What was observed and every value by its source, aligned; then the notes.
-    pub fn table(&self) -> String {
-        let shown = |source: Source| self.entries.iter().filter(move |entry| entry.source == source);
-        let mut ordered: Vec<&Entry> = Source::ALL.into_iter().flat_map(shown).collect();
-        ordered.sort_by_key(|entry| (entry.source as usize, entry.section()));
-        let cells =
-            |entry: &&Entry| vec![entry.key.into(), entry.value.clone(), entry.unit.into(), entry.remark.clone()];
-        let rows: Vec<Vec<String>> = ordered.iter().map(cells).collect();
-        let table = columns(&rows, &[Align::Left, Align::Right, Align::Left, Align::Left]);
-        let mut text = format!("{}\n", self.observed);
-        let mut last = None;
-        for (entry, line) in ordered.iter().zip(table.lines()) {
-            if last.replace(entry.source) != Some(entry.source) {
-                text += &format!("\n{}\n", entry.source.title());
-            }
-            text += &format!("  {line}\n");
-        }
-        if !self.notes.is_empty() {
-            text.push('\n');
-        }
-        for note in &self.notes {
-            text += &format!("note: {note}\n");
-        }
-        text
+/// Whether a value was given, or where it came from otherwise.
+pub(super) fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, String) {
+    match given {
+        Some(given) => (Source::Given, given.by.clone()),
+        None => (Source::Data, otherwise.to_owned()),
     }
 }

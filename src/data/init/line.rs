@@ -1,10 +1,9 @@
 //! What a first look says of line and continuum, as values of a config: where the continuum is, how wide the local line
 //! is, and which velocities hold it with some continuum on both sides.
 
-use super::Known;
 use super::digits::rounded;
-use super::ledger::{Ledger, Source};
-use super::values::origin;
+use super::known::Known;
+use super::ledger::{Ledger, Source, origin};
 use crate::inference::first_look::{FirstLook, LineModel};
 
 /// The velocity range reaches so many bins, and so many widths of the line as the spectrograph shows it, into the

@@ -2,24 +2,23 @@
 //! with the best orbit that a search finds, and what is likely to be wrong if none does.
 
 use super::digits::rounded;
+use super::known::Known;
+use super::proposal::{Place, ProposalError, to_json};
 use super::values::Values;
-use super::{Known, Place, ProposalError, to_json};
-use crate::data::config::{self, Automatic, ConfigError, Draft, ImagingSettings, VelocityJitter};
+use crate::data::config::{self, Automatic, ConfigError, Draft, VelocityJitter};
+use crate::data::dataset::{Dataset, ProfileSet, SceneError};
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::scene::Scene;
-use crate::inference::search;
 use crate::inference::search::SearchError;
 use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
-use crate::star::observation::Observations;
-use crate::surface::Change;
-use crate::surface::ObjectiveKind;
-use crate::surface::ReferenceError;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::expansion::nuisances;
 use crate::surface::static_map::Reference;
+use crate::surface::{Change, ObjectiveKind, ReferenceError};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Stands in for a rotation period that is still to be given, so that everything else is checked (d).
 const STAND_IN_D: f64 = 1.0;
@@ -33,14 +32,6 @@ const MOST_MISFIT: f64 = 5.0;
 
 /// More of a star is hardly ever spotted in a maximum-entropy map.
 const MANY_SPOTS: f64 = 0.25;
-
-/// Profiles in units of their continuum, errors as quoted.
-#[derive(Clone, Copy)]
-pub(super) struct Profiles<'a> {
-    pub whole: &'a Observations,
-    /// Within the draft's velocity range.
-    pub cut: &'a Observations,
-}
 
 /// What became of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,43 +89,41 @@ struct Attempt {
 pub(super) fn run(
     draft: &mut Draft,
     Place { config, list, .. }: &Place,
-    profiles: Profiles,
+    profiles: &ProfileSet,
     values: &Values,
     known: &Known,
 ) -> Result<Trial, ProposalError> {
     let mut trial =
         Trial { end: End::Untried, errors: None, diagnosis: None, change: None, orbit: false, measured_vsini: false };
-    if draft.rotation_period_d.is_none() {
-        let stand_in = Draft {
-            rotation_period_d: Some(STAND_IN_D),
-            sigma_scale: Automatic::Fixed(1.0),
-            velocity_jitter: VelocityJitter::default(),
-            ..draft.clone()
-        };
+    if !draft.star.rotation_period_d.is_finite() {
+        let mut stand_in = draft.clone().with_jitter(VelocityJitter::default());
+        stand_in.star.rotation_period_d = STAND_IN_D;
+        stand_in.observations.sigma_scale = Some(Automatic::Number(1.0));
         scene(&stand_in, config, profiles)?;
         return Ok(trial);
     }
     let mut attempt = match attempt_of(draft, config, profiles) {
         // few profiles do not tell how much their zero points scatter
-        Err(ProposalError::Config(ConfigError::Key { key, .. })) if key == JITTER => {
-            draft.velocity_jitter = VelocityJitter::default();
+        Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, .. }))) if key == JITTER => {
+            *draft = draft.clone().with_jitter(VelocityJitter::default());
             attempt_of(draft, config, profiles)?
         }
         attempt => attempt?,
     };
     if attempt.misfits && values.is_another_star(known) {
-        let measured = Draft { vsini_kms: rounded(values.look.unspotted.vsini_kms, 1), ..draft.clone() };
+        let mut measured = draft.clone();
+        measured.star.vsini_kms = rounded(values.look.unspotted.vsini_kms, 1);
         let other = attempt_of(&measured, config, profiles)?;
         if other.misfit < AS_GOOD * attempt.misfit {
             (*draft, attempt, trial.measured_vsini) = (measured, other, true);
         }
     }
     let is_this_star = trial.measured_vsini || !values.is_another_star(known);
-    if attempt.misfits && is_this_star && known.objective() == ObjectiveKind::MarginalLikelihood {
+    if attempt.misfits && is_this_star && known.objective().evolves() {
         trial.change = change(draft, config, profiles)?;
         if trial.change.is_some() {
             // a line that is wrong may look like a star that changes
-            let wrong = attempt.scene.as_ref().and_then(|scene| Diagnosis::of(scene, Some(profiles.whole)));
+            let wrong = attempt.scene.as_ref().and_then(Diagnosis::of);
             trial.diagnosis = wrong.filter(|diagnosis| diagnosis.reason != Reason::Errors);
             trial.end = End::Changes;
             return Ok(trial);
@@ -150,7 +139,7 @@ pub(super) fn run(
         }
     }
     if attempt.misfits {
-        trial.diagnosis = attempt.scene.as_ref().and_then(|scene| Diagnosis::of(scene, Some(profiles.whole)));
+        trial.diagnosis = attempt.scene.as_ref().and_then(Diagnosis::of);
     }
     let hopeless = |diagnosis: &&Diagnosis| diagnosis.reason == Reason::Errors && attempt.misfit > MOST_MISFIT;
     if let Some(diagnosis) = trial.diagnosis.as_ref().filter(hopeless) {
@@ -172,18 +161,19 @@ pub(super) fn run(
 pub(super) fn errors(
     draft: &Draft,
     config: &Path,
-    profiles: Profiles,
+    profiles: &ProfileSet,
 ) -> Result<Option<MeasuredErrors>, ProposalError> {
     Ok(integrated(draft, config, profiles)?.measured.errors)
 }
 
-fn integrated(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Scene, ProposalError> {
-    let imaging = ImagingSettings { objective: ObjectiveKind::MarginalLikelihood, ..draft.imaging.clone() };
-    scene(&Draft { imaging, ..draft.clone() }, config, profiles)
+fn integrated(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Scene, ProposalError> {
+    let mut draft = draft.clone();
+    draft.imaging.objective = ObjectiveKind::MarginalLikelihood;
+    scene(&draft, config, profiles)
 }
 
 /// That the star changes, if it does.
-fn change(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Option<Change>, ProposalError> {
+fn change(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Option<Change>, ProposalError> {
     let Scene { settings, imager, .. } = integrated(draft, config, profiles)?;
     let Ok(frequencies) =
         Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())
@@ -195,26 +185,27 @@ fn change(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Option<Cha
 }
 
 /// The draft as commands see it.
-fn scene(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Scene, ProposalError> {
-    let settings = config::from_json(to_json(draft, config)?.as_bytes(), config)?;
-    Ok(Scene::of_whole(settings, profiles.whole, profiles.cut)?)
+fn scene(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Scene, ProposalError> {
+    let settings = config::from_json(to_json(draft, config)?.as_bytes(), config).map_err(SceneError::from)?;
+    let data = Dataset::with_profiles(&settings, profiles.clone())?;
+    Ok(Scene::of(settings, Arc::new(data))?)
 }
 
 /// The map at the draft's values.
-fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attempt, ProposalError> {
+fn attempt_of(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Attempt, ProposalError> {
     let scene = match scene(draft, config, profiles) {
         Ok(scene) => scene,
         // what is measured, not what is given
-        Err(ProposalError::Config(ConfigError::Key { key, problem, .. }))
+        Err(ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })))
             if key == "observations.sigma_scale"
-                || key == JITTER && draft.velocity_jitter != VelocityJitter::Fitted =>
+                || key == JITTER && draft.observations.velocity_jitter_kms != Some(VelocityJitter::FITTED) =>
         {
             let reached = Err(format!("{key}: {problem}"));
             return Ok(Attempt { scene: None, reached, misfits: true, misfit: f64::INFINITY });
         }
         Err(error) => return Err(error),
     };
-    let target = scene.settings.imaging.chi2_target.value();
+    let target = scene.chi2_target;
     let reference = Reference::build(&scene.imager, scene.settings.values, target);
     let floor = match &reference {
         Err(ReferenceError::TargetBelowFloor { target, floor }) => Some((floor / target).sqrt()),
@@ -232,23 +223,34 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: Profiles) -> Result<Attemp
 
 /// Puts the best orbit and systemic velocity into the draft, searched for with errors as the continuum has them;
 /// whether there are any.
-fn search(draft: &mut Draft, config: &Path, profiles: Profiles, tried: Option<&Scene>) -> Result<bool, ProposalError> {
+fn search(
+    draft: &mut Draft,
+    config: &Path,
+    profiles: &ProfileSet,
+    tried: Option<&Scene>,
+) -> Result<bool, ProposalError> {
     let measured = tried.and_then(|scene| scene.measured.errors.as_ref());
     let by_continuum = measured.and_then(|errors| Some(errors.continuum? * errors.correlated_bins.sqrt()));
-    let sigma_scale = by_continuum.map_or(draft.sigma_scale, Automatic::Fixed);
-    let Scene { settings, imager, space, .. } = scene(&Draft { sigma_scale, ..draft.clone() }, config, profiles)?;
-    let found = match search::find(&imager, &space, settings.search(), &|_| ()) {
+    let mut with_its_errors = draft.clone();
+    if let Some(scale) = by_continuum {
+        with_its_errors.observations.sigma_scale = Some(Automatic::Number(scale));
+    }
+    let scene = scene(&with_its_errors, config, profiles)?;
+    let found = match scene.optimise() {
         Ok(found) => found,
         // what matters is that there is no map
         Err(SearchError::Reference(_) | SearchError::Optimise(_) | SearchError::Field(_)) => return Ok(false),
     };
-    let best = space.values_at(&found.optimum.theta);
+    let best = scene.space.values_at(&found.optimum.theta);
     // rounding does not lead out of the priors
-    let within = |parameter, (min, max): (f64, f64)| rounded(best[parameter], 4).clamp(min, max);
-    let k = within(Parameter::K, (0.0, draft.k_max_kms));
-    let period = within(Parameter::PorbOverProt, draft.porb_over_prot_range);
-    draft.orbit = (k, period, rounded(best[Parameter::Phi], 4).rem_euclid(1.0));
-    draft.vsys_kms = within(Parameter::Vsys, draft.vsys_range_kms);
+    let within = |parameter: Parameter| {
+        let prior = scene.space.free().iter().find(|free| free.parameter == parameter).map(|free| free.prior.bounds());
+        let (min, max) = prior.expect("orbit and systemic velocity of a draft are free");
+        rounded(best[parameter], 4).clamp(min, max)
+    };
+    let phi = rounded(best[Parameter::Phi], 4).rem_euclid(1.0);
+    *draft = draft.clone().with_orbit((within(Parameter::K), within(Parameter::PorbOverProt), phi));
+    draft.star.vsys_kms = within(Parameter::Vsys);
     Ok(true)
 }
 
@@ -264,7 +266,7 @@ impl Trial {
             format!(
                 "no map fits with the given vsini, and one does much better with that of the mean profile, which is \
                 written: {} km/s",
-                draft.vsini_kms
+                draft.star.vsini_kms
             )
         });
         let misfit = self.diagnosis.as_ref().map(|diagnosis| {

@@ -1,9 +1,13 @@
 //! The values of a proposal: measured, given, or assumed.
 
 use super::digits::{rounded, significant};
-use super::ledger::{Ledger, Source};
-use super::{Given, Known, line};
-use crate::data::config::{Automatic, Draft, EquivalentWidth, ImagingSettings, VelocityJitter};
+use super::known::{Given, Known};
+use super::ledger::{Ledger, Source, origin};
+use super::line;
+use crate::data::config::{
+    Automatic, Draft, EquivalentWidth, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape,
+    ObservationsSection, Sought, Star, VelocityJitter,
+};
 use crate::inference::first_look::{Continuum, FirstLook, LineModel, LookError};
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
@@ -122,45 +126,57 @@ impl Values {
         let vsys = (rounded(look.unspotted.centre_kms, 2), Source::Data, by_centre.as_str());
         let vsys_kms = ledger.settle(("star.vsys_kms", "km/s"), &known.vsys_kms, vsys);
         let (porb_over_prot, porb_over_prot_range) = self.periods(cut, rotation_period_d, ledger);
-        Draft {
-            schema: None,
-            observations: Default::default(),
-            rotation_period_d,
-            epoch_d: ledger.settle(("star.epoch_d", "d"), &known.epoch_d, epoch),
-            inclination_deg: ledger.settle(("star.inclination_deg", "deg"), &known.inclination_deg, inclination),
-            vsini_kms: ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini),
+        let epoch_d = ledger.settle(("star.epoch_d", "d"), &known.epoch_d, epoch);
+        let inclination_deg = ledger.settle(("star.inclination_deg", "deg"), &known.inclination_deg, inclination);
+        let vsini_kms = ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini);
+        let gamma_kms = known.line_gamma_kms.as_ref().map(|given| given.value);
+        let star = Star {
+            rotation_period_d: rotation_period_d.unwrap_or(f64::NAN),
+            epoch_d,
+            inclination_deg,
+            vsini_kms,
             vsys_kms,
+            omega_eq_rad_d: None,
             domega_rad_d: ledger.settle(
                 ("star.domega_rad_d", "rad/d"),
                 &known.domega_rad_d,
                 assume(0.0, "no differential rotation; --domega"),
             ),
-            limb_darkening: self.limb_darkening,
-            photosphere_k: ledger.settle(
+            mass_msun: None,
+            limb_darkening: LimbDarkeningSection { law: LimbLaw::Linear, coefficients: vec![self.limb_darkening] },
+            photosphere_k: Some(ledger.settle(
                 ("star.photosphere_k", "K"),
                 &known.photosphere_k,
                 assume(assumed::PHOTOSPHERE_K, "--photosphere"),
-            ),
-            spot_k: ledger.settle(("star.spot_k", "K"), &known.spot_k, assume(assumed::SPOT_K, "--spot")),
+            )),
+            spot_k: Some(ledger.settle(("star.spot_k", "K"), &known.spot_k, assume(assumed::SPOT_K, "--spot"))),
             wavelength_nm: ledger.settle(
                 ("star.wavelength_nm", "nm"),
                 &known.wavelength_nm,
                 assume(assumed::WAVELENGTH_NM, "of the LSD profiles; --wavelength"),
             ),
-            line_sigma_kms: self.line_sigma_kms,
-            line_gamma_kms: known.line_gamma_kms.as_ref().map(|given| given.value),
-            equivalent_width: equivalent_width(cut, known, ledger),
-            resolving_power: self.resolving_power,
-            velocity_range_kms: self.velocity_range_kms,
-            sigma_scale: known.sigma_scale.as_ref().map_or(Automatic::Auto, |given| Automatic::Fixed(given.value)),
-            continuum_level: self.continuum_level,
-            velocity_jitter: VelocityJitter::Fitted,
-            imaging: ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) },
-            orbit: (0.0, porb_over_prot, 0.0),
-            porb_over_prot_range,
-            k_max_kms: k_max(cut, ledger),
-            vsys_range_kms: self.vsys_range(vsys_kms, ledger),
-        }
+            contrast: None,
+            line: Line {
+                shape: gamma_kms.map_or(LineShape::Gaussian, |_| LineShape::Voigt),
+                sigma_kms: self.line_sigma_kms,
+                gamma_kms,
+                equivalent_width_kms: equivalent_width(cut, known, ledger),
+            },
+        };
+        let sigma_scale = known.sigma_scale.as_ref().map_or(Automatic::AUTO, |given| Automatic::Number(given.value));
+        let mut observations = ObservationsSection::default();
+        observations.velocity_range_kms = Some(self.velocity_range_kms.into());
+        observations.sigma_scale = Some(sigma_scale);
+        observations.continuum_level = self.continuum_level;
+        observations.velocity_jitter_kms = Some(VelocityJitter::FITTED);
+        let imaging = ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) };
+        let sought = Sought {
+            k_kms: (0.0, k_max(cut, ledger)),
+            porb_over_prot: porb_over_prot_range,
+            vsys_kms: self.vsys_range(vsys_kms, ledger),
+        };
+        let instrument = Instrument { resolving_power: Some(self.resolving_power) };
+        Draft::new(star, instrument, observations, imaging, sought, porb_over_prot)
     }
 
     fn rotation_period(&self, known: &Known, ledger: &mut Ledger) -> Option<f64> {
@@ -225,14 +241,14 @@ impl Values {
     }
 
     /// The scatter of zero points with its reason.
-    pub fn note_jitter(jitter: VelocityJitter, ledger: &mut Ledger) {
+    pub fn note_jitter(draft: &Draft, ledger: &mut Ledger) {
         const KEY: &str = "observations.velocity_jitter_kms";
-        match jitter {
-            VelocityJitter::Fitted => {
+        match draft.observations.velocity_jitter_kms.unwrap_or_default() {
+            VelocityJitter::Word(_) => {
                 let remark = "measured by every command: zero points of single profiles, counted as noise";
                 ledger.note(KEY, "fitted", "km/s", Source::Data, remark);
             }
-            VelocityJitter::Known(kms) => {
+            VelocityJitter::Number(kms) => {
                 let remark = "the profiles do not tell how much their zero points scatter";
                 ledger.note(KEY, kms, "km/s", Source::Assumed, remark);
             }
@@ -308,22 +324,15 @@ impl Values {
     }
 }
 
-pub(super) fn origin<T>(given: &Option<Given<T>>, otherwise: &str) -> (Source, String) {
-    match given {
-        Some(given) => (Source::Given, given.by.clone()),
-        None => (Source::Data, otherwise.to_owned()),
-    }
-}
-
 fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> EquivalentWidth {
     let auto = format!("{:.3} km/s in this range", cut.mean_equivalent_width_kms());
-    let value = known.equivalent_width.as_ref().map_or(EquivalentWidth::Auto, |given| given.value);
+    let value = known.equivalent_width.as_ref().map_or(EquivalentWidth::AUTO, |given| given.value);
     let (source, by) = origin(&known.equivalent_width, "");
     let (shown, unit, remark) = match value {
-        EquivalentWidth::Auto => {
+        EquivalentWidth::Word(_) => {
             ("auto".to_owned(), "", [by, auto].join(if source == Source::Given { "; " } else { "" }))
         }
-        EquivalentWidth::Fixed(width) => (width.to_string(), "km/s", format!("{by}; the profiles have {auto}")),
+        EquivalentWidth::Number(width) => (width.to_string(), "km/s", format!("{by}; the profiles have {auto}")),
     };
     ledger.note("star.line.equivalent_width_kms", shown, unit, source, remark);
     value
@@ -342,7 +351,7 @@ fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
         ledger.note("imaging.pixels", given.value, "", Source::Given, given.by.as_str());
     }
     if let Some(given) = &known.chi2_target {
-        imaging.chi2_target = Automatic::Fixed(given.value);
+        imaging.chi2_target = Automatic::Number(given.value);
         ledger.note("imaging.chi2_target", given.value, "", Source::Given, given.by.as_str());
     }
     imaging
@@ -386,7 +395,7 @@ fn k_max(cut: &Observations, ledger: &mut Ledger) -> f64 {
 
 /// The orbit that the config starts from, and the systemic velocity that comes with it.
 pub(super) fn note_orbit(draft: &Draft, found: bool, ledger: &mut Ledger) {
-    let (k, period, phi) = draft.orbit;
+    let (k, period, phi) = draft.orbit();
     match found {
         true => {
             let shown = format!("{k}, {period}, {phi}");
@@ -397,7 +406,7 @@ pub(super) fn note_orbit(draft: &Draft, found: bool, ledger: &mut Ledger) {
                 Source::Data,
                 "start: K (km/s), Porb/Prot, phi of the best orbit",
             );
-            ledger.replace("star.vsys_kms", draft.vsys_kms, "start: with the best orbit");
+            ledger.replace("star.vsys_kms", draft.star.vsys_kms, "start: with the best orbit");
         }
         false => ledger.note("planet.k_kms", k, "km/s", Source::Assumed, "start: no planet"),
     }

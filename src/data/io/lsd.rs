@@ -1,94 +1,85 @@
 //! Observations on disk: `observations.txt`, one line `FILE TIME_DAYS [VRAD_KMS]` a profile (`#` starts a comment), and
 //! the LSD profiles it names, relative to its folder (`layout` has their formats).
 //!
-//! Times are days of one count (`times`). VRAD is subtracted from the velocity axis first; the velocity range is cut in
-//! that frame. Stokes V and nulls are not used.
+//! Times are days of one count (`times`). VRAD is subtracted from the velocity axis; profiles are read in their whole
+//! width, errors as quoted. Stokes V and nulls are not used.
 
 mod axis;
 mod error;
 mod layout;
 mod level;
+mod list;
 mod names;
+mod row;
 mod text;
 mod times;
 mod writing;
 
 pub use error::LsdError;
+pub use list::{Label, files};
 pub use times::LONGEST_D;
 pub use writing::{is_written, write, write_as, write_numbers};
 
+use crate::data::io::FileError;
 use crate::star::observation::{Observations, Profile};
 use axis::Axis;
 use level::Given;
+use list::{Entry, list_bytes, parse_list};
+use row::shown;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use text::{MIN_BINS, RawProfile, shown};
+use std::sync::{Mutex, PoisonError};
+use text::{MIN_BINS, RawProfile};
 
-/// What to do with the profiles on reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReadOptions {
-    /// First and last velocity to keep (km/s, after subtraction of VRAD); all bins if `None`.
-    pub velocity_range_kms: Option<(f64, f64)>,
-    /// Factor on every sigma.
-    pub sigma_scale: f64,
-}
-
-impl Default for ReadOptions {
-    fn default() -> Self {
-        ReadOptions { velocity_range_kms: None, sigma_scale: 1.0 }
-    }
-}
-
-/// Observations together with the fingerprint of the files they came from.
+/// The profiles of a data set as they are in their files, with what the list says of each.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DataSet {
-    /// The profiles after subtraction of VRAD, cut and scaling.
+pub struct ProfileSet {
+    /// The profiles in their whole width after subtraction of VRAD, errors as quoted.
     pub observations: Observations,
-    /// SHA-256 (hex) of the bytes of the list and of every profile, in the order of the list.
-    pub sha256: String,
+    /// What the list says of each of them.
+    pub labels: Vec<Label>,
+    /// SHA-256 (hex) of the bytes of the list and of every profile, in the order of the list; `None` of profiles that
+    /// are in no file.
+    pub sha256: Option<String>,
     /// What was made of the files that a reader of results must know, one line each.
     pub remarks: Vec<String>,
 }
 
-/// What a list says of a profile beside its time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Label {
-    /// Its file, as the list names it.
-    pub file: String,
-    /// Velocity that is subtracted from its axis (km/s).
-    pub vrad_kms: f64,
-}
-
-/// One line of the list.
-struct Entry {
-    line: usize,
-    file: String,
-    path: PathBuf,
-    time_d: f64,
-    vrad_kms: f64,
+impl ProfileSet {
+    /// The profiles between first and last velocity (km/s), all bins if `None`, with errors times a factor.
+    ///
+    /// # Errors
+    /// Fewer than five bins of a profile, and errors that are none any more.
+    pub fn within(&self, range_kms: Option<(f64, f64)>, sigma_scale: f64) -> Result<Observations, LsdError> {
+        let cut = |(profile, label): (&Profile, &Label)| {
+            let path = || label.path.clone().unwrap_or_else(|| label.file.clone().into());
+            cut(profile, range_kms, sigma_scale).map_err(|problem| LsdError::from(FileError::of(&path(), problem)))
+        };
+        let profiles = self.observations.profiles.iter().zip(&self.labels).map(cut).collect::<Result<_, _>>()?;
+        Ok(Observations { profiles })
+    }
 }
 
 /// Reads the list at `list` and all profiles it names.
 ///
 /// # Errors
-/// A file that cannot be read, a line that makes no sense, a list of one profile, profiles on different velocity axes,
-/// or a velocity range that leaves fewer than five bins of a profile.
-pub fn read(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
-    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
-    read_listed(list, &bytes, options)
+/// A file that cannot be read, a line that makes no sense, a list of one profile, or profiles on different velocity
+/// axes.
+pub fn read(list: &Path) -> Result<ProfileSet, LsdError> {
+    read_listed(list, &list_bytes(list)?)
 }
 
 /// Reads all profiles that a list of the content `bytes` names, which is or will be at `list`.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<DataSet, LsdError> {
+pub fn read_listed(list: &Path, bytes: &[u8]) -> Result<ProfileSet, LsdError> {
     let entries = parse_list(list, &String::from_utf8_lossy(bytes))?;
     // a list that is none, a profile for one, is told of by what it names
     entries.iter().filter(|entry| !entry.path.exists()).try_for_each(|entry| read_profile(list, entry).map(drop))?;
-    times::check(&entries).map_err(|(line, problem)| LsdError::Line { path: list.into(), line, problem })?;
-    read_entries(list, bytes, &entries, options)
+    times::check(&entries).map_err(|(line, problem)| FileError::Line { path: list.into(), line, problem })?;
+    read_entries(list, bytes, entries)
 }
 
 /// Reads the list at `list`, which [`write()`] wrote, and all profiles it names: of a simulation, whatever its times
@@ -96,24 +87,23 @@ pub fn read_listed(list: &Path, bytes: &[u8], options: &ReadOptions) -> Result<D
 ///
 /// # Errors
 /// As [`read`], but for the times.
-pub fn read_written(list: &Path, options: &ReadOptions) -> Result<DataSet, LsdError> {
-    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
-    let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
-    read_entries(list, &bytes, &entries, options)
+pub fn read_written(list: &Path) -> Result<ProfileSet, LsdError> {
+    let bytes = list_bytes(list)?;
+    read_entries(list, &bytes, parse_list(list, &String::from_utf8_lossy(&bytes))?)
 }
 
-fn read_entries(list: &Path, bytes: &[u8], entries: &[Entry], options: &ReadOptions) -> Result<DataSet, LsdError> {
+fn read_entries(list: &Path, bytes: &[u8], entries: Vec<Entry>) -> Result<ProfileSet, LsdError> {
     let mut hash = Sha256::new();
     hash.update(bytes);
     let mut first: Option<(&Path, Axis)> = None;
     let mut profiles = Vec::with_capacity(entries.len());
     let mut found = Found::default();
-    for entry in entries {
+    for entry in &entries {
         let bytes = read_profile(list, entry)?;
         hash.update(&bytes);
         let raw = text::parse(&String::from_utf8_lossy(&bytes)).map_err(|fault| match fault.line {
-            0 => LsdError::File { path: entry.path.clone(), problem: fault.problem },
-            line => LsdError::Line { path: entry.path.clone(), line, problem: fault.problem },
+            0 => FileError::of(&entry.path, fault.problem),
+            line => FileError::Line { path: entry.path.clone(), line, problem: fault.problem },
         })?;
         let (first_path, axis) = *first.get_or_insert((&entry.path, raw.axis));
         if !axis.agrees_with(&raw.axis) {
@@ -125,15 +115,22 @@ fn read_entries(list: &Path, bytes: &[u8], entries: &[Entry], options: &ReadOpti
             });
         }
         found.note(entry, &raw);
-        profiles.push(in_star_frame(entry, RawProfile { axis, ..raw }, options)?);
+        profiles.push(Profile {
+            time_d: entry.time_d,
+            first_velocity_kms: axis.first - entry.vrad_kms,
+            step_kms: axis.step,
+            intensity: raw.intensity,
+            sigma: raw.sigma,
+        });
     }
-    match first {
-        Some(_) => Ok(DataSet {
+    match profiles.is_empty() {
+        true => Err(FileError::of(list, "lists no profile").into()),
+        false => Ok(ProfileSet {
             observations: Observations { profiles },
-            sha256: format!("{:x}", hash.finalize()),
+            sha256: Some(format!("{:x}", hash.finalize())),
             remarks: found.remarks(entries.len()),
+            labels: entries.into_iter().map(Label::from).collect(),
         }),
-        None => Err(LsdError::File { path: list.into(), problem: "lists no profile".into() }),
     }
 }
 
@@ -174,24 +171,16 @@ impl Found {
     }
 }
 
-/// What the list at `list` says of its profiles, in its order.
-///
-/// # Errors
-/// A list that cannot be read or makes no sense.
-pub fn labels(list: &Path) -> Result<Vec<Label>, LsdError> {
-    let bytes = std::fs::read(list).map_err(|source| LsdError::Read { path: list.into(), source })?;
-    let entries = parse_list(list, &String::from_utf8_lossy(&bytes))?;
-    Ok(entries.into_iter().map(|Entry { file, vrad_kms, .. }| Label { file, vrad_kms }).collect())
-}
+/// How often the profile at each path was opened by this process. A profile is read once in a command: tests count.
+static OPENED: Mutex<BTreeMap<PathBuf, usize>> = Mutex::new(BTreeMap::new());
 
-/// The list at `list` and the profiles that it names, as far as it can be read.
-pub fn files(list: &Path) -> Vec<PathBuf> {
-    let folder = list.parent().unwrap_or(Path::new(""));
-    let profiles = labels(list).unwrap_or_default();
-    std::iter::once(list.to_owned()).chain(profiles.into_iter().map(|profile| folder.join(profile.file))).collect()
+/// How often this process opened the profile at `path`.
+pub fn times_opened(path: &Path) -> usize {
+    OPENED.lock().unwrap_or_else(PoisonError::into_inner).get(path).copied().unwrap_or(0)
 }
 
 fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {
+    *OPENED.lock().unwrap_or_else(PoisonError::into_inner).entry(entry.path.clone()).or_default() += 1;
     std::fs::read(&entry.path).map_err(|source| LsdError::Profile {
         list: list.into(),
         line: entry.line,
@@ -200,62 +189,34 @@ fn read_profile(list: &Path, entry: &Entry) -> Result<Vec<u8>, LsdError> {
     })
 }
 
-fn parse_list(list: &Path, text: &str) -> Result<Vec<Entry>, LsdError> {
-    let folder = list.parent().unwrap_or(Path::new(""));
-    let mut entries = Vec::new();
-    for (line, text) in text.lines().enumerate().map(|(k, text)| (k + 1, text)) {
-        let fields: Vec<&str> = text.split_whitespace().take_while(|f| !f.starts_with('#')).collect();
-        let fail = |problem| LsdError::Line { path: list.into(), line, problem };
-        let number = |name: &str, field: &str| match field.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(fail(format!("{name} {} is not a finite number", shown(field)))),
-        };
-        let (file, time_d, vrad_kms) = match fields[..] {
-            [] => continue,
-            [file, time] => (file, number("time", time)?, 0.0),
-            [file, time, vrad] => (file, number("time", time)?, number("radial velocity", vrad)?),
-            _ => return Err(fail(format!("{} columns where FILE TIME_DAYS [VRAD_KMS] is due", fields.len()))),
-        };
-        entries.push(Entry { line, file: file.to_owned(), path: folder.join(file), time_d, vrad_kms });
-    }
-    Ok(entries)
-}
-
-/// Subtracts VRAD, cuts the velocity range, scales sigma.
-fn in_star_frame(entry: &Entry, raw: RawProfile, options: &ReadOptions) -> Result<Profile, LsdError> {
-    let axis = Axis { first: raw.axis.first - entry.vrad_kms, ..raw.axis };
-    let (lo, hi) = options.velocity_range_kms.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-    // A bin on the edge of the range belongs to it, whatever the rounding of VRAD and step.
-    let slack = 1e-6 * axis.step;
-    let kept: Vec<usize> = (0..axis.bins).filter(|j| (lo - slack..=hi + slack).contains(&axis.at(*j))).collect();
-    let (Some(&begin), Some(&last)) = (kept.first(), kept.last()) else {
-        return Err(too_few(entry, &axis, (lo, hi), 0));
-    };
+/// What of a profile lies within the velocity range, errors scaled.
+fn cut(profile: &Profile, range_kms: Option<(f64, f64)>, sigma_scale: f64) -> Result<Profile, String> {
+    let bins = profile.intensity.len();
+    let (lo, hi) = range_kms.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    // a bin on the edge of the range belongs to it, whatever the rounding of VRAD and step
+    let slack = 1e-6 * profile.step_kms;
+    let kept: Vec<usize> =
+        (0..bins).filter(|j| (lo - slack..=hi + slack).contains(&profile.velocity_kms(*j))).collect();
     if kept.len() < MIN_BINS {
-        return Err(too_few(entry, &axis, (lo, hi), kept.len()));
+        let (from, to) = (profile.velocity_kms(0), profile.velocity_kms(bins - 1));
+        let what = match kept.len() {
+            0 if hi < from || lo > to => "lies outside the data".to_string(),
+            0 => "holds no bin".to_string(),
+            n => format!("holds {n} bins, at least {MIN_BINS} are needed"),
+        };
+        return Err(format!(
+            "velocity range [{lo}, {hi}] km/s {what}; the data reach from {from:.3} to {to:.3} km/s after VRAD"
+        ));
     }
-    let sigma: Vec<f64> = raw.sigma[begin..=last].iter().map(|s| s * options.sigma_scale).collect();
-    if let Some(sigma) = sigma.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
-        let problem = format!("sigma becomes {sigma} when scaled by {}", options.sigma_scale);
-        return Err(LsdError::File { path: entry.path.clone(), problem });
+    let kept = kept[0]..kept[kept.len() - 1] + 1;
+    let sigma: Vec<f64> = profile.sigma[kept.clone()].iter().map(|sigma| sigma * sigma_scale).collect();
+    if let Some(sigma) = sigma.iter().find(|sigma| !(sigma.is_finite() && **sigma > 0.0)) {
+        return Err(format!("sigma becomes {sigma} when scaled by {sigma_scale}"));
     }
     Ok(Profile {
-        time_d: entry.time_d,
-        first_velocity_kms: axis.at(begin),
-        step_kms: axis.step,
-        intensity: raw.intensity[begin..=last].to_vec(),
+        first_velocity_kms: profile.velocity_kms(kept.start),
+        intensity: profile.intensity[kept].to_vec(),
         sigma,
+        ..*profile
     })
-}
-
-fn too_few(entry: &Entry, axis: &Axis, (lo, hi): (f64, f64), bins: usize) -> LsdError {
-    let (from, to) = (axis.at(0), axis.at(axis.bins - 1));
-    let what = match bins {
-        0 if hi < from || lo > to => "lies outside the data".to_string(),
-        0 => "holds no bin".to_string(),
-        n => format!("holds {n} bins, at least {MIN_BINS} are needed"),
-    };
-    let problem =
-        format!("velocity range [{lo}, {hi}] km/s {what}; the data reach from {from:.3} to {to:.3} km/s after VRAD");
-    LsdError::File { path: entry.path.clone(), problem }
 }

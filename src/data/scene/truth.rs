@@ -1,7 +1,6 @@
 //! What simulated observations were made with: maps and parameters to hold results against.
 
 use super::Scene;
-use crate::data::config::ObservationSource;
 use crate::data::io::provenance::Season;
 use crate::data::io::truth::Truth;
 use crate::data::simulate::Simulation;
@@ -63,10 +62,7 @@ impl Scene {
     }
 
     fn simulation(&self) -> Option<&Simulation> {
-        match &self.settings.sets[0].source {
-            ObservationSource::Simulate(simulation) => Some(simulation),
-            ObservationSource::Files { .. } => None,
-        }
+        self.settings.sets[0].simulation()
     }
 
     /// What the scene's `simulation` was made with.

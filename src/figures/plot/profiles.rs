@@ -3,7 +3,7 @@
 use super::star_map::ephemeris;
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
-use crate::data::io::lsd::{self, ReadOptions};
+use crate::data::io::lsd;
 use crate::data::io::map::{FIT, FitFile, UNCHANGING};
 use crate::data::io::periodogram::DATA_SET;
 use crate::data::io::truth::{self, TruthFile};
@@ -72,7 +72,7 @@ pub(super) fn simulated(folder: &Path) -> Result<Vec<Line>, PlotError> {
     let truth: TruthFile = origin::read(folder, truth::FILE)?;
     let (period, epoch) = ephemeris(&truth.provenance().config).unwrap_or((1.0, 0.0));
     let list = folder.join("observations.txt");
-    let observations = lsd::read_written(&list, &ReadOptions::default())?.observations;
+    let observations = lsd::read_written(&list)?.observations;
     let line = |profile: &crate::star::observation::Profile| Line {
         time_d: profile.time_d,
         cycle: (profile.time_d - epoch) / period,

@@ -1,7 +1,7 @@
 //! What a page is about: the star, and the data in number and time.
 
 use crate::data::io::csv::Columns;
-use crate::data::io::lsd::{self, ReadOptions};
+use crate::data::io::lsd;
 use crate::data::io::map::{FIT, MAP};
 use crate::data::io::provenance::Measured;
 use crate::figures::plot::PlotError;
@@ -87,7 +87,7 @@ impl Data {
             let table = Columns::read(&folder.join("rv.csv")).ok();
             let times = table.and_then(|table| table.column("time_d").ok().map(<[f64]>::to_vec));
             Data::at(&times.or_else(|| {
-                let read = lsd::read(&folder.join("observations.txt"), &ReadOptions::default()).ok()?;
+                let read = lsd::read(&folder.join("observations.txt")).ok()?;
                 Some(read.observations.times_d())
             })?)
         })

@@ -20,7 +20,7 @@ use crate::numerics::json::number_or_null;
 use crate::sampling::chain::statistics::wrap;
 use crate::sampling::chain::{ChainError, Summary};
 use crate::sampling::landscape::{Marginal, Paraboloid, Rule, Undefined, paraboloid};
-use crate::surface::{ObjectiveKind, UnresolvedSpots};
+use crate::surface::UnresolvedSpots;
 use draws::Draws;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -146,7 +146,7 @@ impl Comparison {
         };
         comparison.notes = notes::notes(&comparison, &summary);
         let imaging = &pair.settings.imaging;
-        let of_one_map = imaging.objective != ObjectiveKind::MarginalLikelihood;
+        let of_one_map = !imaging.objective.evolves();
         if of_one_map && imaging.unresolved_spots == UnresolvedSpots::Fitted {
             comparison.notes.push("the chain counts unresolved spots as noise, the landscape does not".into());
         }

@@ -110,20 +110,25 @@ impl WholeWay {
         }
     }
 
-    /// The blind search of profiles with an orbit in them; `None` where they or their image make no sense any more.
+    /// The star, for another process.
     ///
     /// # Errors
     /// A config or profiles that are no longer what they were.
-    pub fn searcher(&self) -> Result<impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<>, WholeWayError> {
+    pub fn scene(&self) -> Result<Scene, WholeWayError> {
         let scene = Scene::new(&Config::at(self.resolved.clone(), &self.config))?;
-        if scene.data_sha256 != self.data_sha256 {
-            return Err(WholeWayError::Changed(self.config.clone()));
+        match scene.data_sha256 == self.data_sha256 {
+            true => Ok(scene),
+            false => Err(WholeWayError::Changed(self.config.clone())),
         }
-        let (whole, _) = scene.whole().map_err(SceneError::from)?;
+    }
+
+    /// The blind search of the profiles in `scene` with an orbit in them; `None` where they or their image make no
+    /// sense any more.
+    pub fn searcher(&self, scene: Scene) -> impl Fn(&Orbit) -> Option<Outcome> + Send + Sync + use<> {
         let WholeWay { settings, removed, .. } = self.clone();
-        Ok(move |orbit: &Orbit| {
+        move |orbit: &Orbit| {
             let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();
-            let star = scene.injected(&whole, &orbits).ok()?;
+            let star = scene.injected(&orbits).ok()?;
             let mut values = for_blind_search(star.settings.values, &star.settings.free);
             values.set(Parameter::K, 0.0);
             let at = At { imager: &star.imager, values, nuisances: &settings.detection.nuisances };
@@ -133,6 +138,6 @@ impl WholeWay {
             let peak = (1.0 / best.porb_over_prot, best.orbit.delta_ln_l, best.orbit.k_kms);
             let level = search.false_alarm.level(CANDIDATE_FAP);
             Some(Outcome::of(peak, level, orbit, settings.frequencies.time_base_cycles))
-        })
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! A star with the times at which it is to be observed.
 
+use crate::data::calibrated::{fingerprint, imager};
 use crate::data::config::{Config, ConfigError, ObservationSource, PlanSection, Settings};
 use crate::data::io::provenance::{Measured, Provenance};
-use crate::data::scene::{Scene, SceneError, fingerprint, imager};
+use crate::data::scene::{Scene, SceneError};
 use crate::field::{Field, Kernel, Lifetime, Spectrum};
 use crate::inference::detection::nights;
 use crate::model::{Parameter, ParameterValues};
@@ -185,7 +186,7 @@ impl Campaign {
         let assumed = taken.map_or_else(|| usual(known), |taken| taken.marginal.assumed);
         Ok(Campaign {
             name: wanted.map_or(stem.clone(), |nights| format!("{stem}, {nights} nights")),
-            imager: imager(&settings, std::slice::from_ref(&all))?,
+            imager: imager(&settings, &settings.sets, std::slice::from_ref(&all), &[])?,
             taken: taken.map(|taken| Arc::clone(&taken.marginal)),
             assumed,
             source,

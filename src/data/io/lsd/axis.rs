@@ -1,6 +1,6 @@
 //! The velocity axis of a profile: uniform, in km/s, and the same for all profiles of a star.
 
-use super::text::{Fault, Row, fault};
+use super::row::{Fault, Row, fault};
 
 /// A uniform velocity axis (km/s).
 #[derive(Clone, Copy, Debug, PartialEq)]

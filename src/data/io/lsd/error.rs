@@ -1,19 +1,15 @@
 //! What can be wrong with a list of observations or a profile: one line each, naming file and line.
 
+use crate::data::io::FileError;
 use crate::data::io::atomic::WriteError;
 use std::path::PathBuf;
 
 /// Why observations could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum LsdError {
-    /// A file could not be read.
-    #[error("{}: cannot read: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    /// A file could not be read, or is wrong.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The list names a profile that could not be read.
     #[error("{}:{line}: cannot read profile {}: {source}", .list.display(), .profile.display())]
     Profile {
@@ -25,24 +21,6 @@ pub enum LsdError {
         profile: PathBuf,
         /// What the system says.
         source: std::io::Error,
-    },
-    /// A line of a list or profile is wrong.
-    #[error("{}:{line}: {problem}", .path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// Line in it (from 1).
-        line: usize,
-        /// What is wrong with it.
-        problem: String,
-    },
-    /// A file holds nothing of use.
-    #[error("{}: {problem}", .path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: String,
     },
     /// Two profiles differ in their velocity axes.
     #[error("{}: velocity axis ({axis}) differs from that of {} ({expected})", .path.display(), .first.display())]

@@ -11,7 +11,7 @@
 //! Comments and titles before the rows are passed over, and so may be any of these lines.
 
 use super::names::{self, Columns};
-use super::text::{Fault, fault, shown};
+use super::row::{Fault, fault, shown};
 
 /// What separates the fields of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

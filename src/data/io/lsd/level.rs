@@ -2,8 +2,6 @@
 //! LSD solves for it) or `I - 1`. It is told by the continuum at both ends, which is near 1 or near 0, and by the sign
 //! of the line.
 
-use super::text::RawProfile;
-
 /// What the column of intensities holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Given {
@@ -26,14 +24,14 @@ const SMOOTHED: f64 = 0.05;
 /// above.
 const ONE_SIDED: f64 = 0.5;
 
-/// What `profile` is given as.
+/// What a profile of these numbers is given as.
 ///
 /// # Errors
 /// A continuum at 0 with as much above as below it.
-pub(super) fn given_as(profile: &RawProfile) -> Result<Given, String> {
-    let bins = profile.intensity.len();
+pub(super) fn given_as(numbers: &[f64]) -> Result<Given, String> {
+    let bins = numbers.len();
     let end = ((ENDS * bins as f64) as usize).max(2).min(bins);
-    let mut ends: Vec<f64> = profile.intensity[..end].iter().chain(&profile.intensity[bins - end..]).copied().collect();
+    let mut ends: Vec<f64> = numbers[..end].iter().chain(&numbers[bins - end..]).copied().collect();
     ends.sort_by(f64::total_cmp);
     let continuum = 0.5 * (ends[(ends.len() - 1) / 2] + ends[ends.len() / 2]);
     if continuum.abs() > NEAR_ZERO {
@@ -43,7 +41,7 @@ pub(super) fn given_as(profile: &RawProfile) -> Result<Given, String> {
         };
     }
     let window = ((SMOOTHED * bins as f64) as usize).max(1);
-    let means = profile.intensity.windows(window).map(|w| w.iter().sum::<f64>() / window as f64 - continuum);
+    let means = numbers.windows(window).map(|w| w.iter().sum::<f64>() / window as f64 - continuum);
     let (below, above) = means.fold((0.0f64, 0.0f64), |(low, high), mean| (low.max(-mean), high.max(mean)));
     match (below < ONE_SIDED * above, above < ONE_SIDED * below) {
         (true, _) => Ok(Given::Depth),

@@ -4,6 +4,7 @@
 use super::axis::Axis;
 use super::layout::{Announced, Layout, Separator, is_comment, wrong_count};
 use super::level::{self, Given};
+use super::row::{Fault, Row, fault, shown};
 
 /// A profile as it stands in its file, on a uniform velocity axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,27 +19,12 @@ pub(super) struct RawProfile {
     pub profiles: usize,
 }
 
-/// What is wrong with a line (counted from 1), or with the file as a whole (line 0).
-#[derive(Debug, PartialEq)]
-pub(super) struct Fault {
-    pub line: usize,
-    pub problem: String,
-}
-
 /// Smallest standard error and largest numbers that a profile in units of the continuum can have.
 const SMALLEST_SIGMA: f64 = 1e-9;
 const LARGEST: f64 = 1e6;
 
 /// Fewest bins that make a profile.
 pub(super) const MIN_BINS: usize = 5;
-
-/// What is used of a row.
-pub(super) struct Row {
-    pub line: usize,
-    pub velocity: f64,
-    intensity: f64,
-    sigma: f64,
-}
 
 /// Reads the text of a profile.
 pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
@@ -58,7 +44,7 @@ pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
         given: Given::Intensity,
         profiles: layout.announced.map_or(1, |announced| announced.profiles),
     };
-    profile.given = level::given_as(&profile).or_else(|problem| fault(0, problem))?;
+    profile.given = level::given_as(&profile.intensity).or_else(|problem| fault(0, problem))?;
     profile.intensity.iter_mut().for_each(|value| *value = profile.given.intensity(*value));
     Ok(profile)
 }
@@ -82,10 +68,6 @@ fn rows(lines: &[(usize, &str)], layout: &Layout) -> Result<Vec<Row>, Fault> {
         _ if rows.len() < MIN_BINS => fault(0, format!("holds {} points, at least {MIN_BINS} are needed", rows.len())),
         _ => Ok(rows),
     }
-}
-
-pub(super) fn fault<T>(line: usize, problem: String) -> Result<T, Fault> {
-    Err(Fault { line, problem })
 }
 
 fn parse_row(line: usize, fields: &[&str], layout: &Layout) -> Result<Row, Fault> {
@@ -116,12 +98,6 @@ fn parse_row(line: usize, fields: &[&str], layout: &Layout) -> Result<Row, Fault
         return fault(line, format!("intensity {intensity:e} with sigma {sigma:e} is not in units of the continuum"));
     }
     Ok(Row { line, velocity, intensity, sigma })
-}
-
-/// A piece of the user's text, quoted, escaped and cut to a length that keeps a message on one line.
-pub(super) fn shown(text: &str) -> String {
-    let short: String = text.chars().take(40).collect();
-    format!("{short:?}")
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Whether the times of a list are days from one zero point, one for each of several profiles.
 
-use super::Entry;
+use super::list::Entry;
 use std::collections::HashMap;
 use std::path::PathBuf;
 

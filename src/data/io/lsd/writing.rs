@@ -1,7 +1,8 @@
 //! Observations as files: a list and its profiles, which reading gives back.
 
-use super::super::atomic;
-use super::{Label, LsdError};
+use super::error::LsdError;
+use super::list::Label;
+use crate::data::io::atomic;
 use crate::star::observation::{Observations, Profile};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -40,7 +41,7 @@ pub fn write(folder: &Path, observations: &Observations) -> Result<(), LsdError>
 /// # Errors
 /// A file that cannot be written.
 pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), LsdError> {
-    let label = |k: usize| Label { file: format!("profile {k}"), vrad_kms: 0.0 };
+    let label = |k: usize| Label { file: format!("profile {k}"), path: None, vrad_kms: 0.0 };
     let labels: Vec<Label> = (0..observations.profiles.len()).map(label).collect();
     write_as(folder, observations, &labels, "from arrays")
 }
@@ -52,7 +53,7 @@ pub fn write_numbers(folder: &Path, observations: &Observations) -> Result<(), L
 /// A file that cannot be written.
 pub fn write_as(folder: &Path, observations: &Observations, labels: &[Label], what: &str) -> Result<(), LsdError> {
     let mut list = String::from("# file  time_d  vrad_kms\n");
-    for (k, (profile, Label { file, vrad_kms })) in observations.profiles.iter().zip(labels).enumerate() {
+    for (k, (profile, Label { file, vrad_kms, .. })) in observations.profiles.iter().zip(labels).enumerate() {
         let name = format!("p{k:03}.prof");
         let title = format!("{file} {what}");
         save(&folder.join(&name), &profile_text(&title, profile, *vrad_kms))?;

@@ -1,29 +1,31 @@
 //! What a config leaves to the profiles, measured before anything else: their errors, and the scatter of their velocity
 //! zero points.
 
-use super::imager;
-use crate::data::config::{ConfigError, DataSetSettings, Settings, VelocityJitter};
+use super::imager::imager;
+use super::seasons;
+use crate::data::config::{ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter};
+use crate::data::io::provenance::Season;
 use crate::star::observation::Observations;
-use crate::surface::ObjectiveKind;
 use crate::surface::calibration::jitter::{JitterError, MeasuredJitter, ZeroPoints};
 use crate::surface::calibration::noise;
 use crate::surface::calibration::noise::{ErrorSettings, MeasuredErrors, NoiseError};
 use crate::surface::imaging::Imager;
 
-/// The velocity zero points of the config, where there are any, and how large they are where the profiles say so. The
+/// The velocity zero points of the profiles, where there are any, and how large they are where the profiles say so. The
 /// target chi2 is per datum, independent or not.
 pub(super) fn zero_points(
     settings: &Settings,
     imager: &Imager,
+    jitter: VelocityJitter,
     chi2_target: f64,
 ) -> Result<(Option<ZeroPoints>, Option<MeasuredJitter>), ConfigError> {
     let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
-    let (sd_kms, measured) = match settings.velocity_jitter {
-        VelocityJitter::Known(0.0) => return Ok((None, None)),
+    let (sd_kms, measured) = match jitter {
+        VelocityJitter::Number(0.0) => return Ok((None, None)),
         // it is counted with the field
-        _ if settings.imaging.objective == ObjectiveKind::MarginalLikelihood => return Ok((None, None)),
-        VelocityJitter::Known(sd_kms) => (sd_kms, None),
-        VelocityJitter::Fitted => {
+        _ if settings.imaging.objective.evolves() => return Ok((None, None)),
+        VelocityJitter::Number(sd_kms) => (sd_kms, None),
+        VelocityJitter::Word(_) => {
             let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;
             (measured.value_kms, Some(measured))
         }
@@ -36,44 +38,57 @@ pub(super) fn zero_points(
 /// part.
 const SETTLED: (usize, f64) = (3, 0.03);
 
-/// The errors that the observations of a `set`, `cut` as they are used, and the `whole` profiles ask for.
-pub(super) fn measured_errors(
+/// The errors that the config leaves to the profiles of a `set`, if it does: `whole` as they are in their files, and
+/// `used` as they enter the model, errors as quoted. A map is of each of the `seasons` of all sets.
+pub(super) fn measured(
     settings: &Settings,
     set: &DataSetSettings,
-    wanted: ErrorSettings,
     whole: &Observations,
-    cut: &Observations,
-) -> Result<MeasuredErrors, ConfigError> {
+    used: &Observations,
+    all_seasons: &[Season],
+) -> Result<Option<MeasuredErrors>, ConfigError> {
+    let wanted = match set.source {
+        ObservationSource::Files { errors, .. } if errors != ErrorSettings::default() => errors,
+        _ => return Ok(None),
+    };
     let fault = |e: NoiseError| settings.fault(&e.key().replacen("observations", &set.key, 1), &e.to_string());
+    let whole = whole.clone().over_continuum(set.continuum_level());
+    let continuum = noise::by_continuum(&whole, &set.star, &settings.values, wanted).map_err(fault)?;
+    // what a map leaves over is no noise where stars may change
+    if !wanted.measured || settings.imaging.objective.evolves() {
+        return Ok(Some(continuum));
+    }
+    let seasons = seasons::as_parted(set, used, all_seasons);
+    let imager = |part: Observations| imager(settings, std::slice::from_ref(set), &[part], &seasons);
     let scaled = |measured: &MeasuredErrors| {
-        let mut observations = cut.clone();
+        let mut observations = used.clone();
         measured.apply(&mut observations);
         observations
     };
-    let continuum = noise::by_continuum(whole, &set.star, &settings.values, wanted).map_err(fault)?;
-    // what a map leaves over is no noise where stars may change
-    if !wanted.measured || settings.imaging.objective == ObjectiveKind::MarginalLikelihood {
-        return Ok(continuum);
-    }
-    let alone = &Settings { sets: vec![set.clone()], ..settings.clone() };
     let before = scaled(&continuum);
-    let chi2_target = settings.imaging.chi2_target.value() / continuum.correlated_bins;
     let mut measured = continuum.clone();
     for _ in 0..SETTLED.0 {
         // a map that knows nothing of zero points leaves them over, and errors that are too small look like zero points
-        let (zero_points, _) = zero_points(alone, &imager(alone, &[scaled(&measured)])?, chi2_target)?;
+        let zero_points = match settings.imaging.chi2_target.number() {
+            Some(target) => {
+                let target = target / continuum.correlated_bins;
+                zero_points(settings, &imager(scaled(&measured))?, settings.velocity_jitter, target)?.0
+            }
+            // one that is chosen goes by velocities: the config has no zero points beside it
+            None => None,
+        };
         let with_factor = |factor: f64| {
             let mut observations = before.clone();
             observations.profiles.iter_mut().flat_map(|p| &mut p.sigma).for_each(|sigma| *sigma *= factor);
-            let imager = imager(alone, &[observations])?;
+            let imager = imager(observations)?;
             Ok(zero_points.iter().fold(imager, |imager, zero_points| zero_points.counted_in(imager)))
         };
         let then = std::mem::replace(&mut measured, continuum.clone()).sigma_scale.unwrap_or(1.0);
         measured.count_residuals(settings.values, with_factor)?.map_err(fault)?;
         let moved = (measured.sigma_scale.unwrap_or(1.0) / then).ln().abs();
-        if settings.velocity_jitter != VelocityJitter::Fitted || moved < SETTLED.1 {
+        if !settings.velocity_jitter.is_word() || moved < SETTLED.1 {
             break;
         }
     }
-    Ok(measured)
+    Ok(Some(measured))
 }

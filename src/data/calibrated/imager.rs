@@ -1,0 +1,65 @@
+//! From a config and the observations of its data sets to what they are imaged with, the velocity offsets of the sets
+//! held where they belong.
+
+use super::seasons::with_seasons;
+use super::strength::star_for;
+use crate::data::config::{ConfigError, DataSetSettings, Settings, ZeroPoint};
+use crate::data::io::provenance::Season;
+use crate::planets::periodogram::{Frequencies, FrequencySettings};
+use crate::star::observation::Observations;
+use crate::star::{Sampling, Seen, StarSettings};
+use crate::surface::calibration::offsets;
+use crate::surface::calibration::offsets::HeldZeroPoint;
+use crate::surface::imaging::{Imager, ZeroPointPrior};
+
+/// What the observations `parts` of these data `sets` are imaged with, with a map of each of the `seasons`. An offset
+/// that is to be found is at 0.
+///
+/// # Errors
+/// Settings that make no sense with these observations.
+pub fn imager(
+    settings: &Settings,
+    sets: &[DataSetSettings],
+    parts: &[Observations],
+    seasons: &[Season],
+) -> Result<Imager, ConfigError> {
+    let mut stars = Vec::new();
+    for (set, part) in sets.iter().zip(parts) {
+        settings.check_velocity_grid(&set.star, &settings.values, part.step_kms())?;
+        stars.push(star_for(settings, set, part)?);
+    }
+    let star = stars[0].clone();
+    let seen = |(own, part): (&StarSettings, &Observations)| Seen {
+        line: Some(own.line).filter(|line| *line != star.line),
+        contrast: Some(own.contrast).filter(|contrast| *contrast != star.contrast),
+        sampling: Sampling::of(part),
+        own_maps: Vec::new(),
+    };
+    let seen: Vec<Seen> = stars.iter().zip(parts).map(seen).collect();
+    let all = Observations::joined(parts.to_vec());
+    let imager = Imager::of_sets(star, seen, &all, settings.imaging.pixels, settings.imaging.entropy());
+    let mut imager = with_seasons(imager, seasons);
+    if sets.iter().any(|set| set.nuisances.is_some()) {
+        let priors = sets.iter().map(|set| set.nuisances.unwrap_or_default());
+        imager = imager.with_nuisances_of(&priors.zip(parts).collect::<Vec<_>>());
+    }
+    for (set, DataSetSettings { zero_point, .. }) in sets.iter().enumerate() {
+        match *zero_point {
+            ZeroPoint::Number(0.0) => {}
+            ZeroPoint::Number(kms) => imager.move_set(set, kms),
+            ZeroPoint::Word(_) => {
+                imager.zero_points.push(ZeroPointPrior { set, mean_kms: 0.0, sd_kms: offsets::PRIOR_KMS });
+            }
+        }
+    }
+    Ok(imager)
+}
+
+/// Finds the velocity offsets of data sets that are fitted, and holds them in `imager`.
+pub(super) fn hold_offsets(settings: &Settings, imager: &mut Imager) -> Result<Vec<HeldZeroPoint>, ConfigError> {
+    let Some(first) = imager.zero_points.first().map(|prior| prior.set) else { return Ok(Vec::new()) };
+    let usual = FrequencySettings::default();
+    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok();
+    offsets::hold(imager, settings.values, settings.known_field(), frequencies.as_ref())
+        .map_err(|e| settings.fault(&format!("{}.zero_point_kms", settings.sets[first].key), &e.to_string()))
+}

@@ -1,0 +1,191 @@
+//! From observations as they are in their files to what enters the model, a new value: profiles within the velocity
+//! range and in units of their continua, errors scaled or measured, light curves in bins, a map for each season; and
+//! what is then measured on them before anything else: target chi2, velocity jitter, velocity offsets of data sets.
+
+mod errors;
+mod imager;
+mod light_curves;
+mod seasons;
+mod strength;
+
+pub use imager::imager;
+pub use strength::star_for;
+
+use crate::data::config::{Automatic, ConfigError, DataSetSettings, ObservationSource, Settings, VelocityJitter};
+use crate::data::dataset::{Dataset, ProfileSet, SceneError};
+use crate::data::ephemeris::Ephemeris;
+use crate::data::io::lsd::LsdError;
+use crate::data::io::provenance::{Measured, MeasuredSet};
+use crate::star::observation::Observations;
+use crate::surface::calibration::noise::MeasuredErrors;
+use crate::surface::calibration::target;
+use crate::surface::calibration::target::ChosenTarget;
+use crate::surface::imaging::Imager;
+use light_curves::Binned;
+use sha2::{Digest, Sha256};
+
+/// Observations as they enter the model.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// The profiles; of several data sets one after the other.
+    pub observations: Observations,
+    /// SHA-256 (hex): of the bytes of their files where these are what is used, of the numbers where they are not.
+    pub sha256: String,
+    /// What was measured on them.
+    pub measured: Measured,
+    /// Target chi2 per datum, of which noise that several bins share makes fewer; where the config leaves it to the
+    /// observations it is measured.
+    pub chi2_target: f64,
+    /// What they are imaged with.
+    pub imager: Imager,
+}
+
+impl Calibrated {
+    /// The observations of `data` as `settings` want them.
+    ///
+    /// # Errors
+    /// Settings that make no sense with these observations.
+    pub fn of(settings: &Settings, data: &Dataset) -> Result<Self, SceneError> {
+        let light_curves = light_curves::binned(settings, &data.light_curves)?;
+        let sets = || settings.sets.iter().zip(&data.sets);
+        let mut parts = sets().map(|(set, profiles)| used(set, profiles)).collect::<Result<Vec<_>, _>>()?;
+        // errors are what maps leave over, and a map is of a season of all sets
+        let seasons = seasons::seasons(settings, &parts)?;
+        let (mut errors, mut hashes) = (Vec::new(), Vec::new());
+        for ((set, profiles), part) in sets().zip(&mut parts) {
+            let measured = errors::measured(settings, set, &profiles.observations, part, &seasons)?;
+            measured.iter().for_each(|measured| measured.apply(part));
+            // cut and factor are the config's, whose own fingerprint has them
+            let of_files = profiles.sha256.clone().filter(|_| measured.is_none() && set.continuum_level() == 1.0);
+            hashes.push(of_files.unwrap_or_else(|| fingerprint(part)));
+            errors.push(measured);
+        }
+        let sha256 = match &hashes[..] {
+            [one] => one.clone(),
+            several => format!("{:x}", Sha256::digest(several.concat())),
+        };
+        Ephemeris::check(settings, &parts)?;
+        let mut imager = imager(settings, &settings.sets, &parts, &seasons)?;
+        imager.light_curves = light_curves::near(settings, &parts, &light_curves)?;
+        imager.data.correlated_bins = correlated_bins(&parts, &errors);
+        let (chi2_target, chosen) = chi2_target(settings, &imager)?;
+        let (zero_points, velocity_jitter) =
+            errors::zero_points(settings, &imager, settings.velocity_jitter, chi2_target)?;
+        let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
+        let mut held = imager::hold_offsets(settings, &mut imager)?.into_iter();
+        let mut measured = Measured {
+            profiles: remarks(settings, data),
+            velocity_jitter,
+            seasons: if seasons.len() > 1 { seasons } else { Vec::new() },
+            light_curves: light_curves.iter().map(Binned::line).collect(),
+            chi2_target: chosen,
+            ..Measured::default()
+        };
+        match settings.sets.len() {
+            1 => measured.errors = errors.into_iter().next().flatten(),
+            _ => {
+                let of_set = |((set, part), errors): ((&DataSetSettings, &Observations), _)| MeasuredSet {
+                    name: set.name.clone(),
+                    profiles: part.profiles.len(),
+                    errors,
+                    zero_point: if set.zero_point.is_word() { held.next() } else { None },
+                };
+                measured.sets = settings.sets.iter().zip(&parts).zip(errors).map(of_set).collect();
+            }
+        }
+        let sha256 = light_curves::fingerprint(sha256, &light_curves);
+        Ok(Calibrated { observations: Observations::joined(parts), sha256, measured, chi2_target, imager })
+    }
+
+    /// The same where the profiles are others than those that it was measured on, of the same star at the same times and
+    /// in the same bins: errors, target chi2, velocity jitter and velocity offsets of data sets are held.
+    ///
+    /// # Errors
+    /// Profiles that make no sense.
+    pub fn of_others(self, settings: &Settings) -> Result<Self, ConfigError> {
+        let parts = of_sets(&self.imager, &self.observations);
+        let mut imager = imager(settings, &settings.sets, &parts, &self.measured.seasons)?;
+        imager.light_curves = self.imager.light_curves;
+        imager.data.correlated_bins = self.imager.data.correlated_bins;
+        let jitter = self.measured.velocity_jitter.as_ref().map(|measured| VelocityJitter::Number(measured.value_kms));
+        let jitter = jitter.unwrap_or(settings.velocity_jitter);
+        let (zero_points, _) = errors::zero_points(settings, &imager, jitter, self.chi2_target)?;
+        let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
+        let held = self.measured.sets.iter().filter_map(|set| set.zero_point);
+        held.enumerate().for_each(|(z, held)| imager.move_zero_point(z, held.value_kms));
+        Ok(Calibrated { sha256: fingerprint(&self.observations), imager, ..self })
+    }
+}
+
+/// The profiles of each data set that `imager` knows of.
+pub fn of_sets(imager: &Imager, observations: &Observations) -> Vec<Observations> {
+    let part = |set: std::ops::Range<usize>| Observations { profiles: observations.profiles[set].to_vec() };
+    imager.profiles_of_sets().into_iter().map(part).collect()
+}
+
+/// The profiles of a `set` within its velocity range, in units of their continuum, errors times the factor of the
+/// config.
+fn used(set: &DataSetSettings, profiles: &ProfileSet) -> Result<Observations, LsdError> {
+    match set.source {
+        ObservationSource::Files { velocity_range_kms, sigma_scale, continuum_level, .. } => {
+            let observations = profiles.within(velocity_range_kms, sigma_scale)?;
+            Ok(if continuum_level == 1.0 { observations } else { observations.over_continuum(continuum_level) })
+        }
+        ObservationSource::Simulate(_) => Ok(profiles.observations.clone()),
+    }
+}
+
+/// What a reader of results must know of the files.
+fn remarks(settings: &Settings, data: &Dataset) -> Vec<String> {
+    let several = settings.sets.len() > 1;
+    let of_set = |(set, profiles): (&DataSetSettings, &ProfileSet)| {
+        let of = |remark: &String| if several { format!("{}: {remark}", set.name) } else { remark.clone() };
+        profiles.remarks.iter().map(of).collect::<Vec<_>>()
+    };
+    settings.sets.iter().zip(&data.sets).flat_map(of_set).collect()
+}
+
+/// The target chi2 per datum, and how it was chosen where the config leaves it to the observations. That of the config
+/// is per independent datum.
+fn chi2_target(settings: &Settings, imager: &Imager) -> Result<(f64, Option<ChosenTarget>), ConfigError> {
+    let correlated_bins = imager.data.correlated_bins;
+    match settings.imaging.chi2_target {
+        Automatic::Number(target) => Ok((target / correlated_bins, None)),
+        Automatic::Word(_) => {
+            let chosen = target::choose(imager, settings.values, correlated_bins)
+                .map_err(|e| settings.fault("imaging.chi2_target", &e.to_string()))?;
+            Ok((chosen.value, Some(chosen)))
+        }
+    }
+}
+
+/// Bins of which noise is correlated: number of data over that of independent ones.
+fn correlated_bins(parts: &[Observations], errors: &[Option<MeasuredErrors>]) -> f64 {
+    let of_each: Vec<f64> = errors.iter().map(|e| e.as_ref().map_or(1.0, |e| e.correlated_bins)).collect();
+    match &of_each[..] {
+        [one] => *one,
+        several => {
+            let data = |part: &Observations| part.len() as f64;
+            let independent: f64 = parts.iter().zip(several).map(|(part, bins)| data(part) / bins).sum();
+            parts.iter().map(data).sum::<f64>() / independent
+        }
+    }
+}
+
+/// SHA-256 (hex) of the numbers of `observations`, little-endian: the first step, then for each profile time, number of
+/// bins, and velocity, intensity and sigma of each bin.
+pub fn fingerprint(observations: &Observations) -> String {
+    let step = observations.step_kms();
+    let mut hash = Sha256::new();
+    hash.update(step.to_le_bytes());
+    for profile in &observations.profiles {
+        hash.update(profile.time_d.to_le_bytes());
+        hash.update((profile.intensity.len() as u64).to_le_bytes());
+        for (j, (intensity, sigma)) in profile.intensity.iter().zip(&profile.sigma).enumerate() {
+            for number in [profile.velocity_kms(j), *intensity, *sigma] {
+                hash.update(number.to_le_bytes());
+            }
+        }
+    }
+    format!("{:x}", hash.finalize())
+}

@@ -1,0 +1,75 @@
+//! Checks that several sections of a config share.
+
+use super::domain::{check_size, most};
+use super::error::Fault;
+use super::number_or::Automatic;
+use crate::surface::nuisances::LineAndContinuum;
+
+/// Fewest and most pixels of an image or a simulated star.
+pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
+
+/// Longest name of a set.
+const LONGEST_NAME: usize = 40;
+
+/// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
+pub(super) fn check_nuisances(priors: &LineAndContinuum, keys: [String; 3]) -> Result<(), Fault> {
+    match keys.iter().zip(priors.numbers()).find(|(_, sd)| !(0.0..=10.0).contains(sd)) {
+        Some((key, sd)) => Err(Fault::new(key, format!("{sd} must be from 0 to 10"))),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
+    if PIXELS.contains(&pixels) {
+        return Ok(());
+    }
+    Err(Fault::new(key, format!("{pixels} must be from {} to {}", PIXELS.start(), PIXELS.end())))
+}
+
+pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Fault::new(key, format!("{value} must be above 0"))) }
+}
+
+/// Positive, or left to the observations.
+pub(super) fn automatic(key: &str, value: Automatic) -> Result<(), Fault> {
+    match value {
+        Automatic::Number(value) => positive(key, value),
+        Automatic::Word(_) => Ok(()),
+    }
+}
+
+pub(super) fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), Fault> {
+    match (low..=high).contains(&value) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{value} must be from {low} to {high}"))),
+    }
+}
+
+/// Windows of time `[start, end]` (d) that stand at `key`.
+pub(super) fn check_windows(windows: &[[f64; 2]], key: &str) -> Result<(), Fault> {
+    for (k, [start, end]) in windows.iter().enumerate() {
+        let key = format!("{key}[{k}]");
+        check_size(&key, *start, most::TIME)?;
+        check_size(&key, *end, most::TIME)?;
+        if start >= end {
+            return Err(Fault::new(key, format!("the start {start} must be before the end {end}")));
+        }
+    }
+    Ok(())
+}
+
+/// Names are folders and files of `simulate`, and labels: of things that stand at these keys and have these names.
+pub(super) fn names(all: &[(&str, &str)]) -> Result<(), Fault> {
+    for (s, (key, name)) in all.iter().enumerate() {
+        let fault = |problem: String| Err(Fault::new(format!("{key}.name"), problem));
+        let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain) || name.starts_with('.') {
+            let problem = format!("{name:?} must be 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'");
+            return fault(problem);
+        }
+        if let Some((other, _)) = all[..s].iter().find(|(_, other)| other.eq_ignore_ascii_case(name)) {
+            return fault(format!("{name:?} is the name of {other} already: each needs its own"));
+        }
+    }
+    Ok(())
+}

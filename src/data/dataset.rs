@@ -1,0 +1,172 @@
+//! The observations of a config as they are in their files, or as they are simulated: profiles in their whole width
+//! and light curves, errors as quoted. A command reads or simulates them once, and nobody changes them:
+//! [`calibrated`](super::calibrated) makes of them what enters the model.
+
+use crate::data::config::{ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings};
+use crate::data::io::lsd::{self, Label, LsdError};
+use crate::data::io::{FileError, light_curve};
+use crate::data::simulate::Simulation;
+use crate::star::observation::Observations;
+use crate::surface::photometry::Flux;
+use std::path::PathBuf;
+
+pub use crate::data::io::lsd::ProfileSet;
+
+/// More measurements of a light curve are not simulated.
+const MOST_SIMULATED: f64 = 50_000.0;
+
+/// The observations of a config.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    /// The profiles of each data set, those of excluded times left out.
+    pub sets: Vec<ProfileSet>,
+    /// The measurements of each light curve in the order of time.
+    pub light_curves: Vec<Vec<Flux>>,
+    /// The files that they come from.
+    pub files: Vec<PathBuf>,
+}
+
+/// Why there are no observations, or none that make sense: one line that names file, and line or key.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The config is at fault.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The observations are.
+    #[error(transparent)]
+    Observations(#[from] LsdError),
+    /// A light curve is.
+    #[error(transparent)]
+    LightCurve(#[from] FileError),
+}
+
+impl Dataset {
+    /// Reads or simulates the observations of `settings`.
+    ///
+    /// # Errors
+    /// Files that cannot be read or make no sense, and days of several zero points.
+    pub fn read(settings: &Settings) -> Result<Self, SceneError> {
+        let light_curves = light_curves(settings)?;
+        let sets = settings.sets.iter().map(|set| profiles(settings, set)).collect::<Result<Vec<_>, _>>()?;
+        Dataset::of(settings, sets, light_curves)
+    }
+
+    /// The same with profiles at hand in place of those of the only data set.
+    ///
+    /// # Errors
+    /// As [`Dataset::read`], several data sets, and one that is simulated.
+    pub fn with_profiles(settings: &Settings, profiles: ProfileSet) -> Result<Self, SceneError> {
+        let light_curves = light_curves(settings)?;
+        let fault = |problem: &str| settings.fault("observations", problem);
+        profiles.observations.check().map_err(|problem| fault(&problem))?;
+        let [set] = &settings.sets[..] else {
+            return Err(fault("profiles at hand are one data set: give one").into());
+        };
+        if let ObservationSource::Simulate(_) = &set.source {
+            return Err(fault("profiles are given and simulated: leave out `simulate`").into());
+        }
+        Dataset::of(settings, vec![profiles], light_curves)
+    }
+
+    fn of(settings: &Settings, all: Vec<ProfileSet>, light_curves: Vec<Vec<Flux>>) -> Result<Self, SceneError> {
+        let (mut files, mut sets) = (Vec::new(), Vec::new());
+        for (set, profiles) in settings.sets.iter().zip(all) {
+            if let ObservationSource::Files { path, .. } = &set.source {
+                files.push(path.clone());
+            }
+            files.extend(profiles.labels.iter().filter_map(|label| label.path.clone()));
+            sets.push(without_excluded(settings, set, profiles)?);
+        }
+        files.extend(settings.light_curves.iter().filter_map(|curve| match &curve.source {
+            LightSource::File(path) => Some(path.clone()),
+            LightSource::Simulate(_) => None,
+        }));
+        one_day_count(settings, &sets)?;
+        Ok(Dataset { sets, light_curves, files })
+    }
+}
+
+/// Profiles that are in no file, with names for them.
+pub fn in_memory(observations: Observations, name: impl Fn(usize) -> String) -> ProfileSet {
+    let label = |k: usize| Label { file: name(k), path: None, vrad_kms: 0.0 };
+    let labels = (0..observations.profiles.len()).map(label).collect();
+    ProfileSet { observations, labels, sha256: None, remarks: Vec::new() }
+}
+
+/// The profiles of a data `set`, read or simulated.
+fn profiles(settings: &Settings, set: &DataSetSettings) -> Result<ProfileSet, SceneError> {
+    match &set.source {
+        ObservationSource::Files { path, .. } => Ok(lsd::read(path)?),
+        ObservationSource::Simulate(simulation) => {
+            settings.check_velocity_grid(&set.star, &simulation.truth, simulation.step_kms)?;
+            let of = if settings.sets.len() > 1 { format!(" of {}", set.name) } else { String::new() };
+            Ok(in_memory(simulation.observe(&set.star), |k| format!("simulated profile {k}{of}")))
+        }
+    }
+}
+
+/// Whether a time (d) lies in one of these windows.
+pub(super) fn is_within(windows: &[[f64; 2]], time_d: f64) -> bool {
+    windows.iter().any(|[start, end]| *start <= time_d && time_d <= *end)
+}
+
+/// The profiles of a `set` without those of excluded times.
+fn without_excluded(
+    settings: &Settings,
+    set: &DataSetSettings,
+    mut all: ProfileSet,
+) -> Result<ProfileSet, ConfigError> {
+    let before = all.labels.len();
+    let mut times_d = all.observations.times_d().into_iter();
+    all.labels.retain(|_| times_d.next().is_some_and(|time_d| !is_within(&set.exclude, time_d)));
+    all.observations.profiles.retain(|profile| !is_within(&set.exclude, profile.time_d));
+    let left = all.labels.len();
+    let (fewest, are) = if settings.sets.len() > 1 { (1, "is") } else { (2, "are") };
+    if left < before && left < fewest {
+        let problem = format!("leaves {left} of {before} profiles, {fewest} at least {are} needed");
+        return Err(settings.fault(&format!("{}.exclude", set.key), &problem));
+    }
+    if left < before {
+        let left_out = before - left;
+        all.remarks.push(format!("{left_out} of {before} left out: they lie within the times of exclude"));
+    }
+    Ok(all)
+}
+
+/// That days of all data sets are of one count.
+fn one_day_count(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigError> {
+    let firsts = || sets.iter().filter_map(|set| set.observations.times_d().into_iter().reduce(f64::min));
+    let Some(first) = firsts().next() else { return Ok(()) };
+    let far = |(_, time): &(&DataSetSettings, f64)| (time - first).abs() > lsd::LONGEST_D;
+    match settings.sets.iter().zip(firsts()).find(far) {
+        None => Ok(()),
+        Some((set, time)) => {
+            let problem = format!(
+                "its times begin at {time} d, those of {} at {first} d: another zero point? Days of all data sets are \
+                 of one count (MJD is JD - 2400000.5)",
+                settings.sets[0].key
+            );
+            Err(settings.fault(&set.key, &problem))
+        }
+    }
+}
+
+/// The measurements of all light curves, read or simulated.
+fn light_curves(settings: &Settings) -> Result<Vec<Vec<Flux>>, SceneError> {
+    let of = |curve: &LightCurveSettings| match &curve.source {
+        LightSource::File(path) => Ok(light_curve::read(path)?),
+        LightSource::Simulate(light) => {
+            let simulations: Vec<&Simulation> = settings.sets.iter().filter_map(DataSetSettings::simulation).collect();
+            let times = || simulations.iter().flat_map(|simulation| &simulation.times_d).copied();
+            let first = times().fold(f64::INFINITY, f64::min);
+            let count = ((times().fold(f64::NEG_INFINITY, f64::max) - first) / light.cadence_d).floor() + 1.0;
+            if count > MOST_SIMULATED {
+                let problem = format!("{} makes {count} measurements, over {MOST_SIMULATED}", light.cadence_d);
+                return Err(settings.fault(&format!("{}.simulate.cadence_d", curve.key), &problem).into());
+            }
+            let times_d: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * light.cadence_d).collect();
+            Ok(simulations[0].fluxes(&settings.star, &curve.band, &times_d, (light.sigma, light.seed)))
+        }
+    };
+    settings.light_curves.iter().map(of).collect()
+}

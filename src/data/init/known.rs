@@ -1,0 +1,56 @@
+//! What is known of a star without its profiles.
+
+use crate::data::config::EquivalentWidth;
+use crate::numerics::units::gaussian_as_wide_as_voigt;
+use crate::star::BrightnessModel;
+use crate::surface::ObjectiveKind;
+
+/// A value with who gave it: an option, or a line of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Given<T> {
+    /// The value.
+    pub value: T,
+    /// Who gave it, for the table.
+    pub by: String,
+}
+
+/// What is known of the star without its profiles; all of it may be absent. Names and units are those of the config.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Known {
+    pub rotation_period_d: Option<Given<f64>>,
+    pub epoch_d: Option<Given<f64>>,
+    pub inclination_deg: Option<Given<f64>>,
+    pub vsini_kms: Option<Given<f64>>,
+    pub vsys_kms: Option<Given<f64>>,
+    pub domega_rad_d: Option<Given<f64>>,
+    /// Coefficient of the linear law.
+    pub limb_darkening: Option<Given<f64>>,
+    pub photosphere_k: Option<Given<f64>>,
+    pub spot_k: Option<Given<f64>>,
+    pub wavelength_nm: Option<Given<f64>>,
+    /// Standard deviation of the local line, of its Gaussian.
+    pub line_sigma_kms: Option<Given<f64>>,
+    /// Half width at half depth of its Lorentzian, which makes it a Voigt profile.
+    pub line_gamma_kms: Option<Given<f64>>,
+    pub equivalent_width: Option<Given<EquivalentWidth>>,
+    pub resolving_power: Option<Given<f64>>,
+    pub velocity_range_kms: Option<Given<(f64, f64)>>,
+    pub sigma_scale: Option<Given<f64>>,
+    pub objective: Option<Given<ObjectiveKind>>,
+    pub brightness: Option<Given<BrightnessModel>>,
+    pub pixels: Option<Given<usize>>,
+    pub chi2_target: Option<Given<f64>>,
+}
+
+impl Known {
+    /// What reconstructions are judged by: what is right for most stars, if nothing else is given.
+    pub(super) fn objective(&self) -> ObjectiveKind {
+        self.objective.as_ref().map_or(ObjectiveKind::MarginalLikelihood, |given| given.value)
+    }
+
+    /// Standard deviation (km/s) of the Gaussian as wide as the local line, whose Gaussian has that of `sigma_kms`.
+    pub(super) fn line_width_kms(&self, sigma_kms: f64) -> f64 {
+        self.line_gamma_kms.as_ref().map_or(sigma_kms, |gamma| gaussian_as_wide_as_voigt(sigma_kms, gamma.value))
+    }
+}

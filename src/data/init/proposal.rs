@@ -1,0 +1,105 @@
+//! A first config with where its values came from, and the table of them.
+
+use super::ledger::{Entry, Source};
+use crate::data::config::Draft;
+use crate::data::dataset::SceneError;
+use crate::inference::first_look::LookError;
+use crate::numerics::text::{Align, columns};
+use std::path::{Path, PathBuf};
+
+/// Where things are or will be.
+#[derive(Clone, Debug)]
+pub struct Place<'a> {
+    /// The config that will be written.
+    pub config: &'a Path,
+    /// The list of profiles.
+    pub list: &'a Path,
+    /// Its content, which need not have been written.
+    pub list_bytes: &'a [u8],
+    /// The list as the config names it, relative to the config's folder.
+    pub list_in_config: PathBuf,
+    /// The JSON Schema as the config names it.
+    pub schema: Option<String>,
+}
+
+/// A config and where its values came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// The config, as text.
+    pub json: String,
+    /// What was observed, in a line.
+    pub observed: String,
+    /// Every value that is worth a look, with its source.
+    pub entries: Vec<Entry>,
+    /// What became of the trial, and what looks wrong.
+    pub notes: Vec<String>,
+    /// Whether a map can be made of the config as it is.
+    pub complete: bool,
+}
+
+/// Why there is no proposal: one line that names the file at fault.
+#[derive(Debug, thiserror::Error)]
+pub enum ProposalError {
+    /// The list or a profile, or a given value that makes no sense.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The profiles show no star.
+    #[error("{}: {error}", .list.display())]
+    Look {
+        /// The list of profiles.
+        list: PathBuf,
+        /// What is wrong with them.
+        error: LookError,
+    },
+    /// The model is nowhere near the profiles.
+    #[error("{}: no map fits unless the errors are {factor:.1} times as large: {reason}", .list.display())]
+    OutOfReach {
+        /// The list of profiles.
+        list: PathBuf,
+        /// Factor on the errors of the continuum at which a map would fit.
+        factor: f64,
+        /// The likely reason, by trying.
+        reason: String,
+    },
+    /// A path that JSON cannot hold.
+    #[error("{}: the path of the observations cannot be written in JSON: {problem}", .config.display())]
+    Path {
+        /// The config.
+        config: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl Proposal {
+    /// What was observed and every value by its source, aligned; then the notes.
+    pub fn table(&self) -> String {
+        let shown = |source: Source| self.entries.iter().filter(move |entry| entry.source == source);
+        let mut ordered: Vec<&Entry> = Source::ALL.into_iter().flat_map(shown).collect();
+        ordered.sort_by_key(|entry| (entry.source as usize, entry.section()));
+        let cells =
+            |entry: &&Entry| vec![entry.key.into(), entry.value.clone(), entry.unit.into(), entry.remark.clone()];
+        let rows: Vec<Vec<String>> = ordered.iter().map(cells).collect();
+        let table = columns(&rows, &[Align::Left, Align::Right, Align::Left, Align::Left]);
+        let mut text = format!("{}\n", self.observed);
+        let mut last = None;
+        for (entry, line) in ordered.iter().zip(table.lines()) {
+            if last.replace(entry.source) != Some(entry.source) {
+                text += &format!("\n{}\n", entry.source.title());
+            }
+            text += &format!("  {line}\n");
+        }
+        if !self.notes.is_empty() {
+            text.push('\n');
+        }
+        for note in &self.notes {
+            text += &format!("note: {note}\n");
+        }
+        text
+    }
+}
+
+/// The config as text.
+pub(super) fn to_json(draft: &Draft, config: &Path) -> Result<String, ProposalError> {
+    draft.to_json().map_err(|e| ProposalError::Path { config: config.into(), problem: e.to_string() })
+}
