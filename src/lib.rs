@@ -168,6 +168,7 @@ pub use planets::verdict::{Finding, Remark, Signal, Verdict};
 pub use runs::blind_search::BlindSearch;
 pub use runs::export::{ExportError, Format, export};
 pub use runs::log_posterior::LogPosterior;
+pub use runs::manifest::RunSummary;
 pub use runs::maps::{MapError, Maps};
 pub use runs::optimum::OptimumFile;
 pub use runs::periodogram::{Periodogram, PeriodogramError, PeriodogramOptions};

@@ -5,6 +5,8 @@
 
 mod conclusions;
 
+pub use conclusions::RunSummary;
+
 use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::model::{
@@ -108,12 +110,11 @@ impl Manifest {
     ///
     /// # Errors
     /// A chain without a step.
-    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(Summary, Vec<Settled>), ChainError> {
+    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(RunSummary, Vec<Settled>), ChainError> {
         let (kinds, goals) = kinds_and_goals(settings);
         let mut summary = summarise(chain, &kinds, &goals)?;
         let quantities = self.orbit_quantities(settings).of_draws(&settings.free, &settings.values);
         let settled = summary.derive(chain, quantities);
-        self.conclude(settings, chain, &mut summary);
         let mass = summary.derived.get(OrbitQuantity::MinimumMass.name());
         if let Some(earths) = mass.and_then(|mass| in_earths(mass.upper95.unwrap_or(mass.median))) {
             let meaning = summary.definitions.entry(OrbitQuantity::MinimumMass.name().to_owned()).or_default();
@@ -124,7 +125,7 @@ impl Manifest {
                 summary.definitions.insert(name.clone(), meaning.to_owned());
             }
         }
-        Ok((summary, settled))
+        Ok((self.conclude(settings, chain, summary), settled))
     }
 
     /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was

@@ -17,10 +17,10 @@ use crate::inference::search::{Found, SearchError, SearchSettings};
 use crate::model::Parameter;
 use crate::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings as PeriodSearch};
 use crate::runs::grid_scan::{GridScan, GridScanError, PARABOLOID};
+use crate::runs::manifest::RunSummary;
 use crate::runs::origin::by_name;
 use crate::runs::pool::Pool;
 use crate::runs::run::{CHAIN, Run, RunError, StartFrom};
-use crate::sampling::chain::Summary;
 use crate::sampling::ensemble::StopReason;
 use crate::sampling::landscape::{Axis, Grid, Paraboloid, Rule, Undefined, paraboloid};
 use crate::sampling::optimise::Optimum;
@@ -231,7 +231,7 @@ fn vertex(fitted: &Paraboloid) -> BTreeMap<String, Estimate> {
 }
 
 /// The chain, kept in `folder`, and its summary.
-pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, Summary), ExperimentError> {
+pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, RunSummary), ExperimentError> {
     let began = Instant::now();
     let resumed = folder.join(CHAIN).exists();
     let mut run = match Run::resume(scene, folder, None, pool) {

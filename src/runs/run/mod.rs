@@ -19,10 +19,10 @@ use crate::data::scene::Scene;
 use crate::inference::search::Found;
 use crate::inference::surrogate::{Surrogate, SurrogateMove};
 use crate::runs::blind_search::BlindSearch;
-use crate::runs::manifest::{self, Manifest, kinds_and_goals};
+use crate::runs::manifest::{self, Manifest, RunSummary, kinds_and_goals};
 use crate::runs::origin::Origin;
 use crate::runs::pool::{Asked, Evaluations, Pool, Target, Task};
-use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record, Summary};
+use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record};
 use crate::sampling::ensemble::{
     self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason,
 };
@@ -111,7 +111,7 @@ impl Run {
     ///
     /// # Errors
     /// A chain of another kind than its manifest: a fault of the program.
-    pub fn summary(&self) -> Result<Summary, RunError> {
+    pub fn summary(&self) -> Result<RunSummary, RunError> {
         Ok(self.manifest.summarise(&self.settings, &self.chain)?.0)
     }
 
@@ -119,7 +119,7 @@ impl Run {
     ///
     /// # Errors
     /// No run there, or one that is broken.
-    pub fn read(folder: &Path) -> Result<(Chain, Summary), RunError> {
+    pub fn read(folder: &Path) -> Result<(Chain, RunSummary), RunError> {
         let manifest = Manifest::read(folder)?;
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
         let (summary, _) = manifest.summarise(&manifest.settings(folder)?, &chain)?;
