@@ -12,7 +12,7 @@ use crate::data::io::atomic::{WriteError, write_json};
 use crate::model::{
     Elements, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, Quoted, definition, in_earths,
 };
-use crate::runs::blind_search::BlindSearch;
+use crate::runs::blind_search::SearchSummary;
 use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
 use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
 use crate::sampling::ensemble::Positions;
@@ -54,7 +54,7 @@ pub struct Manifest {
     pub merged_seeds: Vec<u64>,
     /// The blind search that the verdict rests on; absent where no orbit was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blind_search: Option<BlindSearch>,
+    pub blind_search: Option<SearchSummary>,
     /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
     pub start: Positions,
 }

@@ -3,8 +3,8 @@
 
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::io::atomic::WriteError;
+use crate::data::io::field::FieldRecord;
 use crate::data::io::map::{ChangingMapResult, FILES, LIGHT_CURVES, MapResult};
-use crate::data::io::periodogram::FieldRecord;
 use crate::data::scene::Scene;
 use crate::model::Parameter;
 use crate::surface::fit::{ChangingFit, ChangingSummary, Deviation, Fit, FitSummary, NoField};

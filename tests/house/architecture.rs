@@ -35,11 +35,9 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
         &[
             "cluster",
             "origin",
-            "known_planet",
             "blind_search",
             "limits",
             "maps",
-            "periodogram",
             "simulated",
             "plan",
             "pool",

@@ -4,6 +4,7 @@
 pub mod atomic;
 pub mod csv;
 pub mod effort;
+pub mod field;
 pub mod journal;
 pub mod landscape;
 pub mod light_curve;
@@ -11,7 +12,6 @@ pub mod lines;
 pub mod lsd;
 pub mod map;
 pub mod paraboloid;
-pub mod periodogram;
 pub mod provenance;
 pub mod truth;
 pub mod zarr;

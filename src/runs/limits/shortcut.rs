@@ -3,6 +3,7 @@
 use crate::inference::detection::{DetectionError, DetectionSettings, Spots, View};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::orbits::{Trial, scan};
+use crate::planets::periodogram::window::is_same_frequency;
 use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
@@ -11,9 +12,6 @@ use crate::star::Orbit;
 use crate::surface::evolving_map::{Change, NoFit};
 use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
-
-/// A period is right when its frequency is off by less than this many inverse time bases.
-const RIGHT: f64 = 0.5;
 
 /// What a blind search makes of an orbit that was put in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,8 +33,8 @@ impl Outcome {
     pub(super) fn of(peak: (f64, f64, f64), level: f64, injected: &Orbit, time_base_cycles: f64) -> Self {
         let (frequency, delta_ln_l, k_kms) = peak;
         let detected = delta_ln_l > level;
-        let apart = (frequency - 1.0 / injected.porb_over_prot).abs() * time_base_cycles;
-        Outcome { delta_ln_l, porb_over_prot: 1.0 / frequency, k_kms, detected, recovered: detected && apart < RIGHT }
+        let recovered = detected && is_same_frequency(frequency, 1.0 / injected.porb_over_prot, time_base_cycles);
+        Outcome { delta_ln_l, porb_over_prot: 1.0 / frequency, k_kms, detected, recovered }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::numerics::quantile::quantile;
 use crate::numerics::text::aligned;
 use crate::planets::modes::{PeriodMode, are_few, doubts, period_modes};
 use crate::planets::periodogram::RotationPeriods;
-use crate::planets::verdict::{Finding, Remark, Verdict};
+use crate::planets::verdict::{Remark, Verdict};
 use crate::sampling::chain::{Chain, ParameterSummary, Summary, table};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -154,7 +154,7 @@ impl Manifest {
     fn verdict(&self, summary: &RunSummary, settings: &Settings) -> Option<(Verdict, Vec<Remark>)> {
         let search = self.blind_search.as_ref()?;
         let mut remarks = Vec::new();
-        let is_found = matches!(search.verdict.finding, Finding::Candidate | Finding::Detection);
+        let is_found = search.verdict.finding.is_signal();
         let k = summary.parameters.get(Parameter::K.name())?;
         match (is_found, k.upper95) {
             (true, Some(_)) => remarks.push(Remark::against(

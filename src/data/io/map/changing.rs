@@ -5,7 +5,7 @@ use super::light::{LIGHT_CURVES, table};
 use super::{CONVENTIONS, FILES, beside};
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
-use crate::data::io::periodogram::FieldRecord;
+use crate::data::io::field::FieldRecord;
 use crate::data::io::provenance::{MeasuredSet, Provenance};
 use crate::model::ParameterValues;
 use crate::star::SurfaceGrid;
