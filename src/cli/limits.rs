@@ -89,11 +89,11 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let meter = Meter::new(global, orbits.count());
     let cells = limits::recovered(&shortcut, &orbits, &|done| meter.show(done));
     meter.bar.finish_and_clear();
-    let found = limits::limits(&cells);
+    let rotation_period_d = scene.imager.star.rotation_period_d;
+    let found = limits::limits(&cells, rotation_period_d);
     let drawn = limits::drawn(&shortcut, &found, usize::from(args.full));
     let comparisons = whole_way(global, &signals, &scene, &shortcut, &drawn)?;
-    let rotation_period_d = scene.imager.star.rotation_period_d;
-    let file = LimitsFile::new(&shortcut, &orbits, &found, &comparisons, rotation_period_d, scene.provenance());
+    let file = LimitsFile::new(&shortcut, &orbits, found, comparisons, rotation_period_d, scene.provenance());
     let folder = args.output.create()?;
     file.write(&cells, rotation_period_d, folder)?;
     console::line(format_args!("{}written: {}: {CSV}, {JSON}", file.table(), shown(folder)));

@@ -125,7 +125,7 @@ impl Manifest {
                 summary.definitions.insert(name.clone(), meaning.to_owned());
             }
         }
-        Ok((self.conclude(settings, chain, summary), settled))
+        Ok((RunSummary::of(chain, summary, settings, self.blind_search.as_ref()), settled))
     }
 
     /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was

@@ -4,17 +4,28 @@ use crate::inference::detection::{DetectionError, DetectionSettings, Spots, View
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::orbits::{Trial, scan};
 use crate::planets::periodogram::window::is_same_frequency;
-use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Search, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
-use crate::runs::limits::LimitSettings;
 use crate::star::Orbit;
 use crate::surface::evolving_map::{Change, NoFit};
 use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
+use serde::{Deserialize, Serialize};
+
+/// How orbits are looked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LimitSettings {
+    /// The blind search.
+    pub detection: DetectionSettings,
+    /// Its trial periods.
+    pub frequencies: Frequencies,
+    /// Whether the best orbit of the profiles as they are is taken out first.
+    pub without_best: bool,
+}
 
 /// What a blind search makes of an orbit that was put in.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// ln L of the highest peak above no planet.
     pub delta_ln_l: f64,

@@ -4,14 +4,14 @@
 //! The verdict is that of the blind search. A chain takes a planet for granted, so that it can only take something
 //! away: where its K is compatible with zero, or its period is not one, a detection becomes a candidate.
 
-use super::Manifest;
 use crate::data::config::Settings;
-use crate::model::{Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
+use crate::model::{Clock, Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
 use crate::numerics::quantile::quantile;
 use crate::numerics::text::aligned;
 use crate::planets::modes::{PeriodMode, are_few, doubts, period_modes};
 use crate::planets::periodogram::RotationPeriods;
 use crate::planets::verdict::{Remark, Verdict};
+use crate::runs::blind_search::SearchSummary;
 use crate::sampling::chain::{Chain, ParameterSummary, Summary, table};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -101,13 +101,14 @@ impl RunSummary {
     }
 }
 
-impl Manifest {
-    /// What priors and blind search have to say to the summary of `chain`.
-    pub(super) fn conclude(&self, settings: &Settings, chain: &Chain, summary: Summary) -> RunSummary {
-        let rotation = self.blind_search.as_ref().and_then(|search| search.rotation.as_ref());
-        let modes = rotation.and_then(|rotation| self.period_modes(settings, chain, summary.discarded_steps, rotation));
-        let mut summary =
-            RunSummary { chain: summary, verdict: None, period_modes: modes.unwrap_or_default(), remarks: Vec::new() };
+impl RunSummary {
+    /// Of a run by `settings` whose `chain` has this `summary`, beside the blind search; a run of the first versions has
+    /// none.
+    pub(super) fn of(chain: &Chain, summary: Summary, settings: &Settings, search: Option<&SearchSummary>) -> Self {
+        let rotation = search.and_then(|search| search.rotation.as_ref());
+        let modes = rotation.and_then(|rotation| modes(chain, summary.discarded_steps, settings, rotation));
+        let period_modes = modes.unwrap_or_default();
+        let mut summary = RunSummary { chain: summary, verdict: None, period_modes, remarks: Vec::new() };
         let few = rotation.is_some_and(|rotation| are_few(&summary.period_modes, rotation));
         let of_the_chain = &mut summary.chain;
         for f in &settings.free {
@@ -122,41 +123,28 @@ impl Manifest {
                 one.unconstrained = open;
             }
         }
-        if self.blind_search.is_none() && summary.parameters.contains_key(Parameter::K.name()) {
-            let why = "this run was begun by a version that made no blind search";
-            summary.verdict = Some(Verdict::not_judged(why));
-        }
-        if let Some((verdict, remarks)) = self.verdict(&summary, settings) {
-            summary.remarks = remarks.into_iter().map(|remark| remark.text).filter(|text| !text.is_empty()).collect();
-            summary.verdict = Some(verdict);
+        let is_planet_sampled = summary.parameters.contains_key(Parameter::K.name());
+        match search.filter(|_| is_planet_sampled) {
+            Some(search) => {
+                let remarks = summary.of_the_planet(settings, search);
+                summary.verdict = Some(search.verdict.clone().with(&remarks));
+                let all = search.remarks.iter().chain(&remarks).map(|remark| &remark.text);
+                summary.remarks = all.filter(|text| !text.is_empty()).cloned().collect();
+            }
+            None if is_planet_sampled => {
+                let why = "this run was begun by a version that made no blind search";
+                summary.verdict = Some(Verdict::not_judged(why));
+            }
+            None => {}
         }
         summary
     }
 
-    /// The modes of the period; `None` where it is not sampled, or K is not.
-    fn period_modes(
-        &self,
-        settings: &Settings,
-        chain: &Chain,
-        discarded: usize,
-        rotation: &RotationPeriods,
-    ) -> Option<Vec<PeriodMode>> {
-        let rotation_period_d = settings.star.rotation_period_d;
-        let place = |p: Parameter| self.names.iter().position(|name| name == p.name());
-        let ratio = place(Parameter::PorbOverProt).map(|i| (i, 1.0));
-        let (period, unit) = ratio.or(place(Parameter::Period).map(|i| (i, rotation_period_d)))?;
-        let draws = |i: usize| chain.series(i, discarded).into_iter().flatten().flatten();
-        let draws = draws(period).map(|period| period / unit).zip(draws(place(Parameter::K)?));
-        Some(period_modes(&draws.collect::<Vec<_>>(), rotation, rotation_period_d))
-    }
-
-    /// The verdict of the blind search, and what the chain has to say to it.
-    fn verdict(&self, summary: &RunSummary, settings: &Settings) -> Option<(Verdict, Vec<Remark>)> {
-        let search = self.blind_search.as_ref()?;
+    /// What the chain has to say to the verdict of the blind search.
+    fn of_the_planet(&self, settings: &Settings, search: &SearchSummary) -> Vec<Remark> {
         let mut remarks = Vec::new();
-        let is_found = search.verdict.finding.is_signal();
-        let k = summary.parameters.get(Parameter::K.name())?;
-        match (is_found, k.upper95) {
+        let (is_found, rotation_period_d) = (search.verdict.finding.is_signal(), settings.star.rotation_period_d);
+        match (is_found, self.parameters[Parameter::K.name()].upper95) {
             (true, Some(_)) => remarks.push(Remark::against(
                 "K of the chain is compatible with zero",
                 "the blind search finds a signal, but K of the chain is compatible with zero",
@@ -168,27 +156,36 @@ impl Manifest {
             _ => {}
         }
         if is_found {
-            remarks.extend(doubts(&summary.period_modes));
-            let heaviest = summary.period_modes.first().map(|mode| mode.porb_over_prot);
+            remarks.extend(doubts(&self.period_modes));
+            let heaviest = self.period_modes.first().map(|mode| mode.porb_over_prot);
             let period = heaviest.unwrap_or(settings.values[Parameter::PorbOverProt]);
-            remarks.extend(search.of_another_orbit(period, settings.star.rotation_period_d));
+            remarks.extend(search.of_another_orbit(period, rotation_period_d));
         }
-        if !summary.converged {
+        if !self.converged {
             let text = "the chain has not converged: its intervals are not to be quoted";
             remarks.push(Remark::against("the chain has not converged", text));
         }
-        let clock = self.orbit_quantities(settings).clock();
+        let clock = Clock { rotation_period_d, epoch_d: settings.star.epoch_d };
         let period = period_prior(&settings.free, &Elements::PLANETS[0], clock);
         if let Some(shortest) = period.map(|prior| prior.bounds().0).filter(|shortest| *shortest > 1.0) {
             remarks.push(Remark::note(format!(
                 "the prior of the period begins at {shortest:.4} Prot, above the rotation period: signals of the \
-                spots at Prot and \
-                 its fractions can only appear as their aliases"
+                spots at Prot and its fractions can only appear as their aliases"
             )));
         }
-        let verdict = search.verdict.clone().with(&remarks);
-        Some((verdict, search.remarks.iter().cloned().chain(remarks).collect()))
+        remarks
     }
+}
+
+/// The modes of the period; `None` where it is not sampled, or K is not.
+fn modes(chain: &Chain, discarded: usize, settings: &Settings, rotation: &RotationPeriods) -> Option<Vec<PeriodMode>> {
+    let rotation_period_d = settings.star.rotation_period_d;
+    let place = |p: Parameter| chain.names().iter().position(|name| name == p.name());
+    let ratio = place(Parameter::PorbOverProt).map(|i| (i, 1.0));
+    let (period, unit) = ratio.or(place(Parameter::Period).map(|i| (i, rotation_period_d)))?;
+    let draws = |i: usize| chain.series(i, discarded).into_iter().flatten().flatten();
+    let draws = draws(period).map(|period| period / unit).zip(draws(place(Parameter::K)?));
+    Some(period_modes(&draws.collect::<Vec<_>>(), rotation, rotation_period_d))
 }
 
 /// Whether the posterior is about as wide as the prior.
