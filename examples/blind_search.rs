@@ -6,11 +6,7 @@
 //! and objectives for which stars do not change are not asked whether they do (verdicts are those of version 0.1.0).
 //! No number of the search changes by that. `calibration_changing.py` runs it.
 
-use dimcmc::internals::data::io::periodogram::PeriodogramResult;
-use dimcmc::internals::data::scene::Scene;
-use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence, Robustness, robustness};
-use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, SearchSettings};
-use dimcmc::internals::surface::{Linearised, SurfaceSettings};
+use dimcmc::{BlindSearch, BlindSearchOptions, RobustnessOf, Scene};
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,41 +18,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("usage: blind_search periodogram CONFIG --out FOLDER".into());
     }
     let scene = Scene::load(config.as_ref())?;
-    let imager = &scene.imager;
-    let surface = scene.surface();
-    let evolves = surface.model().begins_with_blind_search();
-    let field = surface.field.filter(|_| evolves);
-    let settings = DetectionSettings {
-        search: SearchSettings { draws: 10_000, seed: 1 },
-        ..DetectionSettings::of(SurfaceSettings { field, ..surface }, Vec::new())
-    };
-    let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, FrequencySettings::default())?;
-    let values = scene.settings.values;
-    let detection = Detection::find(imager, values, frequencies, &settings, &|_| ())?;
-    let choices = match evolves && detection.is_candidate() {
-        true => robustness(imager, values, &settings, &detection),
-        false => Robustness { all: None, targets: Vec::new(), nights: Vec::new() },
-    };
-    let model = settings.surface.model();
-    let explained = |here: &Linearised| model.explained(imager, &scene.observations, here);
-    let at_best = explained(detection.last());
-    let misfit = &at_best.misfit;
-    let remarks = detection.remarks(&Evidence { imager, settings: &settings, robustness: Some(&choices), misfit });
+    let evolves = scene.surface().objective.evolves();
+    let robustness = if evolves { RobustnessOf::Candidates } else { RobustnessOf::None };
+    let options = BlindSearchOptions { fixed: true, robustness, static_check: false, ..Default::default() };
+    let found = BlindSearch::of(&scene, &options, &|_| ())?;
     std::fs::create_dir_all(folder)?;
-    PeriodogramResult {
-        imager,
-        detection: &detection,
-        verdict: &detection.verdict(&remarks),
-        remarks: &remarks,
-        evidence: scene.evidence(&detection.planet_free.quadratic).as_ref(),
-        robustness: &choices,
-        settings: &settings,
-        planet_free: &explained(&detection.planet_free),
-        at_best: &at_best,
-        truth: scene.truth,
-        mass_msun: scene.settings.mass_msun,
-        provenance: &scene.provenance(),
-    }
-    .write(Path::new(folder))?;
+    found.write(Path::new(folder))?;
     Ok(())
 }

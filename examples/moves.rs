@@ -61,7 +61,7 @@ fn chain(config: &Value, surrogate: f64, ess: f64) -> Result<Summary, Failure> {
     let scene = Scene::new(&Config::at(config, "config".as_ref()))?;
     let mut run = Run::new(&scene)?;
     run.finish()?;
-    Ok(run.summary()?)
+    Ok(run.summary()?.chain)
 }
 
 fn row(summary: &Summary) -> String {

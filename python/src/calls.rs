@@ -4,7 +4,7 @@ use crate::fault::Fault;
 use crate::job::{Job, attend, soon};
 use crate::scene::{Arrays, ConfigText, NewArrays, Source, arrays};
 use dimcmc::{
-    Failure, Figure, Forecast, Format, FrequencySettings, Maps, OptimumFile, Periodogram, PeriodogramOptions,
+    BlindSearch, BlindSearchOptions, Failure, Figure, Forecast, Format, FrequencySettings, Maps, OptimumFile,
     PlanSettings, Scene, Simulated,
 };
 use pyo3::exceptions::{PyKeyError, PyValueError};
@@ -89,10 +89,18 @@ pub fn periodogram(
     manner: Manner,
 ) -> PyResult<String> {
     let (min_period_d, max_period_d, oversampling, eccentric, second_planet, fixed, draws, seed) = options;
-    let options =
-        PeriodogramOptions { min_period_d, max_period_d, oversampling, eccentric, second_planet, fixed, draws, seed };
+    let options = BlindSearchOptions {
+        periods: FrequencySettings { min_period_d, max_period_d, oversampling },
+        eccentric,
+        second_planet,
+        fixed,
+        draws,
+        seed,
+        ..BlindSearchOptions::default()
+    };
     with_scene(py, Source::new(config, observations)?, out, manner, move |job, scene, out| {
-        let found = Periodogram::of(scene, &options, &|what| job.say(what)).map_err(Failure::periodogram)?;
+        let found = BlindSearch::of(scene, &options, &|what| job.say(what));
+        let found = found.map_err(|error| Failure::blind_search(&scene.settings.path, error))?;
         create(job, out)?;
         found.write(out)?;
         Ok(found.table().trim_end().to_owned())

@@ -12,12 +12,12 @@ use crate::data::scene::SceneError;
 use crate::figures::plot::PlotError;
 use crate::inference::search::SearchError;
 use crate::planets::periodogram::FrequencyError;
+use crate::runs::blind_search::BlindSearchError;
 use crate::runs::comparison::PairError;
 use crate::runs::export::ExportError;
 use crate::runs::grid_scan::GridScanError;
 use crate::runs::maps::MapError;
 use crate::runs::origin::OriginError;
-use crate::runs::periodogram::PeriodogramError;
 use crate::runs::plan::{CampaignError, ForecastError, PlanError};
 use crate::runs::run::RunError;
 use crate::runs::simulated::SimulateError;
@@ -100,17 +100,15 @@ impl Failure {
         }
     }
 
-    /// No periodogram.
-    pub fn periodogram(error: PeriodogramError) -> Self {
+    /// No blind search of the star of the config at `path`.
+    pub fn blind_search(path: &Path, error: BlindSearchError) -> Self {
         match error {
-            PeriodogramError::Frequencies { config, error: error @ FrequencyError::TooFewTimes(_) } => {
-                Failure::input(format!("{}: observations: {error}", config.display()))
+            BlindSearchError::Frequencies(error @ FrequencyError::TooFewTimes(_)) => {
+                Failure::input(format!("{}: observations: {error}", path.display()))
             }
-            PeriodogramError::Frequencies { error, .. } => Failure::of(error),
-            PeriodogramError::Detection { config, error: SurfaceError::Reference(error) } => {
-                Failure::reference(&config, error)
-            }
-            error @ PeriodogramError::Detection { .. } => Failure::failed(error),
+            BlindSearchError::Frequencies(error) => Failure::of(error),
+            BlindSearchError::Detection(SurfaceError::Reference(error)) => Failure::reference(path, error),
+            BlindSearchError::Detection(error) => Failure::failed(format!("{}: {error}", path.display())),
         }
     }
 

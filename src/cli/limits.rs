@@ -4,15 +4,13 @@ use super::output::{Output, remarks};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
 use crate::data::scene::Scene;
-use crate::inference::detection::DetectionSettings;
 use crate::model::for_blind_search;
 use crate::numerics::text::shown;
-use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::planets::periodogram::{FrequencySettings, SearchSettings, Unbounded};
+use crate::runs::blind_search::BlindSearchOptions;
 use crate::runs::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
 use crate::runs::pool::Brief;
 use crate::star::Orbit;
-use crate::surface::SurfaceError;
-use crate::surface::expansion::nuisances;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -66,7 +64,7 @@ pub struct Args {
     #[arg(long, alias = "marginalize")]
     marginalise: bool,
     /// Number of stars without a planet that false alarms are taken from
-    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(long, value_name = "N", default_value_t = SearchSettings::DRAWS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
     /// Seed of the draws, and of the orbits that go the whole way
@@ -86,16 +84,16 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let shortcut =
         Shortcut::new(&scene.imager, for_blind_search(scene.settings.values, &scene.settings.free), &settings);
     spinner.finish_and_clear();
-    let shortcut = shortcut.map_err(|e| failure(args, e))?;
+    let shortcut = shortcut.map_err(|error| Failure::blind_search(&args.config, error.into()))?;
     let orbits = orbits(args, &shortcut)?;
     let meter = Meter::new(global, orbits.count());
     let cells = limits::recovered(&shortcut, &orbits, &|done| meter.show(done));
     meter.bar.finish_and_clear();
-    let found = limits::limits(&cells);
+    let rotation_period_d = scene.imager.star.rotation_period_d;
+    let found = limits::limits(&cells, rotation_period_d);
     let drawn = limits::drawn(&shortcut, &found, usize::from(args.full));
     let comparisons = whole_way(global, &signals, &scene, &shortcut, &drawn)?;
-    let rotation_period_d = scene.imager.star.rotation_period_d;
-    let file = LimitsFile::new(&shortcut, &orbits, &found, &comparisons, rotation_period_d, scene.provenance());
+    let file = LimitsFile::new(&shortcut, &orbits, found, comparisons, rotation_period_d, scene.provenance());
     let folder = args.output.create()?;
     file.write(&cells, rotation_period_d, folder)?;
     console::line(format_args!("{}written: {}: {CSV}, {JSON}", file.table(), shown(folder)));
@@ -136,30 +134,22 @@ fn whole_way(
 
 /// How orbits are looked for.
 fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
-    let Args { min_period_d, max_period_d, .. } = *args;
-    let wanted = FrequencySettings { min_period_d, max_period_d, oversampling: None };
-    let frequencies = Frequencies::new(&scene.imager.cycles(), scene.imager.star.rotation_period_d, wanted);
-    let frequencies = frequencies.map_err(|error| match error {
-        FrequencyError::TooFewTimes(_) => Failure::input(format!("{}: observations: {error}", args.config.display())),
-        error => Failure::of(error),
-    })?;
-    Ok(LimitSettings {
-        detection: DetectionSettings {
-            surface: scene.surface(),
-            nuisances: if args.marginalise { nuisances(&scene.settings.free) } else { Vec::new() },
-            search: SearchSettings { draws: args.draws as usize, seed: args.seed },
-            eccentric: false,
-            second_planet: false,
-        },
-        frequencies,
-        without_best: args.without_best,
-    })
+    let Args { min_period_d, max_period_d, without_best, seed, .. } = *args;
+    let options = BlindSearchOptions {
+        periods: FrequencySettings { min_period_d, max_period_d, oversampling: None },
+        fixed: !args.marginalise,
+        draws: args.draws as usize,
+        seed,
+        ..BlindSearchOptions::default()
+    };
+    let frequencies = options.frequencies(scene);
+    let frequencies = frequencies.map_err(|error| Failure::blind_search(&args.config, error.into()))?;
+    Ok(LimitSettings { detection: options.detection(scene), frequencies, without_best })
 }
 
 /// The orbits that are put in.
 fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
-    let unbounded =
-        || Failure::failed(format!("{}: {}", args.config.display(), crate::planets::periodogram::Unbounded));
+    let unbounded = || Failure::failed(format!("{}: {Unbounded}", args.config.display()));
     let (least, most) = shortcut.k_range_kms().ok_or_else(unbounded)?;
     let (min, max) = (args.min_k_kms.unwrap_or(least), args.max_k_kms.unwrap_or(most));
     if !(min > 0.0 && min < max && max.is_finite()) {
@@ -174,13 +164,6 @@ fn orbits(args: &Args, shortcut: &Shortcut) -> Result<Orbits, Failure> {
         k_kms: limits::even_in_logarithm(min, max, usize::from(args.amplitudes)),
         phases: usize::from(args.phases),
     })
-}
-
-fn failure(args: &Args, error: SurfaceError) -> Failure {
-    match error {
-        SurfaceError::Reference(error) => Failure::reference(&args.config, error),
-        error => Failure::failed(format!("{}: {error}", args.config.display())),
-    }
 }
 
 /// What is shown while orbits are tried.

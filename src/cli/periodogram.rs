@@ -2,10 +2,10 @@
 
 use super::output::Output;
 use super::{Failure, Global, console, progress};
-use crate::data::io::periodogram::FILES;
 use crate::data::scene::Scene;
 use crate::numerics::text::shown;
-use crate::runs::periodogram::{Periodogram, PeriodogramOptions};
+use crate::planets::periodogram::{FrequencySettings, SearchSettings};
+use crate::runs::blind_search::{BlindSearch, BlindSearchOptions, FILES};
 use std::path::PathBuf;
 
 /// Search for a planet at every period, the star's spots marginalised out
@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long)]
     fixed: bool,
     /// Number of stars without a planet
-    #[arg(long, value_name = "N", default_value_t = PeriodogramOptions::DRAWS as u32)]
+    #[arg(long, value_name = "N", default_value_t = SearchSettings::DRAWS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,
     /// Seed of the draws
@@ -60,9 +60,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let scene = Scene::load(&args.config)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let spinner = progress::bar(global, None, "reconstructing");
-    let found = Periodogram::of(&scene, &options(args), &|what| spinner.set_message(what.to_owned()));
+    let found = BlindSearch::of(&scene, &options(args), &|what| spinner.set_message(what.to_owned()));
     spinner.finish_and_clear();
-    let found = found.map_err(Failure::periodogram)?;
+    let found = found.map_err(|error| Failure::blind_search(&args.config, error))?;
     let folder = args.output.create()?;
     found.write(folder)?;
     let (table, files) = (found.table(), found.files().join(", "));
@@ -70,15 +70,15 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     Ok(())
 }
 
-fn options(args: &Args) -> PeriodogramOptions {
-    PeriodogramOptions {
-        min_period_d: args.min_period_d,
-        max_period_d: args.max_period_d,
-        oversampling: args.oversampling,
+fn options(args: &Args) -> BlindSearchOptions {
+    let Args { min_period_d, max_period_d, oversampling, .. } = *args;
+    BlindSearchOptions {
+        periods: FrequencySettings { min_period_d, max_period_d, oversampling },
         eccentric: args.eccentric,
         second_planet: args.planets == 2,
         fixed: args.fixed,
         draws: args.draws as usize,
         seed: args.seed,
+        ..BlindSearchOptions::default()
     }
 }

@@ -6,12 +6,14 @@
 //! `window` which periods spots and nights imitate, `limits` what K may be. `eccentric` and `two_planets` have what is
 //! searched for on request.
 //!
-//! [`evidence`] has Bayes factors of models with and without planets; [`mixture`], K where several orbits may be true.
+//! [`evidence`] has Bayes factors of models with and without planets; [`mixture`], K where several orbits may be true;
+//! [`modes`], the periods of a posterior.
 //!
 //! The thresholds (false-alarm probabilities of candidate and detection among them) are constants of [`verdict`].
 
 pub mod evidence;
 pub mod mixture;
+pub mod modes;
 pub mod periodogram;
 pub mod velocities;
 pub mod verdict;

@@ -30,6 +30,13 @@ pub enum Finding {
     NotJudged,
 }
 
+impl Finding {
+    /// Whether it is on a signal that is rare by chance.
+    pub fn is_signal(self) -> bool {
+        matches!(self, Finding::Candidate | Finding::Detection)
+    }
+}
+
 /// Something that is to be said beside a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Remark {

@@ -7,12 +7,12 @@ use crate::data::io::atomic::write_json;
 use crate::data::scene::Scene;
 use crate::inference::search;
 use crate::planets::verdict::Verdict;
-use crate::runs::manifest::{self, Manifest};
+use crate::runs::manifest::{self, Manifest, RunSummary};
 #[cfg(feature = "mpi")]
 use crate::runs::pool::orbit_from_bytes;
 use crate::runs::pool::{Answer, Brief, Pool, Question};
 use crate::runs::run::{CHAIN, Run, RunError, SUMMARY, StartFrom};
-use crate::sampling::chain::{ParameterSummary, Summary};
+use crate::sampling::chain::ParameterSummary;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -146,7 +146,7 @@ pub struct Row {
 pub fn rows(stars: &[Star], ends: &[End]) -> Vec<Row> {
     let row = |(star, end): (&Star, &End)| {
         let summary =
-            || -> Option<Summary> { serde_json::from_slice(&std::fs::read(star.folder.join(SUMMARY)).ok()?).ok() };
+            || -> Option<RunSummary> { serde_json::from_slice(&std::fs::read(star.folder.join(SUMMARY)).ok()?).ok() };
         let summary = if *end == End::Sampled { summary() } else { None };
         Row {
             name: star.name.clone(),
@@ -155,7 +155,7 @@ pub fn rows(stars: &[Star], ends: &[End]) -> Vec<Row> {
             converged: summary.as_ref().map(|summary| summary.converged),
             verdict: summary.as_ref().and_then(|summary| summary.verdict.clone()),
             evaluations: summary.as_ref().map(|summary| summary.evaluations),
-            parameters: summary.map(|summary| summary.parameters).unwrap_or_default(),
+            parameters: summary.map(|summary| summary.chain.parameters).unwrap_or_default(),
         }
     };
     stars.iter().zip(ends).map(row).collect()

@@ -5,12 +5,14 @@
 
 mod conclusions;
 
+pub use conclusions::RunSummary;
+
 use crate::data::config::{Config, Settings};
 use crate::data::io::atomic::{WriteError, write_json};
 use crate::model::{
     Elements, FreeParameter, OrbitQuantities, OrbitQuantity, Parameter, Prior, Quoted, definition, in_earths,
 };
-use crate::runs::blind_search::BlindSearch;
+use crate::runs::blind_search::SearchSummary;
 use crate::runs::origin::{self, OptimumRecord, Origin, OriginError};
 use crate::sampling::chain::{Chain, ChainError, Goals, ParameterKind, Settled, Shape, Summary, summarise};
 use crate::sampling::ensemble::Positions;
@@ -52,7 +54,7 @@ pub struct Manifest {
     pub merged_seeds: Vec<u64>,
     /// The blind search that the verdict rests on; absent where no orbit was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blind_search: Option<BlindSearch>,
+    pub blind_search: Option<SearchSummary>,
     /// Positions of all walkers at step 0: `[ensemble][walker][parameter]`.
     pub start: Positions,
 }
@@ -108,12 +110,11 @@ impl Manifest {
     ///
     /// # Errors
     /// A chain without a step.
-    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(Summary, Vec<Settled>), ChainError> {
+    pub fn summarise(&self, settings: &Settings, chain: &Chain) -> Result<(RunSummary, Vec<Settled>), ChainError> {
         let (kinds, goals) = kinds_and_goals(settings);
         let mut summary = summarise(chain, &kinds, &goals)?;
         let quantities = self.orbit_quantities(settings).of_draws(&settings.free, &settings.values);
         let settled = summary.derive(chain, quantities);
-        self.conclude(settings, chain, &mut summary);
         let mass = summary.derived.get(OrbitQuantity::MinimumMass.name());
         if let Some(earths) = mass.and_then(|mass| in_earths(mass.upper95.unwrap_or(mass.median))) {
             let meaning = summary.definitions.entry(OrbitQuantity::MinimumMass.name().to_owned()).or_default();
@@ -124,7 +125,7 @@ impl Manifest {
                 summary.definitions.insert(name.clone(), meaning.to_owned());
             }
         }
-        Ok((summary, settled))
+        Ok((RunSummary::of(chain, summary, settings, self.blind_search.as_ref()), settled))
     }
 
     /// The injected value of a quantity of the orbit, an event's nearest to the estimate; `None` where no planet was

@@ -5,8 +5,8 @@
 //! 1. [`pool`] spreads reconstructions over threads, or over the ranks of a `cluster`.
 //! 2. [`origin`] and [`manifest`] are what a folder was begun with.
 //! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`maps`] the star there,
-//!    [`simulated`] what it was made with; [`periodogram`], [`blind_search`] and [`limits`] are searches for orbits,
-//!    [`known_planet`] what is said of a planet of known ephemeris, [`plan`] what profiles not yet taken would show.
+//!    [`simulated`] what it was made with; [`blind_search`] and [`limits`] are searches for orbits, [`plan`] what
+//!    profiles not yet taken would show.
 //!    [`log_posterior`] is the density of a chain for samplers elsewhere.
 //! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] holds a chain against a
 //!    landscape.
@@ -20,7 +20,6 @@ pub mod cluster;
 pub mod comparison;
 pub mod export;
 pub mod grid_scan;
-pub mod known_planet;
 pub mod limits;
 pub mod log_posterior;
 pub mod manifest;
@@ -28,7 +27,6 @@ pub mod maps;
 pub mod merge;
 pub mod optimum;
 pub mod origin;
-pub mod periodogram;
 pub mod plan;
 pub mod pool;
 pub mod run;

@@ -8,7 +8,7 @@ use crate::model::{
     Elements, Estimate, OrbitQuantities, OrbitQuantity, Parameter, Quoted, definition, in_earths, quoted_definition,
 };
 use crate::numerics::text::listed;
-use crate::runs::blind_search::BlindSearch;
+use crate::runs::blind_search::{BlindSearch, SearchSummary};
 use crate::runs::origin::OptimumRecord;
 use crate::sampling::optimise::Optimum;
 use crate::surface::record::SurfaceRecord;
@@ -42,7 +42,7 @@ pub struct OptimumFile {
     pub internal_curvature: Vec<Vec<f64>>,
     /// The blind search that the verdict rests on; absent where no orbit was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blind_search: Option<BlindSearch>,
+    pub blind_search: Option<SearchSummary>,
     /// What is usually quoted of the orbit, with standard deviations by the same covariance.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derived: BTreeMap<String, Estimate>,
@@ -102,7 +102,7 @@ impl OptimumFile {
             converged: optimum.converged,
             covariance: rows(&optimum.written_covariance),
             internal_curvature: rows(&optimum.curvature),
-            blind_search: BlindSearch::of(scene, found.detection.as_deref())
+            blind_search: BlindSearch::summary_of(scene, found.detection.as_deref())
                 .map(|search| search.beside(porb_over_prot, prot)),
             derived,
             truth: scene.named_truth(),

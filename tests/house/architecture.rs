@@ -12,8 +12,12 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("star", &[], &["numerics"]),
     ("maxent", &[], &["numerics"]),
     ("field", &[], &["numerics"]),
-    ("planets", &["mixture", "velocities", "verdict", "periodogram", "evidence"], &["numerics", "star::kepler"]),
-    ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics", "planets::verdict"]),
+    (
+        "planets",
+        &["mixture", "velocities", "verdict", "periodogram", "modes", "evidence"],
+        &["numerics", "star::kepler"],
+    ),
+    ("sampling", &["log_density", "chain", "landscape", "optimise", "ensemble"], &["numerics"]),
     ("model", &[], &["numerics", "star", "sampling", "planets"]),
     ("surface", &[], &["numerics", "star", "maxent", "field", "planets", "sampling", "model"]),
     (
@@ -31,11 +35,9 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
         &[
             "cluster",
             "origin",
-            "known_planet",
             "blind_search",
             "limits",
             "maps",
-            "periodogram",
             "simulated",
             "plan",
             "pool",
@@ -57,6 +59,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
         &["drawing", "plot", "report"],
         &[
             "numerics::text",
+            "numerics::quantile",
             "star",
             "planets",
             "sampling::chain",

@@ -22,7 +22,7 @@ use dimcmc::internals::surface::record::by_name;
 use dimcmc::internals::surface::static_map::Posterior;
 use dimcmc::internals::surface::static_map::Reference;
 use dimcmc::{Config, Found, FrequencySettings, Optimum, Parameter, Pool, Run, RunError, Scene, StartFrom, StopReason};
-use dimcmc::{ParameterSummary, Summary};
+use dimcmc::{ParameterSummary, RunSummary};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -210,7 +210,7 @@ pub fn landscape(
 }
 
 /// The chain, kept in `folder`, and its summary.
-pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, Summary), Failure> {
+pub fn chain(scene: &Scene, found: Found, folder: &Path, pool: &Pool) -> Result<(Route, RunSummary), Failure> {
     let began = Instant::now();
     let resumed = folder.join(CHAIN).exists();
     let mut run = match Run::resume(scene, folder, None, pool) {

@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// Beyond this a finite number is no result of this program, and nothing can be drawn with it.
 const LARGEST: f64 = 1e100;
 
+/// Column of the number of each profile's data set, from 1, where there are several.
+pub const DATA_SET: &str = "data_set";
+
 /// A table that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {

@@ -6,8 +6,7 @@ mod light;
 pub use light::LIGHT_CURVES;
 
 use super::atomic::{WriteError, write, write_json};
-use super::csv::Table;
-use super::periodogram::DATA_SET;
+use super::csv::{DATA_SET, Table};
 use super::provenance::{MeasuredSet, Provenance, Season};
 use crate::maxent::entropy::Entropy;
 use crate::model::ParameterValues;

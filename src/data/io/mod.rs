@@ -11,7 +11,6 @@ pub mod lines;
 pub mod lsd;
 pub mod map;
 pub mod paraboloid;
-pub mod periodogram;
 pub mod provenance;
 pub mod truth;
 pub mod zarr;

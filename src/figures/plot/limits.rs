@@ -5,7 +5,7 @@ use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{ColourMap, GREY, VERMILION, WHITE};
 use crate::figures::drawing::panel::{Marker, Shade, Sides, Tile};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};
-use crate::runs::limits::{ComparisonRecord, JSON, LimitRecord, LimitsFile};
+use crate::runs::limits::{Comparison, JSON, Limit, LimitsFile};
 use crate::runs::origin;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
         value: 100.0 * recovered[j] / phases[j],
     };
     panel.tiles(&mut figure, (0..period.len()).map(tile), shade);
-    let curve = |of: fn(&LimitRecord) -> Option<f64>| -> Vec<[f64; 2]> {
+    let curve = |of: fn(&Limit) -> Option<f64>| -> Vec<[f64; 2]> {
         file.limits.iter().map(|limit| [limit.period_d, of(limit).unwrap_or(f64::NAN)]).collect()
     };
     let (half, nearly_all) = (Stroke::new(WHITE, 1.2).dashed(), Stroke::new(VERMILION, 1.2));
@@ -54,8 +54,8 @@ fn figure(file: &LimitsFile, table: &Columns) -> Result<Figure, PlotError> {
         }
     }
     let whole = |found: bool| -> Vec<[f64; 2]> {
-        let of = |c: &&ComparisonRecord| c.full.as_ref().is_some_and(|full| full.recovered) == found;
-        file.comparisons.iter().filter(of).map(|c| [c.porb_over_prot * rotation, c.k_kms]).collect()
+        let of = |c: &&Comparison| c.full.as_ref().is_some_and(|full| full.recovered) == found;
+        file.comparisons.iter().filter(of).map(|c| [c.orbit.porb_over_prot * rotation, c.orbit.k_kms]).collect()
     };
     panel.points(&mut figure, "recovered", &whole(true), (Marker::Disc, 4.0, VERMILION));
     panel.points(&mut figure, "missed", &whole(false), (Marker::Cross, 4.5, VERMILION));

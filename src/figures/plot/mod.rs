@@ -34,11 +34,11 @@ use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::journal::JournalError;
 use crate::data::io::lsd::LsdError;
 use crate::data::io::map::{LIGHT_CURVES, MAP, MapFile};
-use crate::data::io::{self, FileError, truth};
+use crate::data::io::{FileError, truth};
 use crate::figures::drawing::Figure;
 use crate::runs::origin::OriginError;
 use crate::runs::run::CHAIN;
-use crate::runs::{self, grid_scan, manifest, origin};
+use crate::runs::{self, blind_search, grid_scan, manifest, origin};
 use std::path::{Path, PathBuf};
 
 /// Pixels to the inch of PNG files where nothing else is asked for.
@@ -90,7 +90,7 @@ type Draw = fn(&Path, Option<&Path>) -> Result<Vec<Figure>, PlotError>;
 /// The files by which a folder is known, with what draws it.
 const KINDS: [(&str, Draw); 9] = [
     (MAP, star_map_figures),
-    (io::periodogram::FILE, |folder, _| periodogram::figures(folder)),
+    (blind_search::FILE, |folder, _| periodogram::figures(folder)),
     (runs::limits::JSON, |folder, _| limits::figures(folder)),
     (runs::plan::JSON, |folder, _| plan::figures(folder)),
     (manifest::FILE, |folder, _| chain_figures(folder)),

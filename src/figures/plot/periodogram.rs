@@ -4,7 +4,6 @@
 use super::symbols::PERIOD_DIGITS;
 use super::{POSITIVE, PlotError, velocities};
 use crate::data::io::csv::Columns;
-use crate::data::io::periodogram::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{
@@ -12,6 +11,7 @@ use crate::figures::drawing::{
     width_pt,
 };
 use crate::model::Parameter;
+use crate::runs::blind_search::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 use crate::runs::origin;
 use crate::star::Orbit;
 use std::path::Path;

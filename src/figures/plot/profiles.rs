@@ -2,10 +2,9 @@
 
 use super::star_map::ephemeris;
 use super::{ANY, PlotError};
-use crate::data::io::csv::Columns;
+use crate::data::io::csv::{Columns, DATA_SET};
 use crate::data::io::lsd;
 use crate::data::io::map::{FIT, FitFile, UNCHANGING};
-use crate::data::io::periodogram::DATA_SET;
 use crate::data::io::truth::{self, TruthFile};
 use crate::figures::drawing::colour::{BLACK, GREY, VERMILION};
 use crate::figures::drawing::{Align, Axis, Figure, Font, Key, Legend, PAGE_MM, Panel, Rect, Stroke};

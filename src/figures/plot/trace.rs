@@ -7,11 +7,12 @@ use crate::figures::drawing::colour::{BLACK, GREY, SERIES, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Align, Axis, Figure, Key, Legend, PAGE_MM, Paint, Panel, Rect, Scale, Stroke, range_of};
 use crate::model::Prior;
-use crate::runs::manifest::{Manifest, kinds_and_goals};
+use crate::numerics::quantile::quantile;
+use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
 use crate::runs::run::CHAIN;
 use crate::sampling::chain::autocorrelation::{autocorrelation_function, autocorrelation_time};
-use crate::sampling::chain::statistics::{quantile, unwrap_around};
-use crate::sampling::chain::{Chain, Goals, ParameterKind, Series, Summary};
+use crate::sampling::chain::statistics::unwrap_around;
+use crate::sampling::chain::{Chain, Goals, ParameterKind, Series};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -29,7 +30,7 @@ pub struct Sampled {
     /// What every parameter must reach.
     pub goals: Goals,
     /// What the chain says.
-    pub summary: Summary,
+    pub summary: RunSummary,
     /// Injected values of the parameters and of what follows from them.
     pub truth: Option<BTreeMap<String, f64>>,
 }

@@ -3,12 +3,12 @@
 use super::{Chapter, NOTHING, Table, Tone, injection, is_empty, maps, planned, run, verdicts};
 use crate::data::io::map::{FIT, MAP};
 use crate::data::io::paraboloid::ParaboloidFile;
-use crate::data::io::periodogram::{self, PeakRecord, PeriodogramFile};
 use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::model::{Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition, quoted_definition};
 use crate::planets::verdict::probability;
+use crate::runs::blind_search::{self, PeakRecord, PeriodogramFile};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
 use crate::runs::grid_scan::{self, Header, PARABOLOID};
 use crate::runs::optimum::{self, OptimumFile};
@@ -22,7 +22,7 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError
     Ok(match file {
         manifest::FILE => run::chapter(folder)?,
         MAP => maps::chapter(&origin::read(folder, FIT)?),
-        periodogram::FILE => search(&origin::read(folder, file)?),
+        blind_search::FILE => search(&origin::read(folder, file)?),
         grid_scan::HEADER => {
             let present = folder.join(PARABOLOID).is_file();
             let paraboloid = if present { Some(origin::read(folder, PARABOLOID)?) } else { None };

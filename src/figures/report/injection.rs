@@ -3,7 +3,7 @@
 use super::chapters::{number, pairs};
 use super::{Chapter, Table};
 use crate::data::io::truth::InjectedTruth;
-use crate::runs::limits::{LimitRecord, LimitsFile};
+use crate::runs::limits::{Limit, LimitsFile};
 use crate::star::Orbit;
 
 /// Periods in the table, at most.
@@ -23,8 +23,8 @@ pub(super) fn injection(truth: &InjectedTruth) -> Chapter {
 
 /// Of `limits.json`.
 pub(super) fn limits(file: &LimitsFile) -> Chapter {
-    let row = |limit: &LimitRecord| {
-        let LimitRecord { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
+    let row = |limit: &Limit| {
+        let Limit { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
         vec![number(period_d, 4), number(porb_over_prot, 3), number(k50_kms, 3), number(k95_kms, 3)]
     };
     let head = ["period (d)", "*P*_{orb}/*P*_{rot}", "*K* (km/s), 50 %", "95 %"].map(str::to_owned).to_vec();

@@ -3,8 +3,9 @@
 use super::{Chapter, NOTHING, Table, Tone, verdicts};
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::figures::plot::{PlotError, Sampled};
-use crate::runs::manifest::Manifest;
-use crate::sampling::chain::{ParameterSummary, PeriodMode, Summary};
+use crate::planets::modes::PeriodMode;
+use crate::runs::manifest::{Manifest, RunSummary};
+use crate::sampling::chain::{ParameterSummary, Summary};
 use std::path::Path;
 
 /// The chapter of the run in `folder`.
@@ -89,7 +90,7 @@ fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {
 }
 
 /// What the blind search and the chain say against it, and what else must be known beside the verdict.
-fn warnings(manifest: &Manifest, summary: &Summary) -> Vec<String> {
+fn warnings(manifest: &Manifest, summary: &RunSummary) -> Vec<String> {
     let measured = measured(manifest);
     let begun = manifest.warnings().into_iter().filter(|line| !measured.contains(line));
     summary.remarks.iter().cloned().chain(begun).chain(manifest.co_rotation(summary)).collect()
@@ -102,9 +103,8 @@ fn measured(manifest: &Manifest) -> Vec<String> {
 }
 
 /// The modes of the period, where there are several or spots may make the one.
-fn period_modes(manifest: &Manifest, summary: &Summary) -> Table {
-    let modes = &summary.period_modes;
-    if modes.len() < 2 && modes.iter().all(|mode| mode.rotation.is_none()) {
+fn period_modes(manifest: &Manifest, summary: &RunSummary) -> Table {
+    if !summary.has_modes_to_show() {
         return Table::default();
     }
     let rotation_period = manifest.origin.config.pointer("/star/rotation_period_d").and_then(serde_json::Value::as_f64);
@@ -132,7 +132,7 @@ fn period_modes(manifest: &Manifest, summary: &Summary) -> Table {
         "*K* (km/s)",
         "period of the star",
     ];
-    Table { head: head.map(String::from).to_vec(), rows: modes.iter().map(row).collect() }
+    Table { head: head.map(String::from).to_vec(), rows: summary.period_modes.iter().map(row).collect() }
 }
 
 /// Whether the chain has converged, and what that means.

@@ -49,9 +49,14 @@ pub struct SearchSettings {
     pub seed: u64,
 }
 
+impl SearchSettings {
+    /// Number of draws where nothing else is asked for.
+    pub const DRAWS: usize = 10_000;
+}
+
 impl Default for SearchSettings {
     fn default() -> Self {
-        SearchSettings { draws: 10_000, seed: 1 }
+        SearchSettings { draws: SearchSettings::DRAWS, seed: 1 }
     }
 }
 

@@ -6,7 +6,7 @@
 //! one place come once a day, so that each of these has reflections at one and two a day (Dawson & Fabrycky 2010),
 //! however weak the window function is there.
 
-use super::window::{Alias, SAME, WindowPeak, alias, window};
+use super::window::{Alias, SAME, WindowPeak, alias, is_same_frequency, window};
 use serde::{Deserialize, Serialize};
 
 /// Fractions and multiples of the rotation period that are looked at.
@@ -82,7 +82,7 @@ impl RotationPeriods {
         let mut all = peaks.to_vec();
         for days in [1.0, 2.0] {
             let frequency = days * rotation_period_d;
-            let near = |peak: &WindowPeak| (peak.frequency - frequency).abs() * time_base_cycles < SAME;
+            let near = |peak: &WindowPeak| is_same_frequency(peak.frequency, frequency, time_base_cycles);
             let height = window(cycles, frequency);
             if !all.iter().any(near) && height >= DAILY {
                 all.push(WindowPeak { frequency, height });

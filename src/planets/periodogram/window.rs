@@ -18,6 +18,11 @@ const SAMPLES: f64 = 10.0;
 /// Frequencies closer than this many inverse time bases are the same.
 pub(super) const SAME: f64 = 0.5;
 
+/// Whether a time base does not tell two frequencies apart.
+pub fn is_same_frequency(one: f64, other: f64, time_base_cycles: f64) -> bool {
+    (one - other).abs() * time_base_cycles < SAME
+}
+
 /// A peak of the window function.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WindowPeak {

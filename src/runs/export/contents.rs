@@ -5,9 +5,9 @@
 use super::ExportError;
 use crate::data::io::journal;
 use crate::model::{FreeParameter, Prior, Quoted};
-use crate::runs::manifest::{Manifest, kinds_and_goals};
+use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
 use crate::runs::run::CHAIN;
-use crate::sampling::chain::{Chain, Settled, Summary, statistics::unwrap_around};
+use crate::sampling::chain::{Chain, Settled, statistics::unwrap_around};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ pub struct Contents {
     /// Its file.
     pub path: PathBuf,
     /// What `analyse` says of it.
-    pub summary: Summary,
+    pub summary: RunSummary,
     /// Version of the program that the run was begun with.
     pub version: String,
     /// SHA-256 (hex) of the observations.

@@ -1,8 +1,9 @@
 //! The files of detection limits: `limits.csv`, a line for each period and semi-amplitude, and `limits.json`; and a
 //! table.
 
-use super::full::Agreement;
-use super::{Cell, Comparison, Limit, Orbits, Outcome, Shortcut};
+use super::cells::{Cell, Limit, Orbits};
+use super::full::{Agreement, Comparison};
+use super::shortcut::Shortcut;
 use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
@@ -36,11 +37,11 @@ pub struct LimitsFile {
     /// Number of phases.
     pub phases: usize,
     /// Limits at the periods put in.
-    pub limits: Vec<LimitRecord>,
+    pub limits: Vec<Limit>,
     /// How often the whole way agrees; null where it was not gone.
     pub agreement: Option<Agreement>,
     /// Orbits that were tried both ways.
-    pub comparisons: Vec<ComparisonRecord>,
+    pub comparisons: Vec<Comparison>,
     /// What may be wrong.
     pub warnings: Vec<String>,
     /// Config, data and program.
@@ -59,81 +60,18 @@ pub struct BeforeRecord {
     pub false_alarm_probability: f64,
 }
 
-/// The limit at one period.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct LimitRecord {
-    /// The period (d).
-    pub period_d: f64,
-    /// The same over the rotation period.
-    pub porb_over_prot: f64,
-    /// K recovered at half of the phases (km/s); null beyond what was tried.
-    pub k50_kms: Option<f64>,
-    /// The same at 95 %.
-    pub k95_kms: Option<f64>,
-}
-
-/// An orbit tried both ways.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct ComparisonRecord {
-    /// Semi-amplitude (km/s).
-    pub k_kms: f64,
-    /// Period over the rotation period.
-    pub porb_over_prot: f64,
-    /// Phase (cycles).
-    pub phi: f64,
-    /// What the shortcut makes of it.
-    pub shortcut: OutcomeRecord,
-    /// What the whole way does; null where there is no image.
-    pub full: Option<OutcomeRecord>,
-}
-
-/// The highest peak.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct OutcomeRecord {
-    /// Its height.
-    pub delta_ln_l: f64,
-    /// Its period over the rotation period.
-    pub porb_over_prot: f64,
-    /// Its semi-amplitude (km/s).
-    pub k_kms: f64,
-    /// Whether chance hardly makes one as high.
-    pub detected: bool,
-    /// Whether that is so and it is the orbit that was put in.
-    pub recovered: bool,
-}
-
-impl OutcomeRecord {
-    fn of(outcome: &Outcome) -> Self {
-        let Outcome { delta_ln_l, porb_over_prot, k_kms, detected, recovered } = *outcome;
-        OutcomeRecord { delta_ln_l, porb_over_prot, k_kms, detected, recovered }
-    }
-}
-
 impl LimitsFile {
     /// Of the `limits` that were found.
     pub fn new(
         shortcut: &Shortcut,
         orbits: &Orbits,
-        limits: &[Limit],
-        comparisons: &[Comparison],
+        limits: Vec<Limit>,
+        comparisons: Vec<Comparison>,
         rotation_period_d: f64,
         provenance: Provenance,
     ) -> Self {
         let best = shortcut.before.best();
         let false_alarm = shortcut.before.false_alarm.probability(best.orbit.delta_ln_l).value();
-        let record = |limit: &Limit| LimitRecord {
-            period_d: rotation_period_d * limit.porb_over_prot,
-            porb_over_prot: limit.porb_over_prot,
-            k50_kms: limit.k50_kms,
-            k95_kms: limit.k95_kms,
-        };
-        let comparison = |c: &Comparison| ComparisonRecord {
-            k_kms: c.orbit.k_kms,
-            porb_over_prot: c.orbit.porb_over_prot,
-            phi: c.orbit.phi,
-            shortcut: OutcomeRecord::of(&c.shortcut),
-            full: c.full.as_ref().map(OutcomeRecord::of),
-        };
         let mut file = LimitsFile {
             false_alarm_probability: CANDIDATE_FAP,
             level: shortcut.level,
@@ -145,9 +83,9 @@ impl LimitsFile {
             },
             k_kms: orbits.k_kms.clone(),
             phases: orbits.phases,
-            limits: limits.iter().map(record).collect(),
-            agreement: (!comparisons.is_empty()).then(|| Agreement::of(comparisons)),
-            comparisons: comparisons.iter().map(comparison).collect(),
+            limits,
+            agreement: (!comparisons.is_empty()).then(|| Agreement::of(&comparisons)),
+            comparisons,
             warnings: Vec::new(),
             provenance,
         };
@@ -208,7 +146,7 @@ impl LimitsFile {
         let step = self.limits.len().div_ceil(SHOWN).max(1);
         let shown = |k: Option<f64>| k.map_or_else(|| "-".to_owned(), |k| format!("{k:.4}"));
         for limit in self.limits.iter().step_by(step) {
-            let LimitRecord { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
+            let Limit { period_d, porb_over_prot, k50_kms, k95_kms } = *limit;
             rows.push(vec![format!("{period_d:.4}"), format!("{porb_over_prot:.4}"), shown(k50_kms), shown(k95_kms)]);
         }
         let mut text = aligned(&rows);

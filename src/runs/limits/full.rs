@@ -1,7 +1,7 @@
 //! The whole way, for a few orbits: profiles resampled with the orbit in them, imaged without a planet, and searched.
 
-use super::shortcut::{Outcome, Shortcut};
-use super::{Limit, LimitSettings};
+use super::cells::Limit;
+use super::shortcut::{LimitSettings, Outcome, Shortcut};
 use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
 use crate::model::{Parameter, for_blind_search};
@@ -16,9 +16,10 @@ use serde_json::Value;
 use std::path::PathBuf;
 
 /// One orbit, both ways.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// The orbit.
+    #[serde(flatten)]
     pub orbit: Orbit,
     /// By the shortcut.
     pub shortcut: Outcome,

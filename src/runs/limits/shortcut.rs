@@ -1,20 +1,30 @@
 //! The blind search after an orbit has been put in, to second order around the image without a planet.
 
+use crate::inference::detection::DetectionSettings;
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::orbits::{Trial, scan};
-use crate::planets::periodogram::{CircularOrbit, Search, Unbounded};
+use crate::planets::periodogram::window::is_same_frequency;
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Search, Unbounded};
 use crate::planets::verdict::CANDIDATE_FAP;
-use crate::runs::limits::LimitSettings;
 use crate::star::Orbit;
 use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
 use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel};
+use serde::{Deserialize, Serialize};
 
-/// A period is right when its frequency is off by less than this many inverse time bases.
-const RIGHT: f64 = 0.5;
+/// How orbits are looked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LimitSettings {
+    /// The blind search.
+    pub detection: DetectionSettings,
+    /// Its trial periods.
+    pub frequencies: Frequencies,
+    /// Whether the best orbit of the profiles as they are is taken out first.
+    pub without_best: bool,
+}
 
 /// What a blind search makes of an orbit that was put in.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// ln L of the highest peak above no planet.
     pub delta_ln_l: f64,
@@ -33,8 +43,8 @@ impl Outcome {
     pub(super) fn of(peak: (f64, f64, f64), level: f64, injected: &Orbit, time_base_cycles: f64) -> Self {
         let (frequency, delta_ln_l, k_kms) = peak;
         let detected = delta_ln_l > level;
-        let apart = (frequency - 1.0 / injected.porb_over_prot).abs() * time_base_cycles;
-        Outcome { delta_ln_l, porb_over_prot: 1.0 / frequency, k_kms, detected, recovered: detected && apart < RIGHT }
+        let recovered = detected && is_same_frequency(frequency, 1.0 / injected.porb_over_prot, time_base_cycles);
+        Outcome { delta_ln_l, porb_over_prot: 1.0 / frequency, k_kms, detected, recovered }
     }
 }
 

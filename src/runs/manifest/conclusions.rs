@@ -4,28 +4,25 @@
 //! The verdict is that of the blind search. A chain takes a planet for granted, so that it can only take something
 //! away: where its K is compatible with zero, or its period is not one, a detection becomes a candidate.
 
-use super::Manifest;
 use crate::data::config::Settings;
-use crate::model::{Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
+use crate::model::{Clock, Elements, FreeParameter, OrbitQuantity, Parameter, Prior, period_prior};
+use crate::numerics::quantile::quantile;
+use crate::numerics::text::aligned;
+use crate::planets::modes::{PeriodMode, are_few, doubts, period_modes};
 use crate::planets::periodogram::RotationPeriods;
-use crate::planets::verdict::{Finding, Remark, Verdict};
-use crate::sampling::chain::modes::period_modes;
-use crate::sampling::chain::statistics::quantile;
-use crate::sampling::chain::{Chain, ParameterSummary, PeriodMode, Summary};
+use crate::planets::verdict::{Remark, Verdict};
+use crate::runs::blind_search::SearchSummary;
+use crate::sampling::chain::{Chain, ParameterSummary, Summary, table};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A parameter whose 68 % interval is wider than this share of its prior's is not constrained.
 const UNCONSTRAINED: f64 = 0.7;
 
-/// A mode that is wider than this (inverse time bases) is none: the data do not tell its periods from each other.
-const BROAD: f64 = 1.0;
-
-/// A period in no more modes than this, which hold at least that share of the draws, is constrained.
-const FEW_MODES: (usize, f64) = (3, 0.68);
-
-/// A mode of more weight than this has no rival.
-const ALONE: f64 = 0.95;
+/// Modes of the period that are shown.
+const MODES_SHOWN: usize = 6;
 
 /// What follows from the orbit means nothing where one of these is not constrained.
 const DERIVED: [(OrbitQuantity, &[Parameter]); 3] = [
@@ -37,71 +34,117 @@ const DERIVED: [(OrbitQuantity, &[Parameter]); 3] = [
 /// Draws of a prior by which its width is known, to 2 %.
 const PRIOR_DRAWS: usize = 4001;
 
-impl Manifest {
-    /// Adds to the summary of `chain` what priors and blind search have to say to it.
-    pub(super) fn conclude(&self, settings: &Settings, chain: &Chain, summary: &mut Summary) {
-        summary.period_modes = self.period_modes(settings, chain, summary.discarded_steps);
+/// What a run's chain says, and what that means for a planet; serialised, it is `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunSummary {
+    /// Of the chain.
+    #[serde(flatten)]
+    pub chain: Summary,
+    /// What is said of a planet; absent where no orbit was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+    /// The modes of the period, from the heaviest on; empty where it was not sampled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub period_modes: Vec<PeriodMode>,
+    /// What has to be known beside the verdict.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+}
+
+/// Whoever only asks for the chain finds it here.
+impl std::ops::Deref for RunSummary {
+    type Target = Summary;
+
+    fn deref(&self) -> &Summary {
+        &self.chain
+    }
+}
+
+/// The table that `dimcmc analyse` prints.
+impl std::fmt::Display for RunSummary {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(self.table(None).trim_end())
+    }
+}
+
+impl RunSummary {
+    /// The verdict above the table of the chain. With `truth` (injected values by name) there is a column for it.
+    pub fn table(&self, truth: Option<&BTreeMap<String, f64>>) -> String {
+        let verdict = self.verdict.as_ref().map(|verdict| format!("{}\n\n", verdict.sentence)).unwrap_or_default();
+        verdict + &table::parameters(&self.chain, truth) + &self.modes_table() + &table::rest(&self.chain, truth)
+    }
+
+    /// Whether the period has several modes, or one that spots may make.
+    pub fn has_modes_to_show(&self) -> bool {
+        self.period_modes.len() > 1 || self.period_modes.iter().any(|mode| mode.rotation.is_some())
+    }
+
+    fn modes_table(&self) -> String {
+        if !self.has_modes_to_show() {
+            return String::new();
+        }
+        let head = ["mode of the period", "weight", "porb_over_prot", "68% interval", "k_kms", ""];
+        let row = |(k, mode): (usize, &PeriodMode)| {
+            let [low, high] = mode.ci68;
+            let digits = (1.0 - (high - low).log10().floor()).clamp(2.0, 9.0) as usize;
+            vec![
+                (k + 1).to_string(),
+                format!("{:.2}", mode.weight),
+                format!("{:.digits$}", mode.porb_over_prot),
+                format!("[{low:.digits$}, {high:.digits$}]"),
+                format!("{:.3}", mode.k_kms),
+                mode.rotation.clone().unwrap_or_default(),
+            ]
+        };
+        let rows = self.period_modes.iter().enumerate().take(MODES_SHOWN).map(row);
+        aligned(&std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect::<Vec<_>>())
+    }
+}
+
+impl RunSummary {
+    /// Of a run by `settings` whose `chain` has this `summary`, beside the blind search; a run of the first versions has
+    /// none.
+    pub(super) fn of(chain: &Chain, summary: Summary, settings: &Settings, search: Option<&SearchSummary>) -> Self {
+        let rotation = search.and_then(|search| search.rotation.as_ref());
+        let modes = rotation.and_then(|rotation| modes(chain, summary.discarded_steps, settings, rotation));
+        let period_modes = modes.unwrap_or_default();
+        let mut summary = RunSummary { chain: summary, verdict: None, period_modes, remarks: Vec::new() };
+        let few = rotation.is_some_and(|rotation| are_few(&summary.period_modes, rotation));
+        let of_the_chain = &mut summary.chain;
         for f in &settings.free {
             let is_period = matches!(f.parameter, Parameter::PorbOverProt | Parameter::Period);
-            let few = is_period && self.is_in_few_modes(summary);
-            if let Some(one) = summary.parameters.get_mut(f.parameter.name()) {
-                one.unconstrained = !few && is_as_wide(one, f);
+            if let Some(one) = of_the_chain.parameters.get_mut(f.parameter.name()) {
+                one.unconstrained = !(few && is_period) && is_as_wide(one, f);
             }
         }
         for (name, of) in DERIVED {
-            let open = of.iter().any(|p| summary.parameters.get(p.name()).is_some_and(|one| one.unconstrained));
-            if let Some(one) = summary.derived.get_mut(name.name()) {
+            let open = of.iter().any(|p| of_the_chain.parameters.get(p.name()).is_some_and(|one| one.unconstrained));
+            if let Some(one) = of_the_chain.derived.get_mut(name.name()) {
                 one.unconstrained = open;
             }
         }
-        if self.blind_search.is_none() && summary.parameters.contains_key(Parameter::K.name()) {
-            let why = "this run was begun by a version that made no blind search";
-            summary.verdict = Some(Verdict::not_judged(why));
-        }
-        if let Some((verdict, remarks)) = self.verdict(summary, settings) {
-            summary.remarks = remarks.into_iter().map(|remark| remark.text).filter(|text| !text.is_empty()).collect();
-            summary.verdict = Some(verdict);
-        }
-    }
-
-    fn period_modes(&self, settings: &Settings, chain: &Chain, discarded: usize) -> Vec<PeriodMode> {
-        let place = |p: Parameter| self.names.iter().position(|name| name == p.name());
-        let rotation = self.blind_search.as_ref().and_then(|search| search.rotation.as_ref());
-        let ratio = place(Parameter::PorbOverProt).map(|i| (i, 1.0));
-        let period = ratio.or(place(Parameter::Period).map(|i| (i, settings.star.rotation_period_d)));
-        let (Some((period, unit)), Some(k), Some(rotation)) = (period, place(Parameter::K), rotation) else {
-            return Vec::new();
-        };
-        let draws = |i: usize| chain.series(i, discarded).into_iter().flatten().flatten();
-        let draws: Vec<(f64, f64)> = draws(period).map(|period| period / unit).zip(draws(k)).collect();
-        let mut modes = period_modes(&draws, rotation.time_base_cycles);
-        for mode in &mut modes {
-            if is_broad(mode, rotation) {
-                continue;
+        let is_planet_sampled = summary.parameters.contains_key(Parameter::K.name());
+        match search.filter(|_| is_planet_sampled) {
+            Some(search) => {
+                let remarks = summary.of_the_planet(settings, search);
+                summary.verdict = Some(search.verdict.clone().with(&remarks));
+                let all = search.remarks.iter().chain(&remarks).map(|remark| &remark.text);
+                summary.remarks = all.filter(|text| !text.is_empty()).cloned().collect();
             }
-            let sigma = 0.5 * (mode.ci68[1] - mode.ci68[0]);
-            let imitation = rotation.imitated(mode.porb_over_prot, Some(sigma));
-            mode.rotation = imitation.map(|imitation| imitation.words(settings.star.rotation_period_d));
+            None if is_planet_sampled => {
+                let why = "this run was begun by a version that made no blind search";
+                summary.verdict = Some(Verdict::not_judged(why));
+            }
+            None => {}
         }
-        modes
+        summary
     }
 
-    /// Whether a few narrow modes hold most of the draws.
-    fn is_in_few_modes(&self, summary: &Summary) -> bool {
-        let rotation = self.blind_search.as_ref().and_then(|search| search.rotation.as_ref());
-        let Some(rotation) = rotation else { return false };
-        let narrow = summary.period_modes.iter().filter(|mode| !is_broad(mode, rotation));
-        // a single one that is as wide as the prior is none
-        summary.period_modes.len() > 1 && narrow.take(FEW_MODES.0).map(|mode| mode.weight).sum::<f64>() >= FEW_MODES.1
-    }
-
-    /// The verdict of the blind search, and what the chain has to say to it.
-    fn verdict(&self, summary: &Summary, settings: &Settings) -> Option<(Verdict, Vec<Remark>)> {
-        let search = self.blind_search.as_ref()?;
+    /// What the chain has to say to the verdict of the blind search.
+    fn of_the_planet(&self, settings: &Settings, search: &SearchSummary) -> Vec<Remark> {
         let mut remarks = Vec::new();
-        let is_found = matches!(search.verdict.finding, Finding::Candidate | Finding::Detection);
-        let k = summary.parameters.get(Parameter::K.name())?;
-        match (is_found, k.upper95) {
+        let (is_found, rotation_period_d) = (search.verdict.finding.is_signal(), settings.star.rotation_period_d);
+        match (is_found, self.parameters[Parameter::K.name()].upper95) {
             (true, Some(_)) => remarks.push(Remark::against(
                 "K of the chain is compatible with zero",
                 "the blind search finds a signal, but K of the chain is compatible with zero",
@@ -113,52 +156,36 @@ impl Manifest {
             _ => {}
         }
         if is_found {
-            remarks.extend(of_the_period(summary));
-            let heaviest = summary.period_modes.first().map(|mode| mode.porb_over_prot);
+            remarks.extend(doubts(&self.period_modes));
+            let heaviest = self.period_modes.first().map(|mode| mode.porb_over_prot);
             let period = heaviest.unwrap_or(settings.values[Parameter::PorbOverProt]);
-            remarks.extend(search.of_another_orbit(period, settings.star.rotation_period_d));
+            remarks.extend(search.of_another_orbit(period, rotation_period_d));
         }
-        if !summary.converged {
+        if !self.converged {
             let text = "the chain has not converged: its intervals are not to be quoted";
             remarks.push(Remark::against("the chain has not converged", text));
         }
-        let clock = self.orbit_quantities(settings).clock();
+        let clock = Clock { rotation_period_d, epoch_d: settings.star.epoch_d };
         let period = period_prior(&settings.free, &Elements::PLANETS[0], clock);
         if let Some(shortest) = period.map(|prior| prior.bounds().0).filter(|shortest| *shortest > 1.0) {
             remarks.push(Remark::note(format!(
                 "the prior of the period begins at {shortest:.4} Prot, above the rotation period: signals of the \
-                spots at Prot and \
-                 its fractions can only appear as their aliases"
+                spots at Prot and its fractions can only appear as their aliases"
             )));
         }
-        let verdict = search.verdict.clone().with(&remarks);
-        Some((verdict, search.remarks.iter().cloned().chain(remarks).collect()))
+        remarks
     }
 }
 
-/// Whether the chain's period is one, and not the star's.
-fn of_the_period(summary: &Summary) -> Vec<Remark> {
-    let mut remarks = Vec::new();
-    let Some(heaviest) = summary.period_modes.first() else { return remarks };
-    if let Some(words) = &heaviest.rotation {
-        remarks.push(Remark::against(
-            format!("the period is {words}"),
-            format!("the chain's period is {words}: spots may imitate an orbit there"),
-        ));
-    }
-    if heaviest.weight < ALONE {
-        let share = 100.0 * heaviest.weight;
-        remarks.push(Remark::against(
-            "the period is ambiguous",
-            format!("the period is ambiguous: the heaviest mode of the chain holds {share:.0} % of its draws"),
-        ));
-    }
-    remarks
-}
-
-fn is_broad(mode: &PeriodMode, rotation: &RotationPeriods) -> bool {
-    let [low, high] = mode.ci68;
-    (1.0 / low - 1.0 / high) * rotation.time_base_cycles > BROAD
+/// The modes of the period; `None` where it is not sampled, or K is not.
+fn modes(chain: &Chain, discarded: usize, settings: &Settings, rotation: &RotationPeriods) -> Option<Vec<PeriodMode>> {
+    let rotation_period_d = settings.star.rotation_period_d;
+    let place = |p: Parameter| chain.names().iter().position(|name| name == p.name());
+    let ratio = place(Parameter::PorbOverProt).map(|i| (i, 1.0));
+    let (period, unit) = ratio.or(place(Parameter::Period).map(|i| (i, rotation_period_d)))?;
+    let draws = |i: usize| chain.series(i, discarded).into_iter().flatten().flatten();
+    let draws = draws(period).map(|period| period / unit).zip(draws(place(Parameter::K)?));
+    Some(period_modes(&draws.collect::<Vec<_>>(), rotation, rotation_period_d))
 }
 
 /// Whether the posterior is about as wide as the prior.

@@ -3,16 +3,16 @@
 use super::{CHAIN, RunError, SUMMARY};
 use crate::data::io::atomic::write_json;
 use crate::data::io::journal;
-use crate::runs::manifest::{Manifest, kinds_and_goals};
+use crate::runs::manifest::{Manifest, RunSummary, kinds_and_goals};
 use crate::sampling::chain::statistics::unwrap_around;
-use crate::sampling::chain::{Chain, ParameterKind, Settled, Summary, table};
+use crate::sampling::chain::{Chain, ParameterKind, Settled};
 use std::path::Path;
 
 /// Summary and text.
 #[derive(Clone, Debug)]
 pub struct Conclusion {
     /// What `summary.json` holds.
-    pub summary: Summary,
+    pub summary: RunSummary,
     /// The verdict, the table of the parameters, and notes: what `dimcmc analyse` prints.
     pub text: String,
     kinds: Vec<ParameterKind>,
@@ -41,7 +41,7 @@ impl Conclusion {
         let (summary, settled) = manifest
             .summarise(&settings, chain)
             .map_err(|source| RunError::Analysis { path: folder.join(CHAIN), source })?;
-        let mut text = table(&summary, manifest.truth(&settings, &summary).as_ref()).trim_end().to_owned();
+        let mut text = summary.table(manifest.truth(&settings, &summary).as_ref()).trim_end().to_owned();
         let notes = summary.remarks.iter().cloned().chain(manifest.warnings()).chain(manifest.co_rotation(&summary));
         notes.for_each(|note| text += &format!("\nnote: {note}"));
         Ok(Conclusion { summary, text, kinds, settled })

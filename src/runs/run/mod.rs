@@ -17,11 +17,11 @@ use crate::data::io::journal::{self, Journal, JournalError};
 use crate::data::io::lines;
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
-use crate::runs::blind_search::BlindSearch;
-use crate::runs::manifest::{self, Manifest, kinds_and_goals};
+use crate::runs::blind_search::{BlindSearch, SearchSummary};
+use crate::runs::manifest::{self, Manifest, RunSummary, kinds_and_goals};
 use crate::runs::origin::Origin;
 use crate::runs::pool::{Asked, Evaluations, Pool, Target, Task};
-use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record, Summary};
+use crate::sampling::chain::{Chain, Convergence, Goals, ParameterKind, Record};
 use crate::sampling::ensemble::{
     self, EnsembleError, Positions, RunError as StepError, Sampler, StopPolicy, StopReason,
 };
@@ -111,7 +111,7 @@ impl Run {
     ///
     /// # Errors
     /// A chain of another kind than its manifest: a fault of the program.
-    pub fn summary(&self) -> Result<Summary, RunError> {
+    pub fn summary(&self) -> Result<RunSummary, RunError> {
         Ok(self.manifest.summarise(&self.settings, &self.chain)?.0)
     }
 
@@ -119,7 +119,7 @@ impl Run {
     ///
     /// # Errors
     /// No run there, or one that is broken.
-    pub fn read(folder: &Path) -> Result<(Chain, Summary), RunError> {
+    pub fn read(folder: &Path) -> Result<(Chain, RunSummary), RunError> {
         let manifest = Manifest::read(folder)?;
         let chain = journal::read(&folder.join(CHAIN), &manifest.shape())?;
         let (summary, _) = manifest.summarise(&manifest.settings(folder)?, &chain)?;
@@ -155,7 +155,8 @@ impl Run {
         let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
         // what was not evaluated looks like a start that is none
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
-        let manifest = new_manifest(scene, origin, &target, BlindSearch::of(scene, found.detection.as_deref()), start);
+        let blind_search = BlindSearch::summary_of(scene, found.detection.as_deref());
+        let manifest = new_manifest(scene, origin, &target, blind_search, start);
         let mut chain = Chain::new(manifest.shape());
         chain.push_step(&first)?;
         let run = Run::of(scene, manifest, (target, task), surrogate, (None, chain));
@@ -283,7 +284,7 @@ fn new_manifest(
     scene: &Scene,
     origin: Origin,
     target: &Target,
-    blind_search: Option<BlindSearch>,
+    blind_search: Option<SearchSummary>,
     start: Positions,
 ) -> Manifest {
     let prior = |f: &crate::model::FreeParameter| {

@@ -8,7 +8,6 @@ pub mod advice;
 pub mod autocorrelation;
 pub mod convergence;
 pub mod derived;
-pub mod modes;
 pub mod moves;
 pub mod record;
 pub mod statistics;
@@ -18,7 +17,6 @@ pub mod table;
 
 pub use convergence::{Convergence, Diagnostic, Goals, ParameterKind};
 pub use derived::{Derived, Settled};
-pub use modes::PeriodMode;
 pub use moves::MoveSummary;
 pub use record::{MoveKind, Record, Shape};
 pub use store::{Chain, Series};

@@ -1,21 +1,14 @@
-//! Statistics of one parameter's draws: quantiles, shortest intervals, mode, and the unwrapping of a periodic one.
+//! Statistics of one parameter's draws: shortest intervals, mode, and the unwrapping of a periodic one.
 //!
 //! The mode is that of a kernel density estimate: a histogram smoothed by a Gaussian of Silverman's width for the
 //! *effective* number of draws (equal neighbours, which rejections leave, rule out methods on spacings), mirrored at
 //! the ends so that a density that is cut off (an amplitude at 0) keeps its height there.
 
+use crate::numerics::quantile::quantile;
 use std::f64::consts::TAU;
 
 /// Bins of the histogram under the mode.
 const BINS: usize = 1024;
-
-/// Quantile `p` of sorted values, linear between them.
-pub fn quantile(sorted: &[f64], p: f64) -> f64 {
-    let place = p * (sorted.len() - 1) as f64;
-    let below = place.floor() as usize;
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
-}
 
 /// The shortest interval that holds a share of the sorted values.
 pub fn shortest_interval(sorted: &[f64], share: f64) -> [f64; 2] {
@@ -121,13 +114,6 @@ mod tests {
     fn logistic(count: usize) -> Vec<f64> {
         let p = |i: usize| (i as f64 + 0.5) / count as f64;
         (0..count).map(|i| 3.0 + 0.1 * (p(i) / (1.0 - p(i))).ln()).collect()
-    }
-
-    #[test]
-    fn quantiles_of_few_values() {
-        assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.5), 2.0);
-        assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.75), 3.0);
-        assert_eq!((quantile(&[1.0], 0.0), quantile(&[1.0], 1.0)), (1.0, 1.0));
     }
 
     #[test]

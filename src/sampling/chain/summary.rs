@@ -10,15 +10,12 @@
 //! - Statistics are of the steps kept after the burn-in (`convergence`); `evaluations`, `failures`,
 //!   `model_applications_median` and `best` are of the whole chain, the start included.
 //!
-//! What is said of a planet, and which parameters are constrained, is not the chain's to know: whoever knows the priors
-//! and the blind search fills it in (`manifest::conclusions`).
+//! Which parameters are constrained is not the chain's to know: whoever knows the priors fills it in.
 
-use crate::planets::verdict::Verdict;
+use crate::numerics::quantile::quantile;
 use crate::sampling::chain::autocorrelation::mean;
-use crate::sampling::chain::statistics::{mode, periodic_mode, quantile, shortest_interval, unwrap_around, wrap};
-use crate::sampling::chain::{
-    Chain, ChainError, Convergence, Derived, Diagnostic, Goals, MoveSummary, ParameterKind, PeriodMode,
-};
+use crate::sampling::chain::statistics::{mode, periodic_mode, shortest_interval, unwrap_around, wrap};
+use crate::sampling::chain::{Chain, ChainError, Convergence, Derived, Diagnostic, Goals, MoveSummary, ParameterKind};
 use crate::sampling::chain::{Settled, advice, derived, moves, table};
 use crate::sampling::log_density::Status;
 use rayon::prelude::*;
@@ -75,7 +72,7 @@ pub struct Best {
     pub parameters: BTreeMap<String, f64>,
 }
 
-/// Summary of a chain; serialised, it is `summary.json`.
+/// Summary of a chain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Names of the parameters, in order.
@@ -117,15 +114,6 @@ pub struct Summary {
     pub best: Best,
     /// What to do, where the chain has not converged or something looks wrong.
     pub advice: Vec<String>,
-    /// What is said of a planet; absent where no orbit was asked for.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<Verdict>,
-    /// The modes of the period, from the heaviest on; empty where it was not sampled.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub period_modes: Vec<PeriodMode>,
-    /// What has to be known beside the verdict.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub remarks: Vec<String>,
 }
 
 /// Summarises a chain; `kinds` has one entry a parameter.
@@ -165,14 +153,11 @@ pub fn summarise(chain: &Chain, kinds: &[ParameterKind], goals: &Goals) -> Resul
         model_applications_median: model_applications_median(chain),
         best: Best { log_prob: best.log_prob, parameters: names.iter().cloned().zip(best.theta.clone()).collect() },
         advice: advice::advice(chain, &convergence, goals),
-        verdict: None,
-        period_modes: Vec::new(),
-        remarks: Vec::new(),
         names,
     })
 }
 
-/// The table that `dimcmc analyse` prints.
+/// The table.
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.write_str(table(self, None).trim_end())

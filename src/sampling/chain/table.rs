@@ -4,11 +4,13 @@ use crate::numerics::text::aligned;
 use crate::sampling::chain::{MoveSummary, ParameterSummary, Summary};
 use std::collections::BTreeMap;
 
-/// Modes of the period that are shown.
-const MODES_SHOWN: usize = 6;
-
 /// The table. With `truth` (injected values by name) there is a column for it.
 pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
+    parameters(summary, truth) + &rest(summary, truth)
+}
+
+/// Its first part: the parameters, and which of them are not constrained.
+pub fn parameters(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
     let mut head = vec!["parameter", "median", "- 68%", "+ 68%", "95% interval", "95% HDI", "R-hat", "ESS", "tau"];
     if truth.is_some() {
         head.insert(1, "truth");
@@ -23,9 +25,20 @@ pub fn table(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String
         }
         rows.push(row);
     }
-    let head = summary.verdict.as_ref().map(|verdict| format!("{}\n\n", verdict.sentence)).unwrap_or_default();
-    let mut text = head + &aligned(&rows);
-    text += &period_modes(summary);
+    let mut text = aligned(&rows);
+    for (name, one) in summary.parameters.iter().filter(|(_, one)| one.unconstrained) {
+        let [low, high] = one.ci95;
+        let digits = decimals(one);
+        text += &format!(
+            "{name} is not constrained: anything from {low:.digits$} to {high:.digits$}, as its prior has it\n"
+        );
+    }
+    text
+}
+
+/// What follows the parameters: limits, what is derived from them, and how the chain went.
+pub fn rest(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
+    let mut text = String::new();
     for name in &summary.names {
         if let Some((one, upper)) = summary.parameters.get(name).and_then(|one| Some((one, one.upper95?))) {
             text += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
@@ -93,37 +106,6 @@ fn convergence(summary: &Summary) -> String {
         (true, false) => format!("the chain has converged, but {advice}"),
         (false, _) => format!("the chain has NOT converged: {advice}"),
     }
-}
-
-/// The period where it has several modes, or one that spots may make.
-fn period_modes(summary: &Summary) -> String {
-    let mut text = String::new();
-    for (name, one) in summary.parameters.iter().filter(|(_, one)| one.unconstrained) {
-        let [low, high] = one.ci95;
-        let digits = decimals(one);
-        text += &format!(
-            "{name} is not constrained: anything from {low:.digits$} to {high:.digits$}, as its prior has it\n"
-        );
-    }
-    if summary.period_modes.len() < 2 && summary.period_modes.iter().all(|mode| mode.rotation.is_none()) {
-        return text;
-    }
-    let mut rows = vec![
-        ["mode of the period", "weight", "porb_over_prot", "68% interval", "k_kms", ""].map(str::to_owned).to_vec(),
-    ];
-    for (k, mode) in summary.period_modes.iter().enumerate().take(MODES_SHOWN) {
-        let [low, high] = mode.ci68;
-        let digits = (1.0 - (high - low).log10().floor()).clamp(2.0, 9.0) as usize;
-        rows.push(vec![
-            (k + 1).to_string(),
-            format!("{:.2}", mode.weight),
-            number(mode.porb_over_prot, digits),
-            format!("[{low:.digits$}, {high:.digits$}]"),
-            format!("{:.3}", mode.k_kms),
-            mode.rotation.clone().unwrap_or_default(),
-        ]);
-    }
-    text + &aligned(&rows)
 }
 
 fn cells(name: &str, one: &ParameterSummary) -> Vec<String> {

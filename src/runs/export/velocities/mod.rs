@@ -11,7 +11,7 @@ use super::place::{begins_with, check_folder, check_name, create_parent};
 use crate::data::io::FileError;
 use crate::data::io::atomic::{self, WriteError};
 use crate::data::io::csv::Columns;
-use crate::data::io::periodogram::{FILE, PeriodogramFile};
+use crate::runs::blind_search::{FILE, PeriodogramFile};
 use crate::runs::origin;
 use loss::Loss;
 use nalgebra::{DMatrix, DVector};

@@ -1,58 +1,14 @@
 //! The files of a blind search: `rv.csv`, `covariance.csv`, `periodogram.csv` (with a second planet
 //! `periodogram_2.csv`) and `periodogram.json`.
 
-mod alarm;
-mod quantities;
-mod record;
-mod report;
-mod robustness;
-
-pub use alarm::{FalseAlarmRecord, LevelRecord};
-pub use quantities::QuantitiesRecord;
-pub use record::{AliasRecord, OrbitRecord, PeakRecord, PeriodogramFile};
-
-use super::atomic::{WriteError, write, write_json};
-use super::csv::Table;
-use super::provenance::Provenance;
-use crate::inference::detection::{Detection, DetectionSettings, Robustness};
-use crate::inference::evidence::EvidenceRecord;
-use crate::model::ParameterValues;
+use super::record::{FILE, PeriodogramFile};
+use super::search::BlindSearch;
+use crate::data::io::atomic::{WriteError, write, write_json};
+use crate::data::io::csv::{DATA_SET, Table};
 use crate::planets::periodogram::Search;
 use crate::planets::periodogram::orbits::scan;
-use crate::planets::verdict::{Remark, Verdict};
-use crate::surface::Explained;
-use crate::surface::imaging::Imager;
 use nalgebra::{DMatrix, DVector};
 use std::path::Path;
-
-/// A blind search with all that its files say of it.
-#[derive(Clone, Copy, Debug)]
-pub struct PeriodogramResult<'a> {
-    /// What the data were imaged with.
-    pub imager: &'a Imager,
-    /// What was found.
-    pub detection: &'a Detection,
-    /// What is said of it.
-    pub verdict: &'a Verdict,
-    /// What has to be known beside the verdict.
-    pub remarks: &'a [Remark],
-    /// Bayes factors, where the config has priors for them.
-    pub evidence: Option<&'a EvidenceRecord>,
-    /// Whether that depends on a choice.
-    pub robustness: &'a Robustness,
-    /// How it was asked for.
-    pub settings: &'a DetectionSettings,
-    /// The profiles as the spots of a star without a planet explain them.
-    pub planet_free: &'a Explained,
-    /// The same beside the best orbit.
-    pub at_best: &'a Explained,
-    /// The true parameters, for simulated data.
-    pub truth: Option<ParameterValues>,
-    /// Mass of the star (solar masses), for the minimum mass of the planet.
-    pub mass_msun: Option<f64>,
-    /// Config, data and program.
-    pub provenance: &'a Provenance,
-}
 
 /// Columns of `periodogram.csv`.
 const COLUMNS: [&str; 12] = [
@@ -70,23 +26,18 @@ const COLUMNS: [&str; 12] = [
     "k_limit95_kms",
 ];
 
-/// Column of the number of each profile's data set, from 1, where there are several.
-pub const DATA_SET: &str = "data_set";
-
-/// Name of what was found.
-pub const FILE: &str = "periodogram.json";
-
 /// Names of all files that a search may write.
 pub const FILES: [&str; 5] = ["rv.csv", "covariance.csv", "periodogram.csv", "periodogram_2.csv", FILE];
 
-impl PeriodogramResult<'_> {
+impl BlindSearch<'_> {
     /// Names of the files, in the order in which they are written.
     pub fn files(&self) -> Vec<&'static str> {
         let second = self.detection.second.as_ref().map(|_| "periodogram_2.csv");
         ["rv.csv", "covariance.csv", "periodogram.csv"].into_iter().chain(second).chain([FILE]).collect()
     }
 
-    /// Writes all files into `folder`, which must exist.
+    /// Writes `rv.csv`, `covariance.csv`, `periodogram.csv` and `periodogram.json` into `folder`, which must exist;
+    /// with a second planet `periodogram_2.csv`, too.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -98,7 +49,14 @@ impl PeriodogramResult<'_> {
         if let Some(second) = &self.detection.second {
             write(&folder.join("periodogram_2.csv"), &self.periodogram(&second.search).into_bytes())?;
         }
-        write_json(&folder.join(FILE), &self.record())
+        write_json(&folder.join(FILE), &PeriodogramFile::of(self))
+    }
+
+    /// The table of what was found, and what the config leaves to the observations.
+    pub fn table(&self) -> String {
+        let measured = self.scene.measured.lines();
+        let measured: String = measured.iter().map(|(label, text)| format!("{label}: {text}\n")).collect();
+        PeriodogramFile::of(self).table(self.scene.imager.star.rotation_period_d) + &measured
     }
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
@@ -112,7 +70,7 @@ impl PeriodogramResult<'_> {
 
     fn rv(&self, velocities: &DVector<f64>, covariance: &DMatrix<f64>) -> Table {
         let moments = ["first_moment_kms", "first_moment_sigma_kms", "filtered_kms"];
-        let set_of = self.imager.set_of_each();
+        let set_of = self.scene.imager.set_of_each();
         let sets: &[&str] = if set_of.is_empty() { &[] } else { &[DATA_SET] };
         let mut table = Table::new(&[&["time_d", "cycle", "rv_kms", "rv_sigma_kms"][..], &moments, sets].concat());
         for (k, v) in self.planet_free.velocities.iter().enumerate() {
@@ -127,7 +85,7 @@ impl PeriodogramResult<'_> {
 
     /// That of the first search, with Delta ln L of the regularised likelihood beside it.
     fn first_periodogram(&self) -> Table {
-        let found = self.detection;
+        let found = &self.detection;
         let regularised = scan(&found.planet_free.regularised, &found.frequencies.per_cycle);
         let mut table = Table::new(&[&COLUMNS[..], &["regularised_delta_ln_l"]].concat());
         for (mut numbers, trial) in self.rows(&found.blind).zip(regularised) {
@@ -145,7 +103,7 @@ impl PeriodogramResult<'_> {
 
     /// The numbers under [`COLUMNS`].
     fn rows<'a>(&self, search: &'a Search) -> impl Iterator<Item = Vec<f64>> + 'a {
-        let rotation_period_d = self.imager.star.rotation_period_d;
+        let rotation_period_d = self.scene.imager.star.rotation_period_d;
         search.rows.iter().map(move |row| {
             let frequency = row.trial.frequency;
             let mut numbers = vec![rotation_period_d / frequency, 1.0 / frequency, frequency / rotation_period_d];

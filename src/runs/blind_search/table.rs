@@ -1,66 +1,52 @@
 //! The result of a blind search as text: the best orbit, how often chance does as well, the peaks, and what may be
 //! wrong.
 
-use super::PeriodogramResult;
-use super::alarm::{FalseAlarmRecord, false_alarm};
-use super::record::{OrbitRecord, PeakRecord};
-use crate::model::{OrbitQuantity, Parameter};
+use super::quantities::QuantitiesRecord;
+use super::record::{
+    FalseAlarmRecord, KeplerianRecord, NightRecord, OrbitRecord, PeakRecord, PeriodogramFile, QuickRecord,
+    RobustnessRecord,
+};
+use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
 use crate::planets::verdict::probability;
 
 /// Peaks shown; the file has the others.
 const SHOWN: usize = 6;
 
-impl PeriodogramResult<'_> {
+impl PeriodogramFile {
     /// The text, a line or a table after the other.
-    pub fn table(&self) -> String {
-        let found = self.detection;
-        let best = self.orbit(&found.best);
-        let meanings = self.meanings(&best.quantities);
-        let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(&[best]) + &meanings;
-        if let Some(field) = &found.last().field {
+    pub(super) fn table(&self, rotation_period_d: f64) -> String {
+        let best = std::slice::from_ref(&self.best);
+        let mut text = format!("{}\n\n", self.verdict.sentence) + &self.orbits(best, rotation_period_d);
+        text += &meanings(&self.best.quantities);
+        if let Some(field) = &self.field {
             text += &field.line();
         }
-        text += &format!("{}\n", chance(&false_alarm(&found.blind)));
-        if let Some(evidence) = self.evidence {
+        text += &format!("{}\n", chance(&self.false_alarm));
+        if let Some(evidence) = &self.evidence {
             text += &format!("evidence: {}\n", evidence.sentence);
         }
-        text += &peaks(&self.peaks(&found.blind));
-        for orbit in found.keplerian.iter().take(1).flatten() {
-            let orbit = self.keplerian(orbit);
-            let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" +- {x:.digits$}"));
-            text += &format!(
-                "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circle\n",
-                orbit.eccentricity,
-                error(orbit.sigma_eccentricity, 3),
-                orbit.omega_deg,
-                error(orbit.sigma_omega_deg, 0),
-                orbit.gain_over_circle
-            );
-            for quantity in OrbitQuantity::ALL {
-                if let Some((value, Some(sigma))) = orbit.quantities.of(quantity) {
-                    text += &format!("  its {}: {value:.1$} +- {sigma:.1$}\n", quantity.name(), decimals(sigma));
-                }
+        text += &peaks(&self.peaks);
+        if let Some(Some(orbit)) = self.keplerian.as_ref().and_then(|orbits| orbits.first()) {
+            text += &eccentric(orbit);
+        }
+        if let Some(second) = &self.second {
+            text += &format!("second planet: {}\n", chance(&second.false_alarm));
+            match &second.orbits {
+                Some(both) => text += &self.orbits(both, rotation_period_d),
+                None => text += &peaks(&second.peaks),
             }
         }
-        if let Some(second) = &found.second {
-            text += &format!("second planet: {}\n", chance(&false_alarm(&second.search)));
-            match second.both {
-                Some(both) => text += &self.orbits(&both.orbits.map(|peak| self.orbit(&peak))),
-                None => text += &peaks(&self.peaks(&second.search)),
-            }
-        }
-        text += &self.robustness_table();
-        text += &format!("{}\n", found.co_rotation());
-        for remark in self.remarks {
-            text += &format!("warning: {}\n", remark.text);
+        text += &robustness(&self.robustness);
+        text += &format!("{}\n", self.co_rotation.statement);
+        for warning in &self.warnings {
+            text += &format!("warning: {warning}\n");
         }
         text
     }
 
     /// Parameters of one orbit or several, a line each, beside the true ones of the first.
-    fn orbits(&self, orbits: &[OrbitRecord]) -> String {
-        let prot = self.imager.star.rotation_period_d;
+    fn orbits(&self, orbits: &[OrbitRecord], prot: f64) -> String {
         let truth = self.truth.filter(|_| orbits.len() == 1);
         let head = if truth.is_some() { &["parameter", "truth"][..] } else { &["parameter"] };
         let mut head: Vec<String> = head.iter().map(|s| (*s).to_owned()).collect();
@@ -102,8 +88,8 @@ impl PeriodogramResult<'_> {
             let all = all?;
             let digits = |sigma: Option<f64>| decimals(sigma.unwrap_or(f64::NAN));
             let mut row = vec![quantity.name().to_owned()];
-            if let Some((found, sigma)) = all.first().filter(|_| with_truth) {
-                let injected = self.true_quantity(quantity, *found);
+            if let Some((_, sigma)) = all.first().filter(|_| with_truth) {
+                let injected = self.derived_truth.get(quantity.name());
                 row.push(injected.map_or("-".into(), |value| format!("{value:.*}", digits(*sigma))));
             }
             for (value, sigma) in all {
@@ -114,6 +100,50 @@ impl PeriodogramResult<'_> {
         };
         OrbitQuantity::ALL.into_iter().filter_map(row).collect()
     }
+}
+
+/// What the names in the table of orbits mean, a line each.
+fn meanings(found: &QuantitiesRecord) -> String {
+    let given = OrbitQuantity::ALL.into_iter().filter(|quantity| found.of(*quantity).is_some());
+    let meanings = given.map(|quantity| (quantity.name(), quantity.definition()));
+    let meanings = [("phi", definition("phi"))].into_iter().chain(meanings);
+    let lines = meanings.filter_map(|(name, meaning)| Some(format!("{name}: {}\n", meaning?)));
+    let earths = found.msini_mjup.and_then(in_earths).map(|earths| format!("{earths}\n"));
+    lines.chain(earths).collect()
+}
+
+fn eccentric(orbit: &KeplerianRecord) -> String {
+    let error = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!(" +- {x:.digits$}"));
+    let mut text = format!(
+        "eccentric orbit: e = {:.3}{}, omega = {:.0}{} deg, ln L {:+.2} over the circle\n",
+        orbit.eccentricity,
+        error(orbit.sigma_eccentricity, 3),
+        orbit.omega_deg,
+        error(orbit.sigma_omega_deg, 0),
+        orbit.gain_over_circle
+    );
+    for quantity in OrbitQuantity::ALL {
+        if let Some((value, Some(sigma))) = orbit.quantities.of(quantity) {
+            text += &format!("  its {}: {value:.1$} +- {sigma:.1$}\n", quantity.name(), decimals(sigma));
+        }
+    }
+    text
+}
+
+/// K at the best period under other choices, a line each.
+fn robustness(found: &RobustnessRecord) -> String {
+    let shown = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
+    let row = |what: String, orbit: &QuickRecord| {
+        vec![what, shown(orbit.k_kms, 4), shown(orbit.sigma_k_kms, 4), shown(orbit.delta_ln_l, 2)]
+    };
+    let mut rows = vec![["at the best period", "k_kms", "sigma", "delta_ln_l"].map(str::to_owned).to_vec()];
+    rows.extend(found.targets.iter().map(|at| {
+        let short = if at.reached { "" } else { " (not reached)" };
+        row(format!("target chi2 {:.4}{short}", at.chi2_target), &at.orbit)
+    }));
+    let without = |night: &NightRecord| format!("without night {:.2}, {} profiles", night.first_time_d, night.profiles);
+    rows.extend(found.without_night.iter().map(|night| row(without(night), &night.orbit)));
+    aligned(&rows)
 }
 
 /// Decimals that show two digits of a standard error.

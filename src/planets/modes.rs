@@ -1,10 +1,12 @@
-//! The modes of a chain in the period: how many orbits it holds, and how much weight each has.
+//! The modes of a posterior in the period: how many orbits it holds, and how much weight each has.
 //!
 //! A time base T tells frequencies that differ by some 1/T, and a posterior of periods is a few such peaks. Draws are
 //! smoothed in frequency by a part of that width, and the line is cut wherever the density falls below half of the
 //! lower peak beside it.
 
-use super::statistics::quantile;
+use crate::numerics::quantile::quantile;
+use crate::planets::periodogram::RotationPeriods;
+use crate::planets::verdict::Remark;
 use serde::{Deserialize, Serialize};
 
 /// Smoothing, in inverse time bases.
@@ -22,6 +24,15 @@ const LEAST: f64 = 0.02;
 /// More bins than this are never needed.
 const MOST_BINS: f64 = 1e6;
 
+/// A mode that is wider than this (inverse time bases) is none: the data do not tell its periods from each other.
+const BROAD: f64 = 1.0;
+
+/// A period in no more modes than this, which hold at least that share of the draws, is constrained.
+const FEW: (usize, f64) = (3, 0.68);
+
+/// A mode of more weight than this has no rival.
+const ALONE: f64 = 0.95;
+
 /// A mode of the period.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PeriodMode {
@@ -38,8 +49,48 @@ pub struct PeriodMode {
     pub rotation: Option<String>,
 }
 
-/// The modes, from the heaviest on, of draws (`Porb/Prot`, K) over a time base in rotations.
-pub fn period_modes(draws: &[(f64, f64)], time_base_cycles: f64) -> Vec<PeriodMode> {
+/// The modes, from the heaviest on, of draws (`Porb/Prot`, K), with the periods of the star that they are close to.
+pub fn period_modes(draws: &[(f64, f64)], rotation: &RotationPeriods, rotation_period_d: f64) -> Vec<PeriodMode> {
+    let mut modes = parted(draws, rotation.time_base_cycles);
+    for mode in modes.iter_mut().filter(|mode| !mode.is_broad(rotation)) {
+        let sigma = 0.5 * (mode.ci68[1] - mode.ci68[0]);
+        let imitation = rotation.imitated(mode.porb_over_prot, Some(sigma));
+        mode.rotation = imitation.map(|imitation| imitation.words(rotation_period_d));
+    }
+    modes
+}
+
+/// Whether a few narrow modes hold most of the draws.
+pub fn are_few(modes: &[PeriodMode], rotation: &RotationPeriods) -> bool {
+    let narrow = modes.iter().filter(|mode| !mode.is_broad(rotation));
+    // a single one that is as wide as the prior is none
+    modes.len() > 1 && narrow.take(FEW.0).map(|mode| mode.weight).sum::<f64>() >= FEW.1
+}
+
+/// What speaks against a planet of that period: that it is not one, or that of the star.
+pub fn doubts(modes: &[PeriodMode]) -> Vec<Remark> {
+    let Some(heaviest) = modes.first() else { return Vec::new() };
+    let of_the_star = heaviest.rotation.as_ref().map(|words| {
+        let text = format!("the chain's period is {words}: spots may imitate an orbit there");
+        Remark::against(format!("the period is {words}"), text)
+    });
+    let share = 100.0 * heaviest.weight;
+    let rivals = (heaviest.weight < ALONE).then(|| {
+        let text = format!("the period is ambiguous: the heaviest mode of the chain holds {share:.0} % of its draws");
+        Remark::against("the period is ambiguous", text)
+    });
+    of_the_star.into_iter().chain(rivals).collect()
+}
+
+impl PeriodMode {
+    fn is_broad(&self, rotation: &RotationPeriods) -> bool {
+        let [low, high] = self.ci68;
+        (1.0 / low - 1.0 / high) * rotation.time_base_cycles > BROAD
+    }
+}
+
+/// The modes over a time base in rotations.
+fn parted(draws: &[(f64, f64)], time_base_cycles: f64) -> Vec<PeriodMode> {
     let mut draws: Vec<(f64, f64)> = draws.iter().map(|(ratio, k)| (1.0 / ratio, *k)).collect();
     draws.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let (Some(first), Some(last)) = (draws.first(), draws.last()) else { return Vec::new() };
@@ -118,7 +169,7 @@ mod tests {
     fn modes_come_with_their_weight() {
         let draws: Vec<(f64, f64)> =
             peak(0.5, 0.005, 700, 0.2).chain(peak(1.37, 0.01, 290, 0.1)).chain(peak(3.0, 0.001, 10, 1.0)).collect();
-        let modes = period_modes(&draws, 36.0);
+        let modes = parted(&draws, 36.0);
         assert_eq!(modes.len(), 2, "{modes:?}");
         assert!((modes[0].weight - 0.7).abs() < 1e-12 && (modes[1].weight - 0.29).abs() < 1e-12, "{modes:?}");
         assert!((modes[0].porb_over_prot - 2.0).abs() < 1e-3 && modes[0].k_kms == 0.2, "{modes:?}");
@@ -128,7 +179,7 @@ mod tests {
     #[test]
     fn one_broad_peak_is_one_mode() {
         let draws: Vec<(f64, f64)> = peak(0.6, 0.1, 5000, 0.1).collect();
-        assert_eq!(period_modes(&draws, 3.0).len(), 1);
-        assert!(period_modes(&[], 3.0).is_empty());
+        assert_eq!(parted(&draws, 3.0).len(), 1);
+        assert!(parted(&[], 3.0).is_empty());
     }
 }

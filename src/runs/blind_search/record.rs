@@ -1,20 +1,25 @@
 //! The content of `periodogram.json`.
 
-use super::super::provenance::Provenance;
-use super::PeriodogramResult;
-use super::alarm::{FalseAlarmRecord, false_alarm};
 use super::quantities::QuantitiesRecord;
-use super::robustness::RobustnessRecord;
+use super::search::BlindSearch;
+use crate::data::io::provenance::Provenance;
+use crate::inference::detection::{Robustness, WithoutNight};
 use crate::inference::evidence::EvidenceRecord;
-use crate::model::ParameterValues;
+use crate::model::{OrbitQuantities, ParameterValues};
 use crate::numerics::json::number_or_null;
 use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
-use crate::planets::periodogram::{KeplerianOrbit, Search};
+use crate::planets::periodogram::{CircularOrbit, KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::surface::{Change, SpotField};
+use crate::surface::{AtTarget, Change, SpotField};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Name of the file.
+pub const FILE: &str = "periodogram.json";
+
+/// False-alarm probabilities whose levels are given.
+const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
 
 /// The content of `periodogram.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -209,62 +214,154 @@ pub struct CoRotationRecord {
     pub statement: String,
 }
 
-impl PeriodogramResult<'_> {
-    pub(super) fn record(&self) -> PeriodogramFile {
-        let found = self.detection;
-        let prot = self.imager.star.rotation_period_d;
+/// How often a star without a planet shows as high a peak.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FalseAlarmRecord {
+    /// Height of the peak.
+    pub delta_ln_l: f64,
+    /// The probability, by what is `used`.
+    #[serde(deserialize_with = "number_or_null")]
+    pub probability: f64,
+    /// The share of draws with as high a peak.
+    pub by_draws: f64,
+    /// What the distribution of highest peaks says.
+    #[serde(deserialize_with = "number_or_null")]
+    pub by_extreme_value: f64,
+    /// `draws` or `extreme value`.
+    pub used: String,
+    /// Number of draws.
+    pub draws: usize,
+    /// Effective bandwidth of the search (Baluev 2008).
+    #[serde(deserialize_with = "number_or_null")]
+    pub w: f64,
+    /// How many independent periods there are.
+    #[serde(deserialize_with = "number_or_null")]
+    pub independent_periods: f64,
+    /// Heights of usual probabilities.
+    pub levels: [LevelRecord; 3],
+}
+
+/// A height that chance reaches with some probability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LevelRecord {
+    /// The probability.
+    pub false_alarm_probability: f64,
+    /// The height.
+    pub delta_ln_l: f64,
+}
+
+/// Whether the best orbit hangs on a choice; empty where that was not tried.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobustnessRecord {
+    /// K at the best period with other targets.
+    pub targets: Vec<TargetRecord>,
+    /// K at the best period without each night; empty for profiles of one night.
+    pub without_night: Vec<NightRecord>,
+}
+
+/// The orbit at the best period with another target chi2.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TargetRecord {
+    /// Target, per datum.
+    pub chi2_target: f64,
+    /// Whether the image reaches it.
+    pub reached: bool,
+    /// The orbit.
+    #[serde(flatten)]
+    pub orbit: QuickRecord,
+}
+
+/// The orbit at the best period without the profiles of a night.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NightRecord {
+    /// First time left out (d).
+    pub first_time_d: f64,
+    /// Last time left out (d).
+    pub last_time_d: f64,
+    /// Number of profiles left out.
+    pub profiles: usize,
+    /// The orbit.
+    #[serde(flatten)]
+    pub orbit: QuickRecord,
+}
+
+/// Null where none is bounded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct QuickRecord {
+    /// Semi-amplitude (km/s).
+    pub k_kms: Option<f64>,
+    /// Its error (km/s).
+    pub sigma_k_kms: Option<f64>,
+    /// Phase (cycles).
+    pub phi: Option<f64>,
+    /// Gain in ln L.
+    pub delta_ln_l: Option<f64>,
+}
+
+impl PeriodogramFile {
+    /// All that `search` found.
+    pub(super) fn of(search: &BlindSearch) -> Self {
+        let BlindSearch { scene, settings, detection: found, .. } = search;
+        let (star, span) = (&scene.imager.star, scene.observations.time_span_d());
+        let quantities = OrbitQuantities::new(star, scene.settings.mass_msun, span);
+        let prot = star.rotation_period_d;
         let (lo, hi) = found.frequencies.range();
-        let keplerian = |orbit: &Option<KeplerianOrbit>| orbit.as_ref().map(|orbit| self.keplerian(orbit));
+        let orbit = |peak: &Peak| OrbitRecord::of(peak, &quantities);
+        let peaks =
+            |search: &Search| search.peaks.iter().map(|peak| PeakRecord::of(peak, search, &quantities)).collect();
+        let keplerian = |orbit: &Option<KeplerianOrbit>| Some(KeplerianRecord::of(orbit.as_ref()?, &quantities));
         let second = found.second.as_ref().map(|second| SecondRecord {
-            false_alarm: false_alarm(&second.search),
-            peaks: self.peaks(&second.search),
-            orbits: second.both.map(|both| both.orbits.map(|peak| self.orbit(&peak))),
+            false_alarm: FalseAlarmRecord::of(&second.search),
+            peaks: peaks(&second.search),
+            orbits: second.both.map(|both| both.orbits.map(|peak| orbit(&peak))),
             gain: second.both.map(|both| both.gain),
         });
+        let best = orbit(&found.best);
         PeriodogramFile {
-            verdict: self.verdict.clone(),
-            best: self.orbit(&found.best),
-            truth: self.truth,
-            derived_truth: self.derived_truth(),
-            false_alarm: false_alarm(&found.blind),
-            peaks: self.peaks(&found.blind),
-            keplerian: self.settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
+            verdict: search.verdict.clone(),
+            truth: scene.truth,
+            derived_truth: best.quantities.injected(scene.truth, &quantities),
+            best,
+            false_alarm: FalseAlarmRecord::of(&found.blind),
+            peaks: peaks(&found.blind),
+            keplerian: settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
             second,
             search: SearchRecord {
                 periods: found.blind.rows.len(),
                 min_period_d: prot / hi,
                 max_period_d: prot / lo,
                 time_base_d: found.frequencies.time_base_cycles * prot,
-                seed: self.settings.search.seed,
+                seed: settings.search.seed,
             },
             field: found.last().field.clone(),
             change: found.change.and_then(Result::ok),
             expansion: ExpansionRecord {
-                marginalised: self.settings.nuisances.iter().map(|n| n.parameter.name().to_owned()).collect(),
+                marginalised: settings.nuisances.iter().map(|n| n.parameter.name().to_owned()).collect(),
                 unresolved_spots: [&found.planet_free, found.last()].map(|here| here.unresolved_spots),
                 regularised_delta_ln_l: found.regularised_delta_ln_l(),
                 rounds: found.rounds,
                 closed: found.closed,
-                data: self.imager.data.depth.len(),
-                chi2_target: self.settings.surface.chi2_target,
-                chi2_per_datum_planet_free: self.planet_free.chi2_per_datum,
-                chi2_per_datum: self.at_best.chi2_per_datum,
+                data: scene.imager.data.depth.len(),
+                chi2_target: settings.surface.chi2_target,
+                chi2_per_datum_planet_free: search.planet_free.chi2_per_datum,
+                chi2_per_datum: search.at_best.chi2_per_datum,
             },
             offset: found.offset,
             co_rotation: CoRotationRecord {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: found.co_rotation(),
             },
-            robustness: self.robustness_record(),
-            evidence: self.evidence.cloned(),
-            warnings: self.remarks.iter().map(|remark| remark.text.clone()).collect(),
-            provenance: self.provenance.clone(),
+            robustness: search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default(),
+            evidence: search.evidence.clone(),
+            warnings: search.remarks.iter().map(|remark| remark.text.clone()).collect(),
+            provenance: scene.provenance(),
         }
     }
+}
 
-    pub(super) fn orbit(&self, peak: &Peak) -> OrbitRecord {
-        let prot = self.imager.star.rotation_period_d;
-        let orbit = &peak.orbit;
+impl OrbitRecord {
+    fn of(peak: &Peak, quantities: &OrbitQuantities) -> Self {
+        let (prot, orbit) = (quantities.rotation_period_d, &peak.orbit);
         OrbitRecord {
             k_kms: orbit.k_kms,
             sigma_k_kms: orbit.sigma_k_kms,
@@ -276,14 +373,16 @@ impl PeriodogramResult<'_> {
             sigma_phi: known(orbit.sigma_phi),
             delta_ln_l: orbit.delta_ln_l,
             on_edge: peak.on_edge,
-            quantities: self.quantities(peak),
+            quantities: QuantitiesRecord::of_circle(peak, quantities),
         }
     }
+}
 
-    pub(super) fn peaks(&self, search: &Search) -> Vec<PeakRecord> {
-        let prot = self.imager.star.rotation_period_d;
-        let record = |peak: &Peak| PeakRecord {
-            orbit: self.orbit(peak),
+impl PeakRecord {
+    fn of(peak: &Peak, search: &Search, quantities: &OrbitQuantities) -> Self {
+        let prot = quantities.rotation_period_d;
+        PeakRecord {
+            orbit: OrbitRecord::of(peak, quantities),
             false_alarm_probability: search.false_alarm.probability(peak.orbit.delta_ln_l).value(),
             alias: peak.alias.map(|alias| AliasRecord {
                 window_frequency_per_d: alias.window.frequency / prot,
@@ -291,13 +390,13 @@ impl PeriodogramResult<'_> {
                 relation: if alias.mirrored { "sum of frequencies" } else { "difference of frequencies" }.into(),
             }),
             rotation: peak.imitation.map(|imitation| imitation.words(prot)),
-        };
-        search.peaks.iter().map(record).collect()
+        }
     }
+}
 
-    pub(super) fn keplerian(&self, orbit: &KeplerianOrbit) -> KeplerianRecord {
-        let star = &self.imager.star;
-        let prot = star.rotation_period_d;
+impl KeplerianRecord {
+    fn of(orbit: &KeplerianOrbit, quantities: &OrbitQuantities) -> Self {
+        let prot = quantities.rotation_period_d;
         KeplerianRecord {
             k_kms: orbit.k_kms,
             sigma_k_kms: known(orbit.sigma_k_kms),
@@ -307,11 +406,62 @@ impl PeriodogramResult<'_> {
             sigma_eccentricity: known(orbit.sigma_eccentricity),
             omega_deg: orbit.omega.to_degrees(),
             sigma_omega_deg: known(orbit.sigma_omega.to_degrees()),
-            periastron_d: star.epoch_d + prot * orbit.periastron_cycle,
+            periastron_d: quantities.epoch_d + prot * orbit.periastron_cycle,
             sigma_periastron_d: known(prot * orbit.sigma_periastron_cycle),
             delta_ln_l: orbit.delta_ln_l,
             gain_over_circle: orbit.gain_over_circle,
-            quantities: self.eccentric_quantities(orbit),
+            quantities: QuantitiesRecord::of_ellipse(orbit, quantities),
+        }
+    }
+}
+
+impl FalseAlarmRecord {
+    /// Of the highest peak of `search`.
+    fn of(search: &Search) -> Self {
+        let alarm = &search.false_alarm;
+        let delta_ln_l = search.best().orbit.delta_ln_l;
+        let found = alarm.probability(delta_ln_l);
+        FalseAlarmRecord {
+            delta_ln_l,
+            probability: found.value(),
+            by_draws: found.by_draws,
+            by_extreme_value: found.by_tail,
+            used: if found.draws_suffice { "draws" } else { "extreme value" }.into(),
+            draws: alarm.maxima.len(),
+            w: alarm.tail.w,
+            independent_periods: alarm.independent_periods(),
+            levels: LEVELS.map(|p| LevelRecord { false_alarm_probability: p, delta_ln_l: alarm.level(p) }),
+        }
+    }
+}
+
+impl RobustnessRecord {
+    fn of(found: &Robustness) -> Self {
+        let target = |at: &AtTarget| TargetRecord {
+            chi2_target: at.chi2_target,
+            reached: at.on_target,
+            orbit: QuickRecord::of(at.orbit),
+        };
+        let night = |night: &WithoutNight| NightRecord {
+            first_time_d: night.span_d.0,
+            last_time_d: night.span_d.1,
+            profiles: night.profiles,
+            orbit: QuickRecord::of(night.orbit),
+        };
+        RobustnessRecord {
+            targets: found.targets.iter().map(target).collect(),
+            without_night: found.nights.iter().map(night).collect(),
+        }
+    }
+}
+
+impl QuickRecord {
+    fn of(orbit: Option<CircularOrbit>) -> Self {
+        QuickRecord {
+            k_kms: orbit.map(|o| o.k_kms),
+            sigma_k_kms: orbit.map(|o| o.sigma_k_kms),
+            phi: orbit.map(|o| o.phi),
+            delta_ln_l: orbit.map(|o| o.delta_ln_l),
         }
     }
 }

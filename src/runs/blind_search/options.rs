@@ -1,0 +1,101 @@
+//! What to search for, and how: one set of options for all commands.
+
+use crate::data::scene::Scene;
+use crate::inference::detection::DetectionSettings;
+use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::surface::expansion::nuisances;
+use crate::surface::{SurfaceError, SurfaceSettings};
+
+/// What to search for, and how. The default is that of `dimcmc periodogram`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlindSearchOptions {
+    /// Trial periods.
+    pub periods: FrequencySettings,
+    /// Whether eccentric orbits are fitted around the peaks as well.
+    pub eccentric: bool,
+    /// Whether a second planet is searched for.
+    pub second_planet: bool,
+    /// Whether systemic velocity and stellar parameters that are free in the config are held at its values, instead of
+    /// integrated out within their priors.
+    pub fixed: bool,
+    /// Number of stars without a planet that peaks are judged by.
+    pub draws: usize,
+    /// Seed of these draws.
+    pub seed: u64,
+    /// Whether the verdict is on orbits that the config's priors of K and the period allow.
+    pub within_priors: bool,
+    /// Of which orbits it is asked whether they depend on the target chi2 or on one night.
+    pub robustness: RobustnessOf,
+    /// Whether a static map is compared with an evolving one, and nothing is judged where the star changes.
+    pub static_check: bool,
+}
+
+/// Of which orbits it is asked whether they depend on a choice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RobustnessOf {
+    /// Of the best orbit, whatever it is.
+    Any,
+    /// Of a candidate.
+    Candidates,
+    /// Of none.
+    None,
+}
+
+/// Why there is no search.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum BlindSearchError {
+    /// No trial periods.
+    #[error(transparent)]
+    Frequencies(#[from] FrequencyError),
+    /// No star, or no orbit at all.
+    #[error(transparent)]
+    Detection(#[from] SurfaceError),
+}
+
+impl Default for BlindSearchOptions {
+    fn default() -> Self {
+        let SearchSettings { draws, seed } = SearchSettings::default();
+        BlindSearchOptions {
+            periods: FrequencySettings::default(),
+            eccentric: false,
+            second_planet: false,
+            fixed: false,
+            draws,
+            seed,
+            within_priors: false,
+            robustness: RobustnessOf::Any,
+            static_check: true,
+        }
+    }
+}
+
+impl BlindSearchOptions {
+    /// For what goes on from the best orbit: `optimise`, `sample`, `batch`.
+    pub(super) fn before_a_chain() -> Self {
+        BlindSearchOptions { within_priors: true, robustness: RobustnessOf::Candidates, ..Default::default() }
+    }
+
+    /// The trial periods for the star in `scene`.
+    ///
+    /// # Errors
+    /// Periods that make no sense, too few profiles.
+    #[doc(hidden)]
+    pub fn frequencies(&self, scene: &Scene) -> Result<Frequencies, FrequencyError> {
+        Frequencies::new(&scene.imager.cycles(), scene.imager.star.rotation_period_d, self.periods)
+    }
+
+    /// How the star in `scene` is searched.
+    #[doc(hidden)]
+    pub fn detection(&self, scene: &Scene) -> DetectionSettings {
+        let surface = scene.surface();
+        // an evolving map is not asked whether it is static
+        let field = surface.field.filter(|_| self.static_check || surface.objective.evolves());
+        DetectionSettings {
+            surface: SurfaceSettings { field, ..surface },
+            nuisances: if self.fixed { Vec::new() } else { nuisances(&scene.settings.free) },
+            search: SearchSettings { draws: self.draws, seed: self.seed },
+            eccentric: self.eccentric,
+            second_planet: self.second_planet,
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! What a blind search says, for the results of the commands that go on from it.
+
+use super::options::BlindSearchError;
+use crate::inference::evidence::EvidenceRecord;
+use crate::planets::periodogram::RotationPeriods;
+use crate::planets::periodogram::window::is_same_frequency;
+use crate::planets::verdict::{Remark, Verdict};
+use serde::{Deserialize, Serialize};
+
+/// What a blind search says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SearchSummary {
+    /// What is said of the best orbit.
+    pub verdict: Verdict,
+    /// What has to be known beside the verdict.
+    pub remarks: Vec<Remark>,
+    /// The star's own periods under this sampling; null where there was no search.
+    #[doc(hidden)]
+    pub rotation: Option<RotationPeriods>,
+    /// Bayes factors of no, one and two planets; absent where the config has no priors for them.
+    #[doc(hidden)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<EvidenceRecord>,
+}
+
+impl SearchSummary {
+    /// Where the search failed.
+    pub(super) fn failed(error: &BlindSearchError) -> Self {
+        let verdict = Verdict::not_judged(format!("the blind search failed ({error})"));
+        SearchSummary { verdict, remarks: Vec::new(), rotation: None, evidence: None }
+    }
+
+    /// The same beside an orbit that was found, of this `Porb/Prot`.
+    #[doc(hidden)]
+    pub fn beside(mut self, porb_over_prot: f64, rotation_period_d: f64) -> Self {
+        let another = self.of_another_orbit(porb_over_prot, rotation_period_d);
+        if let Some(another) = another.filter(|_| self.verdict.finding.is_signal()) {
+            self.verdict = self.verdict.with(std::slice::from_ref(&another));
+            self.remarks.push(another);
+        }
+        self
+    }
+
+    /// What speaks against a planet where the orbit that was found, of this `Porb/Prot`, is not the one that the
+    /// verdict is on.
+    #[doc(hidden)]
+    pub fn of_another_orbit(&self, porb_over_prot: f64, rotation_period_d: f64) -> Option<Remark> {
+        let (judged, rotation) = (self.verdict.signal?.period_d, self.rotation.as_ref()?);
+        let frequency = 1.0 / (judged / rotation_period_d);
+        (!is_same_frequency(1.0 / porb_over_prot, frequency, rotation.time_base_cycles)).then(|| {
+            let found = rotation_period_d * porb_over_prot;
+            Remark::against(
+                format!("the orbit found here is another one ({found:.4} d)"),
+                format!("the blind search judges an orbit of {judged:.4} d, and the one found here has {found:.4} d"),
+            )
+        })
+    }
+}
