@@ -80,7 +80,7 @@ impl<T: JsonSchema> JsonSchema for PerParameter<T> {
 
 /// The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a parameter is
 /// free, its value here is the start. What the table gives the planet as usual is always there.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct Planet(PerParameter<f64>);
 
 impl Planet {
@@ -110,7 +110,7 @@ impl Planet {
     }
 }
 
-/// Whether the planet has a value where the config gives none.
+/// Whether the planet has a value of it where the config gives none.
 fn has_usual(parameter: Parameter) -> bool {
     !parameter.is_optional()
 }
@@ -119,12 +119,6 @@ impl Default for Planet {
     fn default() -> Self {
         let usual = Planet::rows().map(|row| row.parameter).filter(|p| has_usual(*p));
         Planet(usual.map(|p| (p, p.usual())).collect())
-    }
-}
-
-impl Serialize for Planet {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0.serialize(serializer)
     }
 }
 

@@ -63,7 +63,7 @@ impl Config {
     pub fn number_at(&self, key: &str) -> Option<f64> {
         let star = serde_json::to_value(&self.star).expect("a section of the config is JSON");
         let path = key.strip_prefix("star.").expect("a key of the star").split('.');
-        path.fold(Some(&star), |section, name| section?.get(name))?.as_f64()
+        path.fold(&star, |section, name| &section[name]).as_f64()
     }
 
     /// Whether it has an axis.
