@@ -245,8 +245,8 @@ fn a_profile_is_opened_once_in_a_command() {
     let orbit = ["--k-kms", "0.1", "--porb-over-prot", "2", "--phi", "0"];
     for (command, options) in [
         ("map", &[][..]),
-        ("periodogram", &["--draws", "100"]),
-        ("limits", &["--periods", "2", "--full", "2", "--draws", "100"]),
+        ("periodogram", &["--draws", "1000"]),
+        ("limits", &["--periods", "4", "--full", "2", "--draws", "1000"]),
         ("inject", &orbit),
     ] {
         let before = opened();
