@@ -17,7 +17,7 @@ fn config(seed: u64) -> Value {
             "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
             "snr": 500, "seed": seed, "pixels": 1000
         } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
+        "imaging": { "pixels": 200, "chi2_target": 1.05, "objective": "spottedness" },
         "parameters": {
             "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
             "phi": { "prior": "periodic" }

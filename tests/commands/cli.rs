@@ -15,7 +15,7 @@ fn simulated() -> Value {
             "velocity_kms": { "min": -28.8, "max": 28.8, "step": 1.8 },
             "snr": 500, "seed": 7, "pixels": 1000
         } },
-        "imaging": { "pixels": 300, "chi2_target": 1.05 },
+        "imaging": { "pixels": 300, "chi2_target": 1.05, "objective": "spottedness" },
         "parameters": {
             "k_kms": { "prior": "uniform", "min": 0.0, "max": 0.3 },
             "phi": { "prior": "periodic" }

@@ -65,7 +65,7 @@ fn a_stream_that_is_gone_stops_no_signal() {
     let desk = Desk::new(long());
     for (k, stderr) in broken().into_iter().enumerate() {
         // before the first step: a slow image keeps the search at work
-        desk.set("/imaging", json!({ "pixels": 50_000, "chi2_target": 1.05 }));
+        desk.set("/imaging", json!({ "pixels": 50_000, "chi2_target": 1.05, "objective": "spottedness" }));
         let run = |name: &str, stderr: Stdio| {
             let args = ["sample", "config.json", "--out", name];
             Command::new(PROGRAM)

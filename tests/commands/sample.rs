@@ -164,7 +164,7 @@ fn ctrl_c_stops_cleanly_and_says_how_to_go_on() {
 fn ctrl_c_during_the_search_writes_nothing() {
     let desk = desk();
     // an image large enough to be at work for a while
-    desk.set("/imaging", json!({ "pixels": 20000, "chi2_target": 1.05 }));
+    desk.set("/imaging", json!({ "pixels": 20000, "chi2_target": 1.05, "objective": "spottedness" }));
     let before = desk.inventory();
     let child = desk.start(&["sample", CONFIG, "--out", "run"]);
     std::thread::sleep(Duration::from_millis(150));

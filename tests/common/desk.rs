@@ -31,7 +31,7 @@ pub fn two_spots(sampler: Value) -> Value {
             "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
             "snr": 1000, "seed": 7, "pixels": 2000
         } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05, "unresolved_spots": "entropy" },
+        "imaging": { "pixels": 200, "chi2_target": 1.05, "unresolved_spots": "entropy", "objective": "spottedness" },
         "parameters": {
             "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
             "phi": { "prior": "periodic" }

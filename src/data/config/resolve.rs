@@ -235,8 +235,16 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if !jitter.is_default() && imaging.chi2_target == Automatic::Auto {
-        let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
-                       give a number, such as 0.97";
+        let problem = match imaging.objective {
+            ObjectiveKind::MarginalLikelihood => {
+                "auto is for one map of a star that does not change, not for imaging.objective \
+                 \"marginal-likelihood\", the default: leave it out, or give the objective \"spottedness\""
+            }
+            _ => {
+                "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
+                 give a number, such as 0.97"
+            }
+        };
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if let Some(priors) = &imaging.nuisances {

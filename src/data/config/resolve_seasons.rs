@@ -12,8 +12,8 @@ pub(super) fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
     let given = [(gap.is_some(), GAP), (!seasons.is_empty(), "imaging.seasons")].map(|(is, key)| is.then_some(key));
     match (given, *objective) {
         ([Some(key), _] | [None, Some(key)], ObjectiveKind::MarginalLikelihood) => {
-            let problem = "leave it out: with imaging.objective \"marginal-likelihood\" spots change all the time, \
-                           and seasons need no maps of their own";
+            let problem = "leave it out: with imaging.objective \"marginal-likelihood\", the default, spots change \
+                           all the time; for a map of each season give the objective \"spottedness\"";
             return Err(Fault::new(key, problem));
         }
         ([Some(_), Some(key)], _) => return Err(Fault::new(key, "stands in place of season_gap_d: give one of them")),
