@@ -32,4 +32,6 @@ mod plot;
 mod report;
 mod reproduce;
 mod sample;
+mod shared;
+mod stopped;
 mod zero_points;
