@@ -104,7 +104,8 @@ fn figures_say_what_the_files_do(desk: &Desk) {
     assert!(curve.contains('C'), "straight lines from period to period");
     let (points, marker) = (paths(&svg, "delta-ln-l"), middle(&paths(&svg, "highest")[0]));
     let top = points[0].iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
-    assert!(near(top[0], marker[0]) && near(top[1], marker[1]), "{top:?} {marker:?}");
+    // the curve goes from trial period to trial period, and the summit lies between two
+    assert!((top[0] - marker[0]).abs() < 1.0 && near(top[1], marker[1]), "{top:?} {marker:?}");
     // what the program does not judge by is not drawn; what it judges by is said
     let svg = desk.read("sample/figures/autocorrelation.svg");
     assert!(!texts(&svg).contains(&"steps/50"));
@@ -210,7 +211,7 @@ fn what_cannot_be_drawn_is_refused() {
     // files that are wrong, by name and line
     let profiles = desk.read("map/profiles.csv");
     desk.write("map/profiles.csv", &crate::desk::with_line(&profiles, 5, "0,1,2"));
-    says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/profiles.csv:5:", "3 columns instead of 8"]);
+    says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/profiles.csv:5:", "3 columns instead of 9"]);
     desk.write("map/profiles.csv", &profiles.replacen("sigma", "error", 1));
     says(&desk.refusal(&["plot", "map", "--out", "new"]), &["map/profiles.csv", "no column sigma"]);
     desk.edit("map/map.json", |map| map.replace("\"ring_pixels\"", "\"rings\""));

@@ -27,15 +27,15 @@ const RUN: [&str; 3] = ["manifest.json", "chain.jsonl", "summary.json"];
 
 fn tasks() -> [Task; 2] {
     let mut landscape = tiny(2);
-    landscape["grid"] = json!({ "axes": { "k_kms": [0.0, 0.4, 400] } });
+    landscape["grid"] = json!({ "axes": { "k_kms": [0.0, 0.4, 200] } });
     [
-        Task { command: "sample", config: tiny(60), files: RUN, block: 12, kills: &[0, 1, 100, 400] },
+        Task { command: "sample", config: tiny(60), files: RUN, block: 12, kills: &[0, 100, 400] },
         Task {
             command: "grid",
             config: landscape,
             files: ["landscape.json", "landscape.jsonl", "paraboloid.json"],
             block: 1,
-            kills: &[0, 1, 150],
+            kills: &[0, 80],
         },
     ]
 }
@@ -74,7 +74,7 @@ impl Task {
 }
 
 #[test]
-fn killed_and_resumed_is_uninterrupted() {
+fn killed_or_torn_and_resumed_is_uninterrupted() {
     for task in tasks().into_iter().chain([integrated()]) {
         let desk = task.desk();
         for least in task.kills {
@@ -96,20 +96,12 @@ fn killed_and_resumed_is_uninterrupted() {
             }
             task.resumed_is_whole(&desk, &out);
         }
-    }
-}
-
-#[test]
-fn a_torn_file_is_recovered() {
-    for task in tasks() {
-        let desk = task.desk();
-        let [head, lines, end] = task.files;
+        let [head, lines, _] = task.files;
         let whole = desk.read(&format!("whole/{lines}"));
-        for (out, cut) in [("nothing", 0), ("within_a_line", whole.len() * 2 / 3), ("last_byte", whole.len() - 1)] {
+        for (out, cut) in [("within_a_line", whole.len() * 2 / 3), ("last_byte", whole.len() - 1)] {
             std::fs::create_dir(desk.path(out)).unwrap();
             std::fs::copy(desk.path("whole").join(head), desk.path(out).join(head)).unwrap();
             desk.write(&format!("{out}/{lines}"), &whole[..cut]);
-            assert!(!desk.path(out).join(end).exists());
             task.resumed_is_whole(&desk, out);
         }
     }
