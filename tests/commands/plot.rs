@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
 
-/// A star that does not change, for what is drawn of one map, and for chains of K and phase that tests write themselves.
+/// A star that does not change, for what is drawn of one map, and for chains of K and phase that tests write.
 fn unchanging() -> Value {
     let mut config = two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 30, "ess": 100, "rhat": 1.1 }));
     config["observations"]["simulate"]["spots"][1] = json!([250, 10, 15, 0.9]);

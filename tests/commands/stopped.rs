@@ -1,5 +1,5 @@
-//! Whatever stops what takes long (a kill, Ctrl-C, a scheduler's warning, a power cut in the middle of a line), the same
-//! command with `--resume` comes to the bytes of one that was not stopped. What a cut leaves byte by byte is in
+//! Whatever stops what takes long (a kill, Ctrl-C, a scheduler's warning, a power cut within a line), the same command
+//! with `--resume` comes to the bytes of one that was not stopped. What a cut leaves byte by byte is in
 //! `tests/method/chain.rs`, ranks of a cluster in `tests/mpi.rs`.
 #![cfg(unix)]
 
