@@ -15,7 +15,8 @@ import dimcmc
 # A config says which star it is, which profiles there are and what is free. Its keys are those of the
 # [reference](../docs/reference/config.md); units are in their names. This star turns in 3 days; 24 profiles over four
 # rotations are simulated, with a signal-to-noise ratio of 1000. Spots are longitude, latitude, radius (degrees) and
-# filling factor.
+# filling factor. They do not change here, so that one map fits and everything takes seconds; for a star of your own
+# leave `objective` out, and spots may come and go.
 
 # %%
 config = dimcmc.Config(
@@ -36,7 +37,7 @@ config = dimcmc.Config(
                 "snr": 1000.0,
             }
         },
-        "imaging": {"pixels": 500},
+        "imaging": {"objective": "spottedness", "pixels": 500},
         "parameters": {
             "k_kms": {"prior": "uniform", "min": 0.0, "max": 0.5},
             "porb_over_prot": {"prior": "uniform", "min": 0.5, "max": 4.0},

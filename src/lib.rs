@@ -45,7 +45,7 @@
 //!     .with("observations.simulate.cycles", cycles)
 //!     .with("observations.simulate.velocity_kms", json!({ "min": -40.0, "max": 40.0, "step": 2.0 }))
 //!     .with("observations.simulate.snr", 1000.0)
-//!     .with("imaging.pixels", 500)
+//!     .with("imaging", json!({ "objective": "spottedness", "pixels": 500 }))
 //!     .with("sampler", json!({ "ensembles": 2, "walkers": 8, "steps": 50, "ess": 100.0, "rhat": 1.1 }))
 //!     .free(Parameter::K, Prior::Uniform { min: 0.0, max: 1.0 })
 //!     .free(Parameter::Phi, Prior::Periodic);

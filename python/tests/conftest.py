@@ -33,7 +33,7 @@ SMALL: dict[str, Any] = {
             "snr": 1000.0,
         }
     },
-    "imaging": {"pixels": 300},
+    "imaging": {"pixels": 300, "objective": "spottedness"},
     "parameters": {
         "k_kms": {"prior": "uniform", "min": 0.0, "max": 1.0},
         "phi": {"prior": "periodic"},

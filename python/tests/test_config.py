@@ -26,7 +26,9 @@ def test_dict_text_file_and_config_are_the_same(tmp_path: Path) -> None:
 def test_attributes_give_what_is_written_or_the_default(config: dimcmc.Config) -> None:
     assert config.star.vsini_kms == 25.0 and config["star"]["vsini_kms"] == 25.0
     # nothing is written of these
-    assert config.star.epoch_d == 0.0 and config.imaging.objective == "spottedness"
+    assert config.star.epoch_d == 0.0 and config.sampler.seed == 1
+    del config.imaging.objective
+    assert config.imaging.objective == "marginal-likelihood"
     assert "vsini_kms" in dir(config.star) and "star" in dir(config)
     with pytest.raises(AttributeError, match=r"no star.vsini: did you mean vsini_kms\?"):
         config.star.vsini

@@ -1,8 +1,9 @@
 //! `dimcmc batch`: the chains of many stars.
 
-use super::output::Output;
+use super::output::{Output, note_objective};
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
+use crate::data::config::Config;
 use crate::data::io::atomic::write_json;
 use crate::numerics::text::{Align, columns, escaped, shown};
 use crate::runs::batch::{End, FILE, Row, read_list, rows, sample_all};
@@ -29,6 +30,8 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let signals = Signals::catch("star")?;
     let stars = read_list(&args.list, &args.folder).map_err(Failure::of)?;
+    // a config that cannot be read is told of with its star
+    stars.iter().filter_map(|star| Config::load(&star.config).ok()).for_each(|config| note_objective(&config));
     let output = Output::to(args.folder.clone(), true);
     let folder = output.create()?;
     let pool = cluster::pool(global, &signals);

@@ -1,12 +1,12 @@
 //! `dimcmc grid`: the landscape and its paraboloid.
 
-use super::output::{Output, remarks};
+use super::output::{Output, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, cluster, console, progress};
+use crate::data::config::Config;
 use crate::data::io::effort::{EFFORT, Effort};
 use crate::data::io::paraboloid::ParaboloidFile;
-use crate::data::scene::Scene;
 use crate::numerics::text::shown;
 use crate::runs::grid_scan::{GridScan, HEADER, NODES, PARABOLOID};
 use crate::sampling::landscape::{Landscape, Rule, paraboloid, paraboloid_table, table};
@@ -51,7 +51,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     if !resume {
         args.output.check()?;
     }
-    let scene = Scene::load(&args.config)?;
+    let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| [HEADER, NODES, PARABOLOID, EFFORT].contains(&name))?;
     remarks(&scene);
     let plan = scene.settings.require_grid()?;

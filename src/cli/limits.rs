@@ -1,8 +1,9 @@
 //! `dimcmc limits`: which planets the profiles would show.
 
-use super::output::{Output, remarks};
+use super::output::{Output, remarks, scene};
 use super::signals::{Signals, before_the_first};
 use super::{Failure, Global, cluster, console, progress};
+use crate::data::config::Config;
 use crate::data::scene::Scene;
 use crate::model::for_blind_search;
 use crate::numerics::text::shown;
@@ -76,7 +77,7 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let signals = Signals::catch(LIMIT)?;
     args.output.check()?;
-    let scene = Scene::load(&args.config)?;
+    let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| [CSV, JSON].contains(&name))?;
     remarks(&scene);
     let settings = settings(args, &scene)?;

@@ -1,10 +1,10 @@
 //! `dimcmc map`: one reconstruction at the config's parameter values.
 
-use super::output::Output;
+use super::output::{Output, scene};
 use super::report_lines::Report;
 use super::{Failure, Global, progress};
+use crate::data::config::Config;
 use crate::data::io::map::{FILES, LIGHT_CURVES};
-use crate::data::scene::Scene;
 use crate::runs::maps::Maps;
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
-    let scene = Scene::load(&args.config)?;
+    let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name) || name == LIGHT_CURVES)?;
     let spinner = progress::bar(global, None, "reconstructing");
     let maps = Maps::of(&scene, args.times.as_deref(), &|what| spinner.set_message(what));

@@ -1,9 +1,9 @@
 //! `dimcmc optimise`: the best parameters and their curvature.
 
-use super::output::{Output, remarks};
+use super::output::{Output, remarks, scene};
 use super::search::search;
 use super::{Failure, Global, console};
-use crate::data::scene::Scene;
+use crate::data::config::Config;
 use crate::runs::optimum::{self, OptimumFile};
 use std::path::PathBuf;
 
@@ -23,7 +23,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
-    let scene = Scene::load(&args.config)?;
+    let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| name == optimum::FILE)?;
     remarks(&scene);
     scene.settings.require_free()?;

@@ -4,10 +4,37 @@
 //! nothing behind.
 
 use super::{Failure, console};
-use crate::data::scene::Scene;
+use crate::data::config::Config;
+use crate::data::scene::{Scene, SceneError};
 use crate::runs::{grid_scan, run};
+use crate::surface::objective::ObjectiveKind;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+/// The observations of a config, which is told first what it takes for granted.
+pub fn scene(config: &Config) -> Result<Scene, SceneError> {
+    note_objective(config);
+    Scene::new(config)
+}
+
+/// Keys of `imaging` by which a config means one map of a star that does not change.
+const OF_ONE_MAP: [&str; 4] = ["brightness", "default_spot", "chi2_target", "unresolved_spots"];
+
+/// The objective of a config that names none: it was another one in older versions.
+pub fn note_objective(config: &Config) {
+    if config.get("imaging.objective").is_some() {
+        return;
+    }
+    let given = |key: &&str| config.get(&format!("imaging.{key}")).is_some();
+    let keys: Vec<&str> = OF_ONE_MAP.into_iter().filter(given).collect();
+    let for_it = if keys.is_empty() { String::new() } else { format!(", which {} is for", keys.join(", ")) };
+    console::note(format_args!(
+        "{}: imaging.objective is not given: it is \"{}\"; older versions took \"{}\"{for_it}; name one of them",
+        config.path().display(),
+        ObjectiveKind::default().name(),
+        ObjectiveKind::Spottedness.name(),
+    ));
+}
 
 /// Says on standard error what was made of the profiles of `scene` on reading, for commands whose report does not.
 pub fn remarks(scene: &Scene) {

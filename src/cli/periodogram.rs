@@ -1,8 +1,8 @@
 //! `dimcmc periodogram`: the blind search for a planet.
 
-use super::output::Output;
+use super::output::{Output, scene};
 use super::{Failure, Global, console, progress};
-use crate::data::scene::Scene;
+use crate::data::config::Config;
 use crate::numerics::text::shown;
 use crate::planets::periodogram::{FrequencySettings, SearchSettings};
 use crate::runs::blind_search::{BlindSearch, BlindSearchOptions, FILES};
@@ -57,7 +57,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.check()?;
-    let scene = Scene::load(&args.config)?;
+    let scene = scene(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let spinner = progress::bar(global, None, "reconstructing");
     let found = BlindSearch::of(&scene, &options(args), &|what| spinner.set_message(what.to_owned()));

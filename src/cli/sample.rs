@@ -1,12 +1,11 @@
 //! `dimcmc sample`: the ensemble chain.
 
-use super::output::{Output, remarks};
+use super::output::{Output, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
 use super::{Failure, Global, analyse, cluster, progress};
 use crate::data::config::Config;
 use crate::data::io::effort::EFFORT;
-use crate::data::scene::Scene;
 use crate::runs::manifest;
 use crate::runs::run::{CHAIN, Meter, Pace, Run, RunError, SUMMARY, StartFrom};
 use crate::sampling::ensemble::{MOST_STEPS, StopReason};
@@ -62,7 +61,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         return Err(Failure::input(format!("--extend: must be at most {MOST_STEPS}, not {steps}")));
     }
     let config = Config::load(&args.config)?;
-    let scene = Scene::new(&match args.seed {
+    let scene = scene(&match args.seed {
         Some(seed) => config.with("sampler.seed", seed),
         None => config,
     })?;

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 pub enum ObjectiveKind {
     /// Spottedness at the target chi2 (coverage by spots; rms of brightness minus 1 of bright and dark images), turned
     /// into a log-probability by the trade-off curve.
-    #[default]
     Spottedness,
     /// Entropy at the target chi2, turned into a log-probability in the same way.
     Entropy,
@@ -17,6 +16,7 @@ pub enum ObjectiveKind {
     #[serde(alias = "regularized-likelihood")]
     RegularisedLikelihood,
     /// The likelihood with all maps integrated out, which may change with time: spots are a Gaussian field.
+    #[default]
     MarginalLikelihood,
 }
 

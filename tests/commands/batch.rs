@@ -17,7 +17,7 @@ fn config(seed: u64) -> Value {
             "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
             "snr": 500, "seed": seed, "pixels": 1000
         } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05 },
+        "imaging": { "pixels": 200, "chi2_target": 1.05, "objective": "spottedness" },
         "parameters": {
             "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
             "phi": { "prior": "periodic" }
@@ -103,41 +103,6 @@ fn send(signal: &str, child: Child) -> (Option<i32>, String) {
     assert!(Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
     (output.status.code(), text(&output.stderr))
-}
-
-#[test]
-fn a_scheduler_is_told_to_resume() {
-    let desk = Desk::new(config(7));
-    desk.succeed(&["sample", "config.json", "--out", "whole"]);
-    desk.set("/sampler/steps", json!(100_000));
-    for signal in ["USR1", "TERM"] {
-        let mut child = desk.start(&["sample", "config.json", "--out", signal]);
-        desk.wait_for_lines(&format!("{signal}/chain.jsonl"), &mut child, 24);
-        let (code, message) = send(signal, child);
-        assert_eq!(code, Some(75), "{message}");
-        says(&message, &["interrupted after step", "--resume"]);
-    }
-    // before there is anything to lose, just the same
-    desk.set("/imaging/pixels", json!(20000));
-    let child = desk.start(&["sample", "config.json", "--out", "early"]);
-    std::thread::sleep(std::time::Duration::from_millis(150));
-    let (code, message) = send("USR1", child);
-    assert_eq!((code, message.as_str()), (Some(75), "error: interrupted before the first step; nothing was written\n"));
-}
-
-/// A landscape of one thread: some of a batch is finished, in order, and the rest of it not begun.
-#[test]
-fn a_landscape_stops_within_a_batch() {
-    let desk = Desk::new(config(7));
-    desk.succeed(&["grid", "config.json", "--out", "whole"]);
-    let mut child = desk.start(&["grid", "config.json", "--out", "stopped", "--threads", "1"]);
-    desk.wait_for_lines("stopped/landscape.jsonl", &mut child, 8);
-    let (code, message) = send("USR1", child);
-    assert_eq!(code, Some(75), "{message}");
-    desk.succeed(&["grid", "config.json", "--out", "stopped", "--resume"]);
-    for file in ["landscape.json", "landscape.jsonl", "paraboloid.json"] {
-        assert_eq!(desk.read(&format!("whole/{file}")), desk.read(&format!("stopped/{file}")));
-    }
 }
 
 fn script(name: &str) -> PathBuf {

@@ -161,7 +161,8 @@ fn faint_features_look_the_same_to_both_models() {
 fn config() -> Value {
     let mut config = two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 300, "ess": 400, "rhat": 1.03 }));
     config["observations"]["simulate"]["faculae"] = json!([[140.0, 30.0, 25.0, 0.3], [330.0, 50.0, 15.0, 0.2]]);
-    config["imaging"] = json!({ "pixels": 300, "chi2_target": 1.05, "brightness": "bright-and-dark" });
+    config["imaging"] =
+        json!({ "pixels": 300, "chi2_target": 1.05, "brightness": "bright-and-dark", "objective": "spottedness" });
     config["grid"] = json!({ "axes": { "k_kms": [0.16, 0.24, 9], "phi": [-0.04, 0.04, 9] } });
     config
 }
@@ -213,7 +214,7 @@ fn every_command_takes_it_and_the_injected_orbit_is_found() {
     println!("K {k}, paraboloid {vertex} +- {error}, blind {best}");
     // a landscape of the other model is another one
     let mut other = config();
-    other["imaging"] = json!({ "pixels": 300, "chi2_target": 4.0 });
+    other["imaging"] = json!({ "pixels": 300, "chi2_target": 4.0, "objective": "spottedness" });
     desk.write("other.json", &other.to_string());
     desk.succeed(&["grid", "other.json", "--out", "other"]);
     says(&desk.refusal(&["compare", "sample", "other", "--out", "no"]), &["imaging.brightness"]);

@@ -100,7 +100,7 @@ fn an_orbit_is_put_into_all_sets() {
 /// Two spectrographs in two seasons, of a star that does not change in either.
 fn unchanging() -> Value {
     let mut config = two_sets();
-    config["imaging"] = json!({ "pixels": 200, "chi2_target": 1.05 });
+    config["imaging"] = json!({ "pixels": 200, "chi2_target": 1.05, "objective": "spottedness" });
     config["observations"][1]["zero_point_kms"] = json!(0.3);
     config
 }

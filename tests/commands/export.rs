@@ -1,6 +1,7 @@
 //! `export` as users run it: what is in the files, what other programs read there, and what is refused.
 
 use crate::desk::{Desk, dimcmc, says, text, two_spots};
+use crate::shared::{self, ENSEMBLES, WALKERS};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;
@@ -9,18 +10,16 @@ const CONFIG: &str = "config.json";
 
 const FORMATS: [&str; 4] = ["zarr", "emcee", "getdist", "csv"];
 
-/// Ensembles of the small run.
-const ENSEMBLES: usize = 2;
-
-/// Walkers of each.
-const WALKERS: usize = 6;
-
-/// A desk with a run of 31 steps in `run`.
+/// A desk with a run in `run`.
 fn small() -> Desk {
-    let desk =
-        Desk::new(two_spots(json!({ "ensembles": ENSEMBLES, "walkers": WALKERS, "steps": 30, "seed": 3, "ess": 1e6 })));
-    desk.succeed(&["sample", CONFIG, "--out", "run"]);
+    let desk = shared::desk();
+    std::fs::rename(desk.path("sample"), desk.path("run")).unwrap();
     desk
+}
+
+/// Steps of the run, the start among them.
+fn steps(desk: &Desk) -> usize {
+    desk.lines("run/chain.jsonl") / (ENSEMBLES * WALKERS)
 }
 
 /// Lines of the chain.
@@ -86,8 +85,9 @@ fn a_zarr_store_has_every_draw_once() {
     says(&out, &["written: new/a.zarr\n"]);
     let records = records(&desk);
     let discarded = desk.json("run/summary.json")["discarded_steps"].as_u64().unwrap() as usize;
-    assert!((1..=15).contains(&discarded) && records.len() == 31 * ENSEMBLES * WALKERS);
-    for (group, steps) in [("posterior", discarded..31), ("warmup_posterior", 0..discarded)] {
+    let whole = steps(&desk);
+    assert!((1..=whole / 2).contains(&discarded) && records.len() == whole * ENSEMBLES * WALKERS);
+    for (group, steps) in [("posterior", discarded..whole), ("warmup_posterior", 0..discarded)] {
         let stats = group.replace("posterior", "sample_stats");
         let draws = in_order(&desk, &records, "new/a.zarr", group);
         let mut places: Vec<[u64; 3]> =
@@ -97,8 +97,10 @@ fn a_zarr_store_has_every_draw_once() {
         assert_eq!(places.len(), steps.len() * ENSEMBLES * WALKERS);
         assert!(places.iter().all(|place| steps.contains(&(place[1] as usize))));
         let wanted = |key: &str| draws.iter().map(|record| number(&record[key])).collect::<Vec<f64>>();
-        assert_eq!(floats(&desk, &format!("new/a.zarr/{group}/k_kms/c/0/0")), wanted("k_kms"));
-        for (name, key) in [("lp", "log_prob"), ("spottedness", "spottedness"), ("chi2", "chi2")] {
+        for name in ["k_kms", "spot_lifetime_d"] {
+            assert_eq!(floats(&desk, &format!("new/a.zarr/{group}/{name}/c/0/0")), wanted(name));
+        }
+        for (name, key) in [("lp", "log_prob"), ("ln_evidence", "ln_evidence")] {
             assert_eq!(floats(&desk, &format!("new/a.zarr/{stats}/{name}/c/0/0")), wanted(key), "{name}");
         }
         let phases = floats(&desk, &format!("new/a.zarr/{group}/phi/c/0/0"));
@@ -111,7 +113,7 @@ fn a_zarr_store_has_every_draw_once() {
     let phases = floats(&desk, "new/a.zarr/posterior/phi/c/0/0");
     assert!(phases.iter().any(|x| *x < 0.0 || *x >= 1.0));
     let node = desk.json("new/a.zarr/posterior/phi/zarr.json");
-    assert_eq!(node["shape"], json!([ENSEMBLES, (31 - discarded) * WALKERS]));
+    assert_eq!(node["shape"], json!([ENSEMBLES, (whole - discarded) * WALKERS]));
     assert_eq!((&node["dimension_names"], &node["data_type"]), (&json!(["chain", "draw"]), &json!("float64")));
     assert_eq!((&node["attributes"]["units"], &node["attributes"]["injected"]), (&json!("cycles"), &json!(0.0)));
     let root = desk.json("new/a.zarr/zarr.json");
@@ -132,8 +134,8 @@ fn text_formats_have_the_digits_of_the_chain() {
     let table = desk.read("run/chain.csv");
     let mut lines = table.lines();
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let names = "ensemble step walker warmup k_kms phi log_prob spottedness chi2 accepted status move proposed \
-                 model_applications t_max_rv_d t_conjunction_d";
+    let names = "ensemble step walker warmup k_kms phi spot_lifetime_d log_prob ln_evidence accepted status move \
+                 proposed model_applications t_max_rv_d t_conjunction_d";
     assert_eq!(columns.join(" "), names);
     assert_eq!(lines.clone().count(), records.len());
     for (line, record) in lines.zip(&records) {
@@ -155,18 +157,19 @@ fn text_formats_have_the_digits_of_the_chain() {
     assert_eq!(rows.lines().count(), draws.len());
     for (row, (record, phi)) in rows.lines().zip(draws.iter().zip(phases)) {
         let found: Vec<f64> = row.split(' ').map(|cell| cell.parse().unwrap()).collect();
-        let [k, log_prob, spottedness, chi2] =
-            ["k_kms", "log_prob", "spottedness", "chi2"].map(|key| number(&record[key]));
+        let [k, log_prob, lifetime, evidence] =
+            ["k_kms", "log_prob", "spot_lifetime_d", "ln_evidence"].map(|key| number(&record[key]));
         // P = 5.1 d, counted from day 0
-        let quarters = (found[5] - found[4] - 0.25 * 5.1) / 5.1;
-        let turns = found[4] / 5.1 - phi;
+        let quarters = (found[6] - found[5] - 0.25 * 5.1) / 5.1;
+        let turns = found[5] / 5.1 - phi;
         assert!((quarters - quarters.round()).abs() < 1e-12 && (turns - turns.round()).abs() < 1e-12, "{row}");
-        assert_eq!([&found[..4], &found[6..]].concat(), [1.0, -log_prob, k, phi, spottedness, chi2]);
+        assert_eq!([&found[..5], &found[7..]].concat(), [1.0, -log_prob, k, phi, lifetime, evidence]);
     }
     let names = "k_kms\tK\\;[\\mathrm{km/s}]\nphi\t\\phi\\;[\\mathrm{cycles}]\n\
+                 spot_lifetime_d\t\\tau_\\mathrm{spot}\\;[\\mathrm{d}]\n\
                  t_max_rv_d*\tT_\\mathrm{max\\,RV}\\;[\\mathrm{d}]\n\
                  t_conjunction_d*\tT_\\mathrm{conj}\\;[\\mathrm{d}]\n\
-                 spottedness*\t\\mathrm{spottedness}\nchi2*\t\\chi^2\n";
+                 ln_evidence*\t\\mathrm{ln\\_evidence}\n";
     assert_eq!(desk.read("run/chain.paramnames"), names);
     let ranges = desk.read("run/chain.ranges");
     let phi: Vec<&str> = ranges.lines().nth(1).unwrap().split(' ').collect();
@@ -191,7 +194,7 @@ fn the_hdf5_file_holds_the_chain_step_by_step() {
         bytes.windows(wanted.len()).any(|window| window == wanted)
     };
     assert!(holds(later.iter().map(|record| number(&record["log_prob"])).collect()));
-    // blobs: what follows from the parameters comes after spottedness and chi2, as in the last columns of csv
+    // blobs: what follows from the parameters comes after ln_evidence, as in the last columns of csv
     desk.succeed(&["export", "run", "--format", "csv"]);
     let csv = desk.read("run/chain.csv");
     let derived = csv.lines().skip(1 + ENSEMBLES * WALKERS).map(|line| {
@@ -199,8 +202,7 @@ fn the_hdf5_file_holds_the_chain_step_by_step() {
         [cells[1], cells[0]]
     });
     let blobs = later.iter().zip(derived);
-    let blobs = blobs
-        .flat_map(|(r, [maximum, conjunction])| [number(&r["spottedness"]), number(&r["chi2"]), maximum, conjunction]);
+    let blobs = blobs.flat_map(|(r, [maximum, conjunction])| [number(&r["ln_evidence"]), maximum, conjunction]);
     assert!(holds(blobs.collect()));
     let accepted =
         |w: usize| later.iter().skip(w).step_by(ENSEMBLES * WALKERS).filter(|r| r["accepted"] == true).count();
@@ -259,8 +261,7 @@ fn the_same_bytes_again_and_nothing_overwritten() {
 #[test]
 fn what_cannot_be_exported_is_refused() {
     let desk = small();
-    let message = desk.refusal(&["export", "nowhere", "--format", "csv"]);
-    says(&message, &["nowhere: no manifest.json"]);
+    desk.refusal(&["export", "nowhere", "--format", "csv"]);
     for args in [&["export", "run"][..], &["export", "run", "--format", "fits"]] {
         let output = dimcmc(args, &desk.path(""));
         assert_eq!(output.status.code(), Some(2));
@@ -295,7 +296,7 @@ fn what_cannot_be_exported_is_refused() {
 fn a_run_may_grow_meanwhile() {
     let desk = small();
     let chain = desk.read("run/chain.jsonl");
-    let size = ENSEMBLES * WALKERS;
+    let (size, whole) = (ENSEMBLES * WALKERS, steps(&desk));
     let ends: Vec<usize> = chain.match_indices('\n').map(|(k, _)| k + 1).collect();
     // within the last line, and after a line that is not the last of its step
     for cut in [chain.len() - 40, ends[ends.len() - 3]] {
@@ -303,19 +304,19 @@ fn a_run_may_grow_meanwhile() {
         for format in FORMATS {
             desk.succeed(&["export", "run", "--format", format, "--out", &format!("{format}/x"), "--force"]);
         }
-        assert_eq!(desk.lines("csv/x"), 1 + 30 * size);
+        assert_eq!(desk.lines("csv/x"), 1 + (whole - 1) * size);
         let shape = desk.json("zarr/x/posterior/k_kms/zarr.json")["shape"][1].as_u64().unwrap() as usize;
         let warmup = desk.json("zarr/x/warmup_posterior/k_kms/zarr.json")["shape"][1].as_u64().unwrap() as usize;
-        assert_eq!(shape + warmup, 30 * WALKERS);
+        assert_eq!(shape + warmup, (whole - 1) * WALKERS);
         assert_eq!(desk.lines("getdist/x_1.txt"), shape);
         assert_eq!(desk.read("run/chain.jsonl").len(), cut, "the chain is left alone");
     }
 }
 
-/// A search of a small star in `search`.
+/// A desk with a search in `search`.
 fn searched() -> Desk {
-    let desk = Desk::new(two_spots(json!({})));
-    desk.succeed(&["periodogram", CONFIG, "--draws", "1000", "--out", "search"]);
+    let desk = shared::desk();
+    std::fs::rename(desk.path("periodogram"), desk.path("search")).unwrap();
     desk
 }
 

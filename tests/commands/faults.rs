@@ -1,13 +1,11 @@
 //! What users and systems do to a program: streams that are gone, signals at any time, full disks, missing permissions,
 //! numbers beyond sense, `--force` into the wrong place, edited results, control characters in names.
 
-use crate::desk::{Desk, dimcmc, says, text, tiny};
+use crate::desk::{Desk, PROGRAM, dimcmc, says, text, tiny};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_dimcmc");
 
 fn long() -> Value {
     let mut config = tiny(100_000);
@@ -65,7 +63,7 @@ fn a_stream_that_is_gone_stops_no_signal() {
     let desk = Desk::new(long());
     for (k, stderr) in broken().into_iter().enumerate() {
         // before the first step: a slow image keeps the search at work
-        desk.set("/imaging", json!({ "pixels": 50_000, "chi2_target": 1.05 }));
+        desk.set("/imaging", json!({ "pixels": 50_000, "chi2_target": 1.05, "objective": "spottedness" }));
         let run = |name: &str, stderr: Stdio| {
             let args = ["sample", "config.json", "--out", name];
             Command::new(PROGRAM)

@@ -18,7 +18,7 @@ fn desk(snr: Value) -> Desk {
             "cycles": (0..14).map(|k| 0.23 * f64::from(k)).collect::<Vec<_>>(),
             "velocity_kms": { "min": -50.4, "max": 50.4, "step": 1.8 }, "snr": snr, "pixels": 800
         } },
-        "imaging": { "pixels": 300, "chi2_target": 1.0 },
+        "imaging": { "pixels": 300, "chi2_target": 1.0, "objective": "spottedness" },
         "parameters": {
             "k_kms": { "prior": "uniform", "min": 0, "max": 0.5 },
             "phi": { "prior": "periodic" }

@@ -15,7 +15,7 @@ fn desk(k_kms: f64) -> Desk {
             "velocity_kms": { "min": -34.2, "max": 34.2, "step": 1.8 }, "snr": 400, "pixels": 500,
             "truth": { "k_kms": k_kms }
         } },
-        "imaging": { "pixels": 300, "chi2_target": 1.0 }
+        "imaging": { "pixels": 300, "chi2_target": 1.0, "objective": "spottedness" }
     }))
 }
 

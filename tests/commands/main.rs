@@ -31,4 +31,6 @@ mod plan;
 mod plot;
 mod report;
 mod sample;
+mod shared;
+mod stopped;
 mod zero_points;

@@ -1,6 +1,6 @@
 //! Commands with the objective `marginal-likelihood`: a star whose spots come and go within its twelve profiles.
 
-use super::desk::{Desk, kill, says, two_spots};
+use super::desk::{Desk, dimcmc, says, text, two_spots};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -19,7 +19,7 @@ fn changing(steps: usize) -> Value {
 }
 
 #[test]
-fn a_chain_has_the_same_bytes_by_any_number_of_threads_and_resumed() {
+fn a_chain_has_the_same_bytes_by_any_number_of_threads() {
     let desk = Desk::new(changing(4));
     for (threads, out) in [("1", "one"), ("2", "two")] {
         desk.succeed(&["sample", CONFIG, "--out", out, "--threads", threads]);
@@ -30,12 +30,6 @@ fn a_chain_has_the_same_bytes_by_any_number_of_threads_and_resumed() {
     for name in ["k_kms", "phi", "spot_amplitude", "spot_slope", "spot_lifetime_d", "ln_evidence"] {
         assert!(first[name].is_number(), "{name} in {first}");
     }
-    let sample = ["sample", CONFIG, "--out", "killed"];
-    let mut child = desk.start(&sample);
-    desk.wait_for_lines("killed/chain.jsonl", &mut child, 25);
-    kill(child);
-    desk.succeed(&[&sample[..], &["--resume"]].concat());
-    assert_eq!(whole, desk.read("killed/chain.jsonl"));
     let manifest = desk.json("one/manifest.json");
     assert!(manifest["reference"]["ln_evidence"].is_number());
     assert_eq!(manifest["priors"]["spot_lifetime_d"]["prior"], "log-uniform");
@@ -55,7 +49,7 @@ fn a_landscape_is_that_of_the_chain_with_the_field_held() {
     assert!(!said.contains("unresolved spots"), "{said}");
     // the paper's method beside it, of the same star and profiles
     let mut mapped = changing(4);
-    mapped["imaging"] = json!({ "pixels": 200, "chi2_target": 1.6 });
+    mapped["imaging"] = json!({ "pixels": 200, "chi2_target": 1.6, "objective": "spottedness" });
     desk.write("mapped.json", &mapped.to_string());
     desk.succeed(&["grid", "mapped.json", "--out", "mapped"]);
     let said = desk.succeed(&["compare", "run", "mapped", "--out", "both"]);
@@ -64,6 +58,27 @@ fn a_landscape_is_that_of_the_chain_with_the_field_held() {
     let optimum = desk.json("best/optimum.json");
     let (k, sd) = (optimum["parameters"]["k_kms"].as_f64().unwrap(), optimum["sd"]["k_kms"].as_f64().unwrap());
     assert!((k - 0.2).abs() < 3.0 * sd, "{k} +- {sd}");
+}
+
+/// Older programs took spottedness.
+#[test]
+fn a_config_without_an_objective_has_this_one_and_is_told_so() {
+    let mut config = changing(1);
+    config["imaging"] = json!({ "pixels": 200, "spot_lifetime_d": 8 });
+    let desk = Desk::new(config);
+    for args in [["map", CONFIG, "--out", "map"], ["sample", CONFIG, "--out", "run"]] {
+        let output = dimcmc(&args, &desk.path(""));
+        assert_eq!(output.status.code(), Some(0));
+        let note = "note: config.json: imaging.objective is not given: it is \"marginal-likelihood\"; older versions \
+                    took \"spottedness\"; name one of them\n";
+        assert_eq!(text(&output.stderr), note, "{args:?}");
+    }
+    assert!(desk.json("map/map.json")["field"].is_object());
+    assert_eq!(desk.json("run/manifest.json")["config"]["imaging"]["objective"], "marginal-likelihood");
+    // keys of one map
+    desk.set("/imaging/chi2_target", json!(1.05));
+    let output = dimcmc(&["map", CONFIG, "--out", "again"], &desk.path(""));
+    says(&text(&output.stderr), &["took \"spottedness\", which chi2_target is for; name one of them"]);
 }
 
 #[test]
@@ -76,7 +91,7 @@ fn what_has_no_meaning_is_refused() {
     let prior = json!({ "prior": "log-uniform", "min": 1.0, "max": 100.0 });
     refused(
         &|config| {
-            config["imaging"] = json!({ "pixels": 200 });
+            config["imaging"] = json!({ "pixels": 200, "objective": "spottedness" });
             config["parameters"]["spot_lifetime_d"] = prior.clone();
         },
         &["parameters.spot_lifetime_d", "marginal-likelihood"],
@@ -90,9 +105,19 @@ fn what_has_no_meaning_is_refused() {
     );
     refused(&|config| config["imaging"]["spot_break_degree"] = json!(31), &["imaging.spot_break_degree", "0 to 30"]);
     refused(
-        &|config| config["imaging"] = json!({ "pixels": 200, "spot_break_degree": 7 }),
+        &|config| config["imaging"] = json!({ "pixels": 200, "spot_break_degree": 7, "objective": "spottedness" }),
         &["imaging.spot_break_degree", "marginal-likelihood"],
     );
+    // configs of older programs, which meant one map
+    let cure = "give the objective \"spottedness\"";
+    refused(
+        &|config| {
+            config["imaging"] = json!({ "chi2_target": "auto" });
+            config["observations"]["velocity_jitter_kms"] = json!("fitted");
+        },
+        &["imaging.chi2_target", cure],
+    );
+    refused(&|config| config["imaging"] = json!({ "season_gap_d": 30 }), &["imaging.season_gap_d", cure]);
     refused(&|config| config["imaging"]["spot_amplitude"] = json!("static"), &["imaging.spot_amplitude"]);
     refused(&|config| config["imaging"]["spot_amplitude"] = json!(7), &["imaging.spot_amplitude", "0.01 to 1.5"]);
     refused(

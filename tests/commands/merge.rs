@@ -1,6 +1,7 @@
 //! `merge` as users run it: the draws of all runs and no others, and refusals of what does not belong together.
 
 use crate::desk::{Desk, says, tiny};
+use crate::shared;
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -67,34 +68,33 @@ fn the_whole_is_its_parts() {
 
 #[test]
 fn what_does_not_belong_together_is_not_merged() {
-    let desk = Desk::new(tiny(40));
-    sample(&desk, "a", "1");
-    sample(&desk, "b", "2");
-    let merge = |other: &str| desk.refusal(&["merge", "a", other, "--out", "all"]);
-    says(&desk.refusal(&["merge", "a", "--out", "all"]), &["two or more"]);
-    says(&merge("a"), &["a and a", "seed 1", "the same chain"]);
-    desk.succeed(&["merge", "a", "b", "--out", "joined"]);
-    says(&desk.refusal(&["merge", "joined", "b", "--out", "all"]), &["joined and b", "seed 2"]);
-    says(&desk.refusal(&["merge", "a", "b", "--out", "joined"]), &["--out joined", "not empty", "--force"]);
-    says(&merge("absent"), &["absent: no manifest.json"]);
+    let desk = shared::desk();
+    let merge = |other: &str| desk.refusal(&["merge", "sample", other, "--out", "all"]);
+    says(&desk.refusal(&["merge", "sample", "--out", "all"]), &["two or more"]);
+    says(&merge("sample"), &["sample and sample", "seed 3", "the same chain"]);
+    let joined = desk.succeed(&["merge", "sample", "seed_4", "--out", "joined"]);
+    says(&joined, &["spot_lifetime_d"]);
+    says(&desk.refusal(&["merge", "joined", "seed_4", "--out", "all"]), &["joined and seed_4", "seed 4"]);
+    desk.refusal(&["merge", "sample", "seed_4", "--out", "joined"]);
+    merge("absent");
 
-    let mut other = tiny(40);
-    other["parameters"]["k_kms"]["max"] = json!(0.9);
-    desk.write("prior.json", &other.to_string());
-    desk.succeed(&["sample", "prior.json", "--out", "prior", "--seed", "5"]);
-    says(&merge("prior"), &["a and prior", "parameters.k_kms.max (1.0 and 0.9) of the config is not the same"]);
-
-    desk.succeed(&["sample", CONFIG, "--out", "c", "--seed", "6"]);
-    for (key, from, to, what) in [
-        ("data", "\"data_sha256\": \"", "\"data_sha256\": \"0", "observations are not the same"),
-        ("version", "\"version\": \"", "\"version\": \"9", "versions"),
-        ("lambda", "\"lambda\": ", "\"lambda\": 1", "references are not the same"),
-    ] {
+    type Change = fn(&mut Value);
+    let cases: [(&str, Change, &str); 4] = [
+        (
+            "prior",
+            |m| m["config"]["parameters"]["k_kms"]["max"] = json!(0.9),
+            "parameters.k_kms.max (1.0 and 0.9) of the config is not the same",
+        ),
+        ("data", |m| m["data_sha256"] = json!("0"), "observations are not the same"),
+        ("version", |m| m["version"] = json!("9.0"), "versions"),
+        ("reference", |m| m["reference"]["ln_evidence"] = json!(7.0), "references are not the same"),
+    ];
+    for (key, change, what) in cases {
         std::fs::create_dir(desk.path(key)).unwrap();
-        std::fs::copy(desk.path("c/chain.jsonl"), desk.path(&format!("{key}/chain.jsonl"))).unwrap();
-        let manifest = desk.read("c/manifest.json");
-        assert!(manifest.contains(from), "{from}");
-        desk.write(&format!("{key}/manifest.json"), &manifest.replacen(from, to, 1));
-        says(&merge(key), &[what]);
+        std::fs::copy(desk.path("seed_4/chain.jsonl"), desk.path(&format!("{key}/chain.jsonl"))).unwrap();
+        let mut manifest = desk.json("seed_4/manifest.json");
+        change(&mut manifest);
+        desk.write(&format!("{key}/manifest.json"), &manifest.to_string());
+        says(&merge(key), &[&format!("sample and {key}"), what]);
     }
 }

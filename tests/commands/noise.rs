@@ -15,7 +15,7 @@ fn desk(change: impl Fn(&mut Observations)) -> Desk {
             "cycles": (0..20).map(|k| 0.17 * f64::from(k)).collect::<Vec<_>>(),
             "velocity_kms": { "min": -72.0, "max": 72.0, "step": 1.8 }, "snr": 500, "pixels": 2000
         } },
-        "imaging": { "pixels": 600, "chi2_target": 0.97 }
+        "imaging": { "pixels": 600, "chi2_target": 0.97, "objective": "spottedness" }
     }));
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
     let list = desk.path("data").join("observations.txt");
@@ -217,7 +217,7 @@ fn without_continuum_there_are_no_weights() {
 fn the_target_is_where_velocities_stop_shrinking() {
     let desk = desk(|_| ());
     desk.set("/observations", json!({ "path": "data/observations.txt", "velocity_range_kms": [-34.2, 34.2] }));
-    let config = json!({ "pixels": 600, "chi2_target": "auto" });
+    let config = json!({ "pixels": 600, "chi2_target": "auto", "objective": "spottedness" });
     let mut whole: Value = serde_json::from_str(&desk.read("config.json")).unwrap();
     whole["imaging"] = config;
     desk.write("config.json", &whole.to_string());

@@ -46,7 +46,7 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn a_config_of_a_star_that_does_not_change_has_a_plan_too() {
     let mut config = config(6);
-    config["imaging"] = json!({ "pixels": 300, "seasons": [[-1, 100]] });
+    config["imaging"] = json!({ "pixels": 300, "seasons": [[-1, 100]], "objective": "spottedness" });
     plan(&Desk::new(config), &["--out", "plan"]);
 }
 

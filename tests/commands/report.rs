@@ -1,23 +1,19 @@
 //! `report` as users run it: one page that needs nothing else, and that a browser shows on a desk and on a phone.
 
 use crate::desk::{Desk, says, text, two_spots};
-use serde_json::{Value, json};
+use crate::shared;
+use serde_json::json;
 use std::io::Write as _;
 use std::process::Command;
 
 const CONFIG: &str = "config.json";
 
-fn config() -> Value {
-    two_spots(json!({ "ensembles": 4, "walkers": 8, "steps": 100, "ess": 100, "rhat": 1.1 }))
-}
-
 #[test]
 fn a_run_has_a_page() {
-    let desk = Desk::new(config());
-    desk.succeed(&["sample", CONFIG, "--out", "run"]);
-    says(&desk.succeed(&["report", "run"]), &["written  run/report.html"]);
-    let page = desk.read("run/report.html");
-    let summary = desk.json("run/summary.json");
+    let desk = shared::desk();
+    says(&desk.succeed(&["report", "sample"]), &["written  sample/report.html"]);
+    let page = desk.read("sample/report.html");
+    let summary = desk.json("sample/summary.json");
     let [median, sd] = ["median", "sd"].map(|key| summary["parameters"]["k_kms"][key].as_f64().unwrap());
     // two digits of the error
     let digits = (1.0 - sd.log10().floor()) as usize;
@@ -45,23 +41,23 @@ fn a_run_has_a_page() {
         assert!(allowed.iter().any(|a| address.starts_with(a)), "{address}");
     }
     // nothing is overwritten, and the same bytes come out again
-    says(&desk.refusal(&["report", "run"]), &["run/report.html", "--force"]);
-    says(&desk.refusal(&["report", "run", "--out", "run"]), &["run", "is a folder"]);
-    desk.succeed(&["report", "run", "--force"]);
-    assert!(page == desk.read("run/report.html"));
-    says(&desk.refusal(&["report", "absent"]), &["absent", "no such folder"]);
+    says(&desk.refusal(&["report", "sample"]), &["sample/report.html", "--force"]);
+    says(&desk.refusal(&["report", "sample", "--out", "sample"]), &["sample", "is a folder"]);
+    desk.succeed(&["report", "sample", "--force"]);
+    assert!(page == desk.read("sample/report.html"));
+    desk.refusal(&["report", "absent"]);
     // a chain that has not converged says so
-    let mut manifest = desk.json("run/manifest.json");
+    let mut manifest = desk.json("sample/manifest.json");
     manifest["config"]["sampler"]["ess"] = json!(1_000_000);
-    desk.write("run/manifest.json", &manifest.to_string());
-    desk.succeed(&["report", "run", "--out", "short.html"]);
+    desk.write("sample/manifest.json", &manifest.to_string());
+    desk.succeed(&["report", "sample", "--out", "short.html"]);
     assert!(desk.read("short.html").contains("The chain has not converged"));
 }
 
 /// What cannot be computed there, such as chi2 outside of the line, is null in the file.
 #[test]
 fn a_map_of_nothing_but_the_core_of_the_line_has_a_page() {
-    let desk = Desk::new(config());
+    let desk = Desk::new(two_spots(json!({})));
     desk.set("/observations/simulate/velocity_kms", json!({ "min": -6.0, "max": 6.0, "step": 1.0 }));
     desk.succeed(&["map", CONFIG, "--out", "map"]);
     assert!(desk.json("map/fit.json")["checks"]["chi2_per_datum_outside"].is_null());
@@ -72,16 +68,10 @@ fn a_map_of_nothing_but_the_core_of_the_line_has_a_page() {
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn every_folder_has_a_page_that_a_browser_shows() {
-    let desk = Desk::new(config());
-    desk.set("/grid", json!({ "axes": { "k_kms": [0.15, 0.25, 5], "phi": [-0.05, 0.04, 5] } }));
-    for command in ["simulate", "map", "optimise", "grid", "sample"] {
-        desk.succeed(&[command, CONFIG, "--out", command]);
-    }
-    desk.succeed(&["periodogram", CONFIG, "--out", "periodogram", "--draws", "1000"]);
-    desk.succeed(&["compare", "sample", "grid", "--out", "compare"]);
+    let desk = shared::desk();
     for (folder, part) in [
         ("simulate", "Injected parameters"),
-        ("map", "greatest entropy"),
+        ("map", "most probable maps"),
         ("periodogram", "Peaks of the periodogram"),
         ("optimise", "A well-defined maximum"),
         ("grid", "Axes and paraboloid"),

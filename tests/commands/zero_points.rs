@@ -65,7 +65,7 @@ fn jittering(seed: u64, k_kms: f64) -> Desk {
             "cycles": cycles, "velocity_kms": { "min": -50.4, "max": 50.4, "step": 1.8 }, "snr": 1000, "pixels": 2000,
             "seed": seed, "velocity_jitter_kms": 0.1, "truth": { "k_kms": k_kms }
         } },
-        "imaging": { "pixels": 500, "chi2_target": 0.97 }
+        "imaging": { "pixels": 500, "chi2_target": 0.97, "objective": "spottedness" }
     }));
     desk.succeed(&["simulate", "config.json", "--out", "data"]);
     desk

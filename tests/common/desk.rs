@@ -31,7 +31,7 @@ pub fn two_spots(sampler: Value) -> Value {
             "velocity_kms": { "min": -27.0, "max": 27.0, "step": 3.0 },
             "snr": 1000, "seed": 7, "pixels": 2000
         } },
-        "imaging": { "pixels": 200, "chi2_target": 1.05, "unresolved_spots": "entropy" },
+        "imaging": { "pixels": 200, "chi2_target": 1.05, "unresolved_spots": "entropy", "objective": "spottedness" },
         "parameters": {
             "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
             "phi": { "prior": "periodic" }
@@ -49,8 +49,24 @@ pub fn tiny(steps: usize) -> Value {
     config
 }
 
+/// The program.
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_dimcmc");
+
+/// Copies a folder and all that is in it.
+pub fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let name = to.join(path.file_name().unwrap());
+        match path.is_dir() {
+            true => copy(&path, &name),
+            false => drop(std::fs::copy(&path, name).unwrap()),
+        }
+    }
+}
+
 pub fn dimcmc(args: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dimcmc")).args(args).current_dir(folder).output().unwrap()
+    Command::new(PROGRAM).args(args).current_dir(folder).output().unwrap()
 }
 
 pub fn text(bytes: &[u8]) -> String {
@@ -105,7 +121,7 @@ impl Desk {
 
     /// Starts the program and does not wait for it.
     pub fn start(&self, args: &[&str]) -> Child {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_dimcmc"));
+        let mut command = Command::new(PROGRAM);
         command.args(args).current_dir(self.path("")).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     }
 

@@ -130,9 +130,14 @@ fn the_resolved_form_is_a_config_with_the_same_fingerprint() {
     }
     let resolved = resolve(&minimal).unwrap().resolved;
     assert_eq!(resolved["imaging"]["chi2_target"], 0.97);
+    assert_eq!(resolved["imaging"]["objective"], "marginal-likelihood");
     assert_eq!(resolved["imaging"]["unresolved_spots"], "fitted");
-    assert_eq!(resolved["sampler"]["walkers"], 32);
-    assert_eq!(resolved["observations"], json!({ "path": "observations.txt", "sigma_scale": 1.0 }));
+    assert_eq!(resolved["sampler"]["walkers"], 16);
+    let observations = json!({ "path": "observations.txt", "sigma_scale": 1.0, "velocity_jitter_kms": "fitted" });
+    assert_eq!(resolved["observations"], observations);
+    let unchanging = resolve(&with(minimal, "/imaging", json!({ "objective": "spottedness" }))).unwrap().resolved;
+    assert_eq!(unchanging["sampler"]["walkers"], 32);
+    assert_eq!(unchanging["observations"], json!({ "path": "observations.txt", "sigma_scale": 1.0 }));
     assert_eq!(resolved["parameters"]["inclination_deg"]["max"], 90.0);
 }
 

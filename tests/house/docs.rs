@@ -4,9 +4,9 @@
 //! blocks marked `console`, which need what a test does not have, commands and options are looked up. Blocks marked
 //! `json` are configs.
 
-use crate::desk::Desk;
+use crate::desk::{Desk, copy};
 use crate::reference;
-use crate::small::{commands, copy, desk, help, root, run, short_chains, zdipy};
+use crate::small::{commands, desk, help, root, run, short_chains, zdipy};
 use dimcmc::internals::data::config;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -345,7 +345,7 @@ fn run_page(page: &Page, star: &Desk) -> Desk {
     }
     for (number, line) in lines {
         // `cargo` builds what is built already, and the tests are these
-        if line == "cargo test --release" {
+        if line == "cargo test" {
             continue;
         }
         let line = line.replace("cargo run --release -- ", "dimcmc ");

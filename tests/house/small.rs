@@ -1,7 +1,7 @@
 //! A small star to run commands on: the demo with a third of its profiles, few pixels and short chains; and a shell's
 //! line, run.
 
-use crate::desk::{Desk, dimcmc, text};
+use crate::desk::{Desk, PROGRAM, copy, dimcmc, text};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -77,22 +77,9 @@ pub fn zdipy(desk: &Desk, data: &str) {
     copy(&desk.path(data), &desk.path("LSDprof"));
 }
 
-/// Copies a folder and all that is in it.
-pub fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let name = to.join(path.file_name().unwrap());
-        match path.is_dir() {
-            true => copy(&path, &name),
-            false => drop(std::fs::copy(&path, name).unwrap()),
-        }
-    }
-}
-
 /// Runs a line of one command in a shell, as it stands; what it printed.
 pub fn run(line: &str, desk: &Desk) -> String {
-    let program = Path::new(env!("CARGO_BIN_EXE_dimcmc")).parent().unwrap();
+    let program = Path::new(PROGRAM).parent().unwrap();
     let path = std::env::join_paths(
         [program.to_owned()].into_iter().chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
     );

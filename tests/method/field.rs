@@ -278,12 +278,6 @@ fn stars() -> Vec<PathBuf> {
 
 #[test]
 #[ignore = "long: .ci/run has it run"]
-fn a_star_that_changes_has_the_evidence_of_the_reference() {
-    stars().iter().take(1).for_each(|folder| check(folder));
-}
-
-#[test]
-#[ignore = "a minute: all stars of the reference"]
 fn stars_that_change_have_the_evidence_of_the_reference() {
     stars().iter().for_each(|folder| check(folder));
 }

@@ -137,13 +137,14 @@ fn a_light_curve_tells_the_lifetime_of_spots() {
     assert!(with < 0.5 * without, "{with} with a light curve, {without} without");
 }
 
-/// Fits of several stars: errors of the lifetime, the rest of the field held, and K in units of its error.
+/// Fits of some stars: errors of the lifetime, the rest of the field held, and K in units of its error.
 #[test]
-#[ignore = "minutes: fits of the field of six stars, each with a light curve and without"]
+#[ignore = "long: .ci/run has it run"]
 fn light_curves_halve_the_error_of_the_lifetime_and_do_not_bias_k() {
     let light = json!({ "simulate": { "cadence_d": 0.1, "sigma": 3e-4 } });
+    const STARS: u64 = 3;
     let (mut ratios, mut pulls) = (Vec::new(), Vec::new());
-    for seed in 1..=6 {
+    for seed in 1..=STARS {
         let [with, without] = [Some(light.clone()), None].map(|light| {
             let scene = scene(&config(seed, 16, 500, light));
             let basis = Basis::new(&scene.imager.grid);
@@ -170,7 +171,7 @@ fn light_curves_halve_the_error_of_the_lifetime_and_do_not_bias_k() {
         pulls.push(with.1);
     }
     ratios.sort_by(f64::total_cmp);
-    assert!(0.5 * (ratios[2] + ratios[3]) < 0.6, "errors of the lifetime over those without: {ratios:?}");
-    let mean = pulls.iter().sum::<f64>() / 6.0;
-    assert!(mean.abs() < 3.0 / 6f64.sqrt() && pulls.iter().all(|pull| pull.abs() < 3.5), "{pulls:?}");
+    assert!(ratios[1] < 0.6, "errors of the lifetime over those without: {ratios:?}");
+    let mean = pulls.iter().sum::<f64>() / STARS as f64;
+    assert!(mean.abs() < 3.0 / (STARS as f64).sqrt() && pulls.iter().all(|pull| pull.abs() < 3.5), "{pulls:?}");
 }

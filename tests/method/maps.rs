@@ -23,6 +23,7 @@ fn config(spots: &serde_json::Value, cycles: &[f64]) -> Config {
         .with("observations.simulate.snr", 500.0)
         .with("observations.simulate.pixels", 2000)
         .with("imaging.pixels", 300)
+        .with("imaging.objective", "spottedness")
 }
 
 /// Where profiles are given there is nothing to simulate.

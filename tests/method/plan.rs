@@ -21,7 +21,7 @@ fn scene() -> Scene {
         .with("observations.simulate.velocity_kms", json!({ "min": -30.0, "max": 30.0, "step": 4.0 }))
         .with("observations.simulate.snr", 1.0 / SIGMA)
         .with("observations.simulate.pixels", 500)
-        .with("imaging.pixels", 150);
+        .with("imaging", json!({ "objective": "spottedness", "pixels": 150 }));
     Scene::new(&config).unwrap()
 }
 

@@ -204,8 +204,16 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if !jitter.is_default() && imaging.chi2_target.is_word() {
-        let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
-                       give a number, such as 0.97";
+        let problem = match imaging.objective.evolves() {
+            true => {
+                "auto is for one map of a star that does not change, not for imaging.objective \
+                 \"marginal-likelihood\", the default: leave it out, or give the objective \"spottedness\""
+            }
+            false => {
+                "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
+                 give a number, such as 0.97"
+            }
+        };
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if let Some(priors) = &imaging.nuisances {
@@ -224,8 +232,8 @@ fn check_seasons(imaging: &ImagingSettings) -> Result<(), Fault> {
     let given = [(gap.is_some(), GAP), (!seasons.is_empty(), "imaging.seasons")].map(|(is, key)| is.then_some(key));
     match (given, *objective) {
         ([Some(key), _] | [None, Some(key)], ObjectiveKind::MarginalLikelihood) => {
-            let problem = "leave it out: with imaging.objective \"marginal-likelihood\" spots change all the time, \
-                           and seasons need no maps of their own";
+            let problem = "leave it out: with imaging.objective \"marginal-likelihood\", the default, spots change \
+                           all the time; for a map of each season give the objective \"spottedness\"";
             return Err(Fault::new(key, problem));
         }
         ([Some(_), Some(key)], _) => return Err(Fault::new(key, "stands in place of season_gap_d: give one of them")),
