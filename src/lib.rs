@@ -185,5 +185,4 @@ pub use sampling::log_density::{Evaluation, LogDensity, Status};
 pub use sampling::optimise::Optimum;
 pub use star::Orbit;
 pub use star::observation::{Observations, Profile};
-pub use surface::static_map::Posterior;
 pub use surface::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};

@@ -397,6 +397,8 @@ mod tests {
         values.set(K2, 0.1);
         values.set(PorbOverProt2, 3.5);
         values.set(Phi2, 0.5);
+        values.set(SqrtECosOmega, 0.0);
+        values.set(SqrtESinOmega, 0.0);
         let space = ParameterSpace::new(free, values, 1.47, 2.94, 3.0);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         for _ in 0..20 {

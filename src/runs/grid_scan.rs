@@ -13,8 +13,8 @@ use crate::inference::search::Found;
 use crate::runs::origin::{self, Origin, OriginError};
 use crate::runs::pool::{Asked, Brief, Pool, Task};
 use crate::sampling::landscape::{Grid, Landscape, LandscapeError, Node};
+use crate::surface::LIKELIHOOD_NUMBERS;
 use crate::surface::density::Density;
-use crate::surface::static_map::LIKELIHOOD_NUMBERS;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

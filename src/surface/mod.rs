@@ -25,11 +25,16 @@ pub mod record;
 pub mod static_map;
 pub mod surrogate;
 
+/// What profiles that are not yet taken will say of velocities: spots that evolve, whatever the config's objective.
+pub mod planned {
+    pub use super::evolving_map::{Assumed, Basis, Marginal, Planned, fit};
+}
+
 pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
 pub use objective::{ObjectiveKind, UnresolvedSpots};
-pub use static_map::{CHI2, ReferenceError, SPOTTEDNESS};
+pub use static_map::{CHI2, LIKELIHOOD_NUMBERS, ReferenceError, SPOTTEDNESS};
 
 use crate::model::{ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters};

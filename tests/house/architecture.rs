@@ -22,7 +22,7 @@ const ROOMS: &[(&str, &[&str], &[&str])] = &[
     ("surface", &[], &["numerics", "star", "maxent", "field", "planets", "sampling", "model"]),
     (
         "inference",
-        &["first_look", "evidence", "detection", "surrogate", "search"],
+        &["evidence", "detection", "search"],
         &["numerics", "star", "maxent", "field", "planets", "sampling", "model", "surface"],
     ),
     (
@@ -182,6 +182,21 @@ fn imports_run_downwards() {
             };
             if !allowed {
                 faults.push(format!("{}:{line}: sees {other}::{inside}", source.path.display()));
+            }
+        }
+    }
+    hold(faults);
+}
+
+/// Nothing outside of `surface` asks which surface model it is given.
+#[test]
+fn surface_models_are_named_in_their_room_alone() {
+    let names = ["static_map", "evolving_map", "StaticMap", "EvolvingMap"];
+    let mut faults = Vec::new();
+    for source in in_rooms().filter(|source| source.place().0 != "surface") {
+        for (line, code) in source.code() {
+            for name in names.iter().filter(|name| code.contains(*name)) {
+                faults.push(format!("{}:{line}: names {name}", source.path.display()));
             }
         }
     }

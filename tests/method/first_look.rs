@@ -2,10 +2,10 @@
 //! every reason to see nothing.
 
 use dimcmc::internals::data::simulate::Simulation;
-use dimcmc::internals::inference::first_look::{FirstLook, LineModel, LookError, MeanProfile};
 use dimcmc::internals::model::{Parameter, ParameterValues};
 use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{LimbDarkening, LocalLine, Spot, StarSettings};
+use dimcmc::internals::surface::calibration::first_look::{FirstLook, LineModel, LookError, MeanProfile};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

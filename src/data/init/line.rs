@@ -4,7 +4,7 @@
 use super::digits::rounded;
 use super::known::Known;
 use super::ledger::{Ledger, Source, origin};
-use crate::inference::first_look::{FirstLook, LineModel};
+use crate::surface::calibration::first_look::{FirstLook, LineModel};
 
 /// The velocity range reaches so many bins, and so many widths of the line as the spectrograph shows it, into the
 /// continuum on either side.

@@ -3,8 +3,8 @@
 use super::ledger::{Entry, Source};
 use crate::data::config::Draft;
 use crate::data::dataset::SceneError;
-use crate::inference::first_look::LookError;
 use crate::numerics::text::{Align, columns};
+use crate::surface::calibration::first_look::LookError;
 use std::path::{Path, PathBuf};
 
 /// Where things are or will be.

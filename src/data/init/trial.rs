@@ -15,8 +15,7 @@ use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::expansion::nuisances;
-use crate::surface::static_map::Reference;
-use crate::surface::{Change, ObjectiveKind, ReferenceError};
+use crate::surface::{Change, NoMaps, ObjectiveKind, ReferenceError};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -205,10 +204,9 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Att
         }
         Err(error) => return Err(error),
     };
-    let target = scene.chi2_target;
-    let reference = Reference::build(&scene.imager, scene.settings.values, target);
-    let floor = match &reference {
-        Err(ReferenceError::TargetBelowFloor { target, floor }) => Some((floor / target).sqrt()),
+    let maps = scene.maps(None);
+    let floor = match &maps {
+        Err(NoMaps::Reference(ReferenceError::TargetBelowFloor { target, floor })) => Some((floor / target).sqrt()),
         _ => None,
     };
     let errors = scene.measured.errors.as_ref();
@@ -216,7 +214,9 @@ fn attempt_of(draft: &Draft, config: &Path, profiles: &ProfileSet) -> Result<Att
     Ok(Attempt {
         misfits: floor.is_some() || errors.is_some_and(MeasuredErrors::is_misfit),
         misfit: larger * floor.unwrap_or(1.0),
-        reached: reference.map(|reference| reference.solution.spottedness).map_err(|error| error.to_string()),
+        reached: maps
+            .map(|maps| maps.summary.image.map_or(0.0, |image| image.spottedness))
+            .map_err(|error| error.to_string()),
         scene: Some(scene),
     })
 }

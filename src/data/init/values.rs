@@ -8,12 +8,12 @@ use crate::data::config::{
     Automatic, Draft, EquivalentWidth, ImagingSettings, Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape,
     ObservationsSection, Sought, Star, VelocityJitter,
 };
-use crate::inference::first_look::{Continuum, FirstLook, LineModel, LookError};
 use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
 use crate::surface::Change;
+use crate::surface::calibration::first_look::{Continuum, FirstLook, LineModel, LookError};
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::nuisances::LineAndContinuum;
 

@@ -353,11 +353,12 @@ mod tests {
     #[test]
     fn what_a_map_warns_of_is_told_and_it_does_not_converge() {
         let chapter = |status: &str| {
+            let parameters = ParameterValues::of_eight([0.1, 1.7, 0.5, 2.1, 0.0, 40.0, 30.0, 0.0]);
             maps::chapter(&file(&[
                 &json!({ "status": status, "chi2": 9.0, "chi2_per_datum": 0.97, "chi2_target": 9.0, "lambda": 1.0 }),
                 &json!({ "alpha": 1.0, "entropy": -1.0, "spottedness": 0.1, "test": 0.0, "model_applications": 9 }),
                 &json!({ "newton_steps": 3, "profiles": 2, "data": 9, "pixels": 100, "equivalent_width_kms": 5.0 }),
-                &json!({ "contrast": 0.3, "parameters": { "k_kms": 0.1 }, "truth": null, "trade_off": [] }),
+                &json!({ "contrast": 0.3, "parameters": parameters, "truth": null, "trade_off": [] }),
                 &json!({ "observed_rv_rms_kms": 0.1, "filtered_rv_rms_kms": 0.1, "photon_rv_error_kms": 0.1 }),
                 &json!({ "residual_rms": 1e-3, "residual_rms_core": 1e-3, "sigma_rms": 1e-3 }),
                 &json!({ "checks": {

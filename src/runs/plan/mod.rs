@@ -20,8 +20,8 @@ pub use outlook::{Expected, Outlook};
 
 use crate::field::FieldError;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings};
-use crate::surface::evolving_map::Planned;
 use crate::surface::expansion::nuisances;
+use crate::surface::planned::Planned;
 use serde::{Deserialize, Serialize};
 
 /// Periods over which schedules are compared, even in their logarithm.

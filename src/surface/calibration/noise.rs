@@ -12,11 +12,11 @@
 //! what they are. What counts is noise that looks like the local line, for nothing in a profile is narrower; where
 //! features are broader and the noise is correlated farther, errors are still a little too small.
 
-use crate::inference::first_look::Scatter;
 use crate::model::{Parameter, ParameterValues};
 use crate::star::StarSettings;
 use crate::star::observation::Observations;
 use crate::surface::ReferenceError;
+use crate::surface::calibration::first_look::Scatter;
 use crate::surface::imaging::Imager;
 use crate::surface::static_map::Reference;
 use crate::surface::static_map::reference::PROVISIONAL_LAMBDA;
