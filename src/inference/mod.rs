@@ -1,5 +1,8 @@
-//! What the data say of planet, star and spots, whatever the surface model: a first look at the profiles, the blind
-//! search for a planet, the best parameters, the surrogate of the posterior, and Bayes factors.
+//! What the data say of planet, star and spots, whatever the surface model.
+//!
+//! In: an `Imager`, and a surface model (room `surface`). Out: a [`first_look`] at the profiles; [`detection`], the
+//! blind search for a planet; [`search`], the best parameters; [`evidence`], Bayes factors under the priors of a
+//! config.
 
 pub mod detection;
 pub mod evidence;
