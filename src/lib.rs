@@ -7,19 +7,21 @@
 //!
 //! # The rooms
 //!
-//! Each knows those above it only, and `mod.rs` of each says what comes in, what goes out and what happens between.
+//! Each knows only rooms above it. `mod.rs` of each says what comes in, what goes out and what happens between.
 //!
 //! | room | holds |
 //! |---|---|
-//! | `numerics` | vector instructions, units |
+//! | `numerics` | vector instructions, units, text in columns |
 //! | `star` | geometry, rotation, local line, spots, orbit, and the response: a brightness map to line profiles |
 //! | `maxent` | entropies and the maximum-entropy solver (Skilling & Bryan 1984) |
-//! | `field` | Gaussian fields on the sphere and in time, integrated out |
-//! | `planets` | periodograms, false alarms, limits, verdicts: planets in the velocities of the profiles |
+//! | `field` | Gaussian fields on the sphere and in time, marginalised over |
+//! | `planets` | planets in the velocities of the profiles: periodograms, false alarms, limits, verdicts |
 //! | `sampling` | log-densities, the affine-invariant ensemble, chains, optimiser, landscapes |
-//! | `posterior` | parameters and priors, images, objectives, fits, what profiles say by themselves |
-//! | `data` | configs, file formats, a config with its observations, a first config |
-//! | `runs` | chains and grids on disk, threads and ranks, merging, batches, exports |
+//! | `model` | the parameters: their table, priors, sampling coordinates |
+//! | `surface` | what spots do to profiles: static and evolving maps behind one interface |
+//! | `inference` | the blind search, the best parameters, a first look at the profiles |
+//! | `data` | configs, file formats, calibration, a config with its observations, a first config |
+//! | `runs` | chains, grids and searches on disk, threads and ranks, merging, batches, exports |
 //! | `figures` | figures of a folder, a page of them |
 //! | `cli` | the commands |
 //!

@@ -81,8 +81,8 @@ def map(
     observations : Observations, optional
         Profiles in place of those that the config names.
     times_d : sequence of float, optional
-        Times (d) of the maps of a star that may change (``imaging.objective`` "marginal-likelihood"); by default the
-        mean time of each night.
+        Times (d) of evolving maps (``imaging.objective`` "marginal-likelihood"); by default the mean time of each
+        night.
     out : str or path, optional
         Folder for the files; by default one that goes with the result.
     force : bool

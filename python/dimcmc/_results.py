@@ -232,7 +232,7 @@ class Maps(Result):
 
     @property
     def map(self) -> Record:
-        """The map on its pixels, or the maps of a star that may change (`map.json`)."""
+        """The pixels and what they hold (`map.json`). Its ``maps`` is a list: one, one per season, or one per time."""
         return self._json("map.json")
 
     @property

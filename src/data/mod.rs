@@ -1,11 +1,11 @@
 //! What comes from files, and a first config.
 //!
-//! The way of a profile: [`config`] names its file and says how it is used; [`dataset`] holds it as it is in the file,
-//! which [`io`] reads once; [`calibrated`] makes of it what enters the model; [`scene`] joins all of that. Settings and
-//! data set do not change once they are there.
+//! The way of a profile: [`config`] names its file and says how it is used; [`io`] reads the file once; [`dataset`]
+//! holds the profile as in the file; [`calibrated`] makes of it what enters the model; [`scene`] joins all of these.
+//! Neither the settings nor the data set change afterwards.
 //!
-//! [`init`] and [`import`] write a first config, [`diagnosis`] tries out why a model does not fit. `io` also holds the
-//! formats of what is written, a file each.
+//! [`simulate`] makes profiles in place of files. [`init`] and [`import`] write a first config, [`diagnosis`] finds out
+//! why a model does not fit. [`io`] also has the formats of results, a file each.
 
 pub mod calibrated;
 pub mod config;

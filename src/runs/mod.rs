@@ -2,13 +2,12 @@
 //!
 //! In: a scene (`data::scene`), or a folder that an earlier command wrote. Out: files of a folder.
 //!
-//! 1. [`pool`] spreads reconstructions over threads, or over the ranks of a `cluster`.
+//! 1. [`pool`] spreads evaluations over threads, or over the ranks of a `cluster`.
 //! 2. [`origin`] and [`manifest`] are what a folder was begun with.
 //! 3. [`run`] is a chain on disk, [`grid_scan`] a landscape, [`optimum`] the highest point, [`maps`] the star there,
 //!    [`simulated`] what it was made with; [`blind_search`] and [`limits`] are searches for orbits, [`plan`] what
-//!    profiles not yet taken would show.
-//!    [`log_posterior`] is the density of a chain for samplers elsewhere.
-//! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] holds a chain against a
+//!    profiles not yet taken would show. [`log_posterior`] is the density of a chain for other samplers.
+//! 4. [`merge`] joins runs of one star, [`batch`] makes those of many, [`comparison`] compares a chain with a
 //!    landscape.
 //! 5. [`export`] writes a chain for other programs. A new format is a file of it, and a variant of `Format` in
 //!    `export/mod.rs`.

@@ -1,13 +1,14 @@
 //! What spots do to line profiles, behind one interface: a [`SurfaceModel`].
 //!
-//! Two models stand beside each other, and nothing outside of this room asks which it is: `static_map`, the map of
-//! maximum entropy (`docs/method.md` sections 2 to 4), and `evolving_map`, a Gaussian field on the sphere and in time,
-//! marginalised (section 9). [`SurfaceSettings::model`] is the one place where a config chooses. A third model is one
-//! more folder here.
+//! There are two models: `static_map`, the map of maximum entropy (`docs/method.md` sections 2 to 4), and
+//! `evolving_map`, a Gaussian field on the sphere and in time, marginalised (section 9). [`SurfaceSettings::model`]
+//! chooses one of them. A third model is one more folder here.
 //!
-//! Both look at the same thing, an [`Imager`](imaging::Imager): the star, when it was observed, and the data with their
-//! [`nuisances`] and light curves ([`photometry`]). Both give the same things: ln L to second order in the velocities of
-//! the profiles ([`Linearised`], [`expansion`]), a density of the parameters ([`density`]), maps ([`maps`]).
+//! In: an [`Imager`](imaging::Imager), which has the star, when it was observed, and the data with their [`nuisances`]
+//! and light curves ([`photometry`]); [`calibration`] measures their uncertainties. Out: ln L to second order in the
+//! velocities of the profiles ([`Linearised`], [`expansion`]), a density of the parameters ([`density`]) with its
+//! [`surrogate`] and its maximum ([`optimum`]), and [`maps`] with [`checks`] of their residuals. A [`record`] of a
+//! reference rebuilds the density to the same bits.
 
 pub mod calibration;
 pub mod checks;

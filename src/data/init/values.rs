@@ -12,10 +12,10 @@ use crate::numerics::units::instrumental_sigma_kms;
 use crate::planets::periodogram::{Frequencies, FrequencySettings};
 use crate::star::BrightnessModel;
 use crate::star::observation::Observations;
-use crate::surface::Change;
 use crate::surface::calibration::first_look::{Continuum, FirstLook, LineModel, LookError};
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::nuisances::LineAndContinuum;
+use crate::surface::{Change, ObjectiveKind};
 
 /// What is assumed where nobody says otherwise.
 mod assumed {
@@ -340,7 +340,9 @@ fn equivalent_width(cut: &Observations, known: &Known, ledger: &mut Ledger) -> E
 
 fn imaging(known: &Known, ledger: &mut Ledger) -> ImagingSettings {
     let brightness = known.brightness.as_ref().map_or(BrightnessModel::BrightAndDark, |given| given.value);
-    let mut imaging = ImagingSettings { brightness, ..ImagingSettings::default() };
+    // a static map has the sharper eye for what is wrong with a model: it is tried out first
+    let objective = ObjectiveKind::Spottedness;
+    let mut imaging = ImagingSettings { brightness, objective, ..ImagingSettings::default() };
     let (source, remark) = match &known.brightness {
         Some(given) => (Source::Given, given.by.as_str()),
         None => (Source::Assumed, "a star with faculae is no map of spots, and what does not fit looks like an orbit"),

@@ -4,7 +4,7 @@
 //! or observed profiles with a `plan`. Out: for each the error of K, and the K that is detected, at every period, after
 //! every few nights ([`Outlook`]); and which of the schedules is best ([`PlanFile`]). The order:
 //! 1. Maps are drawn from the field of spots, given the profiles that there are, and the profiles made linear at them.
-//! 2. The information that these hold of the orbit's velocities, spots integrated out (`posterior::marginal`).
+//! 2. The information that these hold of the orbit's velocities, spots integrated out (`surface::evolving_map`).
 //! 3. Errors, false alarms and limits follow from it as for observed profiles (`planets::periodogram`). Of what differs
 //!    from map to map the median is taken.
 
