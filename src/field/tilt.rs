@@ -10,8 +10,8 @@
 //! number that was measured.
 
 use super::compress::Compressed;
-use super::covariance::Numbers;
 use super::maps::{correlations, inverses, scale_rows};
+use super::numbers::Numbers;
 use super::{Epoch, Field};
 use nalgebra::DMatrix;
 
