@@ -11,8 +11,7 @@
 
 use super::compress::{Compressed, Compression, Told};
 use super::covariance::Covariance;
-use super::dense::{self, Factor};
-use super::maps::{inverses, scale_rows};
+use super::dense::{self, Factor, inverses, scale_rows};
 use super::numbers::Numbers;
 use super::tilt::Tilt;
 use super::{Epoch, Field, FieldError, Quadratic};
