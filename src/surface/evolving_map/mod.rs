@@ -34,7 +34,6 @@ mod surface;
 
 pub use basis::Basis;
 pub use change::Change;
-pub use density::FieldRecord;
 pub use design::Design;
 pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;

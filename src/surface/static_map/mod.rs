@@ -15,7 +15,6 @@ pub mod tradeoff;
 mod warm_start;
 
 pub use counted::SpotsCounted;
-pub use density::ImageRecord;
 pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
 pub use posterior::{CHI2, Posterior, SPOTTEDNESS, is_physical};
 pub use reference::{Reference, ReferenceError};
