@@ -44,6 +44,18 @@ fn blocks(n: usize, block: usize) -> impl DoubleEndedIterator<Item = (usize, usi
     (0..n.div_ceil(block)).map(move |b| (b * block, block.min(n - b * block)))
 }
 
+/// One over each, and 0 for 0.
+pub(super) fn inverses(numbers: &[f64]) -> Vec<f64> {
+    numbers.iter().map(|x| if *x > 0.0 { x.recip() } else { 0.0 }).collect()
+}
+
+/// Multiplies each row by a factor of its own.
+pub(super) fn scale_rows(matrix: &mut DMatrix<f64>, factors: &[f64]) {
+    for mut column in matrix.column_iter_mut() {
+        column.iter_mut().zip(factors).for_each(|(x, factor)| *x *= factor);
+    }
+}
+
 /// Cholesky factor `L L^T` of a symmetric, positive definite matrix.
 #[derive(Clone, Debug)]
 pub struct Factor {

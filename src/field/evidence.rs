@@ -10,9 +10,9 @@
 //! 400; half of that where another field of the same star is known).
 
 use super::compress::{Compressed, Compression, Told};
-use super::covariance::{Covariance, Numbers};
-use super::dense::{self, Factor};
-use super::maps::{inverses, scale_rows};
+use super::covariance::Covariance;
+use super::dense::{self, Factor, inverses, scale_rows};
+use super::numbers::Numbers;
 use super::tilt::Tilt;
 use super::{Epoch, Field, FieldError, Quadratic};
 use nalgebra::{DMatrix, DVector};

@@ -12,8 +12,8 @@
 
 use super::Kernel;
 use super::compress::with_directions;
-use super::covariance::Numbers;
 use super::dense::{self, Factor};
+use super::numbers::Numbers;
 use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

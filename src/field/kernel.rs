@@ -2,6 +2,7 @@
 //! `k = f + (1 - f) (1 + a) exp(-a)` with `a = sqrt(3) |t - t'| / lifetime`: Matern 3/2 beside a share f that never
 //! changes.
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// How long the field lives.
@@ -42,6 +43,11 @@ impl Kernel {
     /// Correlation of values so far (d) apart.
     pub fn at(&self, delay_d: f64) -> f64 {
         self.persistent + (1.0 - self.persistent) * self.changing(delay_d)
+    }
+
+    /// k between some times (rows) and others (d).
+    pub(super) fn between(&self, times_d: &[f64], others_d: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_fn(times_d.len(), others_d.len(), |k, t| self.at(times_d[k] - others_d[t]))
     }
 
     /// Its derivative with respect to the logarithm of the lifetime.

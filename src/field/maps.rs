@@ -1,6 +1,7 @@
 //! The field after the data (`docs/method.md` section 9): its mean `c(t) = sum_k k(t - t_k) S J_k^T (C^-1 r)_k`, its
 //! standard deviation at points, and the step of Gauss-Newton that both imply.
 
+use super::dense::{inverses, scale_rows};
 use super::{Evidence, Field};
 use nalgebra::{DMatrix, DVector};
 
@@ -30,7 +31,7 @@ impl Evidence {
         scale_rows(&mut scaled, &self.sd);
         let seen = &self.numbers.rows * &scaled;
         let before: Vec<f64> = scaled.column_iter().map(|point| point.norm_squared()).collect();
-        let correlations = correlations(&self.field, &self.numbers.times_d, times_d);
+        let correlations = self.field.kernel.between(&self.numbers.times_d, times_d);
         let mut after = DMatrix::zeros(harmonics.ncols(), times_d.len());
         for (correlations, mut after) in correlations.column_iter().zip(after.column_iter_mut()) {
             let mut known = seen.clone();
@@ -52,7 +53,7 @@ impl Evidence {
     /// `(1 - K J^T C^-1 J) (K' pulled - c)`, K' of that field, all else of this evidence. With all of one model that is
     /// the step of Gauss-Newton; and it vanishes at the most probable coefficients of the other, `c = K' pulled`.
     pub(super) fn step(&self, field: &Field, coefficients: &DMatrix<f64>, pulled: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut gradient = pulled * correlations(field, &self.numbers.times_d, &self.numbers.times_d);
+        let mut gradient = pulled * field.kernel.between(&self.numbers.times_d, &self.numbers.times_d);
         scale_rows(&mut gradient, &field.spectrum.variances(&self.degrees));
         gradient -= coefficients;
         let mut scaled = gradient.clone();
@@ -65,23 +66,6 @@ impl Evidence {
     fn spread(&self, x: &DVector<f64>, times_d: &[f64]) -> DMatrix<f64> {
         let mut pulls = self.numbers.pulled(x);
         scale_rows(&mut pulls, &self.sd);
-        pulls * correlations(&self.field, &self.numbers.times_d, times_d)
-    }
-}
-
-/// k between some times (rows) and others (d).
-pub(super) fn correlations(field: &Field, times_d: &[f64], others_d: &[f64]) -> DMatrix<f64> {
-    DMatrix::from_fn(times_d.len(), others_d.len(), |k, t| field.kernel.at(times_d[k] - others_d[t]))
-}
-
-/// One over each, and 0 for 0.
-pub(super) fn inverses(numbers: &[f64]) -> Vec<f64> {
-    numbers.iter().map(|x| if *x > 0.0 { x.recip() } else { 0.0 }).collect()
-}
-
-/// Multiplies each row by a factor of its own.
-pub(super) fn scale_rows(matrix: &mut DMatrix<f64>, factors: &[f64]) {
-    for mut column in matrix.column_iter_mut() {
-        column.iter_mut().zip(factors).for_each(|(x, factor)| *x *= factor);
+        pulls * self.field.kernel.between(&self.numbers.times_d, times_d)
     }
 }

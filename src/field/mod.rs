@@ -36,6 +36,7 @@ mod harmonics;
 mod jacobian;
 mod kernel;
 mod maps;
+mod numbers;
 mod quadratic;
 mod settle;
 mod spectrum;

@@ -10,8 +10,8 @@
 //! number that was measured.
 
 use super::compress::Compressed;
-use super::covariance::Numbers;
-use super::maps::{correlations, inverses, scale_rows};
+use super::dense::{inverses, scale_rows};
+use super::numbers::Numbers;
 use super::{Epoch, Field};
 use nalgebra::DMatrix;
 
@@ -82,7 +82,7 @@ impl Tilt {
     /// `K a` (H, times), by which the mean of the field falls at any times (d), given those of the epochs and the
     /// variances of the coefficients.
     pub fn lowers(&self, field: &Field, epochs_d: &[f64], variances: &[f64], times_d: &[f64]) -> DMatrix<f64> {
-        let mut lowered = &self.by * correlations(field, epochs_d, times_d);
+        let mut lowered = &self.by * field.kernel.between(epochs_d, times_d);
         scale_rows(&mut lowered, variances);
         lowered
     }

@@ -16,8 +16,8 @@ pub mod values;
 
 pub use coordinates::{FreeParameter, ParameterSpace, for_blind_search, period_prior};
 pub use elements::{Clock, Elements};
-pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths, quoted_definition};
+pub use orbital::{Estimate, OrbitQuantities, OrbitQuantity, definition, in_earths};
 pub use parameters::{PARAMETERS, Parameter, Spec, Step, turning};
 pub use prior::{Prior, PriorKind};
-pub use quoted::Quoted;
+pub use quoted::{Quoted, quoted_definition};
 pub use values::{Element, FieldValues, OrbitValues, ParameterValues, StarValues};

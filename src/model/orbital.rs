@@ -5,7 +5,6 @@
 
 use super::Parameter;
 use super::elements::{Clock, to_conjunction};
-use super::quoted::Quoted;
 use crate::numerics::units::EARTHS_PER_JUPITER;
 use crate::star::planet::{maximum_phase, minimum_mass};
 use crate::star::{Eccentric, Orbit, StarSettings};
@@ -198,11 +197,6 @@ impl OrbitQuantities {
 /// What a parameter of an orbit is, in a line, where its name does not say it.
 pub fn definition(parameter: &str) -> Option<&'static str> {
     Parameter::from_name(parameter)?.spec().definition
-}
-
-/// The same of a quantity that follows from the parameters.
-pub fn quoted_definition(quantity: &str) -> Option<&'static str> {
-    Quoted::from_name(quantity)?.quantity.definition()
 }
 
 /// A small mass (Jupiter masses) in words, in masses of the Earth; `None` for a larger one.

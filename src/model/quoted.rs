@@ -183,6 +183,11 @@ impl OrbitQuantities {
     }
 }
 
+/// What a quantity that follows from the parameters is, in a line, where its name does not say it.
+pub fn quoted_definition(quantity: &str) -> Option<&'static str> {
+    Quoted::from_name(quantity)?.quantity.definition()
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::Prior;

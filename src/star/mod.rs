@@ -37,6 +37,7 @@ mod placement;
 pub mod planet;
 pub mod response;
 pub mod rotation;
+mod seen;
 mod sorting;
 pub mod spots;
 pub mod stability;
@@ -50,10 +51,10 @@ pub use limb_darkening::LimbDarkening;
 pub use nearby::Nearby;
 pub use orbit::{Eccentric, Motion, Orbit, Shape};
 pub use photometry::Band;
-pub use response::Sampling;
 pub use rotation::Rotation;
+pub use seen::{OwnMap, Sampling, Seen};
 pub use spots::{Disc, Facula, Life, Spot};
-pub use stacked::{OwnMap, Response, Seen};
+pub use stacked::Response;
 
 /// The star. [`Surface`] may have other values for some of it.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,33 +7,11 @@ use super::convolution::{Convolutions, Rows, VelocityGrid};
 use super::deposit::{Deposit, Observed};
 use super::grid::SurfaceGrid;
 use super::line_profile::LineKernel;
-use super::{Seen, StarSettings, StarState};
+use super::seen::Seen;
+use super::{StarSettings, StarState};
 use crate::numerics::vector::{self, Instructions, Number, Task};
-use crate::star::observation::Observations;
 use nalgebra::DMatrixView;
 use std::sync::Arc;
-
-/// When and at which velocities a data set observes the star.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sampling {
-    /// Width of a velocity bin (km/s).
-    pub step_kms: f64,
-    /// Of each profile: time (d), velocity of its first bin (km/s), number of bins.
-    pub profiles: Vec<(f64, f64, usize)>,
-}
-
-impl Sampling {
-    /// The sampling of a set of observations.
-    pub fn of(observations: &Observations) -> Self {
-        let profile = |p: &crate::star::observation::Profile| (p.time_d, p.first_velocity_kms, p.intensity.len());
-        Sampling { step_kms: observations.step_kms(), profiles: observations.profiles.iter().map(profile).collect() }
-    }
-
-    /// Number of bins of all profiles together.
-    pub fn bins(&self) -> usize {
-        self.profiles.iter().map(|p| p.2).sum()
-    }
-}
 
 /// Most nodes of the velocity grid, which spans twice the fastest velocity in steps of a fraction of the local line's
 /// width. A star has a few hundred; this many have more cells than a map has pixels, and every pass goes through all of
@@ -332,7 +310,7 @@ fn total(x: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::numerics::vector::Portable;
-    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation};
+    use crate::star::{LimbDarkening, LocalLine, Orbit, Quadrature, Rotation, Sampling};
 
     fn noise(n: usize) -> Vec<f64> {
         (0..n).map(|i| (0.7 * (i * i) as f64).sin()).collect()

@@ -2,51 +2,12 @@
 //! axis, and all see one star. A single set is the usual case.
 
 use super::grid::SurfaceGrid;
-use super::response::{Part, Sampling};
-use super::{LocalLine, StarSettings, StarState};
+use super::response::Part;
+use super::seen::{Sampling, Seen};
+use super::{StarSettings, StarState};
 use crate::numerics::vector::Number;
 use nalgebra::DMatrix;
-use std::borrow::Cow;
 use std::ops::Range;
-
-/// What a data set sees: when and at which velocities, and what of the star looks different through it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
-    /// Local line, instrumental broadening included; that of the star's settings if `None`.
-    pub line: Option<LocalLine>,
-    /// Brightness of a wholly spotted pixel over that of the photosphere; that of the star's settings if `None`.
-    pub contrast: Option<f64>,
-    /// Times and velocity bins.
-    pub sampling: Sampling,
-    /// The map that each profile sees, where the star has several; empty where it has one.
-    pub own_maps: Vec<OwnMap>,
-}
-
-/// One of several maps of a star, as one profile sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OwnMap {
-    /// Its number, from 0.
-    pub number: usize,
-    /// The time (d) from which rotation turns it, in place of the star's.
-    pub epoch_d: f64,
-}
-
-impl From<Sampling> for Seen {
-    fn from(sampling: Sampling) -> Self {
-        Seen { line: None, contrast: None, sampling, own_maps: Vec::new() }
-    }
-}
-
-impl Seen {
-    /// The star as this set sees it.
-    pub fn star<'a>(&self, star: &'a StarSettings) -> Cow<'a, StarSettings> {
-        if self.line.is_none() && self.contrast.is_none() {
-            return Cow::Borrowed(star);
-        }
-        let (line, contrast) = (self.line.unwrap_or(star.line), self.contrast.unwrap_or(star.contrast));
-        Cow::Owned(StarSettings { line, contrast, ..star.clone() })
-    }
-}
 
 /// The response of all profiles to a map of the star.
 #[derive(Clone, Debug)]

@@ -7,7 +7,6 @@
 //! and neighbours have nothing to do with each other; noise of which several bins are correlated counts as so many
 //! fewer. What the map itself takes up is spread evenly here.
 
-use super::maps::Residual;
 use crate::numerics::json::number_or_null;
 use crate::numerics::normal::cumulative;
 use serde::{Deserialize, Serialize};
@@ -18,6 +17,17 @@ const RARE: f64 = 0.01;
 
 /// Neighbouring bins, and core against wings, are worth one beyond that many standard deviations.
 const FAR: f64 = 5.0;
+
+/// What is left over in one bin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Residual {
+    /// Depth of the model.
+    pub depth: f64,
+    /// Observed minus modelled intensity.
+    pub difference: f64,
+    /// The same over its standard error.
+    pub scaled: f64,
+}
 
 /// How the misfit is shared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

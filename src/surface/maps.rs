@@ -1,7 +1,7 @@
 //! The maps that a surface model finds, and what they make of the profiles: model profiles, radial velocities before and
 //! after the spots are taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is judged.
 
-use super::checks::Checks;
+use super::checks::{Checks, Residual};
 use super::evolving_map::{FluxFit, NoFit};
 use super::imaging::Imager;
 use super::nuisances::LineAndContinuum;
@@ -199,17 +199,6 @@ impl NoMaps {
             NoMaps::Reference(_) => None,
         }
     }
-}
-
-/// What is left over in one bin.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Residual {
-    /// Depth of the model.
-    pub depth: f64,
-    /// Observed minus modelled intensity.
-    pub difference: f64,
-    /// The same over its standard error.
-    pub scaled: f64,
 }
 
 /// Model profiles against the observed ones.

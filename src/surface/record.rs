@@ -1,7 +1,6 @@
 //! What is written of the reference that every evaluation starts from, and what it is rebuilt from to the same bits.
 
-use super::evolving_map::FieldRecord;
-use super::static_map::{ImageRecord, ReferenceError};
+use super::static_map::ReferenceError;
 use crate::field::FieldError;
 use crate::model::{Parameter, ParameterValues};
 use serde::de::Error as _;
@@ -18,6 +17,98 @@ pub struct SurfaceRecord(Reference);
 enum Reference {
     Image(ImageRecord),
     Field(FieldRecord),
+}
+
+/// The reference solution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageRecord {
+    /// All parameters.
+    pub parameters: BTreeMap<String, f64>,
+    /// Target of chi2.
+    pub chi2_target: f64,
+    /// chi2 of the image.
+    pub chi2: f64,
+    /// Lagrange multiplier.
+    pub lambda: f64,
+    /// Entropy.
+    pub entropy: f64,
+    /// Spottedness.
+    pub spottedness: f64,
+    /// chi2 at the end of the trade-off curve, where lambda is three times as large.
+    pub chi2_reach: f64,
+    /// Number of data.
+    pub data: usize,
+}
+
+impl ImageRecord {
+    /// A target that a noise realisation, which moves the attainable chi2 by sqrt(2/N), may put out of reach: there
+    /// spottedness explodes, and the answer hangs on the target (`docs/method.md` section 3).
+    fn warning(&self) -> Option<String> {
+        let noise = (2.0 / self.data as f64).sqrt() * self.chi2_target;
+        (self.chi2_target - self.chi2_reach < noise).then(|| {
+            let per_datum = |chi2: f64| chi2 / self.data as f64;
+            format!(
+                "the target chi2 of {:.3} per datum is close to the floor (three times its lambda comes down to \
+                {:.3}): see \
+                 whether the answer stays when imaging.chi2_target is raised by {:.3}",
+                per_datum(self.chi2_target),
+                per_datum(self.chi2_reach),
+                per_datum(noise)
+            )
+        })
+    }
+}
+
+/// The most probable maps, one a profile.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FieldRecord {
+    /// All parameters, those of the field among them; without a lifetime spots live for ever.
+    pub parameters: BTreeMap<String, f64>,
+    /// Degree below which the spectrum of the spots is flat.
+    #[serde(default)]
+    pub spot_break_degree: f64,
+    /// Scatter of the profiles' velocity zero points (km/s).
+    pub velocity_jitter_kms: f64,
+    /// ln of the evidence.
+    pub ln_evidence: f64,
+    /// Number of data.
+    pub data: usize,
+}
+
+impl FieldRecord {
+    /// Parameters of the field that lie on a bound of its search, and free ones whose errors are too small.
+    fn warnings(&self, free: &[String]) -> Vec<String> {
+        /// Nearer than this part a bound is reached.
+        const REACHED: f64 = 0.01;
+        let on_bound = |p: &Parameter| {
+            let (value, (low, high)) = (*self.parameters.get(p.name())?, p.widest());
+            let near = |bound: f64| (value / bound - 1.0).abs() < REACHED;
+            let bound = [low, high].into_iter().find(|bound| near(*bound))?;
+            Some(match (p, bound == high) {
+                (Parameter::SpotLifetime, true) => "the profiles do not show that the spots change".to_owned(),
+                _ => format!("{} lies on the bound of its search, {bound}", p.name()),
+            })
+        };
+        Parameter::FIELD.iter().filter_map(on_bound).chain(self.too_sure(free)).collect()
+    }
+
+    /// Which errors are known to be too small (`results/calibration-stellar.md`).
+    fn too_sure(&self, free: &[String]) -> Option<String> {
+        /// Above this vsini (km/s) they are.
+        const FAST_KMS: f64 = 45.0;
+        let is_fast = *self.parameters.get(Parameter::Vsini.name())? > FAST_KMS;
+        let of = [Parameter::OmegaEq, Parameter::DOmega, Parameter::Inclination].map(Parameter::name);
+        let of: Vec<&str> = of.into_iter().filter(|name| free.iter().any(|free| free == name)).collect();
+        (is_fast && !of.is_empty()).then(|| {
+            format!(
+                "vsini is above {FAST_KMS:.0} km/s: take {} with twice the errors, which on simulated stars with spots \
+                like discs were too small by factors of 1.4 to 1.7",
+                of.join(", ")
+            )
+        })
+    }
 }
 
 /// By the key that one of them has, so that an error is about that one.

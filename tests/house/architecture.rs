@@ -1,8 +1,7 @@
-//! The shape of the source tree: which room may see which, read from the `crate::` paths in `src`.
-//!
-//! Code under `#[cfg(test)]` is held to it as well.
+//! The shape of the source tree: which room may see which, read from the `crate::` paths in `src`, code under
+//! `#[cfg(test)]` held to it as well; and that no files need each other.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The rooms of `src/`, lowest first; the modules of each, lowest first, where there is an order to keep; and what it
@@ -222,4 +221,178 @@ fn all_but_the_command_line_are_silent() {
 fn every_file_says_what_it_is() {
     let silent = sources().into_iter().filter(|source| !source.text.starts_with("//! "));
     hold(silent.map(|source| format!("{}: does not open with `//!`", source.path.display())).collect());
+}
+
+/// A module by its path, that of the crate being empty; and any other path in code.
+type Names = Vec<String>;
+
+/// What a file defines, and what it names.
+#[derive(Default)]
+struct Code {
+    file: PathBuf,
+    /// Names of functions, types and constants.
+    defined: BTreeSet<String>,
+    /// Names that it imports or exports, after the paths that they stand for.
+    uses: Vec<(Names, String)>,
+    /// Paths within its code.
+    paths: Vec<Names>,
+}
+
+impl Code {
+    /// Comments and tests left out.
+    fn of(source: &Source) -> Self {
+        let text = source.text.split("#[cfg(test)]\nmod tests").next().unwrap();
+        let mut lines = text.lines().map(str::trim).filter(|line| !line.starts_with("//"));
+        let mut code = Code { file: source.path.clone(), ..Code::default() };
+        let mut rest = String::new();
+        while let Some(line) = lines.next() {
+            let mut public = ["", "pub ", "pub(super) ", "pub(crate) "].into_iter();
+            let Some(tree) = public.find_map(|public| line.strip_prefix(public)?.strip_prefix("use ")) else {
+                rest += line;
+                rest += "\n";
+                continue;
+            };
+            let mut tree = tree.to_owned();
+            while !tree.contains(';') {
+                tree += lines.next().unwrap_or(";");
+            }
+            import(&words(&tree), &mut 0, &[], &mut code.uses);
+        }
+        let words = words(&rest);
+        for (k, word) in words.iter().enumerate() {
+            let next = |i: usize| words.get(k + i).copied().unwrap_or_default();
+            if ["fn", "struct", "enum", "trait", "type", "const", "static"].contains(word) {
+                code.defined.insert(next(1).to_owned());
+            }
+            if is_name(word) && next(1) == "::" && is_name(next(2)) && (k == 0 || words[k - 1] != "::") {
+                let more = words[k + 1..].chunks_exact(2).take_while(|pair| pair[0] == "::" && is_name(pair[1]));
+                code.paths.push(std::iter::once(*word).chain(more.map(|pair| pair[1])).map(str::to_owned).collect());
+            }
+        }
+        code
+    }
+}
+
+fn is_name(word: &str) -> bool {
+    word.starts_with(|c: char| c.is_alphabetic() || c == '_')
+}
+
+/// Names and numbers, `::`, and all other characters one by one.
+fn words(text: &str) -> Vec<&str> {
+    let is_inside = |c: char| c.is_alphanumeric() || c == '_';
+    let (mut words, mut rest) = (Vec::new(), text.trim_start());
+    while let Some(first) = rest.chars().next() {
+        let end = match first {
+            _ if is_inside(first) => rest.find(|c| !is_inside(c)).unwrap_or(rest.len()),
+            _ if rest.starts_with("::") => 2,
+            _ => first.len_utf8(),
+        };
+        words.push(&rest[..end]);
+        rest = rest[end..].trim_start();
+    }
+    words
+}
+
+/// All that the tree of a `use` brings in, from word `at` on to the end of the tree; `before` is the path to it.
+fn import(words: &[&str], at: &mut usize, before: &[String], found: &mut Vec<(Names, String)>) {
+    let mut path = before.to_vec();
+    loop {
+        let word = words[*at];
+        match word {
+            "," | "}" | ";" => {
+                let name = path.last().cloned().unwrap_or_default();
+                return found.push((path, name));
+            }
+            "as" => {
+                *at += 2;
+                return found.push((path, words[*at - 1].to_owned()));
+            }
+            "{" => {
+                *at += 1;
+                while words[*at] != "}" {
+                    import(words, at, &path, found);
+                    *at += usize::from(words[*at] == ",");
+                }
+                *at += 1;
+                return;
+            }
+            "::" => {}
+            // the module before it
+            "self" if !path.is_empty() => {}
+            _ => path.push(word.to_owned()),
+        }
+        *at += 1;
+    }
+}
+
+/// The module whose file defines what a path in module `from` leads to, and its name there; `None` of what is not the
+/// crate's own, and of modules themselves. Re-exports are followed, no more than `steps` of them.
+fn definition(tree: &BTreeMap<Names, Code>, from: &[String], path: &[String], steps: usize) -> Option<(Names, String)> {
+    let up = path.iter().take_while(|word| *word == "super").count();
+    let (mut module, mut rest) = match path.first()?.as_str() {
+        "crate" => (Names::new(), &path[1..]),
+        "self" => (from.to_vec(), &path[1..]),
+        _ => (from[..from.len().checked_sub(up)?].to_vec(), &path[up..]),
+    };
+    while let Some((word, after)) = rest.split_first() {
+        let child = [&module[..], &[word.clone()]].concat();
+        if tree.contains_key(&child) {
+            (module, rest) = (child, after);
+            continue;
+        }
+        let code = tree.get(&module)?;
+        if code.defined.contains(word) {
+            return Some((module, word.clone()));
+        }
+        let steps = steps.checked_sub(1)?;
+        let stands_for = |(path, name): &(Names, String)| match name.as_str() {
+            "*" => Some([&path[..path.len() - 1], rest].concat()),
+            _ => (name == word).then(|| [path, after].concat()),
+        };
+        let mut meant = code.uses.iter().filter_map(stands_for);
+        return meant.find_map(|path| definition(tree, &module, &path, steps));
+    }
+    None
+}
+
+/// Who needs whom can be read from the top of the house to its ground. A folder's own file beside the files in the
+/// folder, or in folders of it, is left out: it may say what they have in common, and put them together.
+#[test]
+fn no_circles_between_files() {
+    /// Re-exports of re-exports.
+    const STEPS: usize = 6;
+    let module = |source: &Source| {
+        let names = source.path.with_extension("");
+        let names: Names = names.iter().map(|name| name.to_str().unwrap().to_owned()).collect();
+        let own = names.last().is_some_and(|name| name == "mod" || name == "lib");
+        names[..names.len() - usize::from(own)].to_vec()
+    };
+    let tree: BTreeMap<Names, Code> = sources().iter().map(|source| (module(source), Code::of(source))).collect();
+    let mut needs: BTreeMap<&Names, BTreeMap<Names, BTreeSet<String>>> = BTreeMap::new();
+    for (from, code) in &tree {
+        for path in code.uses.iter().map(|(path, _)| path).chain(&code.paths) {
+            let Some((of, name)) = definition(&tree, from, path, STEPS) else { continue };
+            if !of.starts_with(from) && !from.starts_with(&of) {
+                needs.entry(from).or_default().entry(of).or_default().insert(name);
+            }
+        }
+    }
+    assert!(needs.values().map(BTreeMap::len).sum::<usize>() > 1000, "paths are no longer understood");
+    let reached = |from: &Names| {
+        let (mut reached, mut next) = (BTreeSet::new(), vec![from]);
+        while let Some(of) = next.pop() {
+            next.extend(needs.get(of).into_iter().flat_map(BTreeMap::keys).filter(|of| reached.insert((*of).clone())));
+        }
+        reached
+    };
+    let reached: BTreeMap<&Names, BTreeSet<Names>> = tree.keys().map(|from| (from, reached(from))).collect();
+    let mut faults = Vec::new();
+    for (from, of) in &needs {
+        for (of, names) in of.iter().filter(|(of, _)| reached[of].contains(*from)) {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let [from, of] = [*from, of].map(|module| tree[module].file.display());
+            faults.push(format!("{from} needs {of} ({}), which needs it", names.join(", ")));
+        }
+    }
+    hold(faults);
 }

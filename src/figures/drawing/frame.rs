@@ -1,7 +1,7 @@
-//! Frames of panels: ticks on all sides, numbers and labels below and to the left.
+//! Frames of panels: ticks on all sides, numbers and labels below and to the left; and bars that explain colours.
 
 use super::colour::BLACK;
-use super::panel::{Panel, Scale, Sides};
+use super::panel::{Panel, Scale, Shade, Sides};
 use super::ticks::{Ticks, ticks};
 use super::{Align, Axis, Figure, Font, LABEL_PT, Paint, Rect, SMALL_PT, Segment, Stroke, width_pt};
 
@@ -26,7 +26,7 @@ const APART: f64 = 4.0;
 
 /// Where numbers may stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Room {
+enum Room {
     /// At every tick.
     Free,
     /// Within the panel's own width: other panels stand close by to its sides, whose numbers they would touch.
@@ -73,14 +73,42 @@ fn y_ticks(frame: Rect, axis: &Axis, room: Room) -> Ticks {
     tried.unwrap_or_else(|| shown(ticks(axis.range, axis.scale, first)))
 }
 
+impl Panel {
+    /// Frame, ticks, numbers and labels; after the data, so that nothing covers them.
+    pub fn frame(&self, figure: &mut Figure, sides: Sides) {
+        draw(self, figure, sides, Room::Free);
+    }
+
+    /// The same where other panels stand close by: no number leaves the panel's own width or height, so that those of
+    /// neighbours cannot touch.
+    pub fn close_frame(&self, figure: &mut Figure, sides: Sides) {
+        draw(self, figure, sides, Room::Own);
+    }
+
+    /// The same where other panels stand close by to its sides alone.
+    pub fn narrow_frame(&self, figure: &mut Figure, sides: Sides) {
+        draw(self, figure, sides, Room::OwnWidth);
+    }
+
+    /// The same without ticks on its sides, where heights are only relative.
+    pub fn bare_y_frame(&self, figure: &mut Figure) {
+        draw_without_y(self, figure, Sides::BOTH, Room::Own);
+    }
+
+    /// The same without numbers.
+    pub fn bare_frame(&self, figure: &mut Figure) {
+        draw_without_y(self, figure, Sides { below: false, left: false }, Room::Own);
+    }
+}
+
 /// The frame of a panel.
-pub(super) fn draw(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
+fn draw(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
     let y = y_ticks(panel.frame, &panel.y, room);
     draw_with(panel, figure, sides, &y, room);
 }
 
 /// The frame of a panel without ticks on its sides.
-pub(super) fn draw_without_y(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
+fn draw_without_y(panel: &Panel, figure: &mut Figure, sides: Sides, room: Room) {
     draw_with(panel, figure, sides, &Ticks::default(), room);
 }
 
@@ -144,8 +172,38 @@ fn numbers_left(figure: &mut Figure, frame: Rect, axis: &Axis, ticks: &Ticks) {
 /// Distance of the baseline of a label from the left side of its panel (pt): numbers of five characters have room.
 const LEFT_LABEL: f64 = 27.0;
 
+impl Shade {
+    /// A bar of the colours with ticks and a label, upright to the right of `beside`.
+    pub fn upright_bar(&self, figure: &mut Figure, beside: Rect, label: &str) {
+        let frame = Rect { left: beside.right() + 6.0, width: 6.0, ..beside };
+        self.gradient(figure, frame, true);
+        draw_right(figure, frame, &Axis::linear(label, [self.low, self.high]));
+    }
+
+    /// The same, lying in `frame`, its ticks below.
+    pub fn lying_bar(&self, figure: &mut Figure, frame: Rect, label: &str) {
+        self.gradient(figure, frame, false);
+        draw_below(figure, frame, &Axis::linear(label, [self.low, self.high]));
+    }
+
+    fn gradient(&self, figure: &mut Figure, frame: Rect, upright: bool) {
+        const STEPS: usize = 100;
+        let Rect { left, top, width, height } = frame;
+        for k in 0..STEPS {
+            let colour = self.map.at((k as f64 + 0.5) / STEPS as f64);
+            let (from, part) = (k as f64 / STEPS as f64, 1.0 / STEPS as f64);
+            let cell = match upright {
+                true => Rect { left, width, top: top + height * (1.0 - from - part), height: height * part },
+                false => Rect { left: left + width * from, width: width * part, top, height },
+            };
+            figure.rect("scale", cell, Paint::cell(colour));
+        }
+        figure.rect("frame", frame, Paint::stroke(Stroke::new(BLACK, 0.6)));
+    }
+}
+
 /// Ticks, numbers and label below a bar.
-pub(super) fn draw_below(figure: &mut Figure, frame: Rect, axis: &Axis) {
+fn draw_below(figure: &mut Figure, frame: Rect, axis: &Axis) {
     let ticks = x_ticks(frame, axis, Room::Free);
     let mut path = Vec::new();
     for (value, _) in &ticks.major {
@@ -157,7 +215,7 @@ pub(super) fn draw_below(figure: &mut Figure, frame: Rect, axis: &Axis) {
 }
 
 /// Ticks, numbers and label to the right of a bar.
-pub(super) fn draw_right(figure: &mut Figure, frame: Rect, axis: &Axis) {
+fn draw_right(figure: &mut Figure, frame: Rect, axis: &Axis) {
     let ticks = y_ticks(frame, axis, Room::Free);
     let mut path = Vec::new();
     let mut widest: f64 = 0.0;

@@ -1,7 +1,6 @@
 //! A panel: a rectangle of the page with two axes, and data drawn in it. Nothing that is drawn by its axes leaves it.
 
 use super::colour::{BLACK, Colour, ColourMap, WHITE};
-use super::frame::Room;
 use super::{Figure, Paint, Point, Rect, Segment, Stroke, closed, open, rectangle, smooth};
 use std::collections::BTreeMap;
 
@@ -224,32 +223,6 @@ impl Panel {
         });
     }
 
-    /// Frame, ticks, numbers and labels; after the data, so that nothing covers them.
-    pub fn frame(&self, figure: &mut Figure, sides: Sides) {
-        super::frame::draw(self, figure, sides, Room::Free);
-    }
-
-    /// The same where other panels stand close by: no number leaves the panel's own width or height, so that those of
-    /// neighbours cannot touch.
-    pub fn close_frame(&self, figure: &mut Figure, sides: Sides) {
-        super::frame::draw(self, figure, sides, Room::Own);
-    }
-
-    /// The same where other panels stand close by to its sides alone.
-    pub fn narrow_frame(&self, figure: &mut Figure, sides: Sides) {
-        super::frame::draw(self, figure, sides, Room::OwnWidth);
-    }
-
-    /// The same without ticks on its sides, where heights are only relative.
-    pub fn bare_y_frame(&self, figure: &mut Figure) {
-        super::frame::draw_without_y(self, figure, Sides::BOTH, Room::Own);
-    }
-
-    /// The same without numbers.
-    pub fn bare_frame(&self, figure: &mut Figure) {
-        super::frame::draw_without_y(self, figure, Sides { below: false, left: false }, Room::Own);
-    }
-
     /// A text within the panel, at shares of its width (from the left) and height (from above).
     pub fn note(&self, figure: &mut Figure, text: &str, at: Point, align: super::Align) {
         let place = [self.frame.left + at[0] * self.frame.width, self.frame.top + at[1] * self.frame.height];
@@ -287,34 +260,6 @@ impl Shade {
     /// The colour of a number; `None` if it is not finite.
     pub fn colour(&self, value: f64) -> Option<Colour> {
         value.is_finite().then(|| self.map.at((value - self.low) / (self.high - self.low)))
-    }
-
-    /// A bar of the colours with ticks and a label, upright to the right of `beside`.
-    pub fn upright_bar(&self, figure: &mut Figure, beside: Rect, label: &str) {
-        let frame = Rect { left: beside.right() + 6.0, width: 6.0, ..beside };
-        self.gradient(figure, frame, true);
-        super::frame::draw_right(figure, frame, &Axis::linear(label, [self.low, self.high]));
-    }
-
-    /// The same, lying in `frame`, its ticks below.
-    pub fn lying_bar(&self, figure: &mut Figure, frame: Rect, label: &str) {
-        self.gradient(figure, frame, false);
-        super::frame::draw_below(figure, frame, &Axis::linear(label, [self.low, self.high]));
-    }
-
-    fn gradient(&self, figure: &mut Figure, frame: Rect, upright: bool) {
-        const STEPS: usize = 100;
-        let Rect { left, top, width, height } = frame;
-        for k in 0..STEPS {
-            let colour = self.map.at((k as f64 + 0.5) / STEPS as f64);
-            let (from, part) = (k as f64 / STEPS as f64, 1.0 / STEPS as f64);
-            let cell = match upright {
-                true => Rect { left, width, top: top + height * (1.0 - from - part), height: height * part },
-                false => Rect { left: left + width * from, width: width * part, top, height },
-            };
-            figure.rect("scale", cell, Paint::cell(colour));
-        }
-        figure.rect("frame", frame, Paint::stroke(Stroke::new(BLACK, 0.6)));
     }
 }
 

@@ -2,8 +2,8 @@
 //! paraboloid and, where a run is given, the contours of its chain.
 
 use super::density::Density;
-use super::paraboloid::{self, Paraboloid};
-use super::symbols::{label, nearest_turn, symbol};
+use super::paraboloid::{self, Paraboloid, turned};
+use super::symbols::{label, symbol};
 use super::trace::Sampled;
 use super::{PlotError, corner::SHARES};
 use crate::data::io::landscape;
@@ -304,9 +304,4 @@ fn nodes(axis: &GridAxis) -> Vec<f64> {
 fn edges(nodes: &[f64]) -> Vec<f64> {
     let half = 0.5 * (nodes[1] - nodes[0]);
     std::iter::once(nodes[0] - half).chain(nodes.iter().map(|x| x + half)).collect()
-}
-
-/// A value in the turn of the axis.
-pub(super) fn turned(axis: &GridAxis, nodes: &[f64], x: f64) -> f64 {
-    if axis.periodic { nearest_turn(x, 0.5 * (nodes[0] + nodes[nodes.len() - 1])) } else { x }
 }

@@ -1,11 +1,10 @@
 //! The paraboloid over a landscape: ellipses above its minimum, cut by a plane or projected onto it.
 
-use super::landscape::turned;
+use super::symbols::nearest_turn;
 use crate::figures::drawing::colour::VERMILION;
 use crate::figures::drawing::panel::gaussian_contour;
 use crate::figures::drawing::{Figure, Panel, Stroke};
-use crate::sampling::landscape;
-use crate::sampling::landscape::Grid;
+use crate::sampling::landscape::{self, Axis, Grid};
 use nalgebra::DMatrix;
 
 /// The pen of its lines.
@@ -61,4 +60,9 @@ impl Paraboloid {
 fn invert([[a, b], [c, d]]: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     let determinant = a * d - b * c;
     (determinant > 0.0).then(|| [[d / determinant, -b / determinant], [-c / determinant, a / determinant]])
+}
+
+/// A value in the turn of the axis.
+pub(super) fn turned(axis: &Axis, nodes: &[f64], x: f64) -> f64 {
+    if axis.periodic { nearest_turn(x, 0.5 * (nodes[0] + nodes[nodes.len() - 1])) } else { x }
 }

@@ -1,12 +1,13 @@
 //! What is said of each kind of result, from its file.
 
-use super::{Chapter, NOTHING, Table, Tone, injection, is_empty, maps, planned, run, verdicts};
+use super::chapter::{Chapter, NOTHING, Tone, number, pairs, parameters, table, tone};
+use super::{injection, maps, planned, run, verdicts};
 use crate::data::io::map::{FIT, MAP};
 use crate::data::io::paraboloid::ParaboloidFile;
 use crate::data::io::truth::{self, Truth, TruthFile};
 use crate::figures::plot::PlotError;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
-use crate::model::{Estimate, OrbitQuantity, Parameter, ParameterValues, Quoted, definition, quoted_definition};
+use crate::model::{Estimate, OrbitQuantity, Parameter, Quoted, definition, quoted_definition};
 use crate::planets::verdict::probability;
 use crate::runs::blind_search::{self, PeakRecord, PeriodogramFile};
 use crate::runs::comparison::{self, AgainstChain, Comparison, Interval};
@@ -41,39 +42,9 @@ pub(super) fn of(folder: &Path, file: &'static str) -> Result<Chapter, PlotError
     })
 }
 
-/// A number with so many decimals; a dash where there is none.
-pub(super) fn number(value: impl Into<Option<f64>>, digits: usize) -> String {
-    value.into().filter(|x| x.is_finite()).map_or_else(|| NOTHING.into(), |x| format!("{x:.digits$}"))
-}
-
 /// Decimals that show an error, where there is one.
 fn digits_of(sigma: Option<f64>, otherwise: usize) -> usize {
     sigma.filter(|x| x.is_finite()).map_or(otherwise, decimals)
-}
-
-/// A table of names and values, those without one left out.
-pub(super) fn pairs(rows: &[(&str, String)]) -> Table {
-    let told = rows.iter().filter(|(_, value)| !is_empty(value));
-    Table { head: Vec::new(), rows: told.map(|(name, value)| vec![(*name).to_owned(), value.clone()]).collect() }
-}
-
-fn table(head: &[&str], rows: Vec<Vec<String>>) -> Table {
-    Table { head: head.iter().map(|text| (*text).to_owned()).collect(), rows }
-}
-
-pub(super) fn tone(good: bool) -> Tone {
-    if good { Tone::Good } else { Tone::Doubt }
-}
-
-/// The parameters that are given, and the injected ones where they are known.
-pub(super) fn parameters(values: &ParameterValues, truth: Option<&ParameterValues>) -> Table {
-    let row = |parameter: Parameter| {
-        let mut row = vec![label(parameter.name()), number(values.get(parameter)?, 4)];
-        row.extend(truth.map(|truth| number(truth.get(parameter), 4)));
-        Some(row)
-    };
-    let head: &[&str] = if truth.is_some() { &["parameter", "value", "injected"] } else { &["parameter", "value"] };
-    table(head, Parameter::ALL.into_iter().filter_map(row).collect())
 }
 
 fn simulation(truth: &Truth) -> Chapter {

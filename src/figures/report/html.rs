@@ -1,7 +1,9 @@
 //! The page as HTML.
 
-use super::{Chapter, Page, Table, Tone, citation};
+use super::chapter::{Chapter, Table, Tone};
+use super::citation;
 use crate::figures::drawing::{COLUMN_MM, Figure, plain};
+use serde_json::Value;
 use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("style.css");
@@ -11,6 +13,23 @@ pub(super) const BEGINNING: &str = "<!doctype html>\n";
 
 /// Points in the width of a column, and some: figures that are not wider fit a phone.
 const NARROW_PT: f64 = 1.3 * COLUMN_MM * 72.0 / 25.4;
+
+/// The page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Page {
+    /// Name of the folder.
+    pub title: String,
+    /// Star and data, label and text a line.
+    pub subject: Vec<(String, String)>,
+    /// What the folder holds, kind by kind.
+    pub chapters: Vec<Chapter>,
+    /// All figures.
+    pub figures: Vec<Figure>,
+    /// The config with all defaults filled in, where a file has it.
+    pub config: Option<Value>,
+    /// Version of the program and fingerprint of the data, where a file has them.
+    pub provenance: Vec<(String, String)>,
+}
 
 /// The whole page.
 pub(super) fn page(page: &Page) -> String {

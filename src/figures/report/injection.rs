@@ -1,7 +1,6 @@
 //! What is said of orbits that were put into profiles, and of limits found that way.
 
-use super::chapters::{number, pairs};
-use super::{Chapter, Table};
+use super::chapter::{Chapter, Table, number, pairs};
 use crate::data::io::truth::InjectedTruth;
 use crate::runs::limits::{Limit, LimitsFile};
 use crate::star::Orbit;

@@ -1,7 +1,6 @@
 //! What a report has on the maps of a star.
 
-use super::chapters::{number, pairs, parameters, tone};
-use super::{Chapter, Tone};
+use super::chapter::{Chapter, Tone, number, pairs, parameters, tone};
 use crate::data::io::map::FitFile;
 use crate::sampling::log_density::Status;
 use crate::surface::SpotField;

@@ -2,6 +2,7 @@
 //! figures, the config and how to cite. A single HTML file that needs nothing else: no network, no script, figures as
 //! SVG within it.
 
+mod chapter;
 mod chapters;
 mod citation;
 mod html;
@@ -12,94 +13,11 @@ mod run;
 mod subject;
 mod verdicts;
 
-use crate::figures::drawing::Figure;
 use crate::figures::plot::{self, PlotError};
 use crate::numerics::text::escaped;
-use serde_json::Value;
+use html::Page;
 use std::io::Read as _;
 use std::path::Path;
-
-/// A table of text.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
-    /// Names of the columns.
-    pub head: Vec<String>,
-    /// The rows, as long as the head.
-    pub rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    /// The same without columns that say nothing in any row.
-    fn without_empty_columns(&self) -> Table {
-        let says = |k: &usize| self.rows.iter().any(|row| row.get(*k).is_some_and(|cell| !is_empty(cell)));
-        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let kept: Vec<usize> = (0..columns).filter(says).collect();
-        let of = |row: &Vec<String>| kept.iter().filter_map(|k| row.get(*k).cloned()).collect::<Vec<_>>();
-        Table { head: of(&self.head), rows: self.rows.iter().map(of).collect() }
-    }
-}
-
-/// What stands in a cell for which there is no number.
-const NOTHING: &str = "–";
-
-fn is_empty(cell: &str) -> bool {
-    cell.is_empty() || cell == NOTHING
-}
-
-/// How a sentence is meant, for the colour that it has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tone {
-    /// It can be relied on.
-    Good,
-    /// It is neither good nor bad.
-    #[default]
-    Neutral,
-    /// It is to be doubted.
-    Doubt,
-}
-
-/// What is said of one kind of result.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Chapter {
-    /// Its heading.
-    pub heading: String,
-    /// What it comes to, a sentence each, the one that heads the result first.
-    pub verdicts: Vec<(Tone, String)>,
-    /// What speaks against it, or must be known beside it.
-    pub warnings: Vec<String>,
-    /// What helps to read it.
-    pub notes: Vec<String>,
-    /// Tables, each with a line above it.
-    pub tables: Vec<(String, Table)>,
-}
-
-impl Chapter {
-    /// The verdicts with the tones that they are shown in: nothing is good beside a warning.
-    pub fn shown_verdicts(&self) -> impl Iterator<Item = (Tone, &str)> {
-        let doubted = !self.warnings.is_empty() || self.verdicts.iter().any(|(tone, _)| *tone == Tone::Doubt);
-        self.verdicts.iter().map(move |(tone, sentence)| match tone {
-            Tone::Good if doubted => (Tone::Neutral, sentence.as_str()),
-            tone => (*tone, sentence.as_str()),
-        })
-    }
-}
-
-/// The page.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Page {
-    /// Name of the folder.
-    pub title: String,
-    /// Star and data, label and text a line.
-    pub subject: Vec<(String, String)>,
-    /// What the folder holds, kind by kind.
-    pub chapters: Vec<Chapter>,
-    /// All figures.
-    pub figures: Vec<Figure>,
-    /// The config with all defaults filled in, where a file has it.
-    pub config: Option<Value>,
-    /// Version of the program and fingerprint of the data, where a file has them.
-    pub provenance: Vec<(String, String)>,
-}
 
 /// The page of what `folder` holds, as HTML.
 ///

@@ -1,7 +1,6 @@
 //! What is said of a campaign that is planned.
 
-use super::chapters::number;
-use super::{Chapter, Table, Tone};
+use super::chapter::{Chapter, Table, Tone, number};
 use crate::runs::plan::{AfterRecord, ExpectedRecord, PlanFile, ScheduleRecord};
 
 /// Decimals of velocities (km/s).

@@ -1,6 +1,7 @@
 //! What is said of a run.
 
-use super::{Chapter, NOTHING, Table, Tone, verdicts};
+use super::chapter::{Chapter, NOTHING, Table, Tone};
+use super::verdicts;
 use crate::figures::plot::symbols::{PERIOD_DIGITS, decimals, label, symbol};
 use crate::figures::plot::{PlotError, Sampled};
 use crate::planets::modes::PeriodMode;

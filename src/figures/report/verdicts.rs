@@ -1,6 +1,6 @@
 //! The sentences that head a result, as its file has them.
 
-use super::Tone;
+use super::chapter::Tone;
 use crate::planets::verdict::{Finding, Verdict};
 
 /// Of a verdict on a planet: a detection can be relied on, a candidate is to be doubted.

@@ -19,9 +19,6 @@ const DRAWS: usize = 250;
 /// Rows, two a trial period, whose product with the draws is held at once.
 const ROWS: usize = 1024;
 
-/// Directions of the gradient with less than this part of the largest variance do not move.
-const STILL: f64 = 1e-13;
-
 /// The highest Delta ln L over the trial frequencies of each of `draws` gradients, the jitter being what suits best
 /// without an orbit and with each.
 pub fn maxima(jitters: &Jitters, frequencies: &[f64], draws: usize, seed: u64) -> Vec<f64> {
@@ -77,13 +74,4 @@ fn whitened(level: &Level, frequencies: &[f64]) -> DMatrix<f64> {
         }
     }
     columns.transpose()
-}
-
-/// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do
-/// draws.
-pub(super) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut eigen = covariance.clone().symmetric_eigen();
-    let still = STILL * eigen.eigenvalues.max();
-    eigen.eigenvalues.apply(|variance| *variance = if *variance > still { variance.sqrt() } else { 0.0 });
-    eigen.recompose()
 }

@@ -5,13 +5,15 @@
 //! is what suits best, without an orbit and with each orbit, as in the F-test of a periodogram of unknown noise. Stars
 //! without a planet, whose zero points scatter as was found without one, are judged in the same way.
 
-use super::draws::root;
 use super::orbits::{CircularOrbit, Trial, scan};
 use crate::planets::velocities::VelocityQuadratic;
 use nalgebra::{DMatrix, DVector};
 
 /// Sizes that are tried, of the one found without a planet.
 const SIZES: [f64; 6] = [0.0, 0.25, 0.5, std::f64::consts::FRAC_1_SQRT_2, 1.0, std::f64::consts::SQRT_2];
+
+/// Directions of the gradient with less than this part of the largest variance do not move.
+const STILL: f64 = 1e-13;
 
 /// ln L of the velocities beside jitters of several sizes.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,6 +129,15 @@ impl Jitters {
         }
         best
     }
+}
+
+/// The symmetric root of a covariance: unlike any made of eigenvectors alone, it does not hang on their signs, nor do
+/// draws.
+fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut eigen = covariance.clone().symmetric_eigen();
+    let still = STILL * eigen.eigenvalues.max();
+    eigen.eigenvalues.apply(|variance| *variance = if *variance > still { variance.sqrt() } else { 0.0 });
+    eigen.recompose()
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! Why a run cannot begin, or go on.
 
-use super::start;
 use crate::data::config::ConfigError;
 use crate::data::io::atomic::WriteError;
 use crate::data::io::journal::JournalError;
@@ -10,6 +9,9 @@ use crate::sampling::chain::ChainError;
 use crate::sampling::ensemble::EnsembleError;
 use crate::surface::density::UnresolvedSpotsError;
 use std::path::PathBuf;
+
+/// Draws from the prior tried for one walker.
+pub(super) const PRIOR_TRIES: usize = 100;
 
 /// Why a run cannot begin, or go on.
 #[derive(Debug, thiserror::Error)]
@@ -27,7 +29,7 @@ pub enum RunError {
     /// A walker found no place in the prior where a reconstruction succeeds.
     #[error(
         "start from the prior: no reconstruction succeeds at {} draws; narrow the priors under `parameters`",
-        start::PRIOR_TRIES
+        PRIOR_TRIES
     )]
     PriorStart,
     /// The unresolved spots have no size that fits.

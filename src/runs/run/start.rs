@@ -2,6 +2,7 @@
 //! the prior.
 
 use super::RunError;
+use super::error::PRIOR_TRIES;
 use crate::data::scene::Scene;
 use crate::inference::search::Found;
 use crate::runs::pool::Target;
@@ -16,9 +17,6 @@ const OVERDISPERSION: f64 = 1.5;
 
 /// Draws from the surrogate tried for one walker.
 const DRAW_TRIES: usize = 3;
-
-/// Draws from the prior tried for one walker.
-pub(super) const PRIOR_TRIES: usize = 100;
 
 /// Walkers drawn from the surrogate, wider than the posterior and with more of them around minor peaks than these
 /// deserve; `None` where the priors leave hardly anything of it, or nothing can be reconstructed at a draw.

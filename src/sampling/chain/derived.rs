@@ -5,8 +5,8 @@
 //! nearest to t0. Where period or phase are hardly known the intervals are as wide as that.
 
 use super::convergence::{Diagnostic, ParameterKind};
+use super::parameter::{ParameterSummary, parameter_summary};
 use super::statistics::{periodic_mode, unwrap_around};
-use super::summary::{ParameterSummary, parameter_summary};
 use super::{Chain, Series};
 use crate::numerics::quantile::quantile;
 use rayon::prelude::*;

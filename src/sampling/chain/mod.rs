@@ -9,6 +9,7 @@ pub mod autocorrelation;
 pub mod convergence;
 pub mod derived;
 pub mod moves;
+pub mod parameter;
 pub mod record;
 pub mod statistics;
 pub mod store;
@@ -18,9 +19,10 @@ pub mod table;
 pub use convergence::{Convergence, Diagnostic, Goals, ParameterKind};
 pub use derived::{Derived, Settled};
 pub use moves::MoveSummary;
+pub use parameter::ParameterSummary;
 pub use record::{MoveKind, Record, Shape};
 pub use store::{Chain, Series};
-pub use summary::{ParameterSummary, Summary, summarise};
+pub use summary::{Summary, summarise};
 pub use table::table;
 
 /// What can be wrong with a chain.

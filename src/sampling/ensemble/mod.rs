@@ -8,6 +8,7 @@ pub mod sampler;
 pub mod settings;
 pub mod start;
 pub mod stop;
+mod streams;
 
 pub use moves::{Mix, Move, MoveWeights, Proposal};
 pub use sampler::{Sampler, State, Walker};

@@ -2,15 +2,15 @@
 //!
 //! Source: Goodman & Weare 2010 (ensemble), Foreman-Mackey et al. 2013, section 2 (halves in turn). The split into
 //! halves is drawn anew each step. Positions are kept in *written* coordinates and a proposal is written -> internal ->
-//! move -> written, so a chain read back from a file goes on to the same bytes. Random numbers are counter-based: the
-//! stream is that of the ensemble and walker, the position in it that of the step; there is no generator state to keep.
+//! move -> written, so a chain read back from a file goes on to the same bytes. Random numbers are counter-based
+//! (`streams`).
 
 use crate::sampling::chain::{Chain, MoveKind, Record};
+use crate::sampling::ensemble::streams::{Purpose, random_numbers, stream};
 use crate::sampling::ensemble::{EnsembleError, Mix, Move, Proposal, SamplerSettings, describe, start};
 use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status};
+use rand::Rng;
 use rand::seq::SliceRandom;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// One walker: where it stands.
@@ -276,27 +276,6 @@ impl<'a> Sampler<'a> {
         second.sort_unstable();
         order
     }
-}
-
-/// What random numbers are for; no two purposes share a stream.
-#[derive(Clone, Copy)]
-pub(super) enum Purpose {
-    Walker = 0,
-    Split = 1,
-    Start = 2,
-}
-
-/// The stream of an ensemble and walker (both under 2^20, see the settings).
-pub(super) fn stream(purpose: Purpose, ensemble: usize, walker: usize) -> u64 {
-    (purpose as u64) << 60 | (ensemble as u64) << 30 | walker as u64
-}
-
-/// The random numbers of a stream at a step: 2^16 words are set aside for each.
-pub(super) fn random_numbers(seed: u64, stream: u64, step: usize) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(stream);
-    rng.set_word_pos((step as u128) << 16);
-    rng
 }
 
 /// The records of a state, given what became of each walker (`ensemble * walkers + walker`).

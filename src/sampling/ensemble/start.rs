@@ -3,7 +3,7 @@
 //! A start in a plane stays there under affine-invariant moves (Goodman & Weare 2010, section 2), hence the checks.
 //! R-hat asks for starts wider than the posterior (Gelman & Rubin 1992), hence the scale.
 
-use crate::sampling::ensemble::sampler::{Purpose, random_numbers, stream};
+use crate::sampling::ensemble::streams::{Purpose, random_numbers, stream};
 use crate::sampling::ensemble::{EnsembleError, describe};
 use crate::sampling::log_density::LogDensity;
 use nalgebra::{DMatrix, DVector};

@@ -14,6 +14,7 @@
 //! 7. [`MarginalPosterior`]: ln Z with the priors, for chains, landscapes and searches.
 //! 8. [`Planned`]: what profiles that are not yet taken will say of velocities.
 
+mod basis;
 pub mod change;
 mod climb;
 mod condense;
@@ -31,9 +32,9 @@ mod planned;
 mod posterior;
 mod surface;
 
+pub use basis::Basis;
 pub use change::Change;
-pub use density::FieldRecord;
-pub use design::{Basis, Design};
+pub use design::Design;
 pub use fit::{Fitted, NoFit, fit};
 pub use forecast::Forecast;
 pub use known::Known;

@@ -1,5 +1,4 @@
-//! The posterior by one map of maximum entropy behind the interface of all surface models, and what is written of its
-//! reference.
+//! The posterior by one map of maximum entropy behind the interface of all surface models.
 
 use super::{LIKELIHOOD_NUMBERS, Posterior, Reference, SpotsCounted};
 use crate::model::ParameterSpace;
@@ -7,34 +6,10 @@ use crate::sampling::log_density::{Evaluation, Evaluator, LogDensity};
 use crate::surface::density::{Density, SurfaceDensity, UnresolvedSpotsError};
 use crate::surface::imaging::Imager;
 use crate::surface::objective::UnresolvedSpots;
-use crate::surface::record::{SurfaceRecord, by_name};
+use crate::surface::record::{ImageRecord, SurfaceRecord, by_name};
 use crate::surface::surrogate::Surrogate;
-use serde::{Deserialize, Serialize};
 use std::any::Any;
-use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// The reference solution.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ImageRecord {
-    /// All parameters.
-    pub parameters: BTreeMap<String, f64>,
-    /// Target of chi2.
-    pub chi2_target: f64,
-    /// chi2 of the image.
-    pub chi2: f64,
-    /// Lagrange multiplier.
-    pub lambda: f64,
-    /// Entropy.
-    pub entropy: f64,
-    /// Spottedness.
-    pub spottedness: f64,
-    /// chi2 at the end of the trade-off curve, where lambda is three times as large.
-    pub chi2_reach: f64,
-    /// Number of data.
-    pub data: usize,
-}
 
 impl ImageRecord {
     pub(super) fn of(reference: &Reference) -> Self {
@@ -49,23 +24,6 @@ impl ImageRecord {
             chi2_reach: reference.tradeoff.nodes().last().map_or(solution.chi2, |node| node.chi2),
             data: reference.response.data_len(),
         }
-    }
-
-    /// A target that a noise realisation, which moves the attainable chi2 by sqrt(2/N), may put out of reach: there
-    /// spottedness explodes, and the answer hangs on the target (`docs/method.md` section 3).
-    pub(in crate::surface) fn warning(&self) -> Option<String> {
-        let noise = (2.0 / self.data as f64).sqrt() * self.chi2_target;
-        (self.chi2_target - self.chi2_reach < noise).then(|| {
-            let per_datum = |chi2: f64| chi2 / self.data as f64;
-            format!(
-                "the target chi2 of {:.3} per datum is close to the floor (three times its lambda comes down to \
-                {:.3}): see \
-                 whether the answer stays when imaging.chi2_target is raised by {:.3}",
-                per_datum(self.chi2_target),
-                per_datum(self.chi2_reach),
-                per_datum(noise)
-            )
-        })
     }
 }
 

@@ -5,6 +5,7 @@ mod counted;
 mod density;
 mod likelihood;
 mod maps;
+mod model;
 mod optimum;
 pub mod posterior;
 mod prediction;
@@ -15,9 +16,8 @@ pub mod tradeoff;
 mod warm_start;
 
 pub use counted::SpotsCounted;
-pub use density::ImageRecord;
 pub use likelihood::NUMBERS as LIKELIHOOD_NUMBERS;
+pub use model::StaticMap;
 pub use posterior::{CHI2, Posterior, SPOTTEDNESS, is_physical};
 pub use reference::{Reference, ReferenceError};
 pub use spots::UNRESOLVED_SPOTS;
-pub use surface::StaticMap;

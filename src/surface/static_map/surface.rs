@@ -1,6 +1,6 @@
 //! The static map behind the interface of all surface models.
 
-use super::{Posterior, Reference, UNRESOLVED_SPOTS, optimum};
+use super::{Posterior, Reference, StaticMap, UNRESOLVED_SPOTS, optimum};
 use crate::maxent::Termination;
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters, Unbounded};
@@ -8,14 +8,12 @@ use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
 use crate::surface::density::Density;
-use crate::surface::evolving_map::{Change, Known, NoFit};
+use crate::surface::evolving_map::{Change, NoFit};
 use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
-use crate::surface::{
-    At, AtTarget, Explained, Linearised, NoMaps, ObjectiveKind, OrbitOf, SurfaceError, SurfaceMaps, SurfaceModel,
-};
+use crate::surface::{At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, SurfaceError, SurfaceMaps, SurfaceModel};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -25,18 +23,6 @@ const TARGETS: [f64; 3] = [0.97, 1.0, 1.03];
 const FAR: f64 = 5.0;
 /// A target is missed by more than this factor; errors that were measured are such that it is just reached.
 const MISSED: f64 = 1.02;
-
-/// Spots that do not change within a season, as the map of maximum entropy at a target chi2 has them.
-#[derive(Clone, Copy, Debug)]
-pub struct StaticMap {
-    /// What a map is judged by.
-    pub objective: ObjectiveKind,
-    /// Target of chi2, per datum. Where it takes more than three times the entropy's weight over the number of data, the
-    /// image stops short of it: beyond, noise is turned into spots.
-    pub chi2_target: f64,
-    /// What is known of the field in a comparison with spots that evolve; without it there is none.
-    pub compared_with: Option<Known>,
-}
 
 impl SurfaceModel for StaticMap {
     fn linearise(&self, at: At, _: Option<&Linearised>) -> Result<Linearised, SurfaceError> {

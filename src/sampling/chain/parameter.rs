@@ -1,0 +1,95 @@
+//! The summary of one parameter, or of a quantity that follows from them: point estimates, intervals and trust in them.
+//!
+//! - `ci68`, `ci95`: equal tails (16 to 84 %, 2.5 to 97.5 %); `hdi68`, `hdi95`: the shortest intervals.
+//! - A periodic parameter is unwrapped around its mode (cut opposite to it) before anything is computed. Point
+//!   estimates are written in [0, 1); intervals stay contiguous (lo < hi) and around the median, so lo may be below 0
+//!   or hi above 1.
+//! - `upper95`, the 95 % quantile, is there for an amplitude whose posterior touches zero: the lower end of its 95 %
+//!   HDI is within a tenth of a standard deviation of 0.
+
+use super::autocorrelation::mean;
+use super::convergence::{Diagnostic, ParameterKind};
+use super::statistics::{mode, periodic_mode, shortest_interval, unwrap_around, wrap};
+use crate::numerics::quantile::quantile;
+use serde::{Deserialize, Serialize};
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
+/// Share of a standard deviation within which an amplitude touches zero.
+const TOUCH: f64 = 0.1;
+
+/// Summary of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParameterSummary {
+    /// Median.
+    pub median: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub sd: f64,
+    /// Mode of a kernel density estimate.
+    pub mode: f64,
+    /// 16 % and 84 % quantiles.
+    pub ci68: [f64; 2],
+    /// 2.5 % and 97.5 % quantiles.
+    pub ci95: [f64; 2],
+    /// Shortest interval of 68 %.
+    pub hdi68: [f64; 2],
+    /// Shortest interval of 95 %.
+    pub hdi95: [f64; 2],
+    /// R-hat between ensembles; null where the chain is too short.
+    pub rhat: Option<f64>,
+    /// Effective sample size; null where the chain is too short.
+    pub ess: Option<f64>,
+    /// Integrated autocorrelation time (steps); null where the chain is too short.
+    pub tau: Option<f64>,
+    /// Whether the data hardly say more of it than its prior, so that its median means nothing.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub unconstrained: bool,
+    /// Upper limit (95 %), for an amplitude that touches zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper95: Option<f64>,
+}
+
+/// Statistics of the pooled draws of one parameter.
+pub(super) fn parameter_summary(
+    mut values: Vec<f64>,
+    kind: ParameterKind,
+    diagnostic: &Diagnostic,
+) -> ParameterSummary {
+    let effective = diagnostic.ess.unwrap_or(1.0);
+    let periodic = kind == ParameterKind::Periodic;
+    let around = periodic.then(|| periodic_mode(&values, effective));
+    if let Some(centre) = around {
+        unwrap_around(&mut values, centre);
+    }
+    values.sort_unstable_by(f64::total_cmp);
+    let median = quantile(&values, 0.5);
+    // Whole periods that bring the median, and the intervals with it, to [0, 1).
+    let turns = if periodic { (median - wrap(median)).round() } else { 0.0 };
+    let point = |x: f64| if periodic { wrap(x) } else { x };
+    let shift = |[low, high]: [f64; 2]| [low - turns, high - turns];
+    let centre = mean(values.iter());
+    let squares = values.iter().map(|x| (x - centre).powi(2)).sum::<f64>();
+    let sd = (squares / (values.len() as f64 - 1.0).max(1.0)).sqrt();
+    let tails = |share: f64| [quantile(&values, 0.5 - 0.5 * share), quantile(&values, 0.5 + 0.5 * share)];
+    let hdi95 = shortest_interval(&values, 0.95);
+    let touches_zero = kind == ParameterKind::Amplitude && hdi95[0] <= TOUCH * sd;
+    ParameterSummary {
+        median: point(median),
+        mean: point(centre),
+        sd,
+        mode: around.unwrap_or_else(|| mode(&values, effective)),
+        ci68: shift(tails(0.68)),
+        ci95: shift(tails(0.95)),
+        hdi68: shift(shortest_interval(&values, 0.68)),
+        hdi95: shift(hdi95),
+        rhat: diagnostic.rhat,
+        ess: diagnostic.ess,
+        tau: diagnostic.tau,
+        unconstrained: false,
+        upper95: touches_zero.then(|| quantile(&values, 0.95)),
+    }
+}

@@ -1,0 +1,64 @@
+//! The harmonics that maps are made of, on the pixels of a star.
+
+use super::{DEGREE, MEAN_FILLING};
+use crate::field::{Compression, Harmonics, Settling};
+use crate::star::SurfaceGrid;
+use nalgebra::DMatrix;
+
+/// Pixels at which changes of the maps are watched, about.
+const WATCHED: usize = 150;
+
+/// The harmonics on the pixels of a map.
+#[derive(Clone, Debug)]
+pub struct Basis {
+    /// Degree of each harmonic (H).
+    pub degrees: Vec<usize>,
+    /// The harmonics (pixels, H).
+    pub on_pixels: DMatrix<f64>,
+    /// The harmonics (points, H) where changes of the maps are watched.
+    pub(super) watched: DMatrix<f64>,
+    /// How exactly maps are found.
+    pub(super) settling: Settling,
+    /// Times that maps are found with a jitter, along their slopes from time to time.
+    pub(super) jittered: usize,
+}
+
+impl Basis {
+    /// On the pixels of `grid`, maps exact enough for ln Z to some 0.03.
+    pub fn new(grid: &SurfaceGrid) -> Self {
+        let harmonics = Harmonics::new(DEGREE);
+        let on_pixels = harmonics.at(&grid.longitude, &grid.latitude);
+        let each = (grid.len() / WATCHED).max(1);
+        let watched: Vec<usize> = (0..grid.len()).step_by(each).collect();
+        Basis {
+            degrees: harmonics.degrees(),
+            watched: on_pixels.select_columns(&watched).transpose(),
+            on_pixels: on_pixels.transpose(),
+            settling: Settling { tolerance: 1e-3, ..Settling::default() },
+            jittered: 1,
+        }
+    }
+
+    /// The same where ln Z is compared with that of neighbours: maps exact enough for ln Z to some 0.003.
+    pub fn exact(grid: &SurfaceGrid) -> Self {
+        let settling = Settling { tolerance: 2e-4, ..Settling::default() };
+        Basis { settling, jittered: 2, ..Basis::new(grid) }
+    }
+
+    /// The same where differences of ln Z need be good to a few tenths only.
+    pub fn rough(grid: &SurfaceGrid) -> Self {
+        Basis::new(grid).roughly()
+    }
+
+    /// These harmonics, differences of ln Z good to a few tenths.
+    #[must_use]
+    pub(super) fn roughly(&self) -> Self {
+        let compression = Compression { left_out: 0.03 };
+        Basis { settling: Settling { tolerance: 5e-3, compression, ..Settling::default() }, ..self.clone() }
+    }
+
+    /// Spot filling factors (pixels, columns) of maps with these `coefficients` (H, columns).
+    pub fn filling(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
+        (&self.on_pixels * coefficients).add_scalar(MEAN_FILLING)
+    }
+}
