@@ -243,6 +243,7 @@ fn compared(file: &Comparison) -> Chapter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::ParameterValues;
     use serde::de::DeserializeOwned;
     use serde_json::{Value, json};
 
