@@ -1,5 +1,5 @@
-//! What a row comes to: a table of numbers, and the few that sum it up; as `table.csv` and `summary.json` in a folder of
-//! its name.
+//! What a row comes to: a table of numbers, and the few that sum it up; as `table.csv` and `summary.json` in a folder
+//! of its name.
 
 use crate::cases::Failure;
 use crate::rows::Row;

@@ -1,5 +1,5 @@
-//! What must come out whatever the paper says, each test named after the mistake that it would catch; and the program on
-//! a row.
+//! What must come out whatever the paper says, each test named after the mistake that it would catch; and the program
+//! on a row.
 
 use super::{Args, list, rows, run};
 use crate::cases::{Case, Nodes, Outcome, Route, paper, with};

@@ -77,8 +77,8 @@ pub struct Tried {
 }
 
 impl Diagnosis {
-    /// Of a scene that no map fits as well as its errors promise, by trying. `None` where there is no map at all, and of
-    /// several data sets.
+    /// Of a scene that no map fits as well as its errors promise, by trying. `None` where there is no map at all, and
+    /// of several data sets.
     pub fn of(scene: &Scene) -> Option<Self> {
         if scene.settings.sets.len() > 1 {
             return None;

@@ -1,5 +1,5 @@
-//! A star, its planets and its spots at one point of parameter space, in the units of the parameters' names; by parameter
-//! see `access`.
+//! A star, its planets and its spots at one point of parameter space, in the units of the parameters' names; by
+//! parameter see `access`.
 
 use crate::star::{Eccentric, Motion, Orbit, Rotation, Shape, StarState, Surface};
 

@@ -1,5 +1,6 @@
-//! The maps that a surface model finds, and what they make of the profiles: model profiles, radial velocities before and
-//! after the spots are taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is judged.
+//! The maps that a surface model finds, and what they make of the profiles: model profiles, radial velocities before
+//! and after the spots are taken out of them (Petit et al. 2015, section 3), and the numbers by which the fit is
+//! judged.
 
 use super::checks::{Checks, Residual};
 use super::evolving_map::{FluxFit, NoFit};
@@ -65,9 +66,9 @@ pub struct SurfaceMap {
 pub struct VelocityWithoutSpots {
     /// Its first moment, and that of the model.
     pub moments: FilteredVelocity,
-    /// The most likely velocity relative to the systemic one, marginalised over maps, whatever the assumed orbit, and its
-    /// standard error, of which those of other profiles are not independent (km/s); NaN where the data do not bound it,
-    /// `None` where there is one map alone.
+    /// The most likely velocity relative to the systemic one, marginalised over maps, whatever the assumed orbit, and
+    /// its standard error, of which those of other profiles are not independent (km/s); NaN where the data do not bound
+    /// it, `None` where there is one map alone.
     pub marginalised_kms: Option<[f64; 2]>,
 }
 

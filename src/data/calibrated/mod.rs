@@ -97,8 +97,8 @@ impl Calibrated {
         Ok(Calibrated { observations: Observations::joined(parts), sha256, measured, chi2_target, imager })
     }
 
-    /// The same where the profiles are others than those that it was measured on, of the same star at the same times and
-    /// in the same bins: errors, target chi2, velocity jitter and velocity offsets of data sets are held.
+    /// The same where the profiles are others than those that it was measured on, of the same star at the same times
+    /// and in the same bins: errors, target chi2, velocity jitter and velocity offsets of data sets are held.
     ///
     /// # Errors
     /// Profiles that make no sense.

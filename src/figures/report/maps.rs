@@ -62,7 +62,8 @@ fn sentence(file: &FitFile) -> (Tone, String) {
         let sentence = match converged {
             true => "The map reaches the target chi2 and is the one of greatest entropy that does.",
             false => {
-                "The reconstruction stopped short of the target chi2: this map is not the one of greatest entropy there."
+                "The reconstruction stopped short of the target chi2: this map is not the one of greatest entropy \
+                 there."
             }
         };
         return (tone(converged), sentence.into());

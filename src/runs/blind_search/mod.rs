@@ -1,8 +1,9 @@
-//! The blind search for a planet that every statement on one rests on: how often do stars without a planet show as much?
+//! The blind search for a planet that every statement on one rests on: how often do stars without a planet show as
+//! much?
 //!
 //! In: a scene and [`BlindSearchOptions`]. Out: a [`BlindSearch`]. `periodogram` writes all of it ([`PeriodogramFile`]
-//! with its tables); an optimum or a chain takes a planet for granted, so that `optimise`, `sample` and `batch` hold its
-//! [`SearchSummary`], whose verdict heads theirs.
+//! with its tables); an optimum or a chain takes a planet for granted, so that `optimise`, `sample` and `batch` hold
+//! its [`SearchSummary`], whose verdict heads theirs.
 //!
 //! `known_planet` is on planets of known ephemeris, `priors` on orbits that a config does not allow.
 

@@ -102,8 +102,8 @@ impl RunSummary {
 }
 
 impl RunSummary {
-    /// Of a run by `settings` whose `chain` has this `summary`, beside the blind search; a run of the first versions has
-    /// none.
+    /// Of a run by `settings` whose `chain` has this `summary`, beside the blind search; a run of the first versions
+    /// has none.
     pub(super) fn of(chain: &Chain, summary: Summary, settings: &Settings, search: Option<&SearchSummary>) -> Self {
         let rotation = search.and_then(|search| search.rotation.as_ref());
         let modes = rotation.and_then(|rotation| modes(chain, summary.discarded_steps, settings, rotation));

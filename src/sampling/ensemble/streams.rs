@@ -1,5 +1,5 @@
-//! Random numbers by counter: the stream is that of a purpose, ensemble and walker, the position in it that of the step;
-//! there is no generator state to keep.
+//! Random numbers by counter: the stream is that of a purpose, ensemble and walker, the position in it that of the
+//! step; there is no generator state to keep.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

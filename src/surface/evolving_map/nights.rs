@@ -1,5 +1,5 @@
-//! The maps of an evolving star held against the data: the field fitted, its most probable map and standard deviation at
-//! any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
+//! The maps of an evolving star held against the data: the field fitted, its most probable map and standard deviation
+//! at any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
 
 use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
 use crate::field::{Field, FieldError, Kernel, Lifetime};

@@ -1,6 +1,6 @@
 //! The search for the best parameters with an evolving map: it begins at the orbit that a blind search finds, with the
-//! field and the jitter as they are with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the top of
-//! the expansion, or what is higher beyond, becomes the next place to expand it around, until that place stays.
+//! field and the jitter as they are with that orbit; ln Z is expanded there (`docs/method.md` section 9), and the top
+//! of the expansion, or what is higher beyond, becomes the next place to expand it around, until that place stays.
 
 use super::{Basis, Fitted, Forecast, Held, Known, MarginalPosterior, fit};
 use crate::field::FieldError;

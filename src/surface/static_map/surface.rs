@@ -121,7 +121,8 @@ impl SurfaceModel for StaticMap {
         if here.unresolved_spots > 0.5 * UNRESOLVED_SPOTS.1 {
             remarks.push(Remark::against(
                 "the model of the star is wrong",
-                "the profiles have nothing to do with the model of the star: what the map leaves over is without bounds",
+                "the profiles have nothing to do with the model of the star: what the map leaves over is without \
+                 bounds",
             ));
         }
         remarks
