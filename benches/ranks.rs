@@ -16,7 +16,7 @@ use dimcmc::internals::runs::cluster::{Answer, Queue, Rank, join};
 use dimcmc::internals::runs::origin::Origin;
 use dimcmc::internals::runs::pool::{Answer as _, Asked, Brief, Evaluations, Pool, Question, Target as Density, Task};
 use dimcmc::internals::sampling::ensemble::{Sampler, StartDraw, draw_start};
-use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Status, Threads};
+use dimcmc::internals::sampling::log_density::{Evaluation, Evaluator, LogDensity, Threads};
 use dimcmc::internals::surface::static_map::Posterior;
 use dimcmc::internals::surface::surrogate::{Surrogate, SurrogateMove};
 use std::convert::Infallible;
@@ -132,7 +132,7 @@ impl Case {
         // of the config as it is written, which is what ranks know: not with the start moved to the truth
         let Settings { resolved, path, .. } = scene(free, Size::pixels(pixels)).settings;
         let scene = Scene::new(&Config::at(resolved.clone(), &path)).unwrap();
-        let settings = SearchSettings { other_starts: 0, ..scene.search_settings() };
+        let settings = search::SearchSettings { other_starts: 0, ..scene.search_settings() };
         let found = search::find(&scene.imager, &scene.space, settings, &|_| ()).unwrap();
         let task = Task::new(&scene, &Origin::of(&scene, &found), scene.space.names(), Asked::LogProbability);
         let target = Density::new(found.posterior.clone(), scene.settings.imaging.unresolved_spots).unwrap();

@@ -99,12 +99,11 @@ pub fn find(
     Ok(Found { posterior, optimum, attempts, detection })
 }
 
+/// A point in parameter space: the free parameters, and the values of all.
+type Point = (Vec<f64>, ParameterValues);
+
 /// A blind search, where an orbit is looked for; and the orbit that it finds, where the priors allow it.
-fn blind(
-    imager: &Imager,
-    space: &ParameterSpace,
-    surface: SurfaceSettings,
-) -> Option<(Detection, Option<(Vec<f64>, ParameterValues)>)> {
+fn blind(imager: &Imager, space: &ParameterSpace, surface: SurfaceSettings) -> Option<(Detection, Option<Point>)> {
     let is_free = |p: Parameter| space.free().iter().any(|f| f.parameter == p);
     let sought = |of: &&Elements| is_free(of.k) && is_free(of.phi) && space.period_prior(of).is_some();
     let sought: Vec<&Elements> = Elements::PLANETS.iter().filter(sought).collect();

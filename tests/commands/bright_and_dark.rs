@@ -219,3 +219,16 @@ fn every_command_takes_it_and_the_injected_orbit_is_found() {
     desk.succeed(&["grid", "other.json", "--out", "other"]);
     says(&desk.refusal(&["compare", "sample", "other", "--out", "no"]), &["imaging.brightness"]);
 }
+
+/// Maps of an evolving star are of filling factors, those of faculae below 0; they are written and drawn as such.
+#[test]
+fn maps_of_an_evolving_star_have_filling_factors() {
+    let mut config = crate::shared::config();
+    config["imaging"]["brightness"] = json!("bright-and-dark");
+    let desk = Desk::new(config);
+    desk.succeed(&["map", "config.json", "--out", "map"]);
+    let maps = desk.json("map/map.json")["maps"].as_array().unwrap().clone();
+    assert!(maps.iter().all(|map| map["spot_filling"].is_array() && map.get("brightness").is_none()));
+    desk.succeed(&["plot", "map"]);
+    desk.succeed(&["report", "map"]);
+}

@@ -335,7 +335,7 @@ fn definition(tree: &BTreeMap<Names, Code>, from: &[String], path: &[String], st
         _ => (from[..from.len().checked_sub(up)?].to_vec(), &path[up..]),
     };
     while let Some((word, after)) = rest.split_first() {
-        let child = [&module[..], &[word.clone()]].concat();
+        let child = [&module[..], std::slice::from_ref(word)].concat();
         if tree.contains_key(&child) {
             (module, rest) = (child, after);
             continue;

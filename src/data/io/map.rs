@@ -253,7 +253,11 @@ impl MapResult<'_> {
                 season,
                 spottedness: season.map(|_| entropy.spottedness(pixels, area)),
                 true_spottedness: truth.as_ref().map(|map| entropy.spottedness(map, area)),
-                pixels: MapColumns::of(entropy, pixels.clone(), truth),
+                // a map with a standard deviation has filling factors, whatever the brightness of pixels may be
+                pixels: match sigma {
+                    Some(_) => MapColumns::Spots { spot_filling: pixels.clone(), true_spot_filling: None },
+                    None => MapColumns::of(entropy, pixels.clone(), truth),
+                },
                 sigma_spot_filling: sigma.clone(),
             }
         };
