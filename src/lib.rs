@@ -19,7 +19,7 @@
 //! | `sampling` | log-densities, the affine-invariant ensemble, chains, optimiser, landscapes |
 //! | `model` | the parameters: their table, priors, sampling coordinates |
 //! | `surface` | what spots do to profiles: static and evolving maps behind one interface |
-//! | `inference` | the blind search, the best parameters, a first look at the profiles |
+//! | `inference` | the blind search, the best parameters, Bayes factors |
 //! | `data` | configs, file formats, calibration, a config with its observations, a first config |
 //! | `runs` | chains, grids and searches on disk, threads and ranks, merging, batches, exports |
 //! | `figures` | figures of a folder, a page of them |

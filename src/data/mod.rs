@@ -1,7 +1,8 @@
 //! What comes from files, and a first config.
 //!
 //! The way of a profile: [`config`] names its file and says how it is used; [`io`] reads the file once; [`dataset`]
-//! holds the profile as in the file; [`calibrated`] makes of it what enters the model; [`scene`] joins all of these.
+//! holds the profile as in the file; [`calibrated`] makes of it what enters the model; [`scene`] joins all of these in
+//! what a surface model takes, an `Imager`.
 //! Neither the settings nor the data set change afterwards.
 //!
 //! [`simulate`] makes profiles in place of files. [`init`] and [`import`] write a first config, [`diagnosis`] finds out

@@ -1,8 +1,8 @@
 //! The seam between the sampler and the star: a vector of parameters in, a log-probability and a few named
 //! numbers out.
 //!
-//! The ensemble, the optimiser and the landscape know only this file; the objective implements it. Batches go through
-//! [`Evaluator`], behind which are the threads of one machine or the ranks of a cluster.
+//! The ensemble, the optimiser and the landscape know only this file; the density of a surface model implements it.
+//! Batches go through [`Evaluator`], behind which are the threads of one machine or the ranks of a cluster.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,8 @@
 //! The star and what it shows (`docs/method.md` section 1; Petit et al. 2015, section 2).
 //!
-//! In: a map of the surface, the values of star and orbit ([`StarState`]), and times. Out: line depth and continuum of
-//! every profile, by one linear [`Response`], and its transpose. Angles are radians here, velocities km/s, times days.
+//! In: a map of the surface, one number a pixel, the values of star and orbit ([`StarState`]), and times. Out: line
+//! depth and continuum of every profile, by one linear [`Response`], and its transpose. Angles are radians here,
+//! velocities km/s, times days.
 //!
 //! 1. [`grid`] has the pixels, [`spots`] what a simulated map of them holds, [`brightness`] how bright that is.
 //! 2. For each observation: [`rotation`] turns the pixels, `view` finds the visible ones, [`limb_darkening`] darkens

@@ -1,4 +1,5 @@
-//! Star and maximum entropy meet: the misfit of a map to observed profiles, and the Doppler image.
+//! Star and data meet: the [`Imager`] of every surface model; for maximum entropy, the misfit of a map to observed
+//! profiles, and the Doppler image.
 //!
 //! A map holds spot filling factors s, which give the brightness `B = 1 - (1 - c) s`, or B itself; the model is `D =
 //! line(B) / continuum(B)` (`docs/method.md` section 1), whose second derivative is kept, so that the solver's Newton

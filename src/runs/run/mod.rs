@@ -1,6 +1,7 @@
 //! A sampling run: search, start, chain, in memory or on disk; begun afresh or resumed to the same bytes.
 //!
-//! `start` is where the walkers begin, `pace` how far they have come, `conclusion` what is said in the end.
+//! Its files: `manifest.json`, `chain.jsonl` (each step, by `data::io::journal`) and `summary.json`. `start` is where
+//! the walkers begin, `pace` how far they have come, `conclusion` what is said in the end.
 
 mod conclusion;
 mod error;

@@ -1,4 +1,5 @@
-//! The affine-invariant ensemble: moves, sampler, start, stop.
+//! The affine-invariant ensemble: `sampler` makes a step by one of the `moves`, from where `start` puts the walkers;
+//! `stop` has the loop of steps.
 //!
 //! Source: Goodman & Weare 2010 (stretch move), ter Braak 2006 (differential evolution), Foreman-Mackey et al. 2013
 //! (halves in turn, so that walkers can be evaluated in parallel). Several independent ensembles run side by side.

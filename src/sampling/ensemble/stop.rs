@@ -1,4 +1,4 @@
-//! When a chain ends: goals reached, step limit, or asked to.
+//! The loop of steps, and when it ends: goals reached, step limit, or asked to.
 //!
 //! The goals are looked at every so many steps and depend on the chain's content alone, so a chain that was interrupted
 //! and resumed ends at the same step as one that was not.

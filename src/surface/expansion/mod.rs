@@ -3,7 +3,7 @@
 //!
 //! `ln L(x) = max_s [alpha S(s) - chi2(s, x)/2]` at the alpha of the reference is very nearly a quadratic in the
 //! velocity of every profile: it holds where the map that fits best answers the change of a velocity linearly. Its
-//! gradient and curvature take one preconditioned solve a profile.
+//! gradient and curvature take one preconditioned solve a profile. Evolving maps fill the same [`Expansion`] with ln Z.
 
 mod marginal;
 mod model;
