@@ -67,7 +67,7 @@ pub fn map(
     out: PathBuf,
     manner: Manner,
 ) -> PyResult<String> {
-    with_scene(py, Source::new(config, observations)?, out, manner, move |job, scene, out| {
+    with_scene(py, Source::new(py, config, observations)?, out, manner, move |job, scene, out| {
         let maps = Maps::of(scene, times_d.as_deref(), &|what| job.say(what)).map_err(Failure::maps)?;
         create(job, out)?;
         maps.write(out)?;
@@ -98,7 +98,7 @@ pub fn periodogram(
         seed,
         ..BlindSearchOptions::default()
     };
-    with_scene(py, Source::new(config, observations)?, out, manner, move |job, scene, out| {
+    with_scene(py, Source::new(py, config, observations)?, out, manner, move |job, scene, out| {
         let found = BlindSearch::of(scene, &options, &|what| job.say(what));
         let found = found.map_err(|error| Failure::blind_search(&scene.settings.path, error))?;
         create(job, out)?;
@@ -143,7 +143,7 @@ pub fn optimise(
     out: PathBuf,
     manner: Manner,
 ) -> PyResult<String> {
-    with_scene(py, Source::new(config, observations)?, out, manner, |job, scene, out| {
+    with_scene(py, Source::new(py, config, observations)?, out, manner, |job, scene, out| {
         scene.require_free()?;
         let found = scene.optimise_with(&|progress| job.search(progress));
         let found = found.map_err(|e| Failure::search(scene.path(), e))?;

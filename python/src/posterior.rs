@@ -29,7 +29,7 @@ impl LogPosterior {
         origin: Option<String>,
         manner: Manner,
     ) -> PyResult<Self> {
-        let source = Source::new(config, observations)?;
+        let source = Source::new(py, config, observations)?;
         let made = attend(py, manner.0, manner.1, move |job| {
             job.say("profiles");
             let scene = source.scene(None)?;

@@ -35,7 +35,7 @@ pub fn sample(
     seed: Option<u64>,
     manner: Manner,
 ) -> PyResult<()> {
-    let source = Source::new(config, observations)?;
+    let source = Source::new(py, config, observations)?;
     attend(py, manner.0, manner.1, move |job| {
         let began = Instant::now();
         job.say("profiles");

@@ -3,8 +3,9 @@
 use crate::fault::Fault;
 use dimcmc::{Config, Observations, Profile, Scene};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
+use std::ffi::CString;
 use std::path::PathBuf;
 
 /// A config as JSON text, and the file that it was read from.
@@ -74,8 +75,13 @@ pub struct Source {
 }
 
 impl Source {
-    /// Of a call's arguments.
-    pub fn new(config: ConfigText, observations: Option<Arrays>) -> PyResult<Self> {
+    /// Of a call's arguments; warns of a config that names no objective.
+    pub fn new(py: Python, config: ConfigText, observations: Option<Arrays>) -> PyResult<Self> {
+        // one that cannot be read is told of with its scene
+        if let Some(text) = config.config().ok().and_then(|config| config.assumed_objective()) {
+            let text = CString::new(text)?;
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+        }
         let observations = observations.map(|arrays| arrays.observations()).transpose()?;
         Ok(Source { config, observations })
     }

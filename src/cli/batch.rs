@@ -30,8 +30,9 @@ pub struct Args {
 pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let signals = Signals::catch("star")?;
     let stars = read_list(&args.list, &args.folder).map_err(Failure::of)?;
-    // a config that cannot be read is told of with its star
-    stars.iter().filter_map(|star| Config::load(&star.config).ok()).for_each(|config| note_objective(&config));
+    // of those to begin; a config that cannot be read is told of with its star
+    let to_begin = stars.iter().filter(|star| !star.folder.exists());
+    note_objective(&to_begin.filter_map(|star| Config::load(&star.config).ok()).collect::<Vec<_>>());
     let output = Output::to(args.folder.clone(), true);
     let folder = output.create()?;
     let pool = cluster::pool(global, &signals);

@@ -1,12 +1,13 @@
 //! `dimcmc inject`: an orbit put into the profiles of a config.
 
 use super::Failure;
-use super::output::{Output, scene};
+use super::output::Output;
 use super::report_lines::Report;
 use crate::data::calibrated::of_sets;
 use crate::data::config::{self, Config, DataSetSettings, Settings};
 use crate::data::io::truth::InjectedTruth;
 use crate::data::io::{atomic, lsd, truth};
+use crate::data::scene::Scene;
 use crate::model::Parameter;
 use crate::star::Orbit;
 use crate::star::injection::inject;
@@ -49,7 +50,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Failure> {
     args.output.check()?;
-    let scene = scene(&Config::load(&args.config)?)?;
+    let scene = Scene::new(&Config::load(&args.config)?)?;
     args.output.spare(&scene.files(), |name| name == CONFIG)?;
     let several = scene.settings.sets.len() > 1;
     let folder_of = |set: &DataSetSettings| if several { format!("{}/", set.name) } else { String::new() };

@@ -7,33 +7,23 @@ use super::{Failure, console};
 use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
 use crate::runs::{grid_scan, run};
-use crate::surface::objective::ObjectiveKind;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The observations of a config, which is told first what it takes for granted.
 pub fn scene(config: &Config) -> Result<Scene, SceneError> {
-    note_objective(config);
+    note_objective(std::slice::from_ref(config));
     Scene::new(config)
 }
 
-/// Keys of `imaging` by which a config means one map of a star that does not change.
-const OF_ONE_MAP: [&str; 4] = ["brightness", "default_spot", "chi2_target", "unresolved_spots"];
-
-/// The objective of a config that names none: it was another one in older versions.
-pub fn note_objective(config: &Config) {
-    if config.get("imaging.objective").is_some() {
-        return;
+/// Says on standard error which objective configs that name none have; of several, by the first of them.
+pub fn note_objective(configs: &[Config]) {
+    let mut unnamed = configs.iter().filter_map(|config| Some((config, config.assumed_objective()?)));
+    if let Some((config, text)) = unnamed.next() {
+        let more = unnamed.count();
+        let more = if more == 0 { String::new() } else { format!(" and {more} more configs") };
+        console::note(format_args!("{}{more}: {text}", config.path().display()));
     }
-    let given = |key: &&str| config.get(&format!("imaging.{key}")).is_some();
-    let keys: Vec<&str> = OF_ONE_MAP.into_iter().filter(given).collect();
-    let for_it = if keys.is_empty() { String::new() } else { format!(", which {} is for", keys.join(", ")) };
-    console::note(format_args!(
-        "{}: imaging.objective is not given: it is \"{}\"; older versions took \"{}\"{for_it}; name one of them",
-        config.path().display(),
-        ObjectiveKind::default().name(),
-        ObjectiveKind::Spottedness.name(),
-    ));
 }
 
 /// Says on standard error what was made of the profiles of `scene` on reading, for commands whose report does not.

@@ -49,13 +49,7 @@ impl<'a> Maps<'a> {
     /// # Errors
     /// [`MapError`].
     pub fn of(scene: &'a Scene, times_d: Option<&[f64]>, report: &dyn Fn(&'static str)) -> Result<Self, MapError> {
-        let (objective, evolves) = (scene.settings.imaging.objective, scene.surface().model().evolves());
-        if times_d.is_some() && !evolves {
-            return Err(MapError::Times(format!(
-                "the map does not change with imaging.objective {:?}; maps that do take \"marginal-likelihood\"",
-                objective.name()
-            )));
-        }
+        let evolves = scene.surface().model().evolves();
         report(if evolves { "fitting the field of spots" } else { "reconstructing" });
         let found = scene.maps(times_d);
         let is_bound = |name: &String| *name != Parameter::SpotLifetime.name();

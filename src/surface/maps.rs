@@ -81,7 +81,7 @@ pub struct MapSummary {
     pub chi2: f64,
     /// chi2 over the number of data.
     pub chi2_per_datum: f64,
-    /// That of static spots, where the maps evolve; null where there are none.
+    /// That of static spots, where the maps evolve and there is a static one; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_per_datum_unchanging: Option<f64>,
     /// The map as one of maximum entropy, where it is one.

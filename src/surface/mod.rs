@@ -179,11 +179,13 @@ impl SurfaceSettings {
             ObjectiveKind::MarginalLikelihood => {
                 Box::new(evolving_map::EvolvingMap::new(self.field.unwrap_or_default()))
             }
-            _ => Box::new(static_map::StaticMap {
-                objective: self.objective,
-                chi2_target: self.chi2_target,
-                compared_with: self.field,
-            }),
+            ObjectiveKind::Spottedness | ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => {
+                Box::new(static_map::StaticMap {
+                    objective: self.objective,
+                    chi2_target: self.chi2_target,
+                    compared_with: self.field,
+                })
+            }
         }
     }
 }

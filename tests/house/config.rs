@@ -342,6 +342,7 @@ fn senseless_values_name_their_key() {
         ("/imaging/brightness", json!("bright"), "imaging.brightness"),
         ("/observations/simulate/faculae", json!([[0, 91, 5, 0.1]]), "observations.simulate.faculae[0]"),
         ("/observations/simulate/faculae", json!([[0, 9, 5, 0.1], [0, 9, 0, 0.1]]), "observations.simulate.faculae[1]"),
+        ("/observations/simulate/truth", json!({ "t_conjunction2_d": 5 }), "observations.simulate.truth"),
         ("/observations/simulate/faculae", json!([[0, 9, 5, 0]]), "observations.simulate.faculae[0]"),
         ("/observations/simulate/faculae", json!([[0, 9, 5, 1e9]]), "observations.simulate.faculae[0]"),
         ("/imaging/nuisances", json!({ "continuum_offset": -1e-3 }), "imaging.nuisances.continuum_offset"),

@@ -121,7 +121,11 @@ impl Reader<'_> {
             PriorKind::UnitDisc => "a unit-disc prior is for sqrt_e_cos_omega and sqrt_e_sin_omega only",
             _ if takes.contains(&PriorKind::Periodic) => "phi takes a periodic or a uniform prior",
             _ if takes.contains(&PriorKind::UnitDisc) => "sqrt_e_cos_omega and sqrt_e_sin_omega take a unit-disc prior",
-            _ => "the time of a conjunction takes a normal or a uniform prior",
+            _ => {
+                let names: Vec<&str> = takes.iter().map(|kind| kind.name()).collect();
+                let name = self.parameter.name();
+                return Err(self.fault("prior", format!("{name} takes one of these priors: {}", names.join(", "))));
+            }
         };
         Err(self.fault("prior", only))
     }

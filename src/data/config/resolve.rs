@@ -198,22 +198,19 @@ fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -> Result<()
         let problem = format!("{} must be above 0 and below 0.5", imaging.default_spot);
         return Err(Fault::new("imaging.default_spot", problem));
     }
+    if imaging.objective.evolves() && imaging.chi2_target.is_word() {
+        let problem = "auto is for one map of a star that does not change, not for imaging.objective \
+                       \"marginal-likelihood\", the default: leave it out, or give the objective \"spottedness\"";
+        return Err(Fault::new("imaging.chi2_target", problem));
+    }
     if imaging.nuisances.is_some() && imaging.chi2_target.is_word() {
         let problem =
             "auto goes by velocities that nuisances of line and continuum take up: give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if !jitter.is_default() && imaging.chi2_target.is_word() {
-        let problem = match imaging.objective.evolves() {
-            true => {
-                "auto is for one map of a star that does not change, not for imaging.objective \
-                 \"marginal-likelihood\", the default: leave it out, or give the objective \"spottedness\""
-            }
-            false => {
-                "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
-                 give a number, such as 0.97"
-            }
-        };
+        let problem = "auto goes by velocities, which observations.velocity_jitter_kms says are not the star's alone: \
+                       give a number, such as 0.97";
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if let Some(priors) = &imaging.nuisances {

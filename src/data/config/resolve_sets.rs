@@ -81,7 +81,7 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
             );
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
-        if section.nuisances.is_some() && raw.imaging.chi2_target.is_word() {
+        if section.nuisances.is_some() && raw.imaging.chi2_target.is_word() && !objective.evolves() {
             let problem = format!("auto goes by velocities that {key}.nuisances take up: give a number, such as 0.97");
             return Err(Fault::new("imaging.chi2_target", problem));
         }

@@ -61,10 +61,16 @@ pub(super) fn simulation(
     for (parameter, value) in section.truth.entries() {
         check_value(parameter, *value, &at(&format!("truth.{}", parameter.name())))?;
     }
+    let no_orbit = || Fault::new(at("truth"), "is no orbit: each planet needs a period, and an eccentricity below 1");
+    let given = |p: Parameter| section.truth.has(p);
+    let has_period = |of: &Elements| truth.get(of.ratio).is_some() || given(of.ratio) || given(of.period);
+    if Elements::PLANETS.iter().any(|of| given(of.conjunction) && !has_period(of)) {
+        return Err(no_orbit());
+    }
     let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
     Elements::write(&mut truth, section.truth.entries().map(|(parameter, value)| (parameter, *value)), clock);
     if truth.motion().orbits().any(|planet| !(planet.shape.eccentricity() < 1.0 && planet.orbit.porb_over_prot > 0.0)) {
-        return Err(Fault::new(at("truth"), "is no orbit: each planet needs a period, and an eccentricity below 1"));
+        return Err(no_orbit());
     }
     Ok(Simulation {
         spots: spots(section, star, &truth, &times_d, set)?,

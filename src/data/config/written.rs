@@ -4,11 +4,15 @@
 use super::resolve::resolve;
 use super::{ConfigError, Settings};
 use crate::model::{Parameter, Prior};
+use crate::surface::ObjectiveKind;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// What errors name where a config was not read from a file; paths in it start from the working directory.
 const NO_FILE: &str = "config";
+
+/// Keys of `imaging` by which a config means one map of a star that does not change.
+const OF_ONE_MAP: [&str; 3] = ["default_spot", "chi2_target", "unresolved_spots"];
 
 /// Longest line of a config as text.
 const WIDTH: usize = 110;
@@ -101,6 +105,21 @@ impl Config {
     /// The value at `key`, `None` where it is not given.
     pub fn get(&self, key: &str) -> Option<&Value> {
         key.split('.').try_fold(&self.json, |place, name| place.get(name))
+    }
+
+    /// What is to be said of a config that names no objective: it had another one in older versions.
+    pub fn assumed_objective(&self) -> Option<String> {
+        if self.get("imaging.objective").is_some() {
+            return None;
+        }
+        let keys: Vec<&str> =
+            OF_ONE_MAP.into_iter().filter(|key| self.get(&format!("imaging.{key}")).is_some()).collect();
+        let for_it = if keys.is_empty() { String::new() } else { format!(", which {} is for", keys.join(", ")) };
+        Some(format!(
+            "imaging.objective is not given: it is \"{}\"; older versions took \"{}\"{for_it}; name one of them",
+            ObjectiveKind::default().name(),
+            ObjectiveKind::Spottedness.name(),
+        ))
     }
 
     /// The file that it was read from, or what errors name in its place.

@@ -98,7 +98,6 @@ pub struct MapFile {
     #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
     pub mean: Option<OneMap>,
     /// The maps in the order of time: one, one a season, or one at each time asked for.
-    #[serde(default)]
     pub maps: Vec<MapAt>,
 }
 

@@ -139,9 +139,9 @@ pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotErr
 fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
     let file: MapFile = origin::read(folder, MAP)?;
     // maps of several times, with their errors, are a strip
-    let mut figures = match file.mean {
-        None => vec![maps::figure(folder, &file)?],
-        Some(_) => star_map::figures(folder, &file)?,
+    let mut figures = match file.field {
+        Some(_) => vec![maps::figure(folder, &file)?],
+        None => star_map::figures(folder, &file)?,
     };
     if folder.join(profiles::FILE).is_file() {
         let profiles = profiles::read(folder)?;

@@ -40,8 +40,10 @@ pub(super) fn figures(folder: &Path, file: &MapFile) -> Result<Vec<Figure>, Plot
     };
     let seasons: Vec<(usize, Season, OneMap)> = file.maps.iter().enumerate().filter_map(of_season).collect();
     if seasons.is_empty() {
+        let problem = "holds no map: spottedness, spot_filling or brightness is missing, or none of numbers";
         let one = file.mean.clone();
-        return one.map(|one| figure(folder, file, one, None)).into_iter().collect();
+        let one = one.ok_or_else(|| PlotError::Content { path: folder.join(MAP), problem: problem.into() })?;
+        return Ok(vec![figure(folder, file, one, None)?]);
     }
     let count = seasons.len();
     let of_season = |(number, season, own): (usize, Season, OneMap)| {

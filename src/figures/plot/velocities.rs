@@ -46,7 +46,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
     let state = fit.summary.parameters.state();
     let column = |name: &str| Ok::<_, PlotError>(table.column(name)?.to_vec());
     let (orbit_kms, sigma) = (column("orbit_kms")?, column("sigma_kms")?);
-    let (clean, residual, errors): (Vec<f64>, Vec<f64>, Vec<f64>) = match fit.summary.rv_rms_kms.is_some() {
+    let (clean, residual, errors): (Vec<f64>, Vec<f64>, Vec<f64>) = match fit.field.is_some() {
         true => {
             let rv: Vec<f64> = column("rv_kms")?.iter().map(|rv| rv + state.vsys_kms).collect();
             let residual = rv.iter().zip(&orbit_kms).map(|(rv, orbit)| rv - orbit).collect();
@@ -73,7 +73,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         orbital: 1,
     };
     let mut figure = curves.draw();
-    figure.caption = match fit.summary.rv_rms_kms.is_some() {
+    figure.caption = match fit.field.is_some() {
         true => {
             "Radial velocities. Above: first moments of the observed profiles and of the model. Middle: with all maps \
             integrated out, and the assumed orbit; their errors are correlated. Below: the assumed orbit taken out. To \

@@ -137,8 +137,14 @@ impl SurfaceModel for StaticMap {
         imager: &Imager,
         observations: &Observations,
         values: ParameterValues,
-        _: Option<&[f64]>,
+        times_d: Option<&[f64]>,
     ) -> Result<SurfaceMaps, NoMaps> {
+        if times_d.is_some() {
+            return Err(NoMaps::Times(
+                "the map does not change with the imaging.objective of the config; maps that do take \
+                 \"marginal-likelihood\"",
+            ));
+        }
         let reference = Reference::build(imager, values, self.chi2_target)?;
         Ok(SurfaceMaps::of_reference(imager, observations, &reference))
     }
