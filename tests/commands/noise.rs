@@ -239,6 +239,11 @@ fn the_target_is_where_velocities_stop_shrinking() {
 #[test]
 fn a_profile_is_opened_once_in_a_command() {
     let desk = desk(|_| ());
+    let mut config = desk.json("config.json");
+    config["parameters"] = json!({ "k_kms": { "prior": "uniform", "min": 0, "max": 1 } });
+    config["sampler"] = json!({ "steps": 2, "ensembles": 2, "walkers": 4, "seed": 1 });
+    config["grid"] = json!({ "axes": { "k_kms": [0, 0.2, 3] } });
+    desk.write("config.json", &config.to_string());
     let config = desk.path("config.json");
     let opened =
         || -> Vec<usize> { (0..20).map(|k| lsd::times_opened(&desk.path(&format!("data/p{k:03}.prof")))).collect() };
@@ -248,6 +253,9 @@ fn a_profile_is_opened_once_in_a_command() {
         ("periodogram", &["--draws", "1000"]),
         ("limits", &["--periods", "4", "--full", "2", "--draws", "1000"]),
         ("inject", &orbit),
+        ("optimise", &[]),
+        ("grid", &[]),
+        ("sample", &[]),
     ] {
         let before = opened();
         let out = desk.path(command);
