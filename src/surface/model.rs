@@ -1,0 +1,117 @@
+//! The interface of surface models: what is assumed of the spots, and what the profiles then say.
+
+use super::density::Density;
+use super::expansion::{Expansion, Nuisance};
+use super::imaging::Imager;
+use super::optimum::{Best, BlindStart, Progress, SearchError, Sought};
+use super::record::{RebuildError, SurfaceRecord};
+use super::{AtTarget, Change, Explained, Linearised, NoFit, NoMaps, SurfaceError, SurfaceMaps};
+use crate::model::{ParameterSpace, ParameterValues};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters};
+use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::verdict::Remark;
+use crate::star::observation::Observations;
+use std::fmt::Debug;
+
+/// Star and data, and what is integrated out with the velocities.
+#[derive(Clone, Copy, Debug)]
+pub struct At<'a> {
+    /// Star, times and data.
+    pub imager: &'a Imager,
+    /// The parameters of star and orbit.
+    pub values: ParameterValues,
+    /// Parameters that are integrated out within their priors; the others are fixed.
+    pub nuisances: &'a [Nuisance],
+}
+
+/// What is made of the velocities of some profiles: an orbit at a period.
+pub type OrbitOf<'a> = &'a (dyn Fn(&VelocityQuadratic) -> Option<CircularOrbit> + Sync);
+
+/// What is assumed of the spots, and what the profiles then say.
+pub trait SurfaceModel: Debug + Send + Sync {
+    /// ln L to second order around the star at some parameters; maps are found from those of a star `near` by.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    fn linearise(&self, at: At, near: Option<&Linearised>) -> Result<Linearised, SurfaceError>;
+
+    /// The quadratic of the orbit's velocities in an expansion of this model, whose gradient may be another one than
+    /// that of the data: spots that the map does not resolve count as noise of the size that the gradient says.
+    fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic>;
+
+    /// The likelihood of the velocities beside velocity jitters of several sizes, where the profiles say how large it
+    /// is.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    fn jitters(&self, at: At, here: &Linearised) -> Result<Jitters, SurfaceError>;
+
+    /// The same model with what was fitted of the spots held.
+    fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel>;
+
+    /// Whether the spots evolve, where the model takes them for static; `None` where that is not asked.
+    fn evolution(&self, at: At, frequencies: &Frequencies) -> Option<Result<Change, NoFit>>;
+
+    /// Whether spots imitate orbits at fractions of the rotation period, too.
+    fn imitates_at_fractions(&self) -> bool;
+
+    /// An orbit without each of these groups of profiles (ascending).
+    fn without_each(
+        &self,
+        at: At,
+        here: &Linearised,
+        groups: &[Vec<usize>],
+        orbit: OrbitOf,
+    ) -> Vec<Option<CircularOrbit>>;
+
+    /// An orbit at other targets of chi2; none where there is no target.
+    fn at_other_targets(&self, at: At, orbit: OrbitOf) -> Vec<AtTarget>;
+
+    /// The profiles as the most probable maps explain them.
+    fn explained(&self, imager: &Imager, observations: &Observations, here: &Linearised) -> Explained;
+
+    /// What has to be known of the maps.
+    fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark>;
+
+    /// Whether maps evolve, so that they are of a time.
+    fn evolves(&self) -> bool;
+
+    /// The maps at `values`, of these times (d) where they are given and the maps evolve.
+    ///
+    /// # Errors
+    /// [`NoMaps`].
+    fn maps(
+        &self,
+        imager: &Imager,
+        observations: &Observations,
+        values: ParameterValues,
+        times_d: Option<&[f64]>,
+    ) -> Result<SurfaceMaps, NoMaps>;
+
+    /// Whether the search for the best parameters begins with a blind search for the planet.
+    fn begins_with_blind_search(&self) -> bool;
+
+    /// The best parameters and the density around them; `report` is called as the search goes on, from any thread.
+    ///
+    /// # Errors
+    /// If there is no reference, or no start leads to a finite log-probability.
+    fn optimum(
+        &self,
+        sought: Sought,
+        start: Option<BlindStart>,
+        report: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Best, SearchError>;
+
+    /// The density of `space` around a reference that was recorded, which is rebuilt to the same bits; what the record
+    /// lacks is as in `others`.
+    ///
+    /// # Errors
+    /// [`RebuildError`].
+    fn rebuilt(
+        &self,
+        imager: Imager,
+        space: ParameterSpace,
+        record: &SurfaceRecord,
+        others: &ParameterValues,
+    ) -> Result<Density, RebuildError>;
+}

@@ -1,0 +1,40 @@
+//! The choice of a surface model: the one place that knows them all.
+
+use super::evolving_map::{EvolvingMap, Known};
+use super::model::SurfaceModel;
+use super::objective::ObjectiveKind;
+use super::static_map::StaticMap;
+use serde::{Deserialize, Serialize};
+
+/// A surface model as a config asks for it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceSettings {
+    /// The objective.
+    pub objective: ObjectiveKind,
+    /// Target of chi2, per datum, where there is one.
+    pub chi2_target: f64,
+    /// What is known of the spots as a field that evolves. Where they are taken for static, whether they are is looked
+    /// into with it; without it that is not asked.
+    pub field: Option<Known>,
+}
+
+impl SurfaceSettings {
+    /// The map of fewest spots at a target chi2 per datum, of a star of which it is not asked whether it evolves.
+    pub fn spottedness(chi2_target: f64) -> Self {
+        SurfaceSettings { objective: ObjectiveKind::Spottedness, chi2_target, field: None }
+    }
+
+    /// The model.
+    pub fn model(&self) -> Box<dyn SurfaceModel> {
+        match self.objective {
+            ObjectiveKind::MarginalLikelihood => Box::new(EvolvingMap::new(self.field.unwrap_or_default())),
+            ObjectiveKind::Spottedness | ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => {
+                Box::new(StaticMap {
+                    objective: self.objective,
+                    chi2_target: self.chi2_target,
+                    compared_with: self.field,
+                })
+            }
+        }
+    }
+}
