@@ -49,7 +49,7 @@ impl<'a> Maps<'a> {
     /// # Errors
     /// [`MapError`].
     pub fn of(scene: &'a Scene, times_d: Option<&[f64]>, report: &dyn Fn(&'static str)) -> Result<Self, MapError> {
-        let evolves = scene.surface().model().evolves();
+        let evolves = scene.settings.imaging.objective.evolves();
         report(if evolves { "fitting the field of spots" } else { "reconstructing" });
         let found = scene.maps(times_d);
         let is_bound = |name: &String| *name != Parameter::SpotLifetime.name();

@@ -73,9 +73,6 @@ pub trait SurfaceModel: Debug + Send + Sync {
     /// What has to be known of the maps.
     fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark>;
 
-    /// Whether maps evolve, so that they are of a time.
-    fn evolves(&self) -> bool;
-
     /// The maps at `values`, of these times (d) where they are given and the maps evolve.
     ///
     /// # Errors

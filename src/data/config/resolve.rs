@@ -48,10 +48,6 @@ pub(super) fn resolve(mut raw: Config, path: &Path) -> Result<Settings, Fault> {
         ));
     }
     let grid = raw.grid.as_ref().map(|grid| resolve_grid(grid, &free, &values)).transpose()?;
-    if raw.imaging.brightness == BrightnessModel::BrightAndDark && raw.parameters.has(Parameter::Contrast) {
-        let problem = "an image of bright and dark pixels knows no spots: contrast has no effect";
-        return Err(Fault::new("parameters.contrast", problem));
-    }
     let resolved = serde_json::to_value(&raw).map_err(|e| Fault::new("config", e.to_string()))?;
     Ok(Settings {
         path: path.into(),

@@ -126,10 +126,6 @@ impl SurfaceModel for EvolvingMap {
         field.at_bounds.iter().map(reached).collect()
     }
 
-    fn evolves(&self) -> bool {
-        true
-    }
-
     fn maps(
         &self,
         imager: &Imager,

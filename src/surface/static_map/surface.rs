@@ -128,10 +128,6 @@ impl SurfaceModel for StaticMap {
         remarks
     }
 
-    fn evolves(&self) -> bool {
-        false
-    }
-
     fn maps(
         &self,
         imager: &Imager,
