@@ -9,7 +9,9 @@ use crate::model::for_blind_search;
 use crate::numerics::text::shown;
 use crate::planets::periodogram::{FrequencySettings, SearchSettings, Unbounded};
 use crate::runs::blind_search::BlindSearchOptions;
-use crate::runs::limits::{self, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Shortcut, WholeWay};
+use crate::runs::limits::{
+    self, BestOrbit, CSV, Comparison, JSON, LimitSettings, LimitsFile, Orbits, Searches, Shortcut, WholeWay,
+};
 use crate::runs::pool::Brief;
 use crate::star::Orbit;
 use std::path::PathBuf;
@@ -24,9 +26,8 @@ const LIMIT: &str = "limit";
 /// Orbits are put into the profiles, and `periodogram` looks for them: recovered is what has a false-alarm probability
 /// below 1 % and the right period. It takes the linear shortcut, in which an orbit is a shift of the velocities around
 /// the image without a planet; with --full, some orbits near the limit go the whole way: resampled profiles, a new
-/// image, a new search. Writes limits.csv (how many phases of each period and K are recovered) and limits.json (K at 50
-/// and 95 %, the comparison); `plot` draws the map. A signal that the profiles hold already stays in them without
-/// --without-best.
+/// image, a new search. A candidate that the profiles show already is taken out of them first. Writes limits.csv (how many
+/// phases of each period and K are recovered) and limits.json (K at 50 and 95 %, the comparison); `plot` draws the map.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc limits configs/demo.json --periods 12 --full 2 --out runs/demo_limits")]
 pub struct Args {
@@ -58,12 +59,19 @@ pub struct Args {
     /// Orbits near the limit that go the whole way
     #[arg(long, value_name = "N", default_value_t = 0)]
     full: u16,
-    /// Take the best orbit of the profiles as they are out of them first
-    #[arg(long)]
+    /// Take the best orbit of the profiles as they are out of them first, even if it is no candidate
+    #[arg(long, conflicts_with = "with_best")]
     without_best: bool,
-    /// Integrate the systemic velocity and stellar parameters that are free in the config out within their priors
-    #[arg(long, alias = "marginalize")]
+    /// Leave the best orbit of the profiles as they are in them, even if it is a candidate
+    #[arg(long)]
+    with_best: bool,
+    /// What `periodogram` does, too: systemic velocity and stellar parameters that are free in the config are
+    /// integrated out within their priors
+    #[arg(long, alias = "marginalize", conflicts_with = "fixed", hide = true)]
     marginalise: bool,
+    /// Hold the systemic velocity and stellar parameters that are free in the config at its values
+    #[arg(long)]
+    fixed: bool,
     /// Number of stars without a planet that false alarms are taken from
     #[arg(long, value_name = "N", default_value_t = SearchSettings::DRAWS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
@@ -88,12 +96,13 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let shortcut = shortcut.map_err(|error| Failure::blind_search(&args.config, error.into()))?;
     let orbits = orbits(args, &shortcut)?;
     let meter = Meter::new(global, orbits.count());
-    let cells = limits::recovered(&shortcut, &orbits, &|done| meter.show(done));
+    let searches = shortcut.searches(orbits.k_kms.last().copied().unwrap_or_default());
+    let cells = limits::recovered(&searches, &orbits, &|done| meter.show(done));
     meter.bar.finish_and_clear();
     let rotation_period_d = scene.imager.star.rotation_period_d;
     let found = limits::limits(&cells, rotation_period_d);
     let drawn = limits::drawn(&shortcut, &found, usize::from(args.full));
-    let comparisons = whole_way(global, &signals, &scene, &shortcut, &drawn)?;
+    let comparisons = whole_way(global, &signals, &scene, (&shortcut, &searches), &drawn)?;
     let file = LimitsFile::new(&shortcut, &orbits, found, comparisons, rotation_period_d, scene.provenance());
     let folder = args.output.create()?;
     file.write(&cells, rotation_period_d, folder)?;
@@ -106,7 +115,7 @@ fn whole_way(
     global: &Global,
     signals: &Signals,
     scene: &Scene,
-    shortcut: &Shortcut,
+    (shortcut, searches): (&Shortcut, &Searches),
     orbits: &[Orbit],
 ) -> Result<Vec<Comparison>, Failure> {
     let pool = cluster::pool(global, signals);
@@ -126,7 +135,7 @@ fn whole_way(
             return Err(signals.interrupted(before_the_first(LIMIT)));
         }
         meter.show(some.len());
-        let both = |(orbit, full): (&Orbit, _)| Comparison { orbit: *orbit, shortcut: shortcut.search(orbit), full };
+        let both = |(orbit, full): (&Orbit, _)| Comparison { orbit: *orbit, shortcut: searches.of(orbit), full };
         comparisons.extend(some.iter().zip(found).map(both));
     }
     meter.bar.finish_and_clear();
@@ -135,17 +144,22 @@ fn whole_way(
 
 /// How orbits are looked for.
 fn settings(args: &Args, scene: &Scene) -> Result<LimitSettings, Failure> {
-    let Args { min_period_d, max_period_d, without_best, seed, .. } = *args;
+    let Args { min_period_d, max_period_d, without_best, with_best, seed, .. } = *args;
+    let best = match (without_best, with_best) {
+        (true, _) => BestOrbit::Out,
+        (_, true) => BestOrbit::In,
+        _ => BestOrbit::OutIfCandidate,
+    };
     let options = BlindSearchOptions {
         periods: FrequencySettings { min_period_d, max_period_d, oversampling: None },
-        fixed: !args.marginalise,
+        fixed: args.fixed,
         draws: args.draws as usize,
         seed,
         ..BlindSearchOptions::default()
     };
     let frequencies = options.frequencies(scene);
     let frequencies = frequencies.map_err(|error| Failure::blind_search(&args.config, error.into()))?;
-    Ok(LimitSettings { detection: options.detection(scene), frequencies, without_best })
+    Ok(LimitSettings { detection: options.detection(scene), frequencies, best })
 }
 
 /// The orbits that are put in.

@@ -10,7 +10,7 @@ use crate::data::io::provenance::{Measured, Provenance};
 use crate::inference::evidence::EvidenceRecord;
 use crate::inference::search::{self, Found, Progress, SearchError, SearchSettings};
 use crate::model::{FreeParameter, ParameterSpace, ParameterValues};
-use crate::planets::velocities::VelocityQuadratic;
+use crate::planets::periodogram::Jitters;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
@@ -210,10 +210,11 @@ impl Scene {
         space(free, &self.settings, &self.imager)
     }
 
-    /// Bayes factors of planets under the priors of the config, from the star's quadratic without a planet.
+    /// Bayes factors of planets under the priors of the config, from the velocities of the star without a
+    /// planet.
     #[doc(hidden)]
-    pub fn evidence(&self, quadratic: &VelocityQuadratic) -> Option<EvidenceRecord> {
-        EvidenceRecord::of(&self.settings.free, self.space.clock(), self.settings.sampler.seed, quadratic)
+    pub fn evidence(&self, jitters: &Jitters) -> Option<EvidenceRecord> {
+        EvidenceRecord::of(&self.settings.free, self.space.clock(), self.settings.sampler.seed, jitters)
     }
 
     /// What results say of where they came from.

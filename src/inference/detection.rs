@@ -19,14 +19,15 @@ use crate::planets::periodogram::orbits;
 use crate::planets::periodogram::peaks::refined;
 use crate::planets::periodogram::two_planets::{both, without};
 use crate::planets::periodogram::{
-    CircularOrbit, Frequencies, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded, co_rotation_penalty,
+    CircularOrbit, Frequencies, Jitters, KeplerianOrbit, Peak, Search, SearchSettings, TwoOrbits, Unbounded,
+    co_rotation_penalty,
 };
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel, SurfaceSettings};
+use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel, SurfaceSettings, WithoutJitter};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -80,8 +81,10 @@ pub struct Detection {
     pub frequencies: Frequencies,
     /// Whether the star changes, where that was looked into: of spots that are taken for unchanging.
     pub change: Option<Result<Change, NoFit>>,
-    /// Without a planet; its quadratic is the one that `search` is of.
+    /// Without a planet.
     pub planet_free: Linearised,
+    /// The same without its jitter, where the profiles say how large that is: what `blind` is of.
+    pub without_jitter: Option<WithoutJitter>,
     /// The blind search there, by which a planet is found or not. The planet itself counts among the unresolved spots,
     /// which makes the false-alarm probability a cautious one.
     pub blind: Search,
@@ -129,6 +132,45 @@ fn highest(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> f64 {
     trials.iter().filter_map(|trial| Some(trial.orbit?.delta_ln_l)).fold(0.0, f64::max)
 }
 
+/// A star without a planet, and the blind search for one there.
+#[derive(Clone, Debug)]
+pub struct PlanetFree {
+    /// The star.
+    pub here: Linearised,
+    /// The same without its jitter, where the profiles say how large that is.
+    pub without_jitter: Option<WithoutJitter>,
+    /// The search.
+    pub blind: Search,
+}
+
+impl PlanetFree {
+    /// Of the star in `at`, whatever the orbit there.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    pub fn find(
+        surface: &dyn SurfaceModel,
+        mut at: At,
+        frequencies: &Frequencies,
+        settings: SearchSettings,
+        report: &dyn Fn(Stage),
+    ) -> Result<Self, SurfaceError> {
+        report(Stage::PlanetFree);
+        at.values.set(Parameter::K, 0.0);
+        let here = surface.linearise(at, None)?;
+        report(Stage::Search);
+        let without_jitter = surface.without_jitter(at, &here)?;
+        let jitters = jitters(&here, without_jitter.as_ref());
+        let blind = imitated(surface, Search::with_jitter(&jitters, frequencies, settings)?);
+        Ok(PlanetFree { here, without_jitter, blind })
+    }
+}
+
+/// The likelihood of the velocities of the star `here`, beside the jitter if the profiles say how large it is.
+pub fn jitters(here: &Linearised, without_jitter: Option<&WithoutJitter>) -> Jitters {
+    without_jitter.map_or_else(|| Jitters::none(&here.quadratic), WithoutJitter::jitters)
+}
+
 impl Detection {
     /// Searches the star in `imager`, all but the orbit as in `values`, at the given periods.
     ///
@@ -141,26 +183,21 @@ impl Detection {
         settings: &DetectionSettings,
         report: &dyn Fn(Stage),
     ) -> Result<Self, SurfaceError> {
-        report(Stage::PlanetFree);
-        let mut alone = values;
-        alone.set(Parameter::K, 0.0);
         let surface = settings.surface.model();
-        let at = At { imager, values: alone, nuisances: &settings.nuisances };
-        let planet_free = surface.linearise(at, None)?;
-        report(Stage::Search);
-        let jitters = surface.jitters(at, &planet_free)?;
-        let blind = Search::with_jitter(&jitters, &frequencies, settings.search)?;
-        let blind = imitated(&*surface, blind);
-        let best = match jitters.is_none() {
-            true => blind.best().orbit.delta_ln_l,
-            false => highest(&planet_free.quadratic, &frequencies),
+        let at = At { imager, values, nuisances: &settings.nuisances };
+        let PlanetFree { here: planet_free, without_jitter, blind } =
+            PlanetFree::find(&*surface, at, &frequencies, settings.search, report)?;
+        let best = match without_jitter.as_ref().is_some_and(|without| without.found_kms > 0.0) {
+            false => blind.best().orbit.delta_ln_l,
+            true => highest(&planet_free.quadratic, &frequencies),
         };
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
-        let change = surface.evolution(At { values, ..at }, &frequencies);
+        let change = surface.evolution(at, &frequencies);
         let mut found = Detection {
             best: *blind.best(),
             planet_free,
+            without_jitter,
             blind,
             frequencies,
             change,
@@ -172,7 +209,7 @@ impl Detection {
             offset,
             co_rotation_penalty: None,
         };
-        found.close(&*surface, At { values, ..at }, report)?;
+        found.close(&*surface, at, report)?;
         found.co_rotation_penalty = co_rotation_penalty(&found.planet_free.quadratic, &found.frequencies);
         if settings.eccentric {
             found.keplerian = found.eccentric();
@@ -182,6 +219,11 @@ impl Detection {
             found.second = found.second_planet(&*surface, settings.search)?;
         }
         Ok(found)
+    }
+
+    /// The likelihood that the blind search is of.
+    pub fn jitters(&self) -> Jitters {
+        jitters(&self.planet_free, self.without_jitter.as_ref())
     }
 
     /// The last expansion.

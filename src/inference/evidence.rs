@@ -2,8 +2,8 @@
 
 use crate::model::{Clock, Elements, FreeParameter, Parameter, Prior, period_prior};
 use crate::planets::evidence::{Density, Evidence, Inclusion, LnBayes, PlanetPrior, evidence};
+use crate::planets::periodogram::Jitters;
 use crate::planets::periodogram::eccentric::LARGEST_ECCENTRICITY;
-use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::probability;
 use serde::{Deserialize, Serialize};
 
@@ -51,19 +51,24 @@ struct Assumed {
 }
 
 impl EvidenceRecord {
-    /// Under the priors of `free` parameters, from a star's `quadratic` without a planet. `None` where K or the period
-    /// of the planet has no prior, or the profiles bound no orbit.
-    pub fn of(free: &[FreeParameter], clock: Clock, seed: u64, quadratic: &VelocityQuadratic) -> Option<Self> {
+    /// Under the priors of `free` parameters, from the velocities of a star without a planet, beside `jitters`. `None`
+    /// where K or the period of the planet has no prior, or the profiles bound no orbit.
+    pub fn of(free: &[FreeParameter], clock: Clock, seed: u64, jitters: &Jitters) -> Option<Self> {
         let [first, second] = &Elements::PLANETS;
         let one = Assumed::of(free, first, clock)?;
         // of a second planet nothing else is assumed unless the config says so
         let two = Assumed::of(free, second, clock).unwrap_or(one);
-        let found = one.with(|one| two.with(|two| evidence(quadratic, [one, two], seed)))?;
-        let error_kms = quadratic.information.trace().sqrt().recip() * 2f64.sqrt();
-        Some(EvidenceRecord::new(found, [one, two], error_kms, clock.rotation_period_d))
+        let found = one.with(|one| two.with(|two| evidence(jitters, [one, two], seed)))?;
+        let error_kms = jitters.as_found().quadratic.information.trace().sqrt().recip() * 2f64.sqrt();
+        Some(EvidenceRecord::new(found, [one, two], (error_kms, !jitters.is_none()), clock.rotation_period_d))
     }
 
-    fn new(found: Evidence, [one, two]: [Assumed; 2], error_kms: f64, rotation_period_d: f64) -> Self {
+    fn new(
+        found: Evidence,
+        [one, two]: [Assumed; 2],
+        (error_kms, jitter): (f64, bool),
+        rotation_period_d: f64,
+    ) -> Self {
         let record = |inclusion: &Inclusion| InclusionRecord {
             period_d: rotation_period_d * inclusion.porb_over_prot,
             false_inclusion_probability: inclusion.false_inclusion_probability,
@@ -84,18 +89,19 @@ impl EvidenceRecord {
         let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
             let most = one.k.1[1];
             format!(
-                "; the prior of K, up to {most} km/s, reaches far beyond what the profiles measure (some \
-                 {error_kms:.3} km/s), and Bayes factors fall in proportion"
+                "the prior of K, up to {most} km/s, reaches far beyond what the profiles measure (some \
+                 {error_kms:.3} km/s), and Bayes factors fall in proportion: "
             )
         });
+        let jitter = if jitter { ", the velocity jitter marginalised in each" } else { "" };
         let sentence = format!(
-            "ln of the Bayes factor over no planet: one on a circle {}, one on an ellipse {}, two on circles {} \
-             (priors: {priors}; spots as fitted without a planet){}{}",
+            "{}ln of the Bayes factor over no planet: one on a circle {}, one on an ellipse {}, two on circles {} \
+             (priors: {priors}; spots as fitted without a planet{jitter}){}",
+            wide.unwrap_or_default(),
             number(&circle),
             number(&ellipse),
             number(&two_circles),
-            at.unwrap_or_default(),
-            wide.unwrap_or_default()
+            at.unwrap_or_default()
         );
         EvidenceRecord { circle, ellipse, two_circles, inclusion, priors, sentence }
     }

@@ -1,8 +1,8 @@
 //! How much more likely the profiles are with planets than without: Bayes factors of no, one and two planets, on
 //! circles and on ellipses, and the false inclusion probability over periods (`docs/method.md` section 4).
 //!
-//! `ln Z` of a model is that of the velocity quadratic, `ln L(V) - ln L(0)`, integrated over the priors of its orbits;
-//! of no planet it is 0. At each period K and the phase are integrated numerically along rays through K = 0, on which
+//! `ln Z` of a model is that of the velocity quadratic, `ln L(V) - ln L(0)`, integrated over the priors of its orbits
+//! and over the velocity jitter, which all models share; of no planet it is 0. At each period K and the phase are integrated numerically along rays through K = 0, on which
 //! the quadratic is a parabola: so any prior of K will do. One circle is a sum over all periods. Eccentricity and
 //! periastron of one ellipse, and the first of two circles, are importance samples of draws from what the circle says,
 //! with the scatter of independent repetitions; the second of two circles is integrated like a single one.
@@ -10,6 +10,7 @@
 //! The false inclusion probability of an interval of frequencies (Hara et al. 2022, A&A 663, A14) is the posterior
 //! probability that no planet has its frequency there, none and one planet taken for equally likely before the data.
 
+use super::periodogram::Jitters;
 use super::periodogram::orbits::{Trial, mid_cycle, scan};
 use super::periodogram::two_planets::without;
 use super::velocities::VelocityQuadratic;
@@ -91,21 +92,67 @@ const EVEN: f64 = 0.1;
 /// Intervals of least false inclusion probability that are told.
 const TOLD: usize = 5;
 
-/// Marginal likelihoods of the models, over that of no planet. `None` where the quadratic does not bound an orbit.
-pub fn evidence(quadratic: &VelocityQuadratic, priors: [&PlanetPrior; 2], seed: u64) -> Option<Evidence> {
-    let one = Periodogram::new(quadratic, priors[0])?;
-    let ellipse = repeated(seed, |rng| ellipse(quadratic, priors[0], &one, rng));
-    // the second where the first is at its best
-    let best = one.best();
-    let beside = without(quadratic, one.frequency(best)).and_then(|rest| Periodogram::new(&rest, priors[1]));
-    let other = Periodogram::new(quadratic, priors[1])?;
-    let best = other.best();
-    let before = without(quadratic, other.frequency(best)).and_then(|rest| Periodogram::new(&rest, priors[0]));
-    let pairs = [(Some(&one), beside.as_ref()), (before.as_ref(), Some(&other))];
-    let pairs: Vec<[&Periodogram; 2]> = pairs.into_iter().filter_map(|(a, b)| Some([a?, b?])).collect();
-    let two_circles = repeated(seed.wrapping_add(1), |rng| two_circles(quadratic, priors, &pairs, rng));
-    let circle = LnBayes { ln_bayes: one.ln_z, sd: None };
-    Some(Evidence { circle, ellipse, two_circles, inclusion: one.inclusion() })
+/// Marginal likelihoods of the models, over that of no planet. Every model, that of no planet among them, is integrated
+/// over the same prior of the velocity jitter, uniform up to the largest of `jitters`: what the jitter without a planet
+/// takes up counts for no planet alone. `None` where the velocities do not bound an orbit.
+pub fn evidence(jitters: &Jitters, priors: [&PlanetPrior; 2], seed: u64) -> Option<Evidence> {
+    let weights = jitters.ln_weights();
+    let alone = ln_sum(&weights);
+    let levels: Vec<OfLevel> =
+        jitters.levels().iter().map(|level| OfLevel::new(&level.quadratic, priors)).collect::<Option<_>>()?;
+    let circles: Vec<f64> = weights.iter().zip(&levels).map(|(weight, of)| weight + of.one.ln_z).collect();
+    let highest = circles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mix = |estimate: &dyn Fn(&OfLevel, &VelocityQuadratic) -> LnBayes| {
+        let counts = |k: &usize| circles[*k] > highest - NEGLIGIBLE;
+        let of = |k: usize| (weights[k] - alone, estimate(&levels[k], &jitters.levels()[k].quadratic));
+        mixed(&(0..levels.len()).filter(counts).map(of).collect::<Vec<_>>())
+    };
+    let ellipse = mix(&|of, quadratic| repeated(seed, |rng| ellipse(quadratic, priors[0], &of.one, rng)));
+    let two_circles = mix(&|of, quadratic| {
+        let pairs = of.pairs();
+        repeated(seed.wrapping_add(1), |rng| two_circles(quadratic, priors, &pairs, rng))
+    });
+    let circle = LnBayes { ln_bayes: ln_sum(&circles) - alone, sd: None };
+    Some(Evidence { circle, ellipse, two_circles, inclusion: Periodogram::mixed(&weights, &levels).inclusion() })
+}
+
+/// Sizes of the jitter beside which one planet is less likely than beside the best by that in ln are left out of what
+/// draws estimate.
+const NEGLIGIBLE: f64 = 8.0;
+
+/// The mean of Bayes factors with weights given as logarithms.
+fn mixed(parts: &[(f64, LnBayes)]) -> LnBayes {
+    let ln: Vec<f64> = parts.iter().map(|(weight, bayes)| weight + bayes.ln_bayes).collect();
+    let ln_bayes = ln_sum(&ln);
+    let part = |(ln, (_, bayes)): (&f64, &(f64, LnBayes))| (ln - ln_bayes).exp() * bayes.sd.unwrap_or_default();
+    let variance: f64 = ln.iter().zip(parts).map(part).map(|sd| sd * sd).sum();
+    LnBayes { ln_bayes, sd: Some(variance.sqrt()) }
+}
+
+/// What draws are made of, beside a jitter of one size.
+struct OfLevel {
+    /// One planet.
+    one: Periodogram,
+    /// The second where the first is at its best, and the other way round.
+    beside: Option<Periodogram>,
+    other: Periodogram,
+    before: Option<Periodogram>,
+}
+
+impl OfLevel {
+    fn new(quadratic: &VelocityQuadratic, priors: [&PlanetPrior; 2]) -> Option<Self> {
+        let one = Periodogram::new(quadratic, priors[0])?;
+        let rest = |best: &Periodogram, prior: &PlanetPrior| {
+            without(quadratic, best.frequency(best.best())).and_then(|rest| Periodogram::new(&rest, prior))
+        };
+        let other = Periodogram::new(quadratic, priors[1])?;
+        Some(OfLevel { beside: rest(&one, priors[1]), before: rest(&other, priors[0]), one, other })
+    }
+
+    fn pairs(&self) -> Vec<[&Periodogram; 2]> {
+        let pairs = [(Some(&self.one), self.beside.as_ref()), (self.before.as_ref(), Some(&self.other))];
+        pairs.into_iter().filter_map(|(a, b)| Some([a?, b?])).collect()
+    }
 }
 
 /// The mean of independent estimates of a marginal likelihood, given as logarithms.
@@ -123,6 +170,7 @@ fn repeated(seed: u64, estimate: impl Fn(&mut ChaCha8Rng) -> f64 + Sync) -> LnBa
 }
 
 /// Marginal likelihoods at the frequencies of a prior.
+#[derive(Default)]
 struct Periodogram {
     lowest: f64,
     width: f64,
@@ -166,6 +214,26 @@ impl Periodogram {
         });
         let cumulative = cumulative.collect();
         Some(Periodogram { lowest, width, ln_cells, drawn, cumulative, ln_z, time_base })
+    }
+
+    /// The posterior of the frequency beside a jitter of all sizes: of `levels`, whose weights are logarithms.
+    fn mixed(weights: &[f64], levels: &[OfLevel]) -> Self {
+        let alone = ln_sum(weights);
+        let cell = |k: usize| {
+            let parts: Vec<f64> = weights.iter().zip(levels).map(|(weight, of)| weight + of.one.ln_cells[k]).collect();
+            ln_sum(&parts) - alone
+        };
+        let first = &levels[0].one;
+        let ln_cells: Vec<f64> = (0..first.ln_cells.len()).map(cell).collect();
+        let ln_z = ln_sum(&ln_cells);
+        Periodogram {
+            lowest: first.lowest,
+            width: first.width,
+            time_base: first.time_base,
+            ln_cells,
+            ln_z,
+            ..Periodogram::default()
+        }
     }
 
     fn frequency(&self, cell: usize) -> f64 {

@@ -4,7 +4,7 @@ use super::evolving_map::NoFit;
 use super::expansion::Expansion;
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
-use crate::planets::periodogram::{CircularOrbit, Unbounded};
+use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::observation::RadialVelocity;
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,27 @@ impl Linearised {
     /// What the model that made it has kept, if that is such a thing.
     pub fn solution<T: 'static>(&self) -> Option<&T> {
         self.solution.downcast_ref()
+    }
+}
+
+/// A star but for its velocity jitter, which the profiles tell.
+#[derive(Clone, Debug)]
+pub struct WithoutJitter {
+    /// The star with its spots, without a jitter.
+    pub here: Linearised,
+    /// The jitter that was found (km/s); 0 where none is needed.
+    pub found_kms: f64,
+}
+
+impl WithoutJitter {
+    /// The likelihood of the velocities beside jitters of several sizes.
+    pub fn jitters(&self) -> Jitters {
+        self.beside(&self.here.quadratic)
+    }
+
+    /// The same of other velocities of this star.
+    pub fn beside(&self, quadratic: &VelocityQuadratic) -> Jitters {
+        if self.found_kms > 0.0 { Jitters::new(quadratic, self.found_kms) } else { Jitters::none(quadratic) }
     }
 }
 

@@ -36,7 +36,7 @@ pub mod planned {
 }
 
 pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit};
-pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError};
+pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
 pub use model::{At, OrbitOf, SurfaceModel};
 pub use objective::{ObjectiveKind, UnresolvedSpots};

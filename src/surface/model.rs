@@ -5,9 +5,9 @@ use super::expansion::{Expansion, Nuisance};
 use super::imaging::Imager;
 use super::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use super::record::{RebuildError, SurfaceRecord};
-use super::{AtTarget, Change, Explained, Linearised, NoFit, NoMaps, SurfaceError, SurfaceMaps};
+use super::{AtTarget, Change, Explained, Linearised, NoFit, NoMaps, SurfaceError, SurfaceMaps, WithoutJitter};
 use crate::model::{ParameterSpace, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters};
+use crate::planets::periodogram::{CircularOrbit, Frequencies};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
@@ -39,12 +39,12 @@ pub trait SurfaceModel: Debug + Send + Sync {
     /// that of the data: spots that the map does not resolve count as noise of the size that the gradient says.
     fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic>;
 
-    /// The likelihood of the velocities beside velocity jitters of several sizes, where the profiles say how large it
-    /// is.
+    /// The star as it is `here` without its velocity jitter, where the profiles are to say how large that is; `None`
+    /// where it is given, or there is none.
     ///
     /// # Errors
     /// [`SurfaceError`].
-    fn jitters(&self, at: At, here: &Linearised) -> Result<Jitters, SurfaceError>;
+    fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError>;
 
     /// The same model with what was fitted of the spots held.
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel>;

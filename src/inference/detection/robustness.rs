@@ -54,7 +54,8 @@ pub fn robustness(
     found: &Detection,
 ) -> Robustness {
     let peak = &found.best;
-    let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, 1.0 / peak.porb_over_prot).orbit;
+    let frequency = 1.0 / peak.porb_over_prot;
+    let orbit = |quadratic: &VelocityQuadratic| orbits::at(quadratic, frequency).orbit;
     values.set(Parameter::K, peak.orbit.k_kms);
     values.set(Parameter::PorbOverProt, peak.porb_over_prot);
     values.set(Parameter::Phi, peak.orbit.phi);
@@ -67,7 +68,15 @@ pub fn robustness(
     nights.iter_mut().for_each(|night| night.sort_unstable());
     let (surface, at) = (settings.surface.model(), At { imager, values, nuisances: &settings.nuisances });
     let targets = surface.at_other_targets(at, &orbit);
-    let without = surface.without_each(at, found.last(), &nights, &orbit);
+    let mut without = surface.without_each(at, found.last(), &nights, &orbit);
+    let mut all = orbit(&found.last().quadratic);
+    // Delta ln L is that of the blind search: beside a jitter that has been found without a planet
+    if let Some(star) = &found.without_jitter {
+        let beside = |quadratic: &VelocityQuadratic| star.beside(quadratic).orbit_at(frequency);
+        let blind = surface.without_each(at, &star.here, &nights, &beside);
+        without = without.into_iter().zip(blind).map(|(orbit, blind)| with_height(orbit, blind)).collect();
+        all = with_height(all, beside(&star.here.quadratic));
+    }
     let without = nights.iter().zip(without).map(|(night, orbit)| {
         let times = || night.iter().map(|&k| times_d[k]);
         WithoutNight {
@@ -76,7 +85,12 @@ pub fn robustness(
             orbit,
         }
     });
-    Robustness { all: orbit(&found.last().quadratic), targets, nights: without.collect() }
+    Robustness { all, targets, nights: without.collect() }
+}
+
+/// An orbit with the Delta ln L of another.
+fn with_height(orbit: Option<CircularOrbit>, other: Option<CircularOrbit>) -> Option<CircularOrbit> {
+    Some(CircularOrbit { delta_ln_l: other?.delta_ln_l, ..orbit? })
 }
 
 /// Profiles night by night, in order of time; nights are more than `gap_d` apart.

@@ -6,7 +6,7 @@
 //! stream of random numbers, so that the number of threads does not matter.
 
 use super::jitter::{Jitters, Level};
-use super::orbits::{design, scan};
+use super::orbits::{Trial, design, scan};
 use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,15 +63,25 @@ fn highest(rows: &DMatrix<f64>, deviates: &DMatrix<f64>) -> Vec<f64> {
 fn whitened(level: &Level, frequencies: &[f64]) -> DMatrix<f64> {
     let mut bounded = scan(&level.quadratic, frequencies);
     bounded.retain(|trial| trial.orbit.is_some());
-    let frequencies: Vec<f64> = bounded.iter().map(|t| t.frequency).collect();
-    let mut columns = &level.root * design(&level.quadratic.cycles, &frequencies);
-    for (j, trial) in bounded.iter().enumerate() {
-        let Some(factor) = trial.information.cholesky().map(|c| c.l()) else { continue };
+    whitening(&level.quadratic.cycles, &bounded, &level.root).0.transpose()
+}
+
+/// `S X L^-T` of all trials, two columns each, S being symmetric; and the three elements of each L.
+pub(super) fn whitening(cycles: &[f64], trials: &[Trial], s: &DMatrix<f64>) -> (DMatrix<f64>, Vec<[f64; 3]>) {
+    let frequencies: Vec<f64> = trials.iter().map(|t| t.frequency).collect();
+    let mut columns = s * design(cycles, &frequencies);
+    let mut factors = Vec::with_capacity(trials.len());
+    for (j, trial) in trials.iter().enumerate() {
+        let Some(factor) = trial.information.cholesky().map(|c| c.l()) else {
+            factors.push([f64::INFINITY; 3]);
+            continue;
+        };
         for i in 0..columns.nrows() {
             let first = columns[(i, 2 * j)] / factor[(0, 0)];
             let second = (columns[(i, 2 * j + 1)] - factor[(1, 0)] * first) / factor[(1, 1)];
             (columns[(i, 2 * j)], columns[(i, 2 * j + 1)]) = (first, second);
         }
+        factors.push([factor[(0, 0)], factor[(1, 0)], factor[(1, 1)]]);
     }
-    columns.transpose()
+    (columns, factors)
 }

@@ -25,16 +25,18 @@ pub struct Jitters {
 
 /// One size.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Level {
+pub struct Level {
+    /// Standard deviation of the jitter (km/s).
+    pub size_kms: f64,
     /// ln L of the velocities.
     pub quadratic: VelocityQuadratic,
     /// ln L at velocities 0, above that of the best size.
     pub ln_l: f64,
     /// From deviates to the gradient of a star without a planet.
-    pub root: DMatrix<f64>,
+    pub(super) root: DMatrix<f64>,
     /// ln L at velocities 0 of such a star: a constant, and a factor on the square of each amplitude.
-    pub constant: f64,
-    pub squares: DVector<f64>,
+    pub(super) constant: f64,
+    pub(super) squares: DVector<f64>,
 }
 
 /// A trial period with the size of the jitter that suits its orbit best.
@@ -60,6 +62,7 @@ impl Jitters {
     /// No jitter.
     pub fn none(quadratic: &VelocityQuadratic) -> Self {
         let level = Level {
+            size_kms: 0.0,
             quadratic: quadratic.clone(),
             ln_l: 0.0,
             root: root(&quadratic.information),
@@ -83,6 +86,7 @@ impl Jitters {
             let constant = 0.5 * left.map(f64::ln).sum();
             let information = among(lambda.component_mul(&left));
             Level {
+                size_kms: size * found_kms,
                 ln_l: constant + 0.5 * variance * pulled.component_mul(&pulled).dot(&left),
                 quadratic: VelocityQuadratic {
                     cycles: without.cycles.clone(),
@@ -100,8 +104,30 @@ impl Jitters {
         Jitters { levels, rotation: u.transpose() }
     }
 
+    /// ln L of no planet with each size, times its share of a prior that is uniform up to the largest.
+    pub fn ln_weights(&self) -> Vec<f64> {
+        let last = self.levels.len() - 1;
+        if last == 0 {
+            return vec![0.0];
+        }
+        let size = |k: usize| self.levels[k.min(last)].size_kms;
+        let share = |k: usize| 0.5 * (size(k + 1) - size(k.saturating_sub(1))) / size(last);
+        (0..=last).map(|k| self.levels[k].ln_l + share(k).ln()).collect()
+    }
+
+    /// All sizes, from small to large.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// The best orbit of one frequency (orbits a rotation cycle) beside the jitter that suits it best, its height above
+    /// no planet beside the jitter that suits this best. `None` where no orbit is bounded.
+    pub fn orbit_at(&self, frequency: f64) -> Option<CircularOrbit> {
+        self.scan(&[frequency])[0].trial_above_no_planet().orbit
+    }
+
     /// With the size that suits the star without a planet best.
-    pub(super) fn as_found(&self) -> &Level {
+    pub fn as_found(&self) -> &Level {
         self.levels.iter().find(|level| level.ln_l == 0.0).unwrap_or(&self.levels[0])
     }
 

@@ -22,8 +22,6 @@ pub struct BlindSearchOptions {
     pub draws: usize,
     /// Seed of these draws.
     pub seed: u64,
-    /// Whether the verdict is on orbits that the config's priors of K and the period allow.
-    pub within_priors: bool,
     /// Of which orbits it is asked whether they depend on the target chi2 or on one night.
     pub robustness: RobustnessOf,
     /// Whether a static map is compared with an evolving one, and nothing is judged where the star changes.
@@ -62,7 +60,6 @@ impl Default for BlindSearchOptions {
             fixed: false,
             draws,
             seed,
-            within_priors: false,
             robustness: RobustnessOf::Any,
             static_check: true,
         }
@@ -72,7 +69,7 @@ impl Default for BlindSearchOptions {
 impl BlindSearchOptions {
     /// For what goes on from the best orbit: `optimise`, `sample`, `batch`.
     pub(super) fn before_a_chain() -> Self {
-        BlindSearchOptions { within_priors: true, robustness: RobustnessOf::Candidates, ..Default::default() }
+        BlindSearchOptions { robustness: RobustnessOf::Candidates, ..Default::default() }
     }
 
     /// The trial periods for the star in `scene`.

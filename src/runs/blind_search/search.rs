@@ -84,7 +84,8 @@ impl<'a> BlindSearch<'a> {
         let of_the_period = detection.of_the_period();
         let of_the_star: Vec<Remark> = remarks.iter().filter(|r| !of_the_period.contains(r)).cloned().collect();
         let mut verdict = detection.verdict(&remarks);
-        if options.within_priors {
+        // where an orbit is asked for, of those that are allowed
+        if scene.settings.free.iter().any(|f| f.parameter == Parameter::K) {
             verdict = within_priors(scene, &detection, verdict, &mut remarks);
         }
         // on a planet of known ephemeris where the config looks for one first; what else is found is said beside it
@@ -98,7 +99,7 @@ impl<'a> BlindSearch<'a> {
                 remarks.push(Remark::note(format!("the planet of known ephemeris: {}", known.sentence)));
             }
         }
-        let evidence = scene.evidence(&detection.planet_free.quadratic);
+        let evidence = scene.evidence(&detection.jitters());
         BlindSearch { scene, settings, detection, robustness, planet_free, at_best, evidence, verdict, remarks }
     }
 

@@ -1,7 +1,6 @@
 //! Orbits of many periods, semi-amplitudes and phases, how many of them are found, and the limits that follow.
 
-use super::shortcut::Shortcut;
-use crate::star::Orbit;
+use super::shortcut::Searches;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -45,15 +44,6 @@ pub struct Limit {
 }
 
 impl Orbits {
-    /// The orbit of that period, semi-amplitude and phase.
-    fn at(&self, period: usize, k: usize, phase: usize) -> Orbit {
-        Orbit {
-            porb_over_prot: self.porb_over_prot[period],
-            k_kms: self.k_kms[k],
-            phi: phase as f64 / self.phases as f64,
-        }
-    }
-
     /// Number of orbits.
     pub fn count(&self) -> usize {
         self.porb_over_prot.len() * self.k_kms.len() * self.phases
@@ -67,21 +57,22 @@ pub fn even_in_logarithm(low: f64, high: f64, count: usize) -> Vec<f64> {
 
 /// All orbits by the shortcut, cells period after period with K rising; `progress` is called with the number done since
 /// the last call, from any thread.
-pub fn recovered(shortcut: &Shortcut, orbits: &Orbits, progress: &(dyn Fn(usize) + Sync)) -> Vec<Cell> {
-    let cells = orbits.porb_over_prot.len() * orbits.k_kms.len();
-    let cell = |index: usize| {
-        let (period, k) = (index / orbits.k_kms.len(), index % orbits.k_kms.len());
-        let outcomes = (0..orbits.phases).map(|phase| shortcut.search(&orbits.at(period, k, phase)));
-        let (mut detected, mut recovered) = (0, 0);
-        for outcome in outcomes {
-            detected += usize::from(outcome.detected);
-            recovered += usize::from(outcome.recovered);
-        }
-        progress(orbits.phases);
-        let (porb_over_prot, k_kms) = (orbits.porb_over_prot[period], orbits.k_kms[k]);
-        Cell { porb_over_prot, k_kms, phases: orbits.phases, detected, recovered }
+pub fn recovered(searches: &Searches, orbits: &Orbits, progress: &(dyn Fn(usize) + Sync)) -> Vec<Cell> {
+    let column = |porb_over_prot: &f64| {
+        let search = searches.of_period(*porb_over_prot);
+        let cell = |k_kms: &f64| {
+            let outcomes = (0..orbits.phases).map(|phase| search(*k_kms, phase as f64 / orbits.phases as f64));
+            let (mut detected, mut recovered) = (0, 0);
+            for outcome in outcomes {
+                detected += usize::from(outcome.detected);
+                recovered += usize::from(outcome.recovered);
+            }
+            progress(orbits.phases);
+            Cell { porb_over_prot: *porb_over_prot, k_kms: *k_kms, phases: orbits.phases, detected, recovered }
+        };
+        orbits.k_kms.iter().map(cell).collect::<Vec<_>>()
     };
-    (0..cells).into_par_iter().map(cell).collect()
+    orbits.porb_over_prot.par_iter().flat_map_iter(column).collect()
 }
 
 /// The limit at every period.

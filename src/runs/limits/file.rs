@@ -8,7 +8,8 @@ use crate::data::io::atomic::{WriteError, write, write_json};
 use crate::data::io::csv::Table;
 use crate::data::io::provenance::Provenance;
 use crate::numerics::text::aligned;
-use crate::planets::verdict::CANDIDATE_FAP;
+use crate::planets::periodogram::Search;
+use crate::planets::verdict::{CANDIDATE_FAP, probability};
 use crate::star::Orbit;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -30,8 +31,11 @@ pub struct LimitsFile {
     pub level: f64,
     /// The orbit that was taken out of the profiles first, its K negative.
     pub removed: Option<Orbit>,
-    /// The search before anything was put in.
+    /// The search of the profiles as they are, that of `periodogram`.
     pub before: BeforeRecord,
+    /// The same without the orbit that was taken out; null where none was.
+    #[serde(default)]
+    pub after: Option<BeforeRecord>,
     /// Semi-amplitudes put in (km/s).
     pub k_kms: Vec<f64>,
     /// Number of phases.
@@ -49,7 +53,7 @@ pub struct LimitsFile {
     pub provenance: Provenance,
 }
 
-/// The highest peak of the profiles as they are.
+/// The highest peak.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct BeforeRecord {
     /// Its period (d).
@@ -70,17 +74,20 @@ impl LimitsFile {
         rotation_period_d: f64,
         provenance: Provenance,
     ) -> Self {
-        let best = shortcut.before.best();
-        let false_alarm = shortcut.before.false_alarm.probability(best.orbit.delta_ln_l).value();
+        let of = |search: &Search| {
+            let best = search.best();
+            BeforeRecord {
+                period_d: rotation_period_d * best.porb_over_prot,
+                delta_ln_l: best.orbit.delta_ln_l,
+                false_alarm_probability: search.false_alarm.probability(best.orbit.delta_ln_l).value(),
+            }
+        };
         let mut file = LimitsFile {
             false_alarm_probability: CANDIDATE_FAP,
             level: shortcut.level,
             removed: shortcut.removed,
-            before: BeforeRecord {
-                period_d: rotation_period_d * best.porb_over_prot,
-                delta_ln_l: best.orbit.delta_ln_l,
-                false_alarm_probability: false_alarm,
-            },
+            before: of(&shortcut.found.blind),
+            after: shortcut.removed.map(|_| of(&shortcut.before)),
             k_kms: orbits.k_kms.clone(),
             phases: orbits.phases,
             limits,
@@ -95,22 +102,29 @@ impl LimitsFile {
 
     fn doubts(&self, shortcut: &Shortcut) -> Vec<String> {
         let mut doubts = Vec::new();
-        match &shortcut.change {
+        match &shortcut.found.change {
             Some(Ok(change)) if change.is_changing() => {
                 doubts.push(format!("these limits do not hold: {}", change.sentence()));
             }
             Some(Err(error)) => doubts.push(format!("whether the star changes is not known: {error}")),
             _ => {}
         }
-        if self.before.false_alarm_probability < CANDIDATE_FAP {
+        if self.removed.is_none() && self.before.false_alarm_probability < CANDIDATE_FAP {
             doubts.push(format!(
-                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: \
-                --without-best takes it \
-                 out first",
+                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: without \
+                --with-best it is taken out first",
                 self.before.period_d
             ));
         }
-        if !shortcut.here.on_target {
+        if let Some(after) = self.after.filter(|after| after.false_alarm_probability < CANDIDATE_FAP) {
+            doubts.push(format!(
+                "without that orbit the profiles show another one, of {:.4} d (false-alarm probability {}), which \
+                counts as recovered near its period",
+                after.period_d,
+                probability(after.false_alarm_probability)
+            ));
+        }
+        if !shortcut.found.planet_free.on_target {
             doubts.push("no map reaches the target chi2 without turning noise into spots".into());
         }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) =
@@ -155,6 +169,15 @@ impl LimitsFile {
             100.0 * self.false_alarm_probability,
             self.phases
         );
+        if let Some(orbit) = self.removed {
+            text += &format!(
+                "taken out first: the orbit that the profiles show, {:.4} d, K = {:.4} km/s (false-alarm probability \
+                {})\n",
+                self.before.period_d,
+                -orbit.k_kms,
+                probability(self.before.false_alarm_probability)
+            );
+        }
         if let Some(Agreement { orbits, agree, by_shortcut, by_full }) = self.agreement {
             text += &format!(
                 "the whole way: {by_full} of {orbits} orbits near the limit recovered, by the shortcut {by_shortcut}; \

@@ -4,8 +4,9 @@ use super::cells::Limit;
 use super::shortcut::{LimitSettings, Outcome, Shortcut};
 use crate::data::config::Config;
 use crate::data::scene::{Scene, SceneError};
-use crate::model::{Parameter, for_blind_search};
-use crate::planets::periodogram::Search;
+use crate::inference::detection::PlanetFree;
+use crate::model::for_blind_search;
+use crate::planets::periodogram::injections::Highest;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
 use crate::surface::At;
@@ -130,15 +131,18 @@ impl WholeWay {
         move |orbit: &Orbit| {
             let orbits: Vec<Orbit> = removed.into_iter().chain([*orbit]).collect();
             let star = scene.injected(&orbits).ok()?;
-            let mut values = for_blind_search(star.settings.values, &star.settings.free);
-            values.set(Parameter::K, 0.0);
+            let values = for_blind_search(star.settings.values, &star.settings.free);
             let at = At { imager: &star.imager, values, nuisances: &settings.detection.nuisances };
-            let here = settings.detection.surface.model().linearise(at, None).ok()?;
-            let search = Search::new(&here.quadratic, &settings.frequencies, settings.detection.search).ok()?;
-            let best = search.best();
-            let peak = (1.0 / best.porb_over_prot, best.orbit.delta_ln_l, best.orbit.k_kms);
-            let level = search.false_alarm.level(CANDIDATE_FAP);
-            Some(Outcome::of(peak, level, orbit, settings.frequencies.time_base_cycles))
+            let (surface, frequencies) = (settings.detection.surface.model(), &settings.frequencies);
+            let found = PlanetFree::find(&*surface, at, frequencies, settings.detection.search, &|_| ()).ok()?;
+            let best = found.blind.best();
+            let highest = Highest {
+                frequency: 1.0 / best.porb_over_prot,
+                delta_ln_l: best.orbit.delta_ln_l,
+                k_kms: best.orbit.k_kms,
+                level: found.blind.false_alarm.level(CANDIDATE_FAP),
+            };
+            Some(Outcome::of(highest, orbit, frequencies.time_base_cycles))
         }
     }
 }

@@ -15,4 +15,4 @@ mod shortcut;
 pub use cells::{Cell, Limit, Orbits, even_in_logarithm, limits, recovered};
 pub use file::{CSV, JSON, LimitsFile};
 pub use full::{Comparison, WholeWay, WholeWayError, drawn};
-pub use shortcut::{LimitSettings, Outcome, Shortcut};
+pub use shortcut::{BestOrbit, LimitSettings, Outcome, Searches, Shortcut};

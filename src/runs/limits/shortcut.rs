@@ -1,15 +1,20 @@
 //! The blind search after an orbit has been put in, to second order around the image without a planet.
+//!
+//! It is that of `periodogram`: the same nuisances, and the same jitter, which grows with an orbit that is not in the
+//! model. A planet that the profiles show as they are is taken out first, with the spots as they are beside it.
 
-use crate::inference::detection::DetectionSettings;
+use crate::inference::detection::{Detection, DetectionSettings, jitters};
 use crate::model::{Parameter, ParameterValues};
+use crate::planets::periodogram::injections::Highest;
 use crate::planets::periodogram::orbits::{Trial, scan};
 use crate::planets::periodogram::window::is_same_frequency;
-use crate::planets::periodogram::{CircularOrbit, Frequencies, Search, Unbounded};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Injections, Search, Unbounded};
+use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
 use crate::surface::expansion::Expansion;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel};
+use crate::surface::{At, Linearised, SurfaceError, SurfaceModel, WithoutJitter};
 use serde::{Deserialize, Serialize};
 
 /// How orbits are looked for.
@@ -20,7 +25,18 @@ pub struct LimitSettings {
     /// Its trial periods.
     pub frequencies: Frequencies,
     /// Whether the best orbit of the profiles as they are is taken out first.
-    pub without_best: bool,
+    pub best: BestOrbit,
+}
+
+/// What becomes of the best orbit of the profiles as they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BestOrbit {
+    /// It is taken out where it is a candidate.
+    OutIfCandidate,
+    /// It is taken out.
+    Out,
+    /// It stays.
+    In,
 }
 
 /// What a blind search makes of an orbit that was put in.
@@ -39,9 +55,9 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Of a peak when an orbit of `injected` was put in; a detection is above `level`.
-    pub(super) fn of(peak: (f64, f64, f64), level: f64, injected: &Orbit, time_base_cycles: f64) -> Self {
-        let (frequency, delta_ln_l, k_kms) = peak;
+    /// Of the highest peak when an orbit of `injected` was put in.
+    pub(super) fn of(highest: Highest, injected: &Orbit, time_base_cycles: f64) -> Self {
+        let Highest { frequency, delta_ln_l, k_kms, level } = highest;
         let detected = delta_ln_l > level;
         let recovered = detected && is_same_frequency(frequency, 1.0 / injected.porb_over_prot, time_base_cycles);
         Outcome { delta_ln_l, porb_over_prot: 1.0 / frequency, k_kms, detected, recovered }
@@ -54,47 +70,59 @@ pub struct Shortcut<'a> {
     pub settings: &'a LimitSettings,
     /// What is assumed of its spots.
     surface: Box<dyn SurfaceModel>,
-    /// Maps and expansion.
-    pub here: Linearised,
-    /// Whether the star changes, where spots are taken for unchanging.
-    pub change: Option<Result<Change, NoFit>>,
+    /// The search of the profiles as they are.
+    pub found: Detection,
     /// What was taken out of the profiles: the orbit found, with the opposite sign.
     pub removed: Option<Orbit>,
-    /// The search before anything is put in.
+    /// The star that orbits are put into.
+    star: Linearised,
+    /// The same without its jitter.
+    without_jitter: Option<WithoutJitter>,
+    /// The search of that star.
     pub before: Search,
-    /// Delta ln L of a detection.
+    /// Delta ln L of a detection in it.
     pub level: f64,
 }
 
 impl<'a> Shortcut<'a> {
-    /// Images the star in `imager`, all but the orbit as in `values`, without a planet.
+    /// Searches the star in `imager`, all but the orbit as in `values`, and takes the planet out that is found.
     ///
     /// # Errors
     /// [`SurfaceError`].
-    pub fn new(
-        imager: &Imager,
-        mut values: ParameterValues,
-        settings: &'a LimitSettings,
-    ) -> Result<Self, SurfaceError> {
-        values.set(Parameter::K, 0.0);
-        let surface = settings.detection.surface.model();
-        let nuisances = &settings.detection.nuisances;
-        let at = At { imager, values, nuisances };
-        let mut here = surface.linearise(at, None)?;
-        let change = surface.evolution(at, &settings.frequencies);
-        let search = |here: &Linearised| Search::new(&here.quadratic, &settings.frequencies, settings.detection.search);
-        let mut before = search(&here)?;
-        let mut removed = None;
-        if settings.without_best {
-            let CircularOrbit { k_kms, phi, .. } = before.best().orbit;
-            let orbit = Orbit { k_kms: -k_kms, porb_over_prot: before.best().porb_over_prot, phi };
-            here.expansion = with(&here.expansion, &orbit);
-            here.quadratic = surface.velocities(&here.expansion, nuisances).ok_or(Unbounded)?;
-            before = search(&here)?;
+    pub fn new(imager: &Imager, values: ParameterValues, settings: &'a LimitSettings) -> Result<Self, SurfaceError> {
+        let LimitSettings { detection, frequencies, best } = settings;
+        let found = Detection::find(imager, values, frequencies.clone(), detection, &|_| ())?;
+        let surface = detection.surface.model();
+        let removes = match best {
+            BestOrbit::OutIfCandidate => found.is_candidate(),
+            BestOrbit::Out => true,
+            BestOrbit::In => false,
+        };
+        let mut star = found.planet_free.clone();
+        let mut without_jitter = found.without_jitter.clone();
+        let (mut before, mut removed) = (found.blind.clone(), None);
+        if removes {
+            let CircularOrbit { k_kms, phi, .. } = found.best.orbit;
+            let porb_over_prot = found.best.porb_over_prot;
+            let orbit = Orbit { k_kms: -k_kms, porb_over_prot, phi };
+            let mut beside = values;
+            beside.set(Parameter::K, k_kms);
+            beside.set(Parameter::PorbOverProt, porb_over_prot);
+            beside.set(Parameter::Phi, phi);
+            let at = At { imager, values: beside, nuisances: &detection.nuisances };
+            // spots and jitter as they are beside the planet
+            let with_planet = found.last().clone();
+            without_jitter = surface.without_jitter(at, &with_planet)?;
+            star = with_planet;
+            for here in std::iter::once(&mut star).chain(without_jitter.as_mut().map(|without| &mut without.here)) {
+                here.expansion = with(&here.expansion, &orbit);
+                here.quadratic = surface.velocities(&here.expansion, &detection.nuisances).ok_or(Unbounded)?;
+            }
+            before = Search::with_jitter(&jitters(&star, without_jitter.as_ref()), frequencies, detection.search)?;
             removed = Some(orbit);
         }
         let level = before.false_alarm.level(CANDIDATE_FAP);
-        Ok(Shortcut { settings, surface, here, change, removed, before, level })
+        Ok(Shortcut { settings, surface, found, removed, star, without_jitter, before, level })
     }
 
     /// Semi-amplitudes (km/s) between which planets begin to be found: from a third of the lowest K that is found half
@@ -109,25 +137,64 @@ impl<'a> Shortcut<'a> {
         Some((lowest / 3.0, 4.0 * most))
     }
 
-    /// The search with `orbit` in the profiles. Nothing is found where no orbit is bounded.
-    pub fn search(&self, orbit: &Orbit) -> Outcome {
-        let frequencies = &self.settings.frequencies;
-        let moved = with(&self.here.expansion, orbit);
-        let Some(quadratic) = self.surface.velocities(&moved, &self.settings.detection.nuisances) else {
-            return Outcome::default();
-        };
+    /// The searches with orbits of up to `most_kms` in the profiles.
+    pub fn searches(&self, most_kms: f64) -> Searches<'_> {
+        let LimitSettings { detection, frequencies, .. } = self.settings;
+        let injections = self.without_jitter.as_ref().map(|without| {
+            Injections::new(&without.here.quadratic, most_kms, frequencies, detection.search, CANDIDATE_FAP)
+        });
+        Searches { shortcut: self, injections }
+    }
+}
+
+/// Searches with an orbit in the profiles.
+pub struct Searches<'a> {
+    shortcut: &'a Shortcut<'a>,
+    /// Where the profiles say how large the jitter is.
+    injections: Option<Injections<'a>>,
+}
+
+impl Searches<'_> {
+    /// Those with orbits of one period over the rotation period, by semi-amplitude (km/s) and phase. Nothing is found
+    /// where no orbit is bounded.
+    pub fn of_period(&self, porb_over_prot: f64) -> impl Fn(f64, f64) -> Outcome + '_ {
+        let column = self.injections.as_ref().map(|injections| injections.column(porb_over_prot));
+        move |k_kms, phi| {
+            let orbit = Orbit { k_kms, porb_over_prot, phi };
+            let highest = match &column {
+                Some(column) => column.highest(k_kms, phi),
+                None => self.shortcut.beside_no_jitter(&orbit),
+            };
+            let time_base_cycles = self.shortcut.settings.frequencies.time_base_cycles;
+            highest.map_or_else(Outcome::default, |highest| Outcome::of(highest, &orbit, time_base_cycles))
+        }
+    }
+
+    /// That with `orbit`.
+    pub fn of(&self, orbit: &Orbit) -> Outcome {
+        self.of_period(orbit.porb_over_prot)(orbit.k_kms, orbit.phi)
+    }
+}
+
+impl Shortcut<'_> {
+    /// The highest peak with `orbit` in the profiles, where the jitter is known; spots that the map does not resolve
+    /// may grow with the orbit.
+    fn beside_no_jitter(&self, orbit: &Orbit) -> Option<Highest> {
+        let LimitSettings { detection, frequencies, .. } = self.settings;
+        let moved = with(&self.star.expansion, orbit);
+        let quadratic: VelocityQuadratic = self.surface.velocities(&moved, &detection.nuisances)?;
         let trials = scan(&quadratic, &frequencies.per_cycle);
         let summits = scan(&quadratic, &summits(&trials));
         let highest = |trials: &[Trial]| {
             let orbits = trials.iter().filter_map(|trial| Some((trial.frequency, trial.orbit?)));
             orbits.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))
         };
-        let Some(trial) = highest(&trials) else { return Outcome::default() };
+        let trial = highest(&trials)?;
         // at an end of the search there is no summit
         let summit = highest(&summits).filter(|summit| summit.1.delta_ln_l >= trial.1.delta_ln_l).unwrap_or(trial);
         // the level is of draws at the trial periods, and so is what is held against it
-        let peak = (summit.0, trial.1.delta_ln_l, summit.1.k_kms);
-        Outcome::of(peak, self.level, orbit, frequencies.time_base_cycles)
+        let (frequency, k_kms) = (summit.0, summit.1.k_kms);
+        Some(Highest { frequency, delta_ln_l: trial.1.delta_ln_l, k_kms, level: self.level })
     }
 }
 

@@ -33,7 +33,7 @@ pub struct Fitted {
     /// Bounds of the search that were reached.
     pub at_bounds: Vec<&'static str>,
     /// Roughly minus the second derivatives of ln Z in the coordinates of the search; `None` if there was no search.
-    hessian: Option<Matrix4<f64>>,
+    pub(super) hessian: Option<Matrix4<f64>>,
 }
 
 /// Why there is no most probable field.

@@ -3,7 +3,7 @@
 use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, fit, nights, optimum};
 use crate::field::{Field, Lifetime};
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters};
+use crate::planets::periodogram::{CircularOrbit, Frequencies};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
@@ -14,6 +14,7 @@ use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use crate::surface::{
     At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, SpotField, SurfaceError, SurfaceMaps, SurfaceModel,
+    WithoutJitter,
 };
 use std::sync::Arc;
 
@@ -62,15 +63,27 @@ impl SurfaceModel for EvolvingMap {
         Some(expansion.velocities(nuisances))
     }
 
-    fn jitters(&self, at: At, here: &Linearised) -> Result<Jitters, SurfaceError> {
-        let marginal = &here.kept::<Fitted>().marginal;
-        if self.known.jitter_kms.is_some() || marginal.assumed.jitter_kms <= 0.0 {
-            return Ok(Jitters::none(&here.quadratic));
+    fn without_jitter(&self, at: At, here: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError> {
+        let fitted = here.kept::<Fitted>();
+        let found_kms = fitted.marginal.assumed.jitter_kms;
+        if self.known.jitter_kms.is_some() {
+            return Ok(None);
+        }
+        if found_kms <= 0.0 {
+            return Ok(Some(WithoutJitter { here: here.clone(), found_kms: 0.0 }));
         }
         let basis = Basis::new(&at.imager.grid);
-        let expansion = marginal.without_jitter(at.imager, &basis)?;
-        let expansion = expansion.expansion(at.imager, &basis, &here.expansion.stellar)?;
-        Ok(Jitters::new(&expansion.velocities(at.nuisances), marginal.assumed.jitter_kms))
+        let marginal = fitted.marginal.without_jitter(at.imager, &basis)?;
+        let expansion = marginal.expansion(at.imager, &basis, &here.expansion.stellar)?;
+        let quadratic = expansion.velocities(at.nuisances);
+        let here = Linearised {
+            expansion,
+            regularised: quadratic.clone(),
+            quadratic,
+            solution: Arc::new(Fitted { marginal, ..fitted.clone() }),
+            ..here.clone()
+        };
+        Ok(Some(WithoutJitter { here, found_kms }))
     }
 
     fn holding(&self, here: &Linearised) -> Box<dyn SurfaceModel> {

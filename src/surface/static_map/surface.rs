@@ -3,7 +3,7 @@
 use super::{Posterior, Reference, StaticMap, UNRESOLVED_SPOTS, optimum};
 use crate::maxent::Termination;
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
-use crate::planets::periodogram::{CircularOrbit, Frequencies, Jitters, Unbounded};
+use crate::planets::periodogram::{CircularOrbit, Frequencies, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
@@ -13,7 +13,9 @@ use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
-use crate::surface::{At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, SurfaceError, SurfaceMaps, SurfaceModel};
+use crate::surface::{
+    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, SurfaceError, SurfaceMaps, SurfaceModel, WithoutJitter,
+};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -43,8 +45,8 @@ impl SurfaceModel for StaticMap {
         Some(expansion.with_unresolved_spots(unresolved_spots)?.velocities(nuisances))
     }
 
-    fn jitters(&self, _: At, here: &Linearised) -> Result<Jitters, SurfaceError> {
-        Ok(Jitters::none(&here.quadratic))
+    fn without_jitter(&self, _: At, _: &Linearised) -> Result<Option<WithoutJitter>, SurfaceError> {
+        Ok(None)
     }
 
     fn holding(&self, _: &Linearised) -> Box<dyn SurfaceModel> {
