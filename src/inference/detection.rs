@@ -275,6 +275,8 @@ impl Detection {
             held = Some(surface.holding(&here));
             self.at_best = Some(here);
         }
+        // whatever the spots beside it, one height: that which is held against stars without a planet
+        self.best.orbit.delta_ln_l = self.blind.best().orbit.delta_ln_l;
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use crate::model::{Clock, Elements, FreeParameter, Parameter, Prior, period_prio
 use crate::planets::evidence::{Density, Evidence, Inclusion, LnBayes, PlanetPrior, evidence};
 use crate::planets::periodogram::Jitters;
 use crate::planets::periodogram::eccentric::LARGEST_ECCENTRICITY;
-use crate::planets::verdict::probability;
+use crate::planets::verdict::{decimals, probability};
 use serde::{Deserialize, Serialize};
 
 /// A prior of K that reaches so many times farther than the error of K is said to be wide.
@@ -60,13 +60,13 @@ impl EvidenceRecord {
         let two = Assumed::of(free, second, clock).unwrap_or(one);
         let found = one.with(|one| two.with(|two| evidence(jitters, [one, two], seed)))?;
         let error_kms = jitters.as_found().quadratic.information.trace().sqrt().recip() * 2f64.sqrt();
-        Some(EvidenceRecord::new(found, [one, two], (error_kms, !jitters.is_none()), clock.rotation_period_d))
+        Some(EvidenceRecord::new(found, [one, two], (error_kms, jitters), clock.rotation_period_d))
     }
 
     fn new(
         found: Evidence,
         [one, two]: [Assumed; 2],
-        (error_kms, jitter): (f64, bool),
+        (error_kms, jitters): (f64, &Jitters),
         rotation_period_d: f64,
     ) -> Self {
         let record = |inclusion: &Inclusion| InclusionRecord {
@@ -84,7 +84,12 @@ impl EvidenceRecord {
         let Evidence { circle, ellipse, two_circles, .. } = found;
         let at = inclusion.first().map(|best| {
             let chance = probability(best.false_inclusion_probability);
-            format!("; false inclusion probability {chance} at {:.4} d", best.period_d)
+            // half of the interval
+            let cycles = &jitters.as_found().quadratic.cycles;
+            let ends = cycles.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
+            let time_base_d = rotation_period_d * (ends[1] - ends[0]);
+            let digits = decimals(0.5 * best.period_d.powi(2) / time_base_d);
+            format!("; false inclusion probability {chance} at {:.digits$} d", best.period_d)
         });
         let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
             let most = one.k.1[1];
@@ -93,7 +98,7 @@ impl EvidenceRecord {
                  {error_kms:.3} km/s), and Bayes factors fall in proportion: "
             )
         });
-        let jitter = if jitter { ", the velocity jitter marginalised in each" } else { "" };
+        let jitter = if !jitters.is_none() { ", the velocity jitter marginalised in each" } else { "" };
         let sentence = format!(
             "{}ln of the Bayes factor over no planet: one on a circle {}, one on an ellipse {}, two on circles {} \
              (priors: {priors}; spots as fitted without a planet{jitter}){}",

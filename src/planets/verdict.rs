@@ -64,10 +64,28 @@ impl Remark {
 pub struct Signal {
     /// Period (d).
     pub period_d: f64,
+    /// Its standard error (d); null on the edge of the search, or where the period is given.
+    #[serde(default)]
+    pub sigma_period_d: Option<f64>,
     /// Semi-amplitude (km/s).
     pub k_kms: f64,
     /// Its standard error (km/s).
     pub sigma_k_kms: f64,
+}
+
+impl Signal {
+    /// The period with its error.
+    pub fn period(&self) -> String {
+        match self.sigma_period_d {
+            Some(sigma) => format!("{:.2$} +- {:.2$} d", self.period_d, sigma, decimals(sigma)),
+            None => format!("{:.4} d", self.period_d),
+        }
+    }
+}
+
+/// Decimals that show two digits of a standard error.
+pub fn decimals(sigma: f64) -> usize {
+    if sigma > 0.0 && sigma.is_finite() { (1.0 - sigma.log10().floor()).clamp(0.0, 12.0) as usize } else { 4 }
 }
 
 /// The verdict.
@@ -174,9 +192,9 @@ impl Verdict {
 }
 
 fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Known, against: &[String]) -> String {
-    let Signal { period_d, k_kms, sigma_k_kms } = *signal;
+    let Signal { k_kms, sigma_k_kms, .. } = *signal;
     let Known { significance, k_upper95_kms } = *known;
-    let digits = digits(sigma_k_kms);
+    let digits = decimals(sigma_k_kms);
     let head = match finding {
         Finding::NoPlanetNeeded => "The known planet is not seen",
         Finding::Candidate => "The known planet is indicated, not detected",
@@ -185,21 +203,18 @@ fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Kno
     };
     let against = if against.is_empty() { String::new() } else { format!(" Against it: {}.", against.join("; ")) };
     format!(
-        "{head}: {period_d:.4} d, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s; against no planet \
+        "{head}: {}, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s; against no planet \
          {significance:.1} sigma (one-sided; false-alarm probability of this one period {}); K is below \
          {k_upper95_kms:.digits$} km/s (95 %).{against}",
+        signal.period(),
         probability(chance)
     )
 }
 
-fn digits(sigma: f64) -> usize {
-    if sigma > 0.0 { (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize } else { 3 }
-}
-
 fn sentence(finding: Finding, false_alarm_probability: f64, signal: &Signal, against: &[String]) -> String {
-    let Signal { period_d, k_kms, sigma_k_kms } = *signal;
-    let digits = digits(sigma_k_kms);
-    let orbit = format!("{period_d:.4} d, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s");
+    let Signal { k_kms, sigma_k_kms, .. } = *signal;
+    let digits = decimals(sigma_k_kms);
+    let orbit = format!("{}, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s", signal.period());
     let chance = format!("false-alarm probability {}", probability(false_alarm_probability));
     match finding {
         Finding::NoPlanetNeeded => {
@@ -237,7 +252,7 @@ pub fn probability(p: f64) -> String {
 mod tests {
     use super::*;
 
-    const SIGNAL: Signal = Signal { period_d: 5.0692, k_kms: 0.1034, sigma_k_kms: 0.0108 };
+    const SIGNAL: Signal = Signal { period_d: 5.0692, sigma_period_d: Some(0.021), k_kms: 0.1034, sigma_k_kms: 0.0108 };
 
     #[test]
     fn a_known_planet_is_judged_by_its_own_period() {

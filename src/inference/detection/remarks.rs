@@ -5,7 +5,7 @@ use super::{Detection, DetectionSettings, Robustness};
 use crate::model::Parameter;
 use crate::planets::periodogram::Peak;
 use crate::planets::periodogram::offset::Offset;
-use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict};
+use crate::planets::verdict::{AMBIGUOUS, CANDIDATE_FAP, Remark, Signal, Verdict, decimals};
 use crate::surface::imaging::Imager;
 
 /// Fewer profiles than this hardly tell how large the unresolved spots are.
@@ -35,6 +35,7 @@ impl Detection {
     pub fn verdict(&self, remarks: &[Remark]) -> Verdict {
         let signal = Signal {
             period_d: self.frequencies.rotation_period_d * self.best.porb_over_prot,
+            sigma_period_d: self.best.sigma_porb_over_prot.map(|sigma| self.frequencies.rotation_period_d * sigma),
             k_kms: self.best.orbit.k_kms,
             sigma_k_kms: self.best.orbit.sigma_k_kms,
         };
@@ -177,9 +178,11 @@ impl Detection {
 
     fn rival(&self, peak: &Peak) -> String {
         let period_d = self.frequencies.rotation_period_d * peak.porb_over_prot;
+        let sigma = peak.sigma_porb_over_prot.map(|sigma| self.frequencies.rotation_period_d * sigma);
+        let digits = decimals(sigma.unwrap_or(f64::NAN));
         let below = self.blind.best().orbit.delta_ln_l - peak.orbit.delta_ln_l;
         let alias = if peak.alias.is_some() { ", an alias by the sampling" } else { "" };
-        format!("{period_d:.4} d{alias} (ln L lower by {below:.1})")
+        format!("{period_d:.digits$} d{alias} (ln L lower by {below:.1})")
     }
 
     /// Whether the result depends on a choice.

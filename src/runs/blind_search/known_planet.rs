@@ -73,7 +73,7 @@ fn verdict(
                 return Verdict::not_judged(UNBOUNDED);
             };
             let [k_kms, sigma_k_kms] = k.moments();
-            let signal = Signal { period_d: ephemeris.period_d[0], k_kms, sigma_k_kms };
+            let signal = Signal { period_d: ephemeris.period_d[0], sigma_period_d: None, k_kms, sigma_k_kms };
             Verdict::of_known(alone, signal, k.upper95(), remarks)
         }
         Err(error) => Verdict::not_judged(format!("at the known ephemeris, {error}")),

@@ -5,7 +5,7 @@ use crate::inference::detection::Detection;
 use crate::model::{Elements, Parameter, Prior, period_prior};
 use crate::planets::periodogram::window::is_same_frequency;
 use crate::planets::periodogram::{CircularOrbit, Imitation, Row};
-use crate::planets::verdict::{Finding, Remark, Signal, Verdict};
+use crate::planets::verdict::{Finding, Remark, Signal, Verdict, decimals};
 
 /// The verdict on what the priors of `scene` allow; remarks on other orbits leave, and what they do not allow joins.
 pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, remarks: &mut Vec<Remark>) -> Verdict {
@@ -13,11 +13,13 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
     if !periods.contain(found.best.porb_over_prot) {
         let of_the_period = found.of_the_period();
         remarks.retain(|remark| !of_the_period.contains(remark));
-        let period_d = found.frequencies.rotation_period_d * found.best.porb_over_prot;
+        let prot = found.frequencies.rotation_period_d;
+        let digits = decimals(found.best.sigma_porb_over_prot.map_or(f64::NAN, |sigma| prot * sigma));
+        let period_d = prot * found.best.porb_over_prot;
         remarks.push(Remark::against(
             "the highest peak lies at a period that the config does not allow",
             format!(
-                "the highest peak of the blind search, {period_d:.4} d, lies at a period that the config does not \
+                "the highest peak of the blind search, {period_d:.digits$} d, lies at a period that the config does not \
                 allow: it may look like an orbit of another one"
             ),
         ));
@@ -72,6 +74,7 @@ fn highest(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict 
     let place = |row: &Row| Some((1.0 / row.trial.frequency, row.trial.orbit?));
     let places = found.blind.rows.iter().filter_map(place).filter(|(ratio, _)| periods.contain(*ratio));
     let highest = || places.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
+    let sigma_period_d = peak.and_then(|peak| peak.sigma_porb_over_prot).map(|sigma| rotation_period_d * sigma);
     let Some((porb_over_prot, orbit)) = peak.map(|peak| (peak.porb_over_prot, peak.orbit)).or_else(highest) else {
         return Verdict::not_judged("the blind search has none of the periods that the config allows");
     };
@@ -79,6 +82,6 @@ fn highest(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict 
     let words = imitation.map(|imitation| format!("the period is {}", imitation.words(rotation_period_d)));
     let remarks: Vec<Remark> = remarks.iter().cloned().chain(words.map(|words| Remark::against(words, ""))).collect();
     let CircularOrbit { k_kms, sigma_k_kms, delta_ln_l, .. } = orbit;
-    let signal = Signal { period_d: rotation_period_d * porb_over_prot, k_kms, sigma_k_kms };
+    let signal = Signal { period_d: rotation_period_d * porb_over_prot, sigma_period_d, k_kms, sigma_k_kms };
     Verdict::new(found.blind.false_alarm.probability(delta_ln_l).value(), signal, &remarks)
 }

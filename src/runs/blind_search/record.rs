@@ -307,8 +307,9 @@ impl PeriodogramFile {
         let prot = star.rotation_period_d;
         let (lo, hi) = found.frequencies.range();
         let orbit = |peak: &Peak| OrbitRecord::of(peak, &quantities);
-        let peaks =
-            |search: &Search| search.peaks.iter().map(|peak| PeakRecord::of(peak, search, &quantities)).collect();
+        let peaks = |search: &Search| -> Vec<PeakRecord> {
+            search.peaks.iter().map(|peak| PeakRecord::of(peak, search, &quantities)).collect()
+        };
         let keplerian = |orbit: &Option<KeplerianOrbit>| Some(KeplerianRecord::of(orbit.as_ref()?, &quantities));
         let second = found.second.as_ref().map(|second| SecondRecord {
             false_alarm: FalseAlarmRecord::of(&second.search),
@@ -317,13 +318,18 @@ impl PeriodogramFile {
             gain: second.both.map(|both| both.gain),
         });
         let best = orbit(&found.best);
+        // the highest one with the spots as they are beside it
+        let mut all = peaks(&found.blind);
+        if let Some(highest) = all.first_mut() {
+            highest.orbit = best.clone();
+        }
         PeriodogramFile {
             verdict: search.verdict.clone(),
             truth: scene.truth,
             derived_truth: best.quantities.injected(scene.truth, &quantities),
             best,
             false_alarm: FalseAlarmRecord::of(&found.blind),
-            peaks: peaks(&found.blind),
+            peaks: all,
             keplerian: settings.eccentric.then(|| found.keplerian.iter().map(keplerian).collect()),
             second,
             search: SearchRecord {

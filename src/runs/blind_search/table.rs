@@ -8,7 +8,7 @@ use super::record::{
 };
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
-use crate::planets::verdict::probability;
+use crate::planets::verdict::{decimals, probability};
 
 /// Peaks shown; the file has the others.
 const SHOWN: usize = 6;
@@ -146,11 +146,6 @@ fn robustness(found: &RobustnessRecord) -> String {
     aligned(&rows)
 }
 
-/// Decimals that show two digits of a standard error.
-fn decimals(sigma: f64) -> usize {
-    if sigma > 0.0 && sigma.is_finite() { (1.0 - sigma.log10().floor()).clamp(0.0, 12.0) as usize } else { 4 }
-}
-
 fn chance(alarm: &FalseAlarmRecord) -> String {
     let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
@@ -168,6 +163,8 @@ fn peaks(peaks: &[PeakRecord]) -> String {
     for (k, peak) in peaks.iter().enumerate().take(SHOWN) {
         let OrbitRecord { period_d, porb_over_prot, k_kms, sigma_k_kms, delta_ln_l, on_edge, .. } = peak.orbit;
         let digits = decimals(sigma_k_kms);
+        let of_period = decimals(peak.orbit.sigma_period_d.unwrap_or(f64::NAN));
+        let of_ratio = decimals(peak.orbit.sigma_porb_over_prot.unwrap_or(f64::NAN));
         let note = match &peak.alias {
             Some(alias) => Some(format!("alias of 1 at {:.3}/d", alias.window_frequency_per_d)),
             None if on_edge => Some("on the edge".to_owned()),
@@ -176,8 +173,8 @@ fn peaks(peaks: &[PeakRecord]) -> String {
         let notes: Vec<String> = note.into_iter().chain(peak.rotation.clone()).collect();
         rows.push(vec![
             (k + 1).to_string(),
-            format!("{period_d:.4}"),
-            format!("{porb_over_prot:.4}"),
+            format!("{period_d:.of_period$}"),
+            format!("{porb_over_prot:.of_ratio$}"),
             format!("{k_kms:.digits$}"),
             format!("{sigma_k_kms:.digits$}"),
             format!("{delta_ln_l:.2}"),
