@@ -68,15 +68,21 @@ pub fn robustness(
     nights.iter_mut().for_each(|night| night.sort_unstable());
     let (surface, at) = (settings.surface.model(), At { imager, values, nuisances: &settings.nuisances });
     let targets = surface.at_other_targets(at, &orbit);
-    let mut without = surface.without_each(at, found.last(), &nights, &orbit);
-    let mut all = orbit(&found.last().quadratic);
-    // Delta ln L is that of the blind search: beside a jitter that has been found without a planet
-    if let Some(star) = &found.without_jitter {
-        let beside = |quadratic: &VelocityQuadratic| star.beside(quadratic).orbit_at(frequency);
-        let blind = surface.without_each(at, &star.here, &nights, &beside);
-        without = without.into_iter().zip(blind).map(|(orbit, blind)| with_height(orbit, blind)).collect();
-        all = with_height(all, beside(&star.here.quadratic));
-    }
+    let without = surface.without_each(at, found.last(), &nights, &orbit);
+    // Delta ln L is that of the blind search: around a star without a planet, beside the jitter that is found there
+    let mut alone = at;
+    alone.values.set(Parameter::K, 0.0);
+    let blind = |quadratic: &VelocityQuadratic| match &found.without_jitter {
+        Some(star) => star.beside(quadratic).orbit_at(frequency),
+        None => orbit(quadratic),
+    };
+    let star = found.without_jitter.as_ref().map_or(&found.planet_free, |without| &without.here);
+    let heights = surface.at_other_targets(alone, &blind).into_iter().map(|at| at.orbit);
+    let targets = targets.into_iter().zip(heights);
+    let targets = targets.map(|(at, blind)| AtTarget { orbit: with_height(at.orbit, blind), ..at }).collect();
+    let heights = surface.without_each(alone, star, &nights, &blind);
+    let without = without.into_iter().zip(heights).map(|(orbit, blind)| with_height(orbit, blind));
+    let all = with_height(orbit(&found.last().quadratic), blind(&star.quadratic));
     let without = nights.iter().zip(without).map(|(night, orbit)| {
         let times = || night.iter().map(|&k| times_d[k]);
         WithoutNight {
