@@ -27,15 +27,15 @@ const RUN: [&str; 3] = ["manifest.json", "chain.jsonl", "summary.json"];
 
 fn tasks() -> [Task; 2] {
     let mut landscape = tiny(2);
-    landscape["grid"] = json!({ "axes": { "k_kms": [0.0, 0.4, 200] } });
+    landscape["grid"] = json!({ "axes": { "k_kms": [0.0, 0.4, 100] } });
     [
-        Task { command: "sample", config: tiny(60), files: RUN, block: 12, kills: &[0, 100, 400] },
+        Task { command: "sample", config: tiny(30), files: RUN, block: 12, kills: &[0, 50, 200] },
         Task {
             command: "grid",
             config: landscape,
             files: ["landscape.json", "landscape.jsonl", "paraboloid.json"],
             block: 1,
-            kills: &[0, 80],
+            kills: &[0, 40],
         },
     ]
 }
@@ -43,7 +43,9 @@ fn tasks() -> [Task; 2] {
 /// A chain with all maps integrated over.
 fn integrated() -> Task {
     let block = shared::ENSEMBLES * shared::WALKERS;
-    Task { command: "sample", config: shared::config(), files: RUN, block, kills: &[40] }
+    let mut config = shared::config();
+    config["sampler"]["steps"] = json!(10);
+    Task { command: "sample", config, files: RUN, block, kills: &[40] }
 }
 
 impl Task {
