@@ -31,9 +31,11 @@ SMALL: dict[str, Any] = {
             "cycles": [0.27 * k for k in range(12)],
             "velocity_kms": {"min": -40.0, "max": 40.0, "step": 2.0},
             "snr": 1000.0,
+            # those of the image, so that few are enough
+            "pixels": 200,
         }
     },
-    "imaging": {"pixels": 300, "objective": "spottedness"},
+    "imaging": {"pixels": 200, "objective": "spottedness", "unresolved_spots": "entropy"},
     "parameters": {
         "k_kms": {"prior": "uniform", "min": 0.0, "max": 1.0},
         "phi": {"prior": "periodic"},

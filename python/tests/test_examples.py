@@ -19,6 +19,14 @@ from notebook import EXAMPLES, cells, notebook
 SCRIPT = (EXAMPLES / "first_star.py").read_text()
 
 
+def quicker(text: str, *changes: tuple[str, str]) -> str:
+    """The same with less to compute: what users wait for is not what is tested here."""
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    return text
+
+
 def test_notebook_and_script_are_the_same() -> None:
     message = "python python/tests/notebook.py writes it anew"
     assert (EXAMPLES / "first_star.ipynb").read_text() == notebook(SCRIPT), message
@@ -29,7 +37,9 @@ def test_the_notebook_runs(capsys: pytest.CaptureFixture[str]) -> None:
     sources = ["".join(cell["source"]) for cell in json.loads(notebook(SCRIPT))["cells"] if cell["cell_type"] == "code"]
     assert sources == [text for kind, text in cells(SCRIPT) if kind == "code"]
     names: dict[str, Any] = {}
-    for source in sources:
+    whole = "\0".join(sources)
+    whole = quicker(whole, ('"pixels": 500', '"pixels": 300'), ('"ess": 400, "rhat": 1.02', '"ess": 100, "rhat": 1.1'))
+    for source in whole.split("\0"):
         tree = ast.parse(source)
         last = tree.body[-1] if tree.body and isinstance(tree.body[-1], ast.Expr) else None
         if last is not None:
@@ -52,8 +62,9 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a demo of few profiles, pixels and steps."""
     demo = json.loads((ROOT / "configs/demo.json").read_text())
     simulate = demo["observations"]["simulate"]
-    simulate |= {"cycles": simulate["cycles"][::3], "pixels": 2000, "snr": 300}
-    demo["imaging"] |= {"pixels": 500, "chi2_target": 1.0}
+    # the same pixels, so that few of them are enough
+    simulate |= {"cycles": simulate["cycles"][::4], "pixels": 200, "snr": 300}
+    demo["imaging"] |= {"pixels": 200, "chi2_target": 1.0}
     demo["sampler"] = {"ensembles": 2, "walkers": 8, "steps": 10}
     (tmp_path / "configs").mkdir()
     (tmp_path / "configs/demo.json").write_text(json.dumps(demo))
@@ -74,7 +85,10 @@ def test_the_guide_runs(desk: Path) -> None:
     for block in blocks((ROOT / "docs/guide/python.md").read_text().split("## Exports")[0]):
         samplers = [name for name in ("emcee", "dynesty") if f"import {name}" in block]
         if all(importlib.util.find_spec(name) for name in samplers):
-            exec(block.replace("nlive=500", "nlive=20"), names)
+            if samplers == ["dynesty"]:
+                # to its end it would be most of the time of all tests
+                block = quicker(block, ("nlive=500", "nlive=20"), ("run_nested()", "run_nested(maxcall=100)"))
+            exec(block, names)
     assert names["run"].summary.steps > 10
 
 

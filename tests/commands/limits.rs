@@ -86,9 +86,13 @@ fn both_ways_and_the_closed_form_agree() {
     };
     assert!(share(k[0]) < 0.1 && share(k[11]) > 0.6, "{} {}", share(k[0]), share(k[11]));
     // the same for any number of threads
-    limits(&desk, &["--full", "10", "--out", "b", "--threads", "1"]);
+    for (threads, out) in [("1", "one"), ("2", "two")] {
+        let few = ["--periods", "3", "--amplitudes", "4", "--phases", "2", "--full", "2"];
+        let whole = ["limits", "config.json", "--min-period-d", "1.7", "--max-period-d", "15"];
+        desk.succeed(&[&whole[..], &few, &["--threads", threads, "--out", out]].concat());
+    }
     for file in ["limits.csv", "limits.json"] {
-        assert_eq!(desk.read(&format!("a/{file}")), desk.read(&format!("b/{file}")), "{file}");
+        assert_eq!(desk.read(&format!("one/{file}")), desk.read(&format!("two/{file}")), "{file}");
     }
     says(&desk.succeed(&["plot", "a"]), &["limits.svg"]);
     says(&desk.succeed(&["report", "a"]), &["report.html"]);

@@ -81,7 +81,7 @@ fn orbits(oracle: &Oracle, imager: &Imager) {
     assert!((expansion.log_likelihood - none).abs() < 1e-4);
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let (mut worst, mut worst_near) = (0.0f64, 0.0f64);
-    for _ in 0..30 {
+    for _ in 0..12 {
         let mut orbit = alone;
         orbit.set(Parameter::K, 0.15 * rng.random::<f64>());
         orbit.set(Parameter::PorbOverProt, 0.5 + 3.5 * rng.random::<f64>());
@@ -97,6 +97,7 @@ fn orbits(oracle: &Oracle, imager: &Imager) {
     }
     println!("largest difference {worst:.4}; within 30 % of co-rotation {worst_near:.4}");
     assert!(worst < 0.05 && worst_near < 1.5);
+    assert!(worst > 0.0 && worst_near > 0.0, "orbits of both kinds");
 }
 
 #[test]
@@ -244,7 +245,7 @@ fn co_rotation_hides_a_planet() {
 #[test]
 fn a_posterior_that_counts_unresolved_spots() {
     let oracle = oracle();
-    let imager = imager(&oracle, oracle.grid.clone());
+    let imager = imager(&oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2));
     let at = truth(&oracle);
     let reference = Reference::build(&imager, at, 0.97).unwrap();
     let free = [Parameter::K, Parameter::PorbOverProt, Parameter::Phi];

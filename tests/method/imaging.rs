@@ -10,9 +10,17 @@ use dimcmc::internals::star::observation::{Observations, Profile};
 use dimcmc::internals::star::{Quadrature, SurfaceGrid};
 use dimcmc::internals::surface::imaging::{Data, Imager, ImagingProblem};
 use dimcmc::internals::surface::static_map::Reference;
+use std::sync::OnceLock;
 
 fn imager(oracle: &Oracle) -> Imager {
-    common::imager(oracle, SurfaceGrid::equal_area(1000, Quadrature::Gauss2x2))
+    common::imager(oracle, SurfaceGrid::equal_area(800, Quadrature::Gauss2x2))
+}
+
+/// The map at the injected values, which takes longest: made once.
+fn reference(oracle: &Oracle, imager: &Imager) -> &'static Reference {
+    static MADE: OnceLock<Reference> = OnceLock::new();
+    let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
+    MADE.get_or_init(|| Reference::build(imager, truth, 0.97).unwrap())
 }
 
 fn problem<'a>(oracle: &Oracle, imager: &'a Imager) -> ImagingProblem<'a> {
@@ -139,7 +147,7 @@ fn the_answer_does_not_depend_on_start_and_preconditioner() {
     let mut elsewhere = truth;
     elsewhere.set(Parameter::K, 0.13);
     elsewhere.set(Parameter::Inclination, 38.5);
-    let here = Reference::build(&imager, truth, 0.97).unwrap();
+    let here = reference(&oracle, &imager);
     let there = Reference::build(&imager, elsewhere, 0.97).unwrap();
     let mut problem = problem(&oracle, &imager);
     let settings = SolverSettings::exact();
@@ -154,8 +162,7 @@ fn the_answer_does_not_depend_on_start_and_preconditioner() {
 fn a_pixel_in_the_dark_is_not_taken_for_solved() {
     let oracle = oracle();
     let imager = imager(&oracle);
-    let truth = values(&oracle.json["results"]["fixed_lambda"][0]["theta"], 3.0);
-    let reference = Reference::build(&imager, truth, 0.97).unwrap();
+    let reference = reference(&oracle, &imager);
     let mut start = reference.start();
     let pixel = start.image.coordinates.iter().position(|u| (-9.5..-8.5).contains(u)).expect("a faint pixel");
     start.image.coordinates[pixel] = -29.0;

@@ -147,7 +147,9 @@ fn zero_points_are_no_spots_and_velocities_scatter_by_them() {
 fn fields_that_cannot_be_fitted_and_times_without_sense_are_refused_by_name() {
     // profiles of a faster star: no spots explain them
     let other = config(&spots(0.5), &cycles()).with("star.vsini_kms", 40.0).with("observations.simulate.snr", 5000.0);
-    let scene = with_profiles(Scene::new(&other).unwrap().observations);
+    let profiles = Scene::new(&other).unwrap().observations;
+    // from every lifetime alike
+    let scene = Scene::with_profiles(&of_profiles(0.0).with("imaging.spot_lifetime_d", 12.0), profiles).unwrap();
     let status = |times: Option<&[f64]>| scene.maps(times).map(|_| ()).map_err(|error| error.status());
     assert_eq!(status(None), Err(Some("not-settled")));
     for times in [&[][..], &[f64::NAN], &[1.0, f64::INFINITY], &[2.0, 1.0, 2.0], &[1e13]] {

@@ -4,19 +4,21 @@ use dimcmc::internals::field::Lifetime;
 use dimcmc::internals::inference::detection::{Detection, DetectionSettings, Evidence};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use dimcmc::internals::planets::periodogram::{Frequencies, FrequencySettings, Search, SearchSettings, orbits};
-use dimcmc::internals::surface::evolving_map::{Basis, Held, MarginalPosterior, fit};
+use dimcmc::internals::surface::evolving_map::{Basis, Held, Marginal, MarginalPosterior, fit};
 use dimcmc::internals::surface::{Change, Known};
 use dimcmc::{Config, Scene};
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 fn folder(star: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/evolving").join(star)
 }
 
-/// The scene of a star, its values without a planet, and the periods to search.
-fn star(name: &str) -> (Scene, ParameterValues, Frequencies) {
-    let scene = Scene::load(&folder(name).join("config.json")).unwrap();
+/// The scene of a star on so many pixels, its values without a planet, and the periods to search.
+fn star(name: &str, pixels: usize) -> (Scene, ParameterValues, Frequencies) {
+    let config = Config::load(&folder(name).join("config.json")).unwrap().with("imaging.pixels", pixels);
+    let scene = Scene::new(&config).unwrap();
     let mut values = scene.settings.values;
     values.set(Parameter::K, 0.0);
     let rotation_period_d = scene.imager.star.rotation_period_d;
@@ -27,7 +29,7 @@ fn star(name: &str) -> (Scene, ParameterValues, Frequencies) {
 #[test]
 fn the_highest_peak_is_that_of_another_implementation() {
     for name in ["slow-planet", "static-planet"] {
-        let (scene, values, frequencies) = star(name);
+        let (scene, values, frequencies) = star(name, 1200);
         let oracle: serde_json::Value =
             serde_json::from_slice(&std::fs::read(folder(name).join("oracle.json")).unwrap()).unwrap();
         let number = |part: &str, key: &str| oracle[part][key].as_f64().unwrap();
@@ -61,7 +63,7 @@ fn the_highest_peak_is_that_of_another_implementation() {
 #[test]
 fn a_star_that_changes_is_told_from_one_that_does_not() {
     for (name, changes) in [("slow-planet", true), ("static-planet", false)] {
-        let (scene, values, frequencies) = star(name);
+        let (scene, values, frequencies) = star(name, 600);
         let known = Known { jitter_kms: Some(0.0), ..Known::default() };
         let change = Change::of(&scene.imager, values, &frequencies, &[], known).unwrap();
         assert_eq!(change.is_changing(), changes, "{name}: {change:?}");
@@ -102,7 +104,7 @@ fn a_planet_of_a_star_without_spots_is_found() {
 /// What is known of the field beforehand counts where it is fitted, too.
 #[test]
 fn a_prior_of_the_field_counts_in_its_fit() {
-    let (scene, values, _) = star("slow-planet");
+    let (scene, values, _) = star("slow-planet", 600);
     let basis = Basis::new(&scene.imager.grid);
     let even = Known { jitter_kms: Some(0.0), slope: Some(0.5), amplitude: Some(0.24), ..Known::default() };
     let fitted = |prior: Option<Prior>| {
@@ -130,29 +132,29 @@ fn the_field_of_many_profiles_is_the_best_of_its_neighbours() {
         .with("observations.simulate.cycles", cycles)
         .with("observations.simulate.velocity_kms", json!({ "min": -16.0, "max": 16.0, "step": 2.0 }))
         .with("observations.simulate.snr", 300.0)
-        .with("imaging", json!({ "objective": "marginal-likelihood", "pixels": 500 }));
+        .with("imaging", json!({ "objective": "marginal-likelihood", "pixels": 200 }));
     let scene = Scene::new(&config).unwrap();
     let basis = Basis::exact(&scene.imager.grid);
     let known = Known { jitter_kms: Some(0.0), ..Known::default() };
     let best = fit(&scene.imager, &basis, scene.settings.values, known, None).unwrap();
-    let of = Known::of(&best.marginal);
-    let days = of.lifetime.and_then(Lifetime::days).unwrap();
+    let days = best.marginal.assumed.field.kernel.lifetime.days().unwrap();
     for (i, factor) in [(0, 1.1), (0, 0.9), (1, 1.1), (1, 0.9), (2, 1.15), (2, 0.87)] {
-        let by = |j: usize| if i == j { factor } else { 1.0 };
-        let beside = Known {
-            amplitude: of.amplitude.map(|x| x * by(0)),
-            slope: of.slope.map(|x| x * by(1)),
-            lifetime: Some(Lifetime::Days(days * by(2))),
-            ..of
-        };
-        let there = fit(&scene.imager, &basis, scene.settings.values, beside, None).unwrap().ln_evidence;
+        let mut beside = best.marginal.assumed;
+        match i {
+            0 => beside.field.spectrum.amplitude *= factor,
+            1 => beside.field.spectrum.slope *= factor,
+            _ => beside.field.kernel.lifetime = Lifetime::Days(days * factor),
+        }
+        let (design, values) = (Arc::clone(&best.marginal.design), best.marginal.values);
+        let there = Marginal::new(&scene.imager, &basis, design, values, beside, Some(&best.marginal)).unwrap();
+        let there = there.ln_evidence();
         assert!(there < best.ln_evidence + 0.02, "{beside:?}: {there}, {}", best.ln_evidence);
     }
 }
 
 /// The posterior of slow-planet with these parameters free, around its planet and the field of the reference.
 fn posterior(free: &[Parameter]) -> MarginalPosterior {
-    let (scene, mut values, _) = star("slow-planet");
+    let (scene, mut values, _) = star("slow-planet", 600);
     let set = [(Parameter::K, 0.1), (Parameter::PorbOverProt, 1.65), (Parameter::Phi, 0.32)];
     let field = [(Parameter::SpotAmplitude, 0.24), (Parameter::SpotSlope, 0.53), (Parameter::SpotLifetime, 33.0)];
     set.into_iter().chain(field).for_each(|(p, value)| values.set(p, value));
@@ -215,8 +217,7 @@ fn an_orbit_by_the_quadratic_is_that_of_profiles_made_anew() {
 
 #[test]
 fn the_same_reference_has_the_same_bytes() {
-    let [one, other] = [0, 1].map(|_| posterior(&ORBIT));
-    assert_eq!(one.reference_ln_evidence().to_bits(), other.reference_ln_evidence().to_bits());
+    let one = posterior(&ORBIT);
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| posterior(&ORBIT));
     assert_eq!(one.reference_ln_evidence().to_bits(), alone.reference_ln_evidence().to_bits());
 }

@@ -126,8 +126,9 @@ fn wandering(nuisances: bool) -> Scene {
     let mut json: serde_json::Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
     json["observations"]["simulate"]["continuum"] =
         serde_json::json!({ "offset": 1e-3, "slope": 2e-3, "equivalent_width": 0.02 });
-    json["observations"]["simulate"]["pixels"] = 5000.into();
-    json["imaging"]["pixels"] = 1000.into();
+    // the same pixels, so that few of them are enough
+    json["observations"]["simulate"]["pixels"] = 600.into();
+    json["imaging"]["pixels"] = 600.into();
     if nuisances {
         json["imaging"]["nuisances"] = serde_json::to_value(PRIORS).unwrap();
     }

@@ -1,9 +1,9 @@
 //! Whole chains against the posterior of an independent implementation (`posterior.json`: emcee on the regularised
 //! likelihood at lambda = 1e-3 on the oracle's pixel table), on the oracle's data.
 //!
-//! Tolerances: the reference chain and ours have effective sizes of 600 and of 3000 on the same pixels, 1500 on others,
-//! so that medians agree to 0.056 sigma (`1.25 (1/600 + 1/3000)^1/2`) and widths to 4 % by chance alone; what is asked
-//! for is three times that on the same pixels, and twice as much again on another grid of pixels.
+//! Tolerances: the reference chain and ours have effective sizes of 600 and of 1000, so that medians agree to 0.065
+//! sigma (`1.25 (1/600 + 1/1000)^1/2`) and widths to 4.6 % by chance alone; what is asked for is three times that on the
+//! same pixels, and up to half as much again on another grid of pixels or for fewer draws.
 
 use crate::common::{Oracle, imager, json, numbers, oracle, truth};
 use dimcmc::internals::model::{FreeParameter, Parameter, ParameterSpace, Prior};
@@ -96,28 +96,28 @@ fn on_the_oracle_pixels(surrogate: bool, ess: f64, sigmas: f64, ratio: f64) {
 
 #[test]
 fn regularised_likelihood_on_the_oracle_pixels() {
-    on_the_oracle_pixels(true, 3000.0, 0.17, 0.10);
+    on_the_oracle_pixels(true, 1000.0, 0.2, 0.14);
 }
 
 #[test]
 #[ignore = "long: .ci/run has it run"]
 fn regularised_likelihood_by_affine_moves_alone() {
-    // a third of the draws
-    on_the_oracle_pixels(false, 1000.0, 0.3, 0.17);
+    // half of the draws
+    on_the_oracle_pixels(false, 500.0, 0.25, 0.17);
 }
 
 #[test]
 #[ignore = "long: .ci/run has it run"]
-fn regularised_likelihood_on_5000_pixels() {
+fn regularised_likelihood_on_3000_pixels() {
     let oracle = oracle();
-    let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);
-    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::RegularisedLikelihood, 0.97), true, 1500.0), 0.3, 0.12);
+    let grid = SurfaceGrid::equal_area(3000, Quadrature::Gauss2x2);
+    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::RegularisedLikelihood, 0.97), true, 800.0), 0.3, 0.15);
 }
 
 #[test]
 #[ignore = "long: .ci/run has it run"]
-fn spottedness_on_5000_pixels() {
+fn spottedness_on_3000_pixels() {
     let oracle = oracle();
-    let grid = SurfaceGrid::equal_area(5000, Quadrature::Gauss2x2);
-    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::Spottedness, 0.97), true, 1500.0), 0.3, 0.12);
+    let grid = SurfaceGrid::equal_area(3000, Quadrature::Gauss2x2);
+    compare(&sample(&posterior(&oracle, grid, ObjectiveKind::Spottedness, 0.97), true, 800.0), 0.3, 0.15);
 }

@@ -14,8 +14,9 @@ use std::path::Path;
 fn scene(change: impl Fn(&mut Value)) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/demo.json");
     let mut json: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    json["observations"]["simulate"]["pixels"] = 5000.into();
-    json["imaging"]["pixels"] = 800.into();
+    // the same pixels, so that few of them are enough
+    json["observations"]["simulate"]["pixels"] = 500.into();
+    json["imaging"]["pixels"] = 500.into();
     json["parameters"] = json!({});
     change(&mut json);
     Scene::new(&Config::at(json.clone(), &path)).unwrap()
