@@ -345,7 +345,7 @@ fn run_page(page: &Page, star: &Desk) -> Desk {
     }
     for (number, line) in lines {
         // `cargo` builds what is built already, and the tests are these
-        if line == "cargo test" {
+        if line == "cargo test --workspace" {
             continue;
         }
         let line = line.replace("cargo run --release -- ", "dimcmc ");

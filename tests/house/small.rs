@@ -41,9 +41,11 @@ fn demo() -> Value {
     let simulate = &mut demo["observations"]["simulate"];
     let cycles = simulate["cycles"].as_array().unwrap().iter().step_by(3).cloned().collect::<Vec<_>>();
     simulate["cycles"] = Value::from(cycles);
-    simulate["pixels"] = json!(2000);
+    simulate["pixels"] = json!(1000);
     simulate["snr"] = json!(300);
-    demo["imaging"]["pixels"] = json!(800);
+    demo["imaging"]["pixels"] = json!(200);
+    // else most of the time goes into reconstructions of a noise that few pixels make
+    demo["imaging"]["unresolved_spots"] = json!("entropy");
     demo["imaging"]["chi2_target"] = json!(1.0);
     demo["sampler"] = short_chains();
     demo["grid"]["axes"] = json!({ "k_kms": [0.05, 0.15, 3], "porb_over_prot": [1.5, 1.9, 3], "phi": [0.4, 0.6, 3] });

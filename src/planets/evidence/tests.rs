@@ -1,7 +1,7 @@
 //! Marginal likelihoods against sums over all parameters, and how often chance makes a Bayes factor.
 
 use super::*;
-use crate::planets::periodogram::sample::{correlated, normal, orbit, uneven};
+use crate::planets::periodogram::sample::{self, correlated, normal, orbit, uneven};
 use nalgebra::DVector;
 
 const K_MAX: f64 = 0.4;
