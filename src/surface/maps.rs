@@ -256,7 +256,7 @@ impl<'a> Against<'a> {
             profiles: observations.profiles.len(),
             data: observations.len(),
             pixels: imager.grid.len(),
-            equivalent_width_kms: star.line.equivalent_width_kms,
+            equivalent_width_kms: star.line.strength_kms(),
             contrast: star.contrast,
             parameters: *values,
             observed_rv_rms_kms: scatter(moments.iter().map(|v| v.observed.value_kms)),

@@ -38,7 +38,7 @@ pub mod planned {
 pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
-pub use model::{At, OrbitOf, SurfaceModel};
+pub use model::{At, OrbitOf, Properties, SurfaceModel};
 pub use objective::{ObjectiveKind, UnresolvedSpots};
 pub use settings::SurfaceSettings;
 pub use static_map::{CHI2, LIKELIHOOD_NUMBERS, ReferenceError, SPOTTEDNESS};

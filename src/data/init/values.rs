@@ -131,7 +131,7 @@ impl Values {
         let vsini_kms = ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini);
         let gamma_kms = known.line_gamma_kms.as_ref().map(|given| given.value);
         let star = Star {
-            rotation_period_d: rotation_period_d.unwrap_or(f64::NAN),
+            rotation_period_d,
             epoch_d,
             inclination_deg,
             vsini_kms,

@@ -5,11 +5,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The star. Where a parameter is free, its value here is the start.
+// in a draft the period need not be known: it is an `Option` there
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Star {
+#[schemars(rename = "Star")]
+pub struct Star<Period = f64> {
     /// Rotation period (d), above 0; rotation cycles and `porb_over_prot` refer to it.
-    pub rotation_period_d: f64,
+    pub rotation_period_d: Period,
     /// Time of rotation cycle 0 (d), on the time scale of the observations.
     #[serde(default)]
     pub epoch_d: f64,

@@ -1,8 +1,8 @@
-//! Checks that several sections of a config share.
+//! Checks that several sections share.
 
-use super::domain::{check_size, most};
-use super::error::Fault;
-use super::number_or::Automatic;
+use crate::data::config::error::Fault;
+use crate::data::config::written::Automatic;
+pub(super) use crate::model::parameters::most;
 use crate::surface::nuisances::LineAndContinuum;
 
 /// Fewest and most pixels of an image or a simulated star.
@@ -24,6 +24,14 @@ pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
         return Ok(());
     }
     Err(Fault::new(key, format!("{pixels} must be from {} to {}", PIXELS.start(), PIXELS.end())))
+}
+
+/// Whether a number keeps within `most`, up or down.
+pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> {
+    match value.abs() <= most {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{value} is beyond sense: at most {most:e}, up or down"))),
+    }
 }
 
 pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {

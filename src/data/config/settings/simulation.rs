@@ -1,10 +1,9 @@
 //! A simulated star's spots and the times at which it is observed: listed, or drawn at random.
 
-use super::checks::{check_nuisances, check_pixels, positive, within};
-use super::data_sets::{SimulateSection, VelocitySection};
-use super::domain::{check_size, check_value, most};
-use super::error::Fault;
-use super::raw_parts::PlanSection;
+use super::checks::{check_nuisances, check_pixels, check_size, most, positive, within};
+use super::parameters::check_value;
+use crate::data::config::error::Fault;
+use crate::data::config::written::{PlanSection, SimulateSection, VelocitySection};
 use crate::data::simulate::{RandomSpots, Schedule, Simulation};
 use crate::model::{Clock, Elements, Parameter, ParameterValues};
 use crate::star::{Disc, Facula, Life, Spot, StarSettings};
@@ -137,7 +136,7 @@ pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str)
 }
 
 /// Whether the schedule at `key` makes sense.
-pub(super) fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
+fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
     let Schedule { nights, seasons, season_spacing_d, per_night: [fewest, largest], night_hours, clouds, .. } =
         *schedule;
     let key = |field: &str| format!("{key}.{field}");
