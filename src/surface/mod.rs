@@ -1,9 +1,9 @@
 //! What spots do to line profiles, behind one interface: a [`SurfaceModel`].
 //!
 //! There are two models: `static_map`, the map of maximum entropy (`docs/method.md` sections 2 to 4), and
-//! `evolving_map`, a Gaussian field on the sphere and in time, marginalised (section 9). [`SurfaceSettings::model`]
-//! chooses one of them. A third model is one more folder here, an arm of that `match`, a name in [`ObjectiveKind`] and
-//! a kind of [`record`]; one with several numbers a pixel, or lines of its own, changes `star::response` and
+//! `evolving_map`, a Gaussian field on the sphere and in time, marginalised (section 9). `settings` chooses
+//! one of them, and its [`Properties`], for an objective. A third model is one more folder here, an arm of these two
+//! `match`es, a name in [`ObjectiveKind`] and a kind of [`record`]; one with several numbers a pixel, or lines of its own, changes `star::response` and
 //! [`imaging`], too.
 //!
 //! In: an [`Imager`](imaging::Imager), which has the star, when it was observed, and the data with their [`nuisances`]

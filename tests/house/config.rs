@@ -2,7 +2,7 @@
 //! key.
 
 use dimcmc::internals::data::calibrated::star_for;
-use dimcmc::internals::data::config::{self, Config, ConfigError, EquivalentWidth, ObservationSource, Settings};
+use dimcmc::internals::data::config::{self, Config, ConfigError, ObservationSource, Settings};
 use dimcmc::internals::model::{Parameter, Prior};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -97,7 +97,7 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 #[test]
 fn lo_peg_resolves() {
     let settings = load(&shipped("lopeg.json")).unwrap();
-    assert_eq!(settings.sets[0].equivalent_width, EquivalentWidth::AUTO);
+    assert_eq!(settings.sets[0].star.line.equivalent_width_kms, None);
     let ObservationSource::Files { path, velocity_range_kms, sigma_scale, .. } = &settings.sets[0].source else {
         panic!()
     };

@@ -1,7 +1,8 @@
 //! The config as users write it: names, units and defaults, a type for each section. Doc comments here are the
 //! descriptions of the JSON Schema.
 //!
-//! What is made of a section is in the file of `settings` that has the same name.
+//! What is made of a section is in the file of `settings` that has the same name: of planets in `orbits`, of priors in
+//! `parameters`, of simulations and plans in `simulation`.
 
 mod imaging;
 mod listed;
