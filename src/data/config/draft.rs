@@ -86,9 +86,8 @@ impl Draft {
     /// If the path of the observations is not Unicode, as JSON must be.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         let mut draft = self.clone();
-        let integrated = self.imaging.objective.properties().marginalises;
         let jitter = &mut draft.observations.velocity_jitter_kms;
-        *jitter = jitter.filter(|jitter| integrated || !jitter.is_default());
+        *jitter = jitter.and_then(|jitter| jitter.mentioned(self.imaging.objective));
         Ok(compact(&serde_json::to_string_pretty(&draft)?))
     }
 }

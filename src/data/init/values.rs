@@ -24,10 +24,8 @@ mod assumed {
     /// Temperatures (K) of a young K dwarf and its spots.
     pub const PHOTOSPHERE_K: f64 = 5000.0;
     pub const SPOT_K: f64 = 3500.0;
-    /// Wavelength (nm) that LSD profiles of the visible are often normalised to.
-    pub const WAVELENGTH_NM: f64 = 550.0;
-    /// Coefficient of linear limb darkening of a cool dwarf in the visible.
-    pub const LIMB_DARKENING: f64 = 0.65;
+    /// Wavelength (nm), and coefficient of linear limb darkening of a cool dwarf at it.
+    pub use crate::data::config::{USUAL_LIMB_DARKENING as LIMB_DARKENING, USUAL_WAVELENGTH_NM as WAVELENGTH_NM};
     /// Standard deviation (km/s) of the lines of a dwarf that does not rotate.
     pub const LINE_SIGMA_KMS: f64 = 2.5;
     /// Resolving power of ESPaDOnS and NARVAL.

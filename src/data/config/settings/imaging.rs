@@ -1,6 +1,6 @@
 //! The Doppler image: what makes sense with an objective, and what is known of the spots as a field.
 
-use super::checks::{automatic, check_nuisances, check_pixels, check_windows};
+use super::checks::{NUISANCES, automatic, check_nuisances, check_pixels, check_windows};
 use super::parameters::check_value;
 use crate::data::config::error::Fault;
 use crate::data::config::written::{Config, Hyperparameter, ImagingSettings, OfField, PriorSection, VelocityJitter};
@@ -46,10 +46,7 @@ pub(super) fn check_imaging(imaging: &ImagingSettings, jitter: VelocityJitter) -
         return Err(Fault::new("imaging.chi2_target", problem));
     }
     if let Some(priors) = &imaging.nuisances {
-        check_nuisances(
-            priors,
-            ["continuum_offset", "continuum_slope", "equivalent_width"].map(|n| format!("imaging.nuisances.{n}")),
-        )?;
+        check_nuisances("imaging.nuisances", NUISANCES, priors)?;
     }
     automatic("imaging.chi2_target", imaging.chi2_target)
 }

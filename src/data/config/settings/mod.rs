@@ -114,13 +114,12 @@ pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Faul
 /// The velocity jitter, its default filled in. A field takes zero points that nobody told it of for spots that change
 /// or for planets.
 fn resolve_jitter(written: &mut Config) -> VelocityJitter {
-    let integrated = written.imaging.objective.properties().marginalises;
-    let usual = if integrated { VelocityJitter::FITTED } else { VelocityJitter::default() };
+    let objective = written.imaging.objective;
     let sections = &mut written.observations.sections;
-    let jitter = sections[0].velocity_jitter_kms.unwrap_or(usual);
+    let jitter = sections[0].velocity_jitter_kms.unwrap_or(VelocityJitter::usual(objective));
     // that of all data sets
     for section in sections {
-        section.velocity_jitter_kms = Some(jitter).filter(|jitter| integrated || !jitter.is_default());
+        section.velocity_jitter_kms = jitter.mentioned(objective);
     }
     jitter
 }

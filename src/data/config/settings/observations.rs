@@ -1,7 +1,9 @@
 //! The data sets: what each says of itself, and what only one of them may say.
 
-use super::checks::{automatic, check_nuisances, check_size, check_windows, most, names};
-use super::simulation::{check_jitter, simulation, spots, times_d};
+use super::checks::{
+    NUISANCES, automatic, check_jitter, check_nuisances, check_size, check_windows, check_zero_point, most, names,
+};
+use super::simulation::{simulation, spots, times_d};
 use super::star::resolve_star;
 use crate::data::config::error::Fault;
 use crate::data::config::written::{Automatic, Config, Instrument, ObservationsSection, VelocityJitter, ZeroPoint};
@@ -11,9 +13,6 @@ use crate::star::{BrightnessModel, StarSettings};
 use crate::surface::calibration::noise::ErrorSettings;
 use crate::surface::nuisances::LineAndContinuum;
 use std::path::{Path, PathBuf};
-
-/// Zero points beyond it (km/s) are a mistake.
-const LARGEST_ZERO_POINT_KMS: f64 = 100.0;
 
 /// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
 const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
@@ -95,14 +94,10 @@ pub(super) fn resolve_sets(
         check_windows(&section.exclude, &format!("{key}.exclude"))?;
         let source = source(section, &key, &star, values, config)?;
         if let Some(priors) = &section.nuisances {
-            let name = |name: &str| format!("{key}.nuisances.{name}");
-            check_nuisances(priors, ["continuum_offset", "continuum_slope", "equivalent_width"].map(name))?;
+            check_nuisances(&format!("{key}.nuisances"), NUISANCES, priors)?;
         }
-        if let ZeroPoint::Number(kms) = section.zero_point_kms
-            && (kms.is_nan() || kms.abs() > LARGEST_ZERO_POINT_KMS)
-        {
-            let problem = format!("{kms} must be from -{LARGEST_ZERO_POINT_KMS} to {LARGEST_ZERO_POINT_KMS} km/s");
-            return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
+        if let ZeroPoint::Number(kms) = section.zero_point_kms {
+            check_zero_point(&format!("{key}.zero_point_kms"), kms)?;
         }
         sets.push(DataSetSettings {
             name: section.name.clone().unwrap_or_else(|| format!("set{}", s + 1)),

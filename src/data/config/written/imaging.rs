@@ -1,6 +1,6 @@
 //! `imaging` as users write it. Doc comments here are the descriptions of the JSON Schema.
 
-use super::number_or::{Automatic, Hyperparameter, OfField};
+use super::number_or::{Automatic, Hyperparameter};
 use crate::maxent::entropy::Entropy;
 use crate::star::BrightnessModel;
 use crate::surface::nuisances::LineAndContinuum;
@@ -70,10 +70,10 @@ impl Default for ImagingSettings {
             objective: ObjectiveKind::default(),
             season_gap_d: None,
             seasons: Vec::new(),
-            spot_amplitude: Hyperparameter::Word(OfField::Fitted),
-            spot_slope: Hyperparameter::Word(OfField::Fitted),
+            spot_amplitude: Hyperparameter::default(),
+            spot_slope: Hyperparameter::default(),
             spot_break_degree: None,
-            spot_lifetime_d: Hyperparameter::Word(OfField::Fitted),
+            spot_lifetime_d: Hyperparameter::default(),
             unresolved_spots: UnresolvedSpots::default(),
             nuisances: None,
         }

@@ -18,7 +18,9 @@ pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, Velocit
 pub use observations::{ObservationsSection, SimulateSection, VelocitySection};
 pub use per_parameter::{PerParameter, Planet};
 pub use photometry::{PhotometrySection, SimulatedLight};
-pub use star::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
+pub use star::{
+    Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star, USUAL_LIMB_DARKENING, USUAL_WAVELENGTH_NM,
+};
 
 use crate::data::simulate::Schedule;
 use crate::model::{Parameter, PriorKind};

@@ -42,7 +42,7 @@ pub struct Star<Period = f64> {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spot_k: Option<f64>,
     /// Wavelength (nm) at which the temperatures give the brightness of a spot.
-    #[serde(default = "default_wavelength_nm")]
+    #[serde(default = "usual_wavelength_nm")]
     pub wavelength_nm: f64,
     /// Brightness of a spot over that of the photosphere, in [0, 1); instead of the two temperatures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -51,8 +51,14 @@ pub struct Star<Period = f64> {
     pub line: Line,
 }
 
-fn default_wavelength_nm() -> f64 {
-    550.0
+/// Wavelength (nm) if none is given: that which LSD profiles of the visible are often normalised to.
+pub const USUAL_WAVELENGTH_NM: f64 = 550.0;
+
+/// Linear limb darkening, if none is given.
+pub const USUAL_LIMB_DARKENING: f64 = 0.65;
+
+fn usual_wavelength_nm() -> f64 {
+    USUAL_WAVELENGTH_NM
 }
 
 /// The line of one surface element, before the spectrograph broadens it.
@@ -95,7 +101,7 @@ pub struct LimbDarkeningSection {
 
 impl Default for LimbDarkeningSection {
     fn default() -> Self {
-        LimbDarkeningSection { law: LimbLaw::Linear, coefficients: vec![0.65] }
+        LimbDarkeningSection { law: LimbLaw::Linear, coefficients: vec![USUAL_LIMB_DARKENING] }
     }
 }
 
