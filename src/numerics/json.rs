@@ -1,5 +1,5 @@
-//! What JSON does not have: numbers that are not finite, which are written as null and come back as NaN, and parts of an
-//! object that are there with all their keys, or not at all.
+//! What JSON does not have: numbers that are not finite, which are written as null and come back as NaN, and parts of
+//! an object that are there with all their keys, or not at all.
 
 use serde::de::{DeserializeOwned, Error, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -16,8 +16,8 @@ pub trait Part: DeserializeOwned {
     const KEYS: &'static [&'static str];
 }
 
-/// For a flattened part: `None` where none of its keys is there. Where one is, a fault of any is an error that names it;
-/// a flattened `Option` of serde's own would be `None`.
+/// For a flattened part: `None` where none of its keys is there. Where one is, a fault of any is an error that names
+/// it; a flattened `Option` of serde's own would be `None`.
 pub fn part<'de, D: Deserializer<'de>, T: Part>(deserializer: D) -> Result<Option<T>, D::Error> {
     let own = deserializer.deserialize_map(Own(T::KEYS))?;
     if own.is_empty() {

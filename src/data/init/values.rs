@@ -162,11 +162,13 @@ impl Values {
             },
         };
         let sigma_scale = known.sigma_scale.as_ref().map_or(Automatic::AUTO, |given| Automatic::Number(given.value));
-        let mut observations = ObservationsSection::default();
-        observations.velocity_range_kms = Some(self.velocity_range_kms.into());
-        observations.sigma_scale = Some(sigma_scale);
-        observations.continuum_level = self.continuum_level;
-        observations.velocity_jitter_kms = Some(VelocityJitter::FITTED);
+        let observations = ObservationsSection {
+            velocity_range_kms: Some(self.velocity_range_kms.into()),
+            sigma_scale: Some(sigma_scale),
+            continuum_level: self.continuum_level,
+            velocity_jitter_kms: Some(VelocityJitter::FITTED),
+            ..ObservationsSection::default()
+        };
         let imaging = ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) };
         let sought = Sought {
             k_kms: (0.0, k_max(cut, ledger)),

@@ -11,8 +11,8 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 /// Longest name of a set.
 const LONGEST_NAME: usize = 40;
 
-/// Velocity zero points that are off, or scatter, by more (km/s) are a mistake: profiles would be seen as the wrong part
-/// of a line.
+/// Velocity zero points that are off, or scatter, by more (km/s) are a mistake: profiles would be seen as the wrong
+/// part of a line.
 const LARGEST_ZERO_POINT_KMS: f64 = 100.0;
 
 /// Keys of line and continuum.

@@ -77,8 +77,8 @@ pub enum ObservationSource {
     Simulate(Simulation),
 }
 
-/// Resolves all data sets of `written`, the star's own settings being `star`. `config` is the config's path, whose folder
-/// paths start from.
+/// Resolves all data sets of `written`, the star's own settings being `star`. `config` is the config's path, whose
+/// folder paths start from.
 pub(super) fn resolve_sets(
     written: &mut Config,
     star: &StarSettings,
