@@ -18,8 +18,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("usage: blind_search periodogram CONFIG --out FOLDER".into());
     }
     let scene = Scene::load(config.as_ref())?;
-    let evolves = scene.surface().objective.evolves();
-    let robustness = if evolves { RobustnessOf::Candidates } else { RobustnessOf::None };
+    let changes = scene.surface().objective.properties().map_changes;
+    let robustness = if changes { RobustnessOf::Candidates } else { RobustnessOf::None };
     let options = BlindSearchOptions { fixed: true, robustness, static_check: false, ..Default::default() };
     let found = BlindSearch::of(&scene, &options, &|_| ())?;
     std::fs::create_dir_all(folder)?;

@@ -7,7 +7,7 @@ use crate::data::io::map::{FILES, LIGHT_CURVES, MapResult};
 use crate::data::scene::Scene;
 use crate::model::Parameter;
 use crate::surface::maps::{Deviation, ImageSummary};
-use crate::surface::{MapSummary, NoMaps, SpotField, SurfaceMaps};
+use crate::surface::{MapSummary, NoMaps, Properties, SpotField, SurfaceMaps};
 use std::path::{Path, PathBuf};
 
 /// The star of a [`Scene`] reconstructed at the values of its config.
@@ -49,8 +49,8 @@ impl<'a> Maps<'a> {
     /// # Errors
     /// [`MapError`].
     pub fn of(scene: &'a Scene, times_d: Option<&[f64]>, report: &dyn Fn(&'static str)) -> Result<Self, MapError> {
-        let evolves = scene.settings.imaging.objective.evolves();
-        report(if evolves { "fitting the field of spots" } else { "reconstructing" });
+        let &Properties { map_changes, under_way, .. } = scene.settings.imaging.objective.properties();
+        report(under_way);
         let found = scene.maps(times_d);
         let is_bound = |name: &String| *name != Parameter::SpotLifetime.name();
         let suspicious = match &found {
@@ -58,11 +58,11 @@ impl<'a> Maps<'a> {
             Ok(_) => scene.measured.misfit_text().is_some(),
             Err(error) => !matches!(error, NoMaps::Times(_)),
         };
-        if suspicious && (evolves || found.is_err()) {
+        if suspicious && (map_changes || found.is_err()) {
             report("looking for the reason");
         }
-        // of the errors a map that evolves knows better
-        let told = |diagnosis: &Diagnosis| !evolves || diagnosis.reason != Reason::Errors;
+        // a map that changes tells nothing of the errors
+        let told = |diagnosis: &Diagnosis| !map_changes || diagnosis.reason != Reason::Errors;
         let diagnosis = suspicious.then(|| diagnosis(scene)).flatten().filter(told);
         match found {
             Ok(maps) => Ok(Maps { scene, maps: Box::new(maps), diagnosis }),

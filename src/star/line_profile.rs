@@ -42,7 +42,7 @@ impl LineKernel {
         LineKernel {
             sigma,
             gamma: line.gamma_kms,
-            norm: line.equivalent_width_kms / (sigma * TAU.sqrt()),
+            norm: line.strength_kms() / (sigma * TAU.sqrt()),
             fourth: ratio.powi(4) / 480.0,
             sixth: ratio.powi(6) / 30240.0,
         }

@@ -81,14 +81,23 @@ pub struct LocalLine {
     pub instrumental_sigma_kms: f64,
     /// Half width at half depth (km/s) of the Lorentzian, 0 for none.
     pub gamma_kms: f64,
-    /// Equivalent width (km/s), wings and all.
-    pub equivalent_width_kms: f64,
+    /// Equivalent width (km/s), wings and all; `None` as long as it is still to be measured on the profiles.
+    pub equivalent_width_kms: Option<f64>,
 }
 
 impl LocalLine {
     /// A Gaussian, all of it the star's own.
     pub fn gaussian(sigma_kms: f64, equivalent_width_kms: f64) -> Self {
+        let equivalent_width_kms = Some(equivalent_width_kms);
         LocalLine { sigma_kms, instrumental_sigma_kms: 0.0, gamma_kms: 0.0, equivalent_width_kms }
+    }
+
+    /// The equivalent width (km/s) of a line that profiles are made with.
+    ///
+    /// # Panics
+    /// If it is still to be measured.
+    pub fn strength_kms(&self) -> f64 {
+        self.equivalent_width_kms.expect("the equivalent width is measured before profiles are made with the line")
     }
 }
 
@@ -115,7 +124,7 @@ impl StarSettings {
         if let Some(sigma_kms) = surface.line_sigma_kms {
             star.line.sigma_kms = sigma_kms.hypot(star.line.instrumental_sigma_kms);
         }
-        star.line.equivalent_width_kms = surface.equivalent_width_kms.unwrap_or(star.line.equivalent_width_kms);
+        star.line.equivalent_width_kms = surface.equivalent_width_kms.or(star.line.equivalent_width_kms);
         star.contrast = surface.contrast.unwrap_or(star.contrast);
         star
     }
@@ -124,7 +133,7 @@ impl StarSettings {
     pub fn is_possible(&self) -> bool {
         (0.0..1.0).contains(&self.contrast)
             && self.line.sigma_kms > 0.0
-            && self.line.equivalent_width_kms > 0.0
+            && self.line.equivalent_width_kms.is_some_and(|width| width > 0.0)
             && self.limb_darkening.is_positive()
     }
 

@@ -89,7 +89,12 @@ mod tests {
         epoch_d: 0.0,
         limb_darkening: LimbDarkening::Linear(0.7),
         contrast: 0.5,
-        line: LocalLine { sigma_kms: 3.18, instrumental_sigma_kms: 0.0, gamma_kms: 0.0, equivalent_width_kms: 5.8 },
+        line: LocalLine {
+            sigma_kms: 3.18,
+            instrumental_sigma_kms: 0.0,
+            gamma_kms: 0.0,
+            equivalent_width_kms: Some(5.8),
+        },
     };
 
     /// The star, and so much another one.

@@ -9,7 +9,7 @@ use super::nuisances::LineAndContinuum;
 use super::static_map::ReferenceError;
 use super::{FilteredVelocity, SpotField};
 use crate::model::ParameterValues;
-use crate::numerics::json::number_or_null;
+use crate::numerics::json::{Part, number_or_null, part};
 use crate::sampling::log_density::Status;
 use crate::star::observation::{Observations, Profile};
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ pub struct MapSummary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_per_datum_unchanging: Option<f64>,
     /// The map as one of maximum entropy, where it is one.
-    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub image: Option<ImageSummary>,
     /// Number of profiles.
     pub profiles: usize,
@@ -137,7 +137,7 @@ pub struct ImageSummary {
     /// Fractional spot coverage; of an image of bright and dark pixels, root mean square of brightness minus 1.
     pub spottedness: f64,
     /// Of an image of bright and dark pixels, what is darker and what is brighter than the photosphere.
-    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub deviation: Option<Deviation>,
     /// Skilling & Bryan's TEST, 0 at a maximum-entropy image.
     pub test: f64,
@@ -148,6 +148,22 @@ pub struct ImageSummary {
     pub newton_steps: usize,
 }
 
+impl Part for ImageSummary {
+    const KEYS: &'static [&'static str] = &[
+        "chi2_target",
+        "lambda",
+        "alpha",
+        "entropy",
+        "spottedness",
+        "darkness",
+        "brightness_excess",
+        "test",
+        "model_applications",
+        "passes",
+        "newton_steps",
+    ];
+}
+
 /// Deviation from the brightness of the photosphere, means over the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
@@ -155,6 +171,10 @@ pub struct Deviation {
     pub darkness: f64,
     /// Mean of what they have too much, 0 for dark ones.
     pub brightness_excess: f64,
+}
+
+impl Part for Deviation {
+    const KEYS: &'static [&'static str] = &["darkness", "brightness_excess"];
 }
 
 /// One image on the trade-off curve.
@@ -256,7 +276,7 @@ impl<'a> Against<'a> {
             profiles: observations.profiles.len(),
             data: observations.len(),
             pixels: imager.grid.len(),
-            equivalent_width_kms: star.line.equivalent_width_kms,
+            equivalent_width_kms: star.line.strength_kms(),
             contrast: star.contrast,
             parameters: *values,
             observed_rv_rms_kms: scatter(moments.iter().map(|v| v.observed.value_kms)),

@@ -1,10 +1,10 @@
 //! What spots do to line profiles, behind one interface: a [`SurfaceModel`].
 //!
 //! There are two models: `static_map`, the map of maximum entropy (`docs/method.md` sections 2 to 4), and
-//! `evolving_map`, a Gaussian field on the sphere and in time, marginalised (section 9). [`SurfaceSettings::model`]
-//! chooses one of them. A third model is one more folder here, an arm of that `match`, a name in [`ObjectiveKind`] and
-//! a kind of [`record`]; one with several numbers a pixel, or lines of its own, changes `star::response` and
-//! [`imaging`], too.
+//! `evolving_map`, a Gaussian field on the sphere and in time, marginalised (section 9). `settings` chooses one of
+//! them, and its [`Properties`], for an objective. A third model is one more folder here, an arm of these two
+//! `match`es, a name in [`ObjectiveKind`] and a kind of [`record`]; one with several numbers a pixel, or lines of its
+//! own, changes `star::response` and [`imaging`], too.
 //!
 //! In: an [`Imager`](imaging::Imager), which has the star, when it was observed, and the data with their [`nuisances`]
 //! and light curves ([`photometry`]); [`calibration`] measures their uncertainties. Out: ln L to second order in the
@@ -38,7 +38,7 @@ pub mod planned {
 pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
-pub use model::{At, OrbitOf, SurfaceModel};
+pub use model::{At, OrbitOf, Properties, SurfaceModel};
 pub use objective::{ObjectiveKind, UnresolvedSpots};
 pub use settings::SurfaceSettings;
 pub use static_map::{CHI2, LIKELIHOOD_NUMBERS, ReferenceError, SPOTTEDNESS};

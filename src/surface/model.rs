@@ -27,6 +27,27 @@ pub struct At<'a> {
 /// What is made of the velocities of some profiles: an orbit at a period.
 pub type OrbitOf<'a> = &'a (dyn Fn(&VelocityQuadratic) -> Option<CircularOrbit> + Sync);
 
+/// What a model is, before there are data: what a config may ask of it, and what it leaves to be measured beforehand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Properties {
+    /// Its name. Images, jitters and fields of two models are not the same quantities.
+    pub name: &'static str,
+    /// What is under way while it looks for maps, in words.
+    pub under_way: &'static str,
+    /// Whether the map changes all the time: seasons need no maps of their own, and what one map leaves over is not
+    /// noise.
+    pub map_changes: bool,
+    /// Whether velocity jitter and velocity offsets of data sets are integrated out with the maps; otherwise they are
+    /// settled beforehand.
+    pub marginalises: bool,
+    /// Whether spots are a field, of an amplitude, a slope and a lifetime.
+    pub has_field: bool,
+    /// Whether it takes light curves beside the profiles.
+    pub takes_light_curves: bool,
+    /// Whether it is one map at a target chi2, which leaves spots unresolved.
+    pub has_target: bool,
+}
+
 /// What is assumed of the spots, and what the profiles then say.
 pub trait SurfaceModel: Debug + Send + Sync {
     /// ln L to second order around the star at some parameters; maps are found from those of a star `near` by.

@@ -21,12 +21,6 @@ pub enum ObjectiveKind {
 }
 
 impl ObjectiveKind {
-    /// Whether spots are a field that comes and goes, so that its parameters, light curves and RV offsets between data
-    /// sets are fitted with it, and seasons need no maps of their own.
-    pub fn evolves(self) -> bool {
-        self == ObjectiveKind::MarginalLikelihood
-    }
-
     /// The name used in configs and tables.
     pub fn name(self) -> &'static str {
         match self {

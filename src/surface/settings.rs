@@ -1,7 +1,7 @@
-//! The choice of a surface model: the one place that knows them all.
+//! The choice of a surface model for an objective: the one place that knows them all.
 
 use super::evolving_map::{EvolvingMap, Known};
-use super::model::SurfaceModel;
+use super::model::{Properties, SurfaceModel};
 use super::objective::ObjectiveKind;
 use super::static_map::StaticMap;
 use serde::{Deserialize, Serialize};
@@ -18,10 +18,28 @@ pub struct SurfaceSettings {
     pub field: Option<Known>,
 }
 
+impl ObjectiveKind {
+    /// What its model is.
+    pub fn properties(self) -> &'static Properties {
+        match self {
+            ObjectiveKind::MarginalLikelihood => &EvolvingMap::PROPERTIES,
+            ObjectiveKind::Spottedness | ObjectiveKind::Entropy | ObjectiveKind::RegularisedLikelihood => {
+                &StaticMap::PROPERTIES
+            }
+        }
+    }
+}
+
 impl SurfaceSettings {
     /// The map of fewest spots at a target chi2 per datum, of a star of which it is not asked whether it evolves.
     pub fn spottedness(chi2_target: f64) -> Self {
         SurfaceSettings { objective: ObjectiveKind::Spottedness, chi2_target, field: None }
+    }
+
+    /// The same, without asking whether spots that are taken for static are.
+    pub fn without_comparison(self) -> Self {
+        let field = self.field.filter(|_| self.objective.properties().has_field);
+        SurfaceSettings { field, ..self }
     }
 
     /// The model.

@@ -97,6 +97,21 @@ fn what_makes_no_sense_is_one_line() {
     desk.succeed(&["map", CONFIG, "--out", "map"]);
     let map: MapFile = serde_json::from_value(desk.json("map/map.json")).unwrap();
     assert_eq!((map.maps.len(), map.maps[0].time_d, map.mean.is_some()), (1, None, true));
+    // what is broken in a file is named, and is not taken for absent
+    let written = desk.json("map/map.json");
+    let mut without_maps = written.clone();
+    without_maps.as_object_mut().unwrap().remove("maps");
+    desk.write("map/map.json", &without_maps.to_string());
+    let earlier = "map.json: maps: missing: an earlier version wrote this file; repeat `dimcmc map`";
+    says(&desk.refusal(&["plot", "map"]), &[earlier]);
+    let mut broken = written;
+    broken["spottedness"] = Value::Null;
+    desk.write("map/map.json", &broken.to_string());
+    says(&desk.refusal(&["plot", "map"]), &["map.json: spottedness: invalid type: null, expected f64"]);
+    let mut fit = desk.json("map/fit.json");
+    fit["lambda"] = json!("large");
+    let read = serde_json::from_value::<FitFile>(fit).unwrap_err().to_string();
+    assert!(read.starts_with("lambda: invalid type"), "{read}");
 
     desk.set("/imaging/objective", json!("marginal-likelihood"));
     let mut bare = config();

@@ -115,5 +115,5 @@ fn look(grid: &SurfaceGrid, pixel: usize, state: &StarState, since_epoch_d: f64)
 /// Depth of the local line at distance `v` (km/s) from its centre.
 fn line_depth(star: &StarSettings, v: f64) -> f64 {
     let sigma = star.line.sigma_kms;
-    star.line.equivalent_width_kms / (sigma * TAU.sqrt()) * (-0.5 * (v / sigma).powi(2)).exp()
+    star.line.strength_kms() / (sigma * TAU.sqrt()) * (-0.5 * (v / sigma).powi(2)).exp()
 }

@@ -2,7 +2,7 @@
 //! key.
 
 use dimcmc::internals::data::calibrated::star_for;
-use dimcmc::internals::data::config::{self, Config, ConfigError, EquivalentWidth, ObservationSource, Settings};
+use dimcmc::internals::data::config::{self, Config, ConfigError, ObservationSource, Settings};
 use dimcmc::internals::model::{Parameter, Prior};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -97,7 +97,7 @@ fn the_landscape_of_the_paper_is_of_the_same_data() {
 #[test]
 fn lo_peg_resolves() {
     let settings = load(&shipped("lopeg.json")).unwrap();
-    assert_eq!(settings.sets[0].equivalent_width, EquivalentWidth::AUTO);
+    assert_eq!(settings.sets[0].star.line.equivalent_width_kms, None);
     let ObservationSource::Files { path, velocity_range_kms, sigma_scale, .. } = &settings.sets[0].source else {
         panic!()
     };
@@ -106,9 +106,7 @@ fn lo_peg_resolves() {
     let list = &Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/lopeg/observations.txt");
     if list.exists() {
         let data = dimcmc::internals::data::io::lsd::read(list).unwrap().within(*velocity_range_kms, 1.0).unwrap();
-        assert!(
-            (star_for(&settings, &settings.sets[0], &data).unwrap().line.equivalent_width_kms - 2.6700).abs() < 1e-3
-        );
+        assert!((star_for(&settings, &settings.sets[0], &data).unwrap().line.strength_kms() - 2.6700).abs() < 1e-3);
     }
 }
 

@@ -90,7 +90,7 @@ pub fn whole_truth(oracle: &Oracle) -> ParameterValues {
     let LimbDarkening::Linear(u) = oracle.star.limb_darkening else { panic!() };
     values.set(Parameter::LimbDarkening, u);
     values.set(Parameter::LineSigma, oracle.json["spec"]["sigma_local"].as_f64().unwrap());
-    values.set(Parameter::EquivalentWidth, oracle.star.line.equivalent_width_kms);
+    values.set(Parameter::EquivalentWidth, oracle.star.line.strength_kms());
     values.set(Parameter::Contrast, oracle.star.contrast);
     values
 }

@@ -71,7 +71,7 @@ fn a_star_seen_pole_on_shows_its_local_line() {
     let line = oracle().star.line;
     for (j, depth) in depth.iter().enumerate() {
         let v = -59.4 + 1.8 * j as f64;
-        let gaussian = (-0.5 * (v / line.sigma_kms).powi(2)).exp() * line.equivalent_width_kms
+        let gaussian = (-0.5 * (v / line.sigma_kms).powi(2)).exp() * line.strength_kms()
             / (line.sigma_kms * std::f64::consts::TAU.sqrt());
         // aliasing of the deposit
         assert!((depth - gaussian).abs() < 1e-6, "{v} km/s: {depth} instead of {gaussian}");
@@ -98,7 +98,7 @@ fn limb_darkening_shapes_the_profile_as_an_integral_over_the_disc_says() {
         for (j, depth) in depth.iter().enumerate() {
             let v = -59.4 + 1.8 * j as f64;
             let gaussian = |x: f64| (-0.5 * ((v - 40.0 * x) / line.sigma_kms).powi(2)).exp();
-            let area = line.equivalent_width_kms / (line.sigma_kms * std::f64::consts::TAU.sqrt());
+            let area = line.strength_kms() / (line.sigma_kms * std::f64::consts::TAU.sqrt());
             let wanted = area * strips.iter().map(|(x, weight)| weight * gaussian(*x)).sum::<f64>() / continuum;
             assert!((depth - wanted).abs() < 3e-6, "{limb:?} {v} km/s: {depth} instead of {wanted}");
         }
@@ -246,7 +246,7 @@ fn surface_parameters_stand_in_place_of_settings() {
     other.limb_darkening = LimbDarkening::Linear(0.4);
     other.contrast = 0.3;
     other.line.sigma_kms = 4.0f64.hypot(other.line.instrumental_sigma_kms);
-    other.line.equivalent_width_kms = 7.0;
+    other.line.equivalent_width_kms = Some(7.0);
     let surface = dimcmc::internals::star::Surface {
         limb_darkening: Some(0.4),
         line_sigma_kms: Some(4.0),

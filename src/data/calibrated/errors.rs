@@ -22,8 +22,8 @@ pub(super) fn zero_points(
     let fault = |e: JitterError| settings.fault("observations.velocity_jitter_kms", &e.to_string());
     let (sd_kms, measured) = match jitter {
         VelocityJitter::Number(0.0) => return Ok((None, None)),
-        // it is counted with the field
-        _ if settings.imaging.objective.evolves() => return Ok((None, None)),
+        // it is counted with the maps
+        _ if settings.imaging.objective.properties().marginalises => return Ok((None, None)),
         VelocityJitter::Number(sd_kms) => (sd_kms, None),
         VelocityJitter::Word(_) => {
             let measured = MeasuredJitter::of(imager, settings.values, chi2_target).map_err(fault)?;
@@ -55,7 +55,7 @@ pub(super) fn measured(
     let whole = whole.clone().over_continuum(set.continuum_level());
     let continuum = noise::by_continuum(&whole, &set.star, &settings.values, wanted).map_err(fault)?;
     // what a map leaves over is no noise where stars may change
-    if !wanted.measured || settings.imaging.objective.evolves() {
+    if !wanted.measured || settings.imaging.objective.properties().map_changes {
         return Ok(Some(continuum));
     }
     let seasons = seasons::as_parted(set, used, all_seasons);

@@ -1,23 +1,23 @@
 //! The seasons of a star that does not change within one: each has a map of its own.
 
-use crate::data::config::{ConfigError, DataSetSettings, ImagingSettings, ObservationSource, SEASON_GAP_D, Settings};
+use crate::data::config::{ConfigError, DataSetSettings, ImagingSettings, ObservationSource, Settings};
 use crate::data::dataset::is_within;
 use crate::data::io::provenance::Season;
 use crate::star::observation::Observations;
 use crate::star::{OwnMap, StarSettings};
 use crate::surface::imaging::Imager;
 
-/// The seasons of profiles, in the order of time: as the config has them, or parted by gaps. Integrated maps, which
-/// change, have one.
+/// The seasons of profiles, in the order of time: as the config has them, or parted by gaps. A map that
+/// changes all the time has one.
 ///
 /// # Errors
 /// A profile in none of the config's seasons, and one of these without a profile.
 pub(super) fn seasons(settings: &Settings, parts: &[Observations]) -> Result<Vec<Season>, ConfigError> {
-    let ImagingSettings { seasons: windows, season_gap_d, objective, .. } = &settings.imaging;
+    let ImagingSettings { seasons: windows, .. } = &settings.imaging;
     let star = &settings.sets[0].star;
     let times = times_d(parts);
     if windows.is_empty() {
-        let gap = if objective.evolves() { f64::INFINITY } else { season_gap_d.unwrap_or(SEASON_GAP_D) };
+        let gap = settings.imaging.longest_gap_d();
         return Ok(times.chunk_by(|a, b| b - a <= gap).map(|of| season(star, of)).collect());
     }
     for (set, part) in settings.sets.iter().zip(parts) {

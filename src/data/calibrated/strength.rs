@@ -21,7 +21,7 @@ pub fn star_for(
     observations: &Observations,
 ) -> Result<StarSettings, ConfigError> {
     let mut star = set.star.clone();
-    if set.equivalent_width.is_word() {
+    if star.line.equivalent_width_kms.is_none() {
         let beside = match set.nuisances.is_some_and(|priors| priors.continuum_offset > 0.0) {
             true => above_its_continuum(&star, &settings.values, observations),
             false => None,
@@ -32,10 +32,10 @@ pub fn star_for(
             let problem = format!("auto gives {width} km/s{of}: the observed profiles are no absorption line");
             return Err(settings.fault("star.line.equivalent_width_kms", &problem));
         }
-        star.line.equivalent_width_kms = width;
+        star.line.equivalent_width_kms = Some(width);
         if beside.is_none() && star.line.gamma_kms > 0.0 {
             // wings beyond the profiles count too
-            star.line.equivalent_width_kms = width / share_observed(&star, &settings.values, observations);
+            star.line.equivalent_width_kms = Some(width / share_observed(&star, &settings.values, observations));
         }
     }
     Ok(star)
@@ -47,7 +47,7 @@ pub fn star_for(
 fn above_its_continuum(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> Option<f64> {
     let reach_kms = values[Parameter::Vsini] + BESIDE * star.line.sigma_kms;
     let mut unit = star.clone();
-    unit.line.equivalent_width_kms = 1.0;
+    unit.line.equivalent_width_kms = Some(1.0);
     let model = unspotted(&unit, values, observations);
     let (mut observed, mut expected, mut first) = (0.0, 0.0, 0);
     for profile in &observations.profiles {
@@ -73,7 +73,7 @@ fn above_its_continuum(star: &StarSettings, values: &ParameterValues, observatio
 fn share_observed(star: &StarSettings, values: &ParameterValues, observations: &Observations) -> f64 {
     let depths = unspotted(star, values, observations);
     let areas = depths.iter().sum::<f64>() * observations.step_kms() / observations.profiles.len() as f64;
-    areas / star.line.equivalent_width_kms
+    areas / star.line.strength_kms()
 }
 
 /// Depths of an unspotted star in all bins of `observations`.

@@ -1,12 +1,10 @@
 //! A config to be written: the keys that a first config of an observed star has, in the order and layout in which
 //! people read them. Defaults that nobody asked about are left to the program.
 
-use super::data_sets::ObservationsSection;
-use super::per_parameter::{PerParameter, Planet};
-use super::raw_parts::PriorSection;
-use super::star::{Instrument, Star};
-use super::written::compact;
-use super::{ImagingSettings, VelocityJitter};
+use super::document::compact;
+use super::written::{
+    ImagingSettings, Instrument, ObservationsSection, PerParameter, Planet, PriorSection, Star, VelocityJitter,
+};
 use crate::model::{Parameter, PriorKind};
 use serde::Serialize;
 
@@ -16,8 +14,8 @@ pub struct Draft {
     /// Where the JSON Schema is, relative to the config.
     #[serde(rename = "$schema", skip_serializing_if = "Option::is_none")]
     pub schema: Option<String>,
-    /// The star. A rotation period that is not finite is written as null, which every command refuses.
-    pub star: Star,
+    /// The star. A rotation period that is not known is written as null, which every command refuses.
+    pub star: Star<Option<f64>>,
     /// The spectrograph.
     pub instrument: Instrument,
     planet: Planet,
@@ -43,7 +41,7 @@ pub struct Sought {
 impl Draft {
     /// A draft of these sections; without a planet as its start, but for the period `porb_over_prot` it would have.
     pub fn new(
-        star: Star,
+        star: Star<Option<f64>>,
         instrument: Instrument,
         observations: ObservationsSection,
         imaging: ImagingSettings,
@@ -88,9 +86,8 @@ impl Draft {
     /// If the path of the observations is not Unicode, as JSON must be.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         let mut draft = self.clone();
-        let integrated = self.imaging.objective.evolves();
         let jitter = &mut draft.observations.velocity_jitter_kms;
-        *jitter = jitter.filter(|jitter| integrated || !jitter.is_default());
+        *jitter = jitter.and_then(|jitter| jitter.mentioned(self.imaging.objective));
         Ok(compact(&serde_json::to_string_pretty(&draft)?))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Reason;
 use crate::data::calibrated;
-use crate::data::config::{ConfigError, EquivalentWidth, Settings};
+use crate::data::config::{ConfigError, Settings};
 use crate::data::io::provenance::Season;
 use crate::model::Parameter;
 use crate::star::BrightnessModel;
@@ -79,7 +79,8 @@ impl Change {
             all.push(Change::BrightAndDark);
         }
         all.extend(PERIOD.map(Change::Period));
-        if !settings.sets[0].equivalent_width.is_word() && settings.values.get(Parameter::EquivalentWidth).is_none() {
+        let given = settings.sets[0].star.line.equivalent_width_kms;
+        if given.is_some() && settings.values.get(Parameter::EquivalentWidth).is_none() {
             all.push(Change::MeasuredStrength);
         }
         all.extend(level(patient).map(Change::Level));
@@ -121,7 +122,8 @@ impl Change {
 
     /// The change in words, with the keys that make it.
     pub fn words(&self, patient: &Patient) -> String {
-        let Settings { values, star, .. } = &patient.settings;
+        let settings = &patient.settings;
+        let Settings { values, star, .. } = settings;
         match self {
             Change::Vsini(factor) => {
                 let vsini = values[Parameter::Vsini];
@@ -147,7 +149,10 @@ impl Change {
                 format!("star.rotation_period_d = {:.4} instead of {period}", factor * period)
             }
             Change::MeasuredStrength => {
-                format!("star.line.equivalent_width_kms = \"auto\" instead of {}", star.line.equivalent_width_kms)
+                format!(
+                    "star.line.equivalent_width_kms = \"auto\" instead of {}",
+                    settings.sets[0].star.line.strength_kms()
+                )
             }
             Change::Level(level) => {
                 format!("observations.continuum_level = {level:.4} (times the present one, if there is one)")
@@ -178,7 +183,7 @@ impl Change {
             Change::BrightAndDark => settings.imaging.brightness = BrightnessModel::BrightAndDark,
             // the orbit, if there is one, keeps its period in days
             Change::Period(factor) => settings.values.star.omega_eq_rad_d /= factor,
-            Change::MeasuredStrength => settings.sets[0].equivalent_width = EquivalentWidth::AUTO,
+            Change::MeasuredStrength => settings.sets[0].star.line.equivalent_width_kms = None,
             Change::Level(level) => changed.observations = changed.observations.over_continuum(*level),
             Change::Offsets => {
                 let offsets = LineAndContinuum { continuum_offset: OFFSET, ..Default::default() };

@@ -45,7 +45,7 @@ pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Propo
     // one map that does not change has the sharper eye for what is wrong with a model
     let mut trial = trial::run(&mut draft, place, &profiles, &values, known)?;
     draft.imaging.objective = known.objective();
-    if draft.star.rotation_period_d.is_finite() && known.objective().evolves() {
+    if draft.star.rotation_period_d.is_some() && known.objective().properties().map_changes {
         trial.errors = trial::errors(&draft, place.config, &profiles)?;
     }
     values::note_objective(&draft, known, trial.change.as_ref(), &mut ledger);

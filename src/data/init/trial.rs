@@ -94,9 +94,9 @@ pub(super) fn run(
 ) -> Result<Trial, ProposalError> {
     let mut trial =
         Trial { end: End::Untried, errors: None, diagnosis: None, change: None, orbit: false, measured_vsini: false };
-    if !draft.star.rotation_period_d.is_finite() {
+    if draft.star.rotation_period_d.is_none() {
         let mut stand_in = draft.clone().with_jitter(VelocityJitter::default());
-        stand_in.star.rotation_period_d = STAND_IN_D;
+        stand_in.star.rotation_period_d = Some(STAND_IN_D);
         stand_in.observations.sigma_scale = Some(Automatic::Number(1.0));
         scene(&stand_in, config, profiles)?;
         return Ok(trial);
@@ -118,7 +118,7 @@ pub(super) fn run(
         }
     }
     let is_this_star = trial.measured_vsini || !values.is_another_star(known);
-    if attempt.misfits && is_this_star && known.objective().evolves() {
+    if attempt.misfits && is_this_star && known.objective().properties().map_changes {
         trial.change = change(draft, config, profiles)?;
         if trial.change.is_some() {
             // a line that is wrong may look like a star that changes

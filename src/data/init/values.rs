@@ -24,10 +24,8 @@ mod assumed {
     /// Temperatures (K) of a young K dwarf and its spots.
     pub const PHOTOSPHERE_K: f64 = 5000.0;
     pub const SPOT_K: f64 = 3500.0;
-    /// Wavelength (nm) that LSD profiles of the visible are often normalised to.
-    pub const WAVELENGTH_NM: f64 = 550.0;
-    /// Coefficient of linear limb darkening of a cool dwarf in the visible.
-    pub const LIMB_DARKENING: f64 = 0.65;
+    /// Wavelength (nm), and coefficient of linear limb darkening of a cool dwarf at it.
+    pub use crate::data::config::{USUAL_LIMB_DARKENING as LIMB_DARKENING, USUAL_WAVELENGTH_NM as WAVELENGTH_NM};
     /// Standard deviation (km/s) of the lines of a dwarf that does not rotate.
     pub const LINE_SIGMA_KMS: f64 = 2.5;
     /// Resolving power of ESPaDOnS and NARVAL.
@@ -131,7 +129,7 @@ impl Values {
         let vsini_kms = ledger.settle(("star.vsini_kms", "km/s"), &known.vsini_kms, vsini);
         let gamma_kms = known.line_gamma_kms.as_ref().map(|given| given.value);
         let star = Star {
-            rotation_period_d: rotation_period_d.unwrap_or(f64::NAN),
+            rotation_period_d,
             epoch_d,
             inclination_deg,
             vsini_kms,
@@ -164,11 +162,13 @@ impl Values {
             },
         };
         let sigma_scale = known.sigma_scale.as_ref().map_or(Automatic::AUTO, |given| Automatic::Number(given.value));
-        let mut observations = ObservationsSection::default();
-        observations.velocity_range_kms = Some(self.velocity_range_kms.into());
-        observations.sigma_scale = Some(sigma_scale);
-        observations.continuum_level = self.continuum_level;
-        observations.velocity_jitter_kms = Some(VelocityJitter::FITTED);
+        let observations = ObservationsSection {
+            velocity_range_kms: Some(self.velocity_range_kms.into()),
+            sigma_scale: Some(sigma_scale),
+            continuum_level: self.continuum_level,
+            velocity_jitter_kms: Some(VelocityJitter::FITTED),
+            ..ObservationsSection::default()
+        };
         let imaging = ImagingSettings { nuisances: self.nuisances(ledger), ..imaging(known, ledger) };
         let sought = Sought {
             k_kms: (0.0, k_max(cut, ledger)),

@@ -10,6 +10,7 @@ use super::csv::{DATA_SET, Table};
 use super::provenance::{MeasuredSet, Provenance, Season};
 use crate::maxent::entropy::Entropy;
 use crate::model::ParameterValues;
+use crate::numerics::json::{Part, part};
 use crate::star::SurfaceGrid;
 use crate::star::observation::Observations;
 use crate::surface::checks::Checks;
@@ -95,9 +96,10 @@ pub struct MapFile {
     /// Share of the surface of each pixel.
     pub area_fraction: Vec<f64>,
     /// The map of all times, where there is one: of several seasons the mean over them.
-    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub mean: Option<OneMap>,
-    /// The maps in the order of time: one, one a season, or one at each time asked for.
+    /// The maps in the order of time: one, one a season, or one at each time asked for. Earlier versions wrote none.
+    #[serde(default)]
     pub maps: Vec<MapAt>,
 }
 
@@ -113,6 +115,11 @@ pub struct OneMap {
     pub pixels: MapColumns,
 }
 
+impl Part for OneMap {
+    const KEYS: &'static [&'static str] =
+        &["spottedness", "true_spottedness", "spot_filling", "true_spot_filling", "brightness", "true_brightness"];
+}
+
 /// One of the maps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapAt {
@@ -123,7 +130,7 @@ pub struct MapAt {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cycle: Option<f64>,
     /// The season that it is of, and how often the star was seen, where there are several.
-    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    #[serde(flatten, deserialize_with = "part", skip_serializing_if = "Option::is_none")]
     pub season: Option<Season>,
     /// As [`OneMap::spottedness`], of one of several seasons.
     #[serde(default, skip_serializing_if = "Option::is_none")]

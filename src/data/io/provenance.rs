@@ -1,5 +1,6 @@
 //! What every result says of where it came from.
 
+use crate::numerics::json::Part;
 use crate::surface::calibration::jitter::MeasuredJitter;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
@@ -59,6 +60,10 @@ pub struct Season {
     pub profiles: usize,
     /// Where longitudes of its map count from, in place of the star's `epoch_d`: whole cycles later (d).
     pub epoch_d: f64,
+}
+
+impl Part for Season {
+    const KEYS: &'static [&'static str] = &["first_d", "last_d", "profiles", "epoch_d"];
 }
 
 /// One of several data sets.

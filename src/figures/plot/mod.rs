@@ -138,6 +138,10 @@ pub fn figures(folder: &Path, run: Option<&Path>) -> Result<Vec<Figure>, PlotErr
 
 fn star_map_figures(folder: &Path, _: Option<&Path>) -> Result<Vec<Figure>, PlotError> {
     let file: MapFile = origin::read(folder, MAP)?;
+    if file.maps.is_empty() {
+        let problem = "maps: missing: an earlier version wrote this file; repeat `dimcmc map`".to_owned();
+        return Err(OriginError::Content { path: folder.join(MAP), problem }.into());
+    }
     // maps of several times, with their errors, are a strip
     let mut figures = match file.field {
         Some(_) => vec![maps::figure(folder, &file)?],

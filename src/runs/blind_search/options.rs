@@ -3,8 +3,8 @@
 use crate::data::scene::Scene;
 use crate::inference::detection::DetectionSettings;
 use crate::planets::periodogram::{Frequencies, FrequencyError, FrequencySettings, SearchSettings};
+use crate::surface::SurfaceError;
 use crate::surface::expansion::nuisances;
-use crate::surface::{SurfaceError, SurfaceSettings};
 
 /// What to search for, and how. The default is that of `dimcmc periodogram`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,10 +85,8 @@ impl BlindSearchOptions {
     #[doc(hidden)]
     pub fn detection(&self, scene: &Scene) -> DetectionSettings {
         let surface = scene.surface();
-        // an evolving map is not asked whether it is static
-        let field = surface.field.filter(|_| self.static_check || surface.objective.evolves());
         DetectionSettings {
-            surface: SurfaceSettings { field, ..surface },
+            surface: if self.static_check { surface } else { surface.without_comparison() },
             nuisances: if self.fixed { Vec::new() } else { nuisances(&scene.settings.free) },
             search: SearchSettings { draws: self.draws, seed: self.seed },
             eccentric: self.eccentric,

@@ -146,8 +146,7 @@ impl Comparison {
         };
         comparison.notes = notes::notes(&comparison, &summary);
         let imaging = &pair.settings.imaging;
-        let of_one_map = !imaging.objective.evolves();
-        if of_one_map && imaging.unresolved_spots == UnresolvedSpots::Fitted {
+        if imaging.objective.properties().has_target && imaging.unresolved_spots == UnresolvedSpots::Fitted {
             comparison.notes.push("the chain counts unresolved spots as noise, the landscape does not".into());
         }
         if imaging.objective != pair.grid_objective {

@@ -116,9 +116,9 @@ const TURNS: i32 = 10;
 fn what_differs(manifest: &Manifest, settings: &Settings, header: &Header, grid_settings: &Settings) -> Option<String> {
     let (run, grid) = (&manifest.origin, &header.origin);
     let both = |d: Difference| format!("{} ({} in the run, {} in the landscape)", d.key, d.first, d.second);
-    let is_integrated = |settings: &Settings| settings.imaging.objective.evolves();
-    let same_method = is_integrated(settings) == is_integrated(grid_settings);
-    // one map and all maps have images, zero points and spots of their own: they are what is compared
+    let model = |settings: &Settings| settings.imaging.objective.properties().name;
+    let same_method = model(settings) == model(grid_settings);
+    // two models have images, zero points and spots of their own: they are what is compared
     let sections = if same_method { &["star", "instrument", "imaging"][..] } else { &["star", "instrument"] };
     let model = sections.iter().find_map(|name| config::section_difference(name, &run.config, &grid.config));
     // data of other zero points are the same data

@@ -13,8 +13,8 @@ use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use crate::surface::{
-    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, SpotField, SurfaceError, SurfaceMaps, SurfaceModel,
-    WithoutJitter,
+    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, Properties, SpotField, SurfaceError, SurfaceMaps,
+    SurfaceModel, WithoutJitter,
 };
 use std::sync::Arc;
 
@@ -28,6 +28,17 @@ pub struct EvolvingMap {
 }
 
 impl EvolvingMap {
+    /// What it is.
+    pub const PROPERTIES: Properties = Properties {
+        name: "evolving map",
+        under_way: "fitting the field of spots",
+        map_changes: true,
+        marginalises: true,
+        has_field: true,
+        takes_light_curves: true,
+        has_target: false,
+    };
+
     /// Of a field of which that is `known`.
     pub fn new(known: Known) -> Self {
         EvolvingMap { known, at_bounds: None }

@@ -14,7 +14,8 @@ use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use crate::surface::{
-    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, SurfaceError, SurfaceMaps, SurfaceModel, WithoutJitter,
+    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, Properties, SurfaceError, SurfaceMaps, SurfaceModel,
+    WithoutJitter,
 };
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -25,6 +26,19 @@ const TARGETS: [f64; 3] = [0.97, 1.0, 1.03];
 const FAR: f64 = 5.0;
 /// A target is missed by more than this factor; errors that were measured are such that it is just reached.
 const MISSED: f64 = 1.02;
+
+impl StaticMap {
+    /// What it is.
+    pub const PROPERTIES: Properties = Properties {
+        name: "static map",
+        under_way: "reconstructing",
+        map_changes: false,
+        marginalises: false,
+        has_field: false,
+        takes_light_curves: false,
+        has_target: true,
+    };
+}
 
 impl SurfaceModel for StaticMap {
     fn linearise(&self, at: At, _: Option<&Linearised>) -> Result<Linearised, SurfaceError> {

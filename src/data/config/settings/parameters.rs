@@ -1,19 +1,11 @@
 //! Which values and which priors each of the parameters may have.
 
-use super::error::Fault;
-use super::raw_parts::PriorSection;
-pub(super) use crate::model::parameters::most;
+use super::checks::check_size;
+use crate::data::config::error::Fault;
+use crate::data::config::written::PriorSection;
 use crate::model::parameters::{Interval, Spec};
 use crate::model::{Parameter, Prior, PriorKind};
 use std::ops::{Bound, RangeBounds};
-
-/// Whether a number keeps within `most`, up or down.
-pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> {
-    match value.abs() <= most {
-        true => Ok(()),
-        false => Err(Fault::new(key, format!("{value} is beyond sense: at most {most:e}, up or down"))),
-    }
-}
 
 /// Whether a value makes sense at all, whatever the prior.
 pub(super) fn check_value(parameter: Parameter, value: f64, key: &str) -> Result<(), Fault> {

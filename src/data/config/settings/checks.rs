@@ -1,8 +1,8 @@
-//! Checks that several sections of a config share.
+//! Checks that several sections share.
 
-use super::domain::{check_size, most};
-use super::error::Fault;
-use super::number_or::Automatic;
+use crate::data::config::error::Fault;
+use crate::data::config::written::Automatic;
+pub(super) use crate::model::parameters::most;
 use crate::surface::nuisances::LineAndContinuum;
 
 /// Fewest and most pixels of an image or a simulated star.
@@ -11,19 +11,48 @@ pub(super) const PIXELS: std::ops::RangeInclusive<usize> = 100..=2_000_000;
 /// Longest name of a set.
 const LONGEST_NAME: usize = 40;
 
-/// Standard deviations of line and continuum: more than ten times the continuum is a mistake.
-pub(super) fn check_nuisances(priors: &LineAndContinuum, keys: [String; 3]) -> Result<(), Fault> {
-    match keys.iter().zip(priors.numbers()).find(|(_, sd)| !(0.0..=10.0).contains(sd)) {
-        Some((key, sd)) => Err(Fault::new(key, format!("{sd} must be from 0 to 10"))),
-        None => Ok(()),
+/// Velocity zero points that are off, or scatter, by more (km/s) are a mistake: profiles would be seen as the wrong
+/// part of a line.
+const LARGEST_ZERO_POINT_KMS: f64 = 100.0;
+
+/// Keys of line and continuum.
+pub(super) const NUISANCES: [&str; 3] = ["continuum_offset", "continuum_slope", "equivalent_width"];
+
+/// Standard deviations of line and continuum, below `at`: more than ten times the continuum is a mistake.
+pub(super) fn check_nuisances(at: &str, names: [&str; 3], priors: &LineAndContinuum) -> Result<(), Fault> {
+    names.iter().zip(priors.numbers()).try_for_each(|(name, sd)| within(&format!("{at}.{name}"), sd, [0.0, 10.0]))
+}
+
+/// A velocity zero point (km/s).
+pub(super) fn check_zero_point(key: &str, kms: f64) -> Result<(), Fault> {
+    check_kms(key, kms, -LARGEST_ZERO_POINT_KMS)
+}
+
+/// The scatter of velocity zero points (km/s).
+pub(super) fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
+    check_kms(key, kms, 0.0)
+}
+
+fn check_kms(key: &str, kms: f64, least: f64) -> Result<(), Fault> {
+    match (least..=LARGEST_ZERO_POINT_KMS).contains(&kms) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{kms} must be from {least} to {LARGEST_ZERO_POINT_KMS} km/s"))),
     }
 }
 
 pub(super) fn check_pixels(key: &str, pixels: usize) -> Result<(), Fault> {
-    if PIXELS.contains(&pixels) {
-        return Ok(());
+    match PIXELS.contains(&pixels) {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{pixels} must be from {} to {}", PIXELS.start(), PIXELS.end()))),
     }
-    Err(Fault::new(key, format!("{pixels} must be from {} to {}", PIXELS.start(), PIXELS.end())))
+}
+
+/// Whether a number keeps within `most`, up or down.
+pub(super) fn check_size(key: &str, value: f64, most: f64) -> Result<(), Fault> {
+    match value.abs() <= most {
+        true => Ok(()),
+        false => Err(Fault::new(key, format!("{value} is beyond sense: at most {most:e}, up or down"))),
+    }
 }
 
 pub(super) fn positive(key: &str, value: f64) -> Result<(), Fault> {

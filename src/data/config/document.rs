@@ -1,8 +1,8 @@
-//! A config before it is checked: read from JSON, or built in code key by key; how it is laid out as text, and the way
-//! to what is checked.
+//! A config as a JSON document, before it is checked: read from a file, or built in code key by key; how it is laid out
+//! as text, and the way to what is checked.
 
-use super::resolve::resolve;
-use super::{ConfigError, Settings};
+use super::error::ConfigError;
+use super::settings::{Settings, resolve};
 use crate::model::{Parameter, Prior};
 use crate::surface::ObjectiveKind;
 use serde_json::{Map, Value};
@@ -156,9 +156,9 @@ impl Config {
 /// What is not JSON, or has a key that is unknown, missing, or does not make sense.
 pub fn from_json(json: &[u8], path: &Path) -> Result<Settings, ConfigError> {
     let mut deserializer = serde_json::Deserializer::from_slice(without_mark(json));
-    let raw = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
+    let written = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| ConfigError::data(path, e))?;
     deserializer.end().map_err(|e| ConfigError::json(path, &e))?;
-    resolve(raw, path).map_err(|fault| fault.within(path))
+    resolve(written, path).map_err(|fault| fault.within(path))
 }
 
 /// Editors on Windows put a byte-order mark first.

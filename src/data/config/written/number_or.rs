@@ -1,5 +1,6 @@
 //! A number, or one of a few words in its place: `"auto"`, `"fitted"`, `"static"`.
 
+use crate::surface::ObjectiveKind;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use serde_json::{Value, json};
@@ -114,6 +115,16 @@ impl Automatic {
 impl VelocityJitter {
     /// Left to the profiles.
     pub const FITTED: Self = NumberOr::Word(FittedJitter);
+
+    /// That of a config which gives none.
+    pub fn usual(objective: ObjectiveKind) -> Self {
+        if objective.properties().marginalises { Self::FITTED } else { Self::default() }
+    }
+
+    /// As configs mention it: none is left out where that is usual.
+    pub fn mentioned(self, objective: ObjectiveKind) -> Option<Self> {
+        Some(self).filter(|jitter| objective.properties().marginalises || !jitter.is_default())
+    }
 }
 
 impl Default for VelocityJitter {

@@ -1,7 +1,7 @@
 //! `photometry`: light curves as users write them. Doc comments here are the descriptions of the JSON Schema.
 
-use super::data_sets::{default_seed, is_one, one};
 use super::listed::Section;
+use super::observations::{default_seed, is_one, one};
 use super::star::LimbDarkeningSection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// A light curve: either `path` or `simulate`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct PhotometrySection {
+pub struct PhotometrySection {
     /// Name of the light curve, in results, and of the file that `dimcmc simulate` writes it to: letters, digits, `-`,
     /// `_` and `.`. "photometry" if not given, of several "photometry1", "photometry2", ...
     #[serde(default, skip_serializing_if = "Option::is_none")]

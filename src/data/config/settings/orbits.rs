@@ -2,15 +2,15 @@
 //! can last.
 
 use super::checks::positive;
-use super::domain::check_value;
-use super::error::Fault;
-use super::raw::Config;
+use super::parameters::check_value;
+use crate::data::config::error::Fault;
+use crate::data::config::written::Config;
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::star::{StarSettings, stability};
 
 /// Fills the orbits into `values`, where K, period and phase of the planet are as in the config: eccentricities, the
 /// second planet, and what ephemerides stand for.
-pub(super) fn resolve_orbits(raw: &Config, values: &mut ParameterValues, star: &StarSettings) -> Result<(), Fault> {
+pub(super) fn resolve_orbits(written: &Config, values: &mut ParameterValues, star: &StarSettings) -> Result<(), Fault> {
     let clock = Clock { rotation_period_d: star.rotation_period_d, epoch_d: star.epoch_d };
     let [first, second] = &Elements::PLANETS;
     // phase and conjunction, or ratio and period, exclude each other
@@ -20,17 +20,17 @@ pub(super) fn resolve_orbits(raw: &Config, values: &mut ParameterValues, star: &
             let problem = format!("give either {} or {}, not both", named.name(), internal.name());
             Fault::new(format!("{section}.{}", named.name()), problem)
         };
-        if raw.planet.tells(internal) && raw.planet.get(named).is_some() {
+        if written.planet.tells(internal) && written.planet.get(named).is_some() {
             return Err(either("planet"));
         }
-        if raw.parameters.has(internal) && raw.parameters.has(named) {
+        if written.parameters.has(internal) && written.parameters.has(named) {
             return Err(either("parameters"));
         }
     }
     for of in &Elements::PLANETS {
-        let is_named = |p: Parameter| raw.planet.get(p).is_some() || raw.is_free(p);
+        let is_named = |p: Parameter| written.planet.get(p).is_some() || written.is_free(p);
         if of == first || of.all().into_iter().any(is_named) {
-            resolve_orbit(raw, of, values, clock)?;
+            resolve_orbit(written, of, values, clock)?;
         }
     }
     Ok(())
@@ -39,16 +39,16 @@ pub(super) fn resolve_orbits(raw: &Config, values: &mut ParameterValues, star: &
 /// Where eccentricities that are free begin, in units of the square root of the largest.
 const START_SHAPE: [f64; 2] = [0.2, 0.1];
 
-fn resolve_orbit(raw: &Config, of: &Elements, values: &mut ParameterValues, clock: Clock) -> Result<(), Fault> {
+fn resolve_orbit(written: &Config, of: &Elements, values: &mut ParameterValues, clock: Clock) -> Result<(), Fault> {
     let [first, _] = &Elements::PLANETS;
     let given = |p: Parameter| -> Result<Option<f64>, Fault> {
-        let value = raw.planet.get(p);
+        let value = written.planet.get(p);
         value.map_or(Ok(()), |value| check_value(p, value, p.spec().config_key))?;
         Ok(value)
     };
     // where the config says nothing a search begins in the middle of the prior
     let start = |p: Parameter| -> Result<Option<f64>, Fault> {
-        let middle = raw.parameters.get(p).and_then(|section| {
+        let middle = written.parameters.get(p).and_then(|section| {
             section.mean.or_else(|| section.min.zip(section.max).map(|(min, max)| 0.5 * (min + max)))
         });
         Ok(given(p)?.or(middle))
@@ -60,19 +60,19 @@ fn resolve_orbit(raw: &Config, of: &Elements, values: &mut ParameterValues, cloc
             Some(ratio) => values.set(of.ratio, ratio),
             None if period.is_some() => {}
             None => {
-                let what = if raw.is_free(of.ratio) { "the start of its period" } else { "its period" };
+                let what = if written.is_free(of.ratio) { "the start of its period" } else { "its period" };
                 let problem = format!("missing: a second planet needs {what}, here or as {}", of.period.name());
                 return Err(Fault::new(of.ratio.spec().config_key, problem));
             }
         }
         values.set(of.phi, given(of.phi)?.unwrap_or(of.phi.usual()));
     }
-    let free = of.shape.map(|p| raw.parameters.has(p));
+    let free = of.shape.map(|p| written.parameters.has(p));
     let shape = [given(of.shape[0])?, given(of.shape[1])?];
-    let any = shape.iter().any(Option::is_some) || of.shape.iter().any(|p| raw.is_free(*p));
+    let any = shape.iter().any(Option::is_some) || of.shape.iter().any(|p| written.is_free(*p));
     if any {
         // where it is looked for a search does not begin at the circle, which is a saddle
-        let largest = raw.parameters.get(of.shape[0]).and_then(|section| section.max).unwrap_or(1.0);
+        let largest = written.parameters.get(of.shape[0]).and_then(|section| section.max).unwrap_or(1.0);
         let begin = if free == [true, true] && shape == [None, None] {
             START_SHAPE.map(|x| x * largest.abs().min(1.0).sqrt())
         } else {
@@ -100,8 +100,8 @@ fn resolve_orbit(raw: &Config, of: &Elements, values: &mut ParameterValues, cloc
     }
     if let Some(time_d) = conjunction {
         of.set_conjunction(values, time_d, clock);
-        let moves = [of.period, of.ratio, of.shape[0], of.shape[1]].into_iter().find(|p| raw.is_free(*p));
-        if let Some(moving) = moves.filter(|_| !raw.is_free(of.conjunction)) {
+        let moves = [of.period, of.ratio, of.shape[0], of.shape[1]].into_iter().find(|p| written.is_free(*p));
+        if let Some(moving) = moves.filter(|_| !written.is_free(of.conjunction)) {
             let problem = format!(
                 "is fixed while {} is free: give parameters.{} a normal prior with its error",
                 moving.name(),

@@ -1,25 +1,50 @@
-//! The light curves of a config.
+//! The light curves.
 
-use super::checks::{check_windows, names, positive};
-use super::domain::{check_size, most};
-use super::error::Fault;
-use super::photometry::{PhotometrySection, SimulatedLight};
-use super::raw::Config;
-use super::resolve_star::{contrast, limb_darkening};
-use super::{LightCurveSettings, LightSource};
+use super::checks::{check_size, check_windows, most, names, positive};
+use super::star::{contrast, limb_darkening};
+use crate::data::config::error::Fault;
+use crate::data::config::written::{Config, PhotometrySection, SimulatedLight};
 use crate::star::Band;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Longest gap within a segment (d): level and slope do not hold for longer.
 const LONGEST_GAP_D: f64 = 1000.0;
 
-/// Resolves the light curves of `raw`. `config` is the config's path, whose folder paths start from.
-pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<LightCurveSettings>, Fault> {
-    let Some(photometry) = &raw.photometry else { return Ok(Vec::new()) };
-    if !raw.imaging.objective.evolves() {
+/// A light curve.
+#[derive(Clone, Debug)]
+pub struct LightCurveSettings {
+    /// Where it stands in the config.
+    pub key: String,
+    /// Its name.
+    pub name: String,
+    /// What of the star looks different in it.
+    pub band: Band,
+    /// Where it comes from.
+    pub source: LightSource,
+    /// Gaps longer than this (d) part segments.
+    pub segment_gap_d: f64,
+    /// Factor on the standard errors.
+    pub sigma_scale: f64,
+    /// Windows `[start, end]` (d) whose measurements are left out.
+    pub exclude: Vec<[f64; 2]>,
+}
+
+/// Where a light curve comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightSource {
+    /// A table, relative to the working directory.
+    File(PathBuf),
+    /// The star that is simulated.
+    Simulate(SimulatedLight),
+}
+
+/// Resolves the light curves of `written`. `config` is the config's path, whose folder paths start from.
+pub(super) fn resolve_photometry(written: &Config, config: &Path) -> Result<Vec<LightCurveSettings>, Fault> {
+    let Some(photometry) = &written.photometry else { return Ok(Vec::new()) };
+    if !written.imaging.objective.properties().takes_light_curves {
         let problem = format!(
             "imaging.objective {:?} does not know of light curves: they take \"marginal-likelihood\"",
-            raw.imaging.objective.name()
+            written.imaging.objective.name()
         );
         return Err(Fault::new("photometry", problem));
     }
@@ -40,8 +65,8 @@ pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<Ligh
         };
         curves.push(LightCurveSettings {
             name: section.name.clone().unwrap_or(usual_name),
-            band: band(raw, section, &key)?,
-            source: source(raw, section, &key, config)?,
+            band: band(written, section, &key)?,
+            source: source(written, section, &key, config)?,
             segment_gap_d: section.segment_gap_d,
             sigma_scale: section.sigma_scale,
             exclude: section.exclude.clone(),
@@ -53,8 +78,8 @@ pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<Ligh
 }
 
 /// Contrast and limb darkening, as far as they are not the star's.
-fn band(raw: &Config, section: &PhotometrySection, key: &str) -> Result<Band, Fault> {
-    let mut own = raw.star.clone();
+fn band(written: &Config, section: &PhotometrySection, key: &str) -> Result<Band, Fault> {
+    let mut own = written.star.clone();
     let at_key = |fault: Fault| Fault::new(format!("{key}.{}", fault.key.trim_start_matches("star.")), fault.problem);
     let contrast = match (section.contrast, section.wavelength_nm) {
         (None, None) => None,
@@ -79,7 +104,7 @@ fn band(raw: &Config, section: &PhotometrySection, key: &str) -> Result<Band, Fa
     Ok(Band { contrast, limb_darkening })
 }
 
-fn source(raw: &Config, section: &PhotometrySection, key: &str, config: &Path) -> Result<LightSource, Fault> {
+fn source(written: &Config, section: &PhotometrySection, key: &str, config: &Path) -> Result<LightSource, Fault> {
     let at = |field: &str| format!("{key}.{field}");
     match (&section.path, &section.simulate) {
         (Some(path), None) if path.as_os_str().is_empty() => Err(Fault::new(at("path"), "is empty")),
@@ -92,7 +117,7 @@ fn source(raw: &Config, section: &PhotometrySection, key: &str, config: &Path) -
             if sigma > 1.0 {
                 return Err(Fault::new(at("simulate.sigma"), format!("{sigma} must be at most 1, the flux itself")));
             }
-            if raw.observations.sections[0].simulate.is_none() {
+            if written.observations.sections[0].simulate.is_none() {
                 let problem = "the star is not simulated: give observations.simulate, or a path";
                 return Err(Fault::new(at("simulate"), problem));
             }

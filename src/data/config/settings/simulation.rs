@@ -1,10 +1,11 @@
 //! A simulated star's spots and the times at which it is observed: listed, or drawn at random.
 
-use super::checks::{check_nuisances, check_pixels, positive, within};
-use super::data_sets::{SimulateSection, VelocitySection};
-use super::domain::{check_size, check_value, most};
-use super::error::Fault;
-use super::raw_parts::PlanSection;
+use super::checks::{
+    check_jitter, check_nuisances, check_pixels, check_size, check_zero_point, most, positive, within,
+};
+use super::parameters::check_value;
+use crate::data::config::error::Fault;
+use crate::data::config::written::{PlanSection, SimulateSection, VelocitySection};
 use crate::data::simulate::{RandomSpots, Schedule, Simulation};
 use crate::model::{Clock, Elements, Parameter, ParameterValues};
 use crate::star::{Disc, Facula, Life, Spot, StarSettings};
@@ -13,16 +14,6 @@ use crate::surface::nuisances::LineAndContinuum;
 /// More drawn at random are a mistake: nights times profiles, and spots.
 const MOST_PROFILES: usize = 10_000;
 const MOST_SPOTS: f64 = 10_000.0;
-
-/// Velocity zero points that scatter by more (km/s) are a mistake: profiles would be seen as the wrong part of a line.
-const LARGEST_JITTER_KMS: f64 = 100.0;
-
-pub(super) fn check_jitter(key: &str, kms: f64) -> Result<(), Fault> {
-    match (0.0..=LARGEST_JITTER_KMS).contains(&kms) {
-        true => Ok(()),
-        false => Err(Fault::new(key, format!("{kms} must be from 0 to {LARGEST_JITTER_KMS} km/s"))),
-    }
-}
 
 /// Where a key of the simulation of a data set stands.
 fn at(set: &str, field: &str) -> String {
@@ -46,13 +37,9 @@ pub(super) fn simulation(
     let continuum = section
         .continuum
         .map_or(LineAndContinuum::default(), |c| LineAndContinuum::of_numbers([c.offset, c.slope, c.equivalent_width]));
-    check_nuisances(&continuum, ["offset", "slope", "equivalent_width"].map(|name| at(&format!("continuum.{name}"))))?;
+    check_nuisances(&at("continuum"), ["offset", "slope", "equivalent_width"], &continuum)?;
     check_jitter(&at("velocity_jitter_kms"), section.velocity_jitter_kms)?;
-    if section.zero_point_kms.is_nan() || section.zero_point_kms.abs() > LARGEST_JITTER_KMS {
-        let problem =
-            format!("{} must be from -{LARGEST_JITTER_KMS} to {LARGEST_JITTER_KMS} km/s", section.zero_point_kms);
-        return Err(Fault::new(at("zero_point_kms"), problem));
-    }
+    check_zero_point(&at("zero_point_kms"), section.zero_point_kms)?;
     if !(section.correlated_bins >= 1.0 && section.correlated_bins <= MOST_CORRELATED_BINS) {
         let problem = format!("{} must be from 1 (white noise) to {MOST_CORRELATED_BINS}", section.correlated_bins);
         return Err(Fault::new(at("correlated_bins"), problem));
@@ -137,7 +124,7 @@ pub(super) fn times_d(section: &SimulateSection, star: &StarSettings, set: &str)
 }
 
 /// Whether the schedule at `key` makes sense.
-pub(super) fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
+fn check_schedule(schedule: &Schedule, key: &str) -> Result<(), Fault> {
     let Schedule { nights, seasons, season_spacing_d, per_night: [fewest, largest], night_hours, clouds, .. } =
         *schedule;
     let key = |field: &str| format!("{key}.{field}");

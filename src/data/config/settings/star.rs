@@ -1,10 +1,8 @@
 //! The star: rotation, limb darkening, spot contrast and local line.
 
-use super::EquivalentWidth;
-use super::checks::positive;
-use super::domain::{check_size, most};
-use super::error::Fault;
-use super::star::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
+use super::checks::{automatic, check_size, most, positive};
+use crate::data::config::error::Fault;
+use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
 use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use std::f64::consts::TAU;
@@ -12,7 +10,7 @@ use std::f64::consts::TAU;
 /// Lightest and heaviest star (solar masses).
 const MASSES_MSUN: std::ops::RangeInclusive<f64> = 0.01..=200.0;
 
-/// Checks and resolves the star; fills the default of its `omega_eq_rad_d`. An equivalent width "auto" becomes NaN.
+/// Checks and resolves the star; fills the default of its `omega_eq_rad_d`.
 pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<StarSettings, Fault> {
     positive("star.rotation_period_d", star.rotation_period_d)?;
     check_size("star.rotation_period_d", star.rotation_period_d, most::TIME)?;
@@ -115,12 +113,7 @@ fn local_line(line: &Line, instrument: &Instrument) -> Result<LocalLine, Fault> 
     if !sigma_kms.is_finite() {
         return Err(Fault::new("instrument.resolving_power", "the line becomes infinitely broad"));
     }
-    let equivalent_width_kms = match line.equivalent_width_kms {
-        EquivalentWidth::Number(width) => {
-            positive("star.line.equivalent_width_kms", width)?;
-            width
-        }
-        EquivalentWidth::Word(_) => f64::NAN,
-    };
+    automatic("star.line.equivalent_width_kms", line.equivalent_width_kms)?;
+    let equivalent_width_kms = line.equivalent_width_kms.number();
     Ok(LocalLine { sigma_kms, instrumental_sigma_kms: instrumental, gamma_kms, equivalent_width_kms })
 }

@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 
 /// One optional entry for each parameter that may be free.
 #[derive(Clone, Debug)]
-pub(super) struct PerParameter<T>(BTreeMap<Parameter, T>);
+pub struct PerParameter<T>(BTreeMap<Parameter, T>);
 
 impl<T> PerParameter<T> {
     /// The entry of one parameter.
@@ -81,7 +81,7 @@ impl<T: JsonSchema> JsonSchema for PerParameter<T> {
 /// The planet's orbit, and that of a second planet if there is one; circles unless told otherwise. Where a parameter is
 /// free, its value here is the start. What the table gives the planet as usual is always there.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Planet(PerParameter<f64>);
+pub struct Planet(PerParameter<f64>);
 
 impl Planet {
     /// Of these values.

@@ -1,10 +1,9 @@
 //! The landscape: its axes, and the priors of the search for its reference.
 
-use super::GridSettings;
-use super::domain::check_value;
-use super::error::Fault;
-use super::raw_parts::Grid as GridSection;
-use super::resolve_orbits::without_planet;
+use super::orbits::without_planet;
+use super::parameters::check_value;
+use crate::data::config::error::Fault;
+use crate::data::config::written::Grid as GridSection;
 use crate::model::{FreeParameter, Parameter, ParameterValues, Prior};
 use crate::sampling::landscape::{Axis, Grid};
 
@@ -13,6 +12,17 @@ pub const MOST_NODES: usize = 1_000_000;
 
 /// Values closer than this, relative to their size, would drown in rounding.
 const SMALLEST_SPACING: f64 = 1e-12;
+
+/// The landscape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridSettings {
+    /// Its nodes, the axes in the order of [`Parameter::ALL`].
+    pub grid: Grid,
+    /// The parameters on its axes, in the same order, with the priors of the search for the reference: those under
+    /// `parameters`, or uniform along the axis. All other parameters are fixed at their values in the config. The
+    /// priors do not enter the landscape.
+    pub free: Vec<FreeParameter>,
+}
 
 /// Resolves `grid`, where `free` are the parameters with a prior and `values` those of the config.
 pub(super) fn resolve_grid(

@@ -1,7 +1,7 @@
 //! `observations` as users write them: one data set, or a list of them. Doc comments here are the descriptions of the
 //! JSON Schema.
 
-use super::listed::{Listed, Section};
+use super::listed::Section;
 use super::number_or::{Automatic, VelocityJitter, ZeroPoint};
 use super::per_parameter::PerParameter;
 use super::star::Line;
@@ -11,9 +11,6 @@ use crate::surface::nuisances::LineAndContinuum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-
-/// The data sets as written.
-pub(super) type DataSets = Listed<ObservationsSection>;
 
 impl Section for ObservationsSection {
     const KEY: &'static str = "observations";
@@ -82,13 +79,13 @@ pub struct ObservationsSection {
     /// Simulated profiles of the star and planet of this config. Of several data sets the first one has the spots, for
     /// all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) simulate: Option<SimulateSection>,
+    pub simulate: Option<SimulateSection>,
 }
 
 /// Simulated profiles.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SimulateSection {
+pub struct SimulateSection {
     /// Hard-edged circular spots `[longitude, latitude, radius, filling]`: degrees, and the filling factor from 0 to 1.
     /// The larger filling counts where they overlap. Two more numbers let a spot come and go, `[longitude, latitude,
     /// radius, filling, peak, lifetime]`: the time of its largest area, when it has that radius and is round, and the
@@ -169,7 +166,7 @@ fn default_simulation_pixels() -> usize {
 /// Wandering line and continuum: standard deviations, from 0 to 10, of one Gaussian number a profile.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct ContinuumSection {
+pub struct ContinuumSection {
     /// Level of the continuum, in its own units.
     pub offset: f64,
     /// Slope of the continuum: by how much it is higher at the last bin than in the middle.
@@ -181,7 +178,7 @@ pub(super) struct ContinuumSection {
 /// Centres of the velocity bins: `min`, `min + step`, ... up to `max` (km/s).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct VelocitySection {
+pub struct VelocitySection {
     /// First velocity (km/s).
     pub min: f64,
     /// Last velocity (km/s).

@@ -1,79 +1,130 @@
-//! The data sets of a config: what each says of itself, and what only one of them may say.
+//! The data sets: what each says of itself, and what only one of them may say.
 
-use super::checks::{automatic, check_nuisances, check_windows, names};
-use super::data_sets::ObservationsSection;
-use super::domain::{check_size, most};
-use super::error::Fault;
-use super::number_or::{Automatic, EquivalentWidth, VelocityJitter, ZeroPoint};
-use super::raw::Config;
-use super::resolve_simulation::{check_jitter, simulation, spots, times_d};
-use super::resolve_star::resolve_star;
-use super::star::Instrument;
-use super::{DataSetSettings, ObservationSource};
+use super::checks::{
+    NUISANCES, automatic, check_jitter, check_nuisances, check_size, check_windows, check_zero_point, most, names,
+};
+use super::simulation::{simulation, spots, times_d};
+use super::star::resolve_star;
+use crate::data::config::error::Fault;
+use crate::data::config::written::{Automatic, Config, Instrument, ObservationsSection, VelocityJitter, ZeroPoint};
+use crate::data::simulate::Simulation;
 use crate::model::{Parameter, ParameterValues};
 use crate::star::{BrightnessModel, StarSettings};
 use crate::surface::calibration::noise::ErrorSettings;
-use std::path::Path;
-
-/// Zero points beyond it (km/s) are a mistake.
-const LARGEST_ZERO_POINT_KMS: f64 = 100.0;
+use crate::surface::nuisances::LineAndContinuum;
+use std::path::{Path, PathBuf};
 
 /// Levels of a continuum that profiles may be divided by: beyond, they are not in units of it at all.
 const CONTINUUM_LEVELS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Resolves all data sets of `raw`, the star's own settings being `star`. `config` is the config's path, whose folder
-/// paths start from.
+/// A data set.
+#[derive(Clone, Debug)]
+pub struct DataSetSettings {
+    /// Where it stands in the config.
+    pub key: String,
+    /// Its name.
+    pub name: String,
+    /// The star as it sees it; where the equivalent width of its line is left to the profiles,
+    /// [`star_for`](crate::data::calibrated::star_for) measures it.
+    pub star: StarSettings,
+    /// Where the profiles come from.
+    pub source: ObservationSource,
+    /// Line and continuum of each profile.
+    pub nuisances: Option<LineAndContinuum>,
+    /// Velocity that all profiles have too much.
+    pub zero_point: ZeroPoint,
+    /// Windows of time (d) whose profiles are left out.
+    pub exclude: Vec<[f64; 2]>,
+}
+
+impl DataSetSettings {
+    /// What is simulated.
+    pub fn simulation(&self) -> Option<&Simulation> {
+        match &self.source {
+            ObservationSource::Simulate(simulation) => Some(simulation),
+            ObservationSource::Files { .. } => None,
+        }
+    }
+
+    /// Level of the continuum in its files.
+    pub fn continuum_level(&self) -> f64 {
+        match self.source {
+            ObservationSource::Files { continuum_level, .. } => continuum_level,
+            ObservationSource::Simulate(_) => 1.0,
+        }
+    }
+}
+
+/// Where the profiles come from.
+// there is one of them in a config
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, PartialEq)]
+pub enum ObservationSource {
+    /// Files.
+    Files {
+        /// The list, relative to the working directory.
+        path: PathBuf,
+        /// First and last velocity to use (km/s, after subtraction of VRAD); all bins if `None`.
+        velocity_range_kms: Option<(f64, f64)>,
+        /// Factor on every sigma, 1 where that is left to the observations.
+        sigma_scale: f64,
+        /// Level of the continuum in the files: what is read is divided by it.
+        continuum_level: f64,
+        /// What the observations are to say of their errors.
+        errors: ErrorSettings,
+    },
+    /// A simulation.
+    Simulate(Simulation),
+}
+
+/// Resolves all data sets of `written`, the star's own settings being `star`. `config` is the config's path, whose
+/// folder paths start from.
 pub(super) fn resolve_sets(
-    raw: &mut Config,
+    written: &mut Config,
     star: &StarSettings,
     values: &ParameterValues,
     config: &Path,
 ) -> Result<Vec<DataSetSettings>, Fault> {
-    check_several(raw)?;
+    check_several(written)?;
     let mut sets = Vec::new();
-    for s in 0..raw.observations.sections.len() {
-        let key = raw.observations.key(s);
-        let (star, equivalent_width) = star_of(raw, s, &key, star, values)?;
-        let section = &mut raw.observations.sections[s];
+    for s in 0..written.observations.sections.len() {
+        let key = written.observations.key(s);
+        let star = star_of(written, s, &key, star, values)?;
+        let section = &mut written.observations.sections[s];
         check_windows(&section.exclude, &format!("{key}.exclude"))?;
         let source = source(section, &key, &star, values, config)?;
         if let Some(priors) = &section.nuisances {
-            let name = |name: &str| format!("{key}.nuisances.{name}");
-            check_nuisances(priors, ["continuum_offset", "continuum_slope", "equivalent_width"].map(name))?;
+            check_nuisances(&format!("{key}.nuisances"), NUISANCES, priors)?;
         }
-        if let ZeroPoint::Number(kms) = section.zero_point_kms
-            && (kms.is_nan() || kms.abs() > LARGEST_ZERO_POINT_KMS)
-        {
-            let problem = format!("{kms} must be from -{LARGEST_ZERO_POINT_KMS} to {LARGEST_ZERO_POINT_KMS} km/s");
-            return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
+        if let ZeroPoint::Number(kms) = section.zero_point_kms {
+            check_zero_point(&format!("{key}.zero_point_kms"), kms)?;
         }
         sets.push(DataSetSettings {
             name: section.name.clone().unwrap_or_else(|| format!("set{}", s + 1)),
             star,
-            equivalent_width,
             source,
-            nuisances: section.nuisances.or(raw.imaging.nuisances),
+            nuisances: section.nuisances.or(written.imaging.nuisances),
             zero_point: section.zero_point_kms,
             exclude: section.exclude.clone(),
             key,
         });
     }
     names(&sets.iter().map(|set| (&*set.key, &*set.name)).collect::<Vec<_>>())?;
-    of_one_star(raw, &mut sets)?;
+    of_one_star(written, &mut sets)?;
     Ok(sets)
 }
 
 /// What several sets need, and what one has no use for.
-fn check_several(raw: &Config) -> Result<(), Fault> {
-    let sections = &raw.observations.sections;
-    let objective = raw.imaging.objective;
+fn check_several(written: &Config) -> Result<(), Fault> {
+    let sections = &written.observations.sections;
+    let objective = written.imaging.objective;
     for (s, section) in sections.iter().enumerate() {
-        let key = raw.observations.key(s);
+        let key = written.observations.key(s);
         if sections.len() == 1 && section.zero_point_kms.is_word() {
             let problem = "of one data set alone the zero point is the systemic velocity: see star.vsys_kms";
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
-        if section.zero_point_kms.is_word() && !objective.evolves() {
+        if section.zero_point_kms.is_word() && !objective.properties().marginalises {
             let problem = format!(
                 "with {:?} a map would follow a wrong zero point: give a number (km/s), or take \
                  imaging.objective \"marginal-likelihood\", which integrates it out",
@@ -81,18 +132,18 @@ fn check_several(raw: &Config) -> Result<(), Fault> {
             );
             return Err(Fault::new(format!("{key}.zero_point_kms"), problem));
         }
-        if section.nuisances.is_some() && raw.imaging.chi2_target.is_word() && !objective.evolves() {
+        if section.nuisances.is_some() && written.imaging.chi2_target.is_word() && objective.properties().has_target {
             let problem = format!("auto goes by velocities that {key}.nuisances take up: give a number, such as 0.97");
             return Err(Fault::new("imaging.chi2_target", problem));
         }
-        let spots = raw.imaging.brightness != BrightnessModel::BrightAndDark;
+        let spots = written.imaging.brightness != BrightnessModel::BrightAndDark;
         let own = [("contrast", section.contrast.is_some()), ("wavelength_nm", section.wavelength_nm.is_some())];
         if let Some((name, _)) = own.into_iter().find(|(_, given)| *given && sections.len() > 1 && !spots) {
             let problem = "an image of bright and dark pixels is as bright in every data set";
             return Err(Fault::new(format!("{key}.{name}"), problem));
         }
         if section.velocity_jitter_kms != sections[0].velocity_jitter_kms {
-            let problem = format!("must be as in {}: the jitter is one of all data sets", raw.observations.key(0));
+            let problem = format!("must be as in {}: the jitter is one of all data sets", written.observations.key(0));
             return Err(Fault::new(format!("{key}.velocity_jitter_kms"), problem));
         }
         if section.simulate.is_some() != sections[0].simulate.is_some() {
@@ -127,7 +178,7 @@ fn source(
             if let Some((name, _)) = file_only.iter().find(|(_, given)| *given) {
                 return Err(Fault::new(at(name), "for observations from files only"));
             }
-            if star.line.equivalent_width_kms.is_nan() {
+            if star.line.equivalent_width_kms.is_none() {
                 return Err(Fault::new("star.line.equivalent_width_kms", "auto is for observations from files only"));
             }
             return Ok(ObservationSource::Simulate(simulation(simulate, star, values, key)?));
@@ -164,15 +215,15 @@ fn source(
 
 /// The star as a set sees it: with its own line, spot contrast and resolving power, where it has any.
 fn star_of(
-    raw: &Config,
+    written: &Config,
     s: usize,
     key: &str,
     star: &StarSettings,
     values: &ParameterValues,
-) -> Result<(StarSettings, EquivalentWidth), Fault> {
-    let section = &raw.observations.sections[s];
+) -> Result<StarSettings, Fault> {
+    let section = &written.observations.sections[s];
     let ObservationsSection { line, wavelength_nm, contrast, resolving_power, .. } = section;
-    let mut own = raw.star.clone();
+    let mut own = written.star.clone();
     let held = |parameter: Parameter, name: &str| match values.get(parameter) {
         Some(_) if parameter.is_surface() => {
             let problem = format!("parameters.{} is free, and is that of all data sets", parameter.name());
@@ -197,27 +248,25 @@ fn star_of(
         held(Parameter::Contrast, "contrast")?;
         (own.contrast, own.photosphere_k, own.spot_k) = (*contrast, None, None);
     }
-    let instrument = Instrument { resolving_power: resolving_power.or(raw.instrument.resolving_power) };
-    let equivalent_width = own.line.equivalent_width_kms;
+    let instrument = Instrument { resolving_power: resolving_power.or(written.instrument.resolving_power) };
     if line.is_none() && wavelength_nm.is_none() && contrast.is_none() && resolving_power.is_none() {
-        return Ok((star.clone(), equivalent_width));
+        return Ok(star.clone());
     }
-    let star = resolve_star(&mut own, &instrument).map_err(|fault| {
+    resolve_star(&mut own, &instrument).map_err(|fault| {
         // what the star and the instrument say is sound by itself
         let name = fault.key.trim_start_matches("star.").trim_start_matches("instrument.");
         Fault::new(format!("{key}.{name}"), fault.problem)
-    })?;
-    Ok((star, equivalent_width))
+    })
 }
 
 /// Of several simulated sets the first has the star: its spots are those of all.
-fn of_one_star(raw: &Config, sets: &mut [DataSetSettings]) -> Result<(), Fault> {
-    let Some(first) = raw.observations.sections[0].simulate.as_ref().filter(|_| sets.len() > 1) else {
+fn of_one_star(written: &Config, sets: &mut [DataSetSettings]) -> Result<(), Fault> {
+    let Some(first) = written.observations.sections[0].simulate.as_ref().filter(|_| sets.len() > 1) else {
         return Ok(());
     };
     let mut times = Vec::new();
     let mut seeds: Vec<u64> = Vec::new();
-    for (s, (section, set)) in raw.observations.sections.iter().zip(&*sets).enumerate() {
+    for (s, (section, set)) in written.observations.sections.iter().zip(&*sets).enumerate() {
         let Some(own) = &section.simulate else { continue };
         let given = [
             ("spots", !own.spots.is_empty()),

@@ -5,11 +5,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The star. Where a parameter is free, its value here is the start.
+// in a draft the period need not be known: it is an `Option` there
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Star {
+#[schemars(rename = "Star")]
+pub struct Star<Period = f64> {
     /// Rotation period (d), above 0; rotation cycles and `porb_over_prot` refer to it.
-    pub rotation_period_d: f64,
+    pub rotation_period_d: Period,
     /// Time of rotation cycle 0 (d), on the time scale of the observations.
     #[serde(default)]
     pub epoch_d: f64,
@@ -40,7 +42,7 @@ pub struct Star {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spot_k: Option<f64>,
     /// Wavelength (nm) at which the temperatures give the brightness of a spot.
-    #[serde(default = "default_wavelength_nm")]
+    #[serde(default = "usual_wavelength_nm")]
     pub wavelength_nm: f64,
     /// Brightness of a spot over that of the photosphere, in [0, 1); instead of the two temperatures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -49,8 +51,14 @@ pub struct Star {
     pub line: Line,
 }
 
-fn default_wavelength_nm() -> f64 {
-    550.0
+/// Wavelength (nm) if none is given: that which LSD profiles of the visible are often normalised to.
+pub const USUAL_WAVELENGTH_NM: f64 = 550.0;
+
+/// Linear limb darkening, if none is given.
+pub const USUAL_LIMB_DARKENING: f64 = 0.65;
+
+fn usual_wavelength_nm() -> f64 {
+    USUAL_WAVELENGTH_NM
 }
 
 /// The line of one surface element, before the spectrograph broadens it.
@@ -93,7 +101,7 @@ pub struct LimbDarkeningSection {
 
 impl Default for LimbDarkeningSection {
     fn default() -> Self {
-        LimbDarkeningSection { law: LimbLaw::Linear, coefficients: vec![0.65] }
+        LimbDarkeningSection { law: LimbLaw::Linear, coefficients: vec![USUAL_LIMB_DARKENING] }
     }
 }
 

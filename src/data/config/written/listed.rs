@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 
 /// Such a section.
-pub(super) trait Section: DeserializeOwned + Serialize + JsonSchema {
+pub trait Section: DeserializeOwned + Serialize + JsonSchema {
     /// Its key.
     const KEY: &'static str;
     /// What one or several of them are called in the JSON Schema, and what they are.
@@ -19,7 +19,7 @@ pub(super) trait Section: DeserializeOwned + Serialize + JsonSchema {
 
 /// The sections as written. A list of one is written as that one.
 #[derive(Clone, Debug)]
-pub(super) struct Listed<T> {
+pub struct Listed<T> {
     pub sections: Vec<T>,
     /// Whether keys have the number of the section in them.
     listed: bool,
