@@ -2,7 +2,7 @@
 //! products of blocks, which nalgebra does with the best instructions of the processor (some 40 Gflop/s on one core;
 //! its own Cholesky factor, column by column, 1.5 to 4). One thread, and always the same order of sums.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, MatrixView};
 
 /// Columns of a block.
 const BLOCK: usize = 64;
@@ -15,11 +15,10 @@ pub fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
 /// Lower triangle of `A B^T`, for A and B (n, m) whose product is known to be symmetric.
 pub fn product_with_transpose(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.nrows();
-    let turned = b.transpose();
     let mut product = DMatrix::zeros(n, n);
     for (first, width) in blocks(n, 2 * BLOCK) {
         let mut below = product.view_mut((first, first), (n - first, width));
-        below.gemm(1.0, &a.rows(first, n - first), &turned.columns(first, width), 0.0);
+        below.gemm(1.0, &a.rows(first, n - first), &rows_turned(b, (first, width)), 0.0);
     }
     product
 }
@@ -38,6 +37,17 @@ pub fn gram_of_columns(a: &DMatrix<f64>) -> DMatrix<f64> {
     }
     product
 }
+
+/// The transpose of some rows (first, number), as they stand in memory. For the right side of a product alone: on the
+/// left of few columns nalgebra 0.34 reads beyond its end.
+fn rows_turned(matrix: &DMatrix<f64>, (first, rows): (usize, usize)) -> Turned<'_> {
+    let (n, columns) = matrix.shape();
+    let from = if columns > 0 { &matrix.as_slice()[first..] } else { &[] };
+    MatrixView::from_slice_with_strides_generic(from, Dyn(columns), Dyn(rows), Dyn(n), Dyn(1))
+}
+
+/// Columns whose numbers do not stand side by side.
+type Turned<'a> = MatrixView<'a, f64, Dyn, Dyn, Dyn, Dyn>;
 
 /// First column and number of columns of every block.
 fn blocks(n: usize, block: usize) -> impl DoubleEndedIterator<Item = (usize, usize)> + ExactSizeIterator {
@@ -140,13 +150,14 @@ impl Factor {
     /// Lower triangle (diagonal blocks whole) of the inverse of the matrix.
     pub fn inverse(&self) -> DMatrix<f64> {
         let n = self.len();
-        let turned = self.lower_inverse().transpose();
+        let lower = self.lower_inverse();
+        let turned = lower.transpose();
         // row i of L^-T starts at column i
         let mut inverse = DMatrix::zeros(n, n);
         for (first, width) in blocks(n, 2 * BLOCK) {
             for (row, height) in blocks(n, 2 * BLOCK).filter(|(row, _)| *row >= first) {
                 let left = turned.view((row, row), (height, n - row));
-                let right = turned.view((first, row), (width, n - row)).transpose();
+                let right = lower.view((row, first), (n - row, width));
                 inverse.view_mut((row, first), (height, width)).gemm(1.0, &left, &right, 0.0);
             }
         }
@@ -170,6 +181,7 @@ impl Factor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::ops::Range;
 
     /// Numbers that look random, (n, m).
     fn some(n: usize, m: usize) -> DMatrix<f64> {
@@ -200,6 +212,32 @@ mod tests {
             assert!((plain.l() * b - late).amax() < 1e-11);
             assert!((factor.inverse().lower_triangle() - plain.inverse().lower_triangle()).amax() < 1e-11);
             assert!((factor.inverse_diagonal() - plain.inverse().diagonal()).amax() < 1e-11);
+        }
+    }
+
+    /// What makes results the same on all processors with AVX2, how wide their registers are: every number of a product
+    /// is one chain of fused sums, in the order of the rows, in parts of 256.
+    #[test]
+    fn products_are_sums_in_one_order() {
+        #[cfg(target_arch = "x86_64")]
+        let fused = std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma");
+        #[cfg(not(target_arch = "x86_64"))]
+        let fused = cfg!(target_arch = "aarch64");
+        for (m, k, n) in [(6, 6, 6), (7, 600, 9), (37, 256, 61), (130, 513, 70)] {
+            let (a, b, c) = (some(m, k), some(k, n), some(m, n));
+            let next = |x: f64, y: f64, sum: f64| if fused { x.mul_add(y, sum) } else { x * y + sum };
+            let part = |i: usize, j: usize, of: Range<usize>| of.fold(0.0, |sum, l| next(a[(i, l)], b[(l, j)], sum));
+            let parts = || blocks(k, 256).map(|(first, width)| first..first + width);
+            let (product, mut got) = (&a * &b, c.clone());
+            got.gemm(-1.0, &a, &b, 1.0);
+            for (i, j) in (0..m).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                assert_eq!(
+                    product[(i, j)],
+                    parts().map(|of| part(i, j, of)).fold(0.0, |sum, x| sum + x),
+                    "{m} {k} {n}"
+                );
+                assert_eq!(got[(i, j)], parts().fold(c[(i, j)], |sum, of| sum - part(i, j, of)), "{m} {k} {n}");
+            }
         }
     }
 
