@@ -26,8 +26,9 @@ const LIMIT: &str = "limit";
 /// Orbits are put into the profiles, and `periodogram` looks for them: recovered is what has a false-alarm probability
 /// below 1 % and the right period. It takes the linear shortcut, in which an orbit is a shift of the velocities around
 /// the image without a planet; with --full, some orbits near the limit go the whole way: resampled profiles, a new
-/// image, a new search. A candidate that the profiles show already is taken out of them first. Writes limits.csv (how many
-/// phases of each period and K are recovered) and limits.json (K at 50 and 95 %, the comparison); `plot` draws the map.
+/// image, a new search. A candidate that the profiles show already is taken out of them first. Writes limits.csv (how
+/// many phases of each period and K are recovered) and limits.json (K at 50 and 95 %, the comparison); `plot` draws the
+/// map.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc limits configs/demo.json --periods 12 --full 2 --out runs/demo_limits")]
 pub struct Args {

@@ -2,8 +2,8 @@
 //! circles and on ellipses, and the false inclusion probability over periods (`docs/method.md` section 4).
 //!
 //! `ln Z` of a model is that of the velocity quadratic, `ln L(V) - ln L(0)`, integrated over the priors of its orbits
-//! and over the velocity jitter, which all models share; of no planet it is 0. At each period K and the phase are integrated numerically along rays through K = 0, on which
-//! the quadratic is a parabola: so any prior of K will do. One circle is a sum over all periods. Eccentricity and
+//! and over the velocity jitter, which all models share; of no planet it is 0. At each period K and the phase are
+//! integrated numerically along rays through K = 0, on which the quadratic is a parabola: so any prior of K will do. One circle is a sum over all periods. Eccentricity and
 //! periastron of one ellipse, and the first of two circles, are importance samples of draws from what the circle says,
 //! with the scatter of independent repetitions; the second of two circles is integrated like a single one.
 //!

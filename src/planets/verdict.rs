@@ -279,7 +279,7 @@ mod tests {
         assert_eq!(doubted.finding, Finding::Candidate);
         assert_eq!(
             doubted.sentence,
-            "Candidate, not a detection: 5.0692 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. Against \
+            "Candidate, not a detection: 5.069 +- 0.021 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. Against \
             it: the \
              period is close to 2 Prot."
         );

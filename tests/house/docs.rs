@@ -319,13 +319,14 @@ fn star() -> Desk {
     desk
 }
 
-/// In place of what `init` wrote: a coarse map, spots of which only the lifetime is to be found, no scatter of zero
-/// points or systemic velocity, and a short chain, which take a tenth of the time.
+/// In place of what `init` wrote: a coarse map, spots of which nothing is to be found, no scatter of zero points or
+/// systemic velocity, and a short chain, which take a tenth of the time.
 fn shorten(desk: &Desk) {
     let mut config = desk.json("star.json");
     config["imaging"]["pixels"] = json!(300);
     config["imaging"]["spot_amplitude"] = json!(0.2);
     config["imaging"]["spot_slope"] = json!(0.9);
+    config["imaging"]["spot_lifetime_d"] = json!(20);
     config["observations"]["velocity_jitter_kms"] = json!(0.0);
     config["parameters"].as_object_mut().unwrap().remove("vsys_kms");
     config["sampler"] = short_chains();

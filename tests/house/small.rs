@@ -41,9 +41,9 @@ fn demo() -> Value {
     let simulate = &mut demo["observations"]["simulate"];
     let cycles = simulate["cycles"].as_array().unwrap().iter().step_by(3).cloned().collect::<Vec<_>>();
     simulate["cycles"] = Value::from(cycles);
-    simulate["pixels"] = json!(1000);
+    simulate["pixels"] = json!(400);
     simulate["snr"] = json!(300);
-    demo["imaging"]["pixels"] = json!(200);
+    demo["imaging"]["pixels"] = json!(400);
     // else most of the time goes into reconstructions of a noise that few pixels make
     demo["imaging"]["unresolved_spots"] = json!("entropy");
     demo["imaging"]["chi2_target"] = json!(1.0);

@@ -1,8 +1,8 @@
 //! Orbits put into the velocities of a star, and the highest peak of each, beside a jitter of unknown size.
 //!
-//! An orbit adds `I V` to the gradient and changes nothing else, so that the whitened gradient at every trial period and
-//! for every size of the jitter is linear in the orbit's two amplitudes: three products a period, and each orbit of
-//! that period is a sum. A jitter that hides an orbit grows with it, so sizes reach from none to that of the largest
+//! An orbit adds `I V` to the gradient and changes nothing else, so that the whitened gradient at every trial period
+//! and for every size of the jitter is linear in the orbit's two amplitudes: three products a period, and each orbit
+//! of that period is a sum. A jitter that hides an orbit grows with it, so sizes reach from none to that of the largest
 //! orbit.
 
 use super::draws::whitening;

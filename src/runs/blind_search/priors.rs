@@ -19,8 +19,8 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
         remarks.push(Remark::against(
             "the highest peak lies at a period that the config does not allow",
             format!(
-                "the highest peak of the blind search, {period_d:.digits$} d, lies at a period that the config does not \
-                allow: it may look like an orbit of another one"
+                "the highest peak of the blind search, {period_d:.digits$} d, lies at a period that the config does \
+                not allow: it may look like an orbit of another one"
             ),
         ));
         if verdict.finding != Finding::NotJudged {

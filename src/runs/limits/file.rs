@@ -111,8 +111,8 @@ impl LimitsFile {
         }
         if self.removed.is_none() && self.before.false_alarm_probability < CANDIDATE_FAP {
             doubts.push(format!(
-                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: without \
-                --with-best it is taken out first",
+                "the profiles show a planet as they are, of {:.4} d, which counts as recovered near its period: \
+                without --with-best it is taken out first",
                 self.before.period_d
             ));
         }
