@@ -3,9 +3,10 @@
 //!
 //! `ln Z` of a model is that of the velocity quadratic, `ln L(V) - ln L(0)`, integrated over the priors of its orbits
 //! and over the velocity jitter, which all models share; of no planet it is 0. At each period K and the phase are
-//! integrated numerically along rays through K = 0, on which the quadratic is a parabola: so any prior of K will do. One circle is a sum over all periods. Eccentricity and
-//! periastron of one ellipse, and the first of two circles, are importance samples of draws from what the circle says,
-//! with the scatter of independent repetitions; the second of two circles is integrated like a single one.
+//! integrated numerically along rays through K = 0, on which the quadratic is a parabola: so any prior of K will do.
+//! One circle is a sum over all periods. Eccentricity and periastron of one ellipse, and the first of two circles, are
+//! importance samples of draws from what the circle says, with the scatter of independent repetitions; the second of
+//! two circles is integrated like a single one.
 //!
 //! The false inclusion probability of an interval of frequencies (Hara et al. 2022, A&A 663, A14) is the posterior
 //! probability that no planet has its frequency there, none and one planet taken for equally likely before the data.

@@ -279,9 +279,8 @@ mod tests {
         assert_eq!(doubted.finding, Finding::Candidate);
         assert_eq!(
             doubted.sentence,
-            "Candidate, not a detection: 5.069 +- 0.021 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. Against \
-            it: the \
-             period is close to 2 Prot."
+            "Candidate, not a detection: 5.069 +- 0.021 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. \
+             Against it: the period is close to 2 Prot."
         );
         assert_eq!(
             verdict(1e-14, &[]).with(&[Remark::against("one night decides", "")]).against,
