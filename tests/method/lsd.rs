@@ -398,7 +398,7 @@ fn lists_as_people_write_them() {
         "a.lsd\t0\nLO Peg/b.lsd\t1.5\t-2\n",
         "a.lsd,0\nb.lsd, 1.5, -2\n",
         "file;time;vrad\na.lsd;0;0\nb.lsd;1.5D0;-2.0\n",
-        "# list\nTime (d), Filename, VRAD (km/s)\n0, a.lsd, 0\n1.5, LO Peg/b.lsd, -2\n",
+        "# list\nTime (d), Filename, VRAD (km/s)\n0, a.lsd, 0\n1.5, \"LO Peg/b.lsd\", -2\n",
     ] {
         assert_eq!(second(list, &text, None).as_ref(), Ok(&due), "{list:?}");
     }
@@ -478,7 +478,7 @@ fn faults_of_other_formats_name_their_line() {
         (format!("v,I,sigma\n{}", csv().replace("1e-3", "1e-3,0")), "a.lsd:2: 4 columns instead of 3"),
         (
             line(|v, i, _| format!("{v};{};0,001\n", format!("{i:.4}").replace('.', ","))),
-            "a.lsd:1: \"0,9599\" has a decimal comma: write numbers with decimal points",
+            "a.lsd:1: \"0,9999\" has a decimal comma: write numbers with decimal points",
         ),
         (format!(" 41 1 1000 1.0\n{}", csv().replace(',', " ").repeat(2)), "a.lsd:43: more rows than the 41 points"),
         (format!(" 42 1 1000 1.0\n{}", csv().replace(',', " ")), "a.lsd:1: announces 42 points, but 41 rows follow"),

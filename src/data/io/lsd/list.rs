@@ -4,7 +4,7 @@
 use super::error::LsdError;
 use super::row::shown;
 use crate::data::io::FileError;
-use crate::data::io::table::{self, Separator, bare, number};
+use crate::data::io::table::{self, Separator, number};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -83,9 +83,9 @@ const SEPARATORS: [Separator; 4] = [Separator::Blanks, Separator::Tab, Separator
 
 /// The places of the columns, if a line names them.
 fn named(line: &str) -> Option<Places> {
-    SEPARATORS.into_iter().find_map(|separator| {
-        let cells: Vec<String> = separator.cells(line).into_iter().map(bare).collect();
-        let place = |names: &[&str]| cells.iter().position(|cell| names.contains(&cell.as_str()));
+    const MOST: usize = 12;
+    (2..=MOST).flat_map(|columns| table::readings(line, columns)).find_map(|columns| {
+        let place = |names: &[&str]| columns.iter().position(|column| names.contains(&column.bare.as_str()));
         Some([place(NAMES[0])?, place(NAMES[1])?, place(NAMES[2]).unwrap_or(usize::MAX)])
     })
 }

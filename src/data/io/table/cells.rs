@@ -29,7 +29,10 @@ impl Separator {
             return if decimal { Separator::Blanks } else { Separator::Comma };
         }
         let even = |line: &str| Separator::Blanks.cells(line).len() == by_blanks.len();
-        match first.contains('\t') && !(rows.all(even) && names.is_none_or(even)) {
+        let by_tabs = |line: &str| Separator::Tab.cells(line).len();
+        // a title is no line of names
+        let is_of_tabs = |names: &str| !even(names) && by_tabs(names) == by_tabs(first);
+        match first.contains('\t') && (!rows.all(even) || names.is_some_and(is_of_tabs)) {
             true => Separator::Tab,
             false => Separator::Blanks,
         }
@@ -108,5 +111,6 @@ mod tests {
         assert_eq!(of(Some("v\tI"), &["1\t\t2", "3\t4"]), Separator::Blanks);
         assert_eq!(of(Some("v (km/s)\tI"), &["1\t2"]), Separator::Tab);
         assert_eq!(of(None, &["1\t2\t3", "1\t\t3"]), Separator::Tab);
+        assert_eq!(of(Some("a title"), &["1\t\t2\t3"]), Separator::Blanks);
     }
 }

@@ -28,7 +28,7 @@ const CENTRE: f64 = 0.004;
 const DOUBT: (f64, f64) = (0.15, 0.2);
 
 /// A continuum outside of these levels is in another unit, within the second ones in percent.
-const LEVELS: std::ops::RangeInclusive<f64> = 0.3..=3.0;
+const LEVELS: std::ops::RangeInclusive<f64> = 0.2..=3.0;
 const PERCENT: std::ops::RangeInclusive<f64> = 50.0..=200.0;
 
 /// The local line as far as it is assumed.
