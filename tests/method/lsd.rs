@@ -113,7 +113,7 @@ fn faults_of_the_list_name_its_line() {
 #[test]
 fn faults_of_a_profile_name_its_line() {
     let cases: [(&str, &str, &str); 10] = [
-        ("-9.0 0.90 0.001", "-9.0 0.90", "b.prof:3: 2 columns instead of 3"),
+        ("-9.0 0.90 0.001", "-9.0 0.90", "b.prof:3: 2 columns instead of 3: velocity, I and sigma are due"),
         ("-9.0 0.90 0.001", "-9.0 0.9O 0.001", "b.prof:3: \"0.9O\" is not a number"),
         ("0.0 0.95 0.001", "0.0 NaN 0.001", "b.prof:8: intensity is NaN, not a finite number"),
         ("0.0 0.95 0.001", "0.0 0.9 inf", "b.prof:8: sigma is inf, not a finite number"),

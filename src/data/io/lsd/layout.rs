@@ -172,6 +172,7 @@ pub(super) fn wrong_count(layout: &Layout, fields: &[&str]) -> String {
         _ if found == 4 && layout.columns.flag.is_none() => {
             format!("{found} columns instead of {due}: name them in a line before the rows (velocity, I, sigma, ...)")
         }
+        [_, _] if due == 3 => "2 columns instead of 3: velocity, I and sigma are due".into(),
         [one] if found < due => format!("{found} columns instead of {due}: {}", shown(one)),
         _ => format!("{found} columns instead of {due}"),
     }

@@ -74,25 +74,8 @@ const INTENSITY: Names = (
 const SIGMA: Names = (
     "sigma",
     &[
-        "sigmai/ic",
-        "sigi/ic",
-        "erri/ic",
-        "errori/ic",
-        "sigmai",
-        "sigi",
-        "isigma",
-        "isig",
-        "errori",
-        "erri",
-        "ierror",
-        "ierr",
-        "ei",
-        "di",
-        "uncertaintyi",
-        "unci",
         "specsigi",
-        "intensityerror",
-        "intensityerr",
+        "uncertaintyi",
         "sigma",
         "sig",
         "error",
@@ -106,21 +89,12 @@ const SIGMA: Names = (
         "stddev",
         "stderr",
         "noise",
-        "fluxerror",
-        "fluxerr",
-        "fluxsigma",
-        "fluxunc",
-        "fluxuncertainty",
-        "errflux",
-        "sigmaflux",
-        "dflux",
-        "profileerror",
-        "eflux",
-        "eccf",
-        "ccferr",
-        "ccferror",
     ],
 );
+
+/// Words before or behind the name of an intensity that make it the name of its sigma: `sigma_I`, `flux_err`.
+const SIGMA_OF: [&str; 12] =
+    ["sigma", "sig", "error", "err", "uncertainty", "unc", "stddev", "std", "sd", "noise", "e", "d"];
 const FLAGS: [&str; 7] = ["flag", "flags", "quality", "mask", "bad", "badpix", "good"];
 
 /// Units of a velocity in km/s, bare.
@@ -138,7 +112,9 @@ pub(super) fn columns(names: &[Name]) -> Result<Columns, String> {
     let places = |known: Names| -> Vec<usize> {
         (0..read.len()).filter(|place| known.1.contains(&read[*place].0.as_str())).collect()
     };
-    let (velocities, intensities, sigmas) = (places(VELOCITY), places(INTENSITY), places(SIGMA));
+    let (velocities, intensities) = (places(VELOCITY), places(INTENSITY));
+    let of_intensity: Vec<usize> = (0..read.len()).filter(|place| is_sigma_of_intensity(&read[*place].0)).collect();
+    let sigmas = places(SIGMA);
     let one = |known: Names, places: &[usize]| match best(&read, known, places)[..] {
         [place] => Ok(place),
         [first, second, ..] => {
@@ -155,9 +131,11 @@ pub(super) fn columns(names: &[Name]) -> Result<Columns, String> {
     let velocity = one(VELOCITY, if lower.is_empty() { &velocities } else { &lower })?;
     let intensity = one(INTENSITY, &intensities)?;
     // where each quantity has its sigma beside it, that of I comes right after it
-    let sigma = match best(&read, SIGMA, &sigmas).len() > 1 && sigmas.contains(&(intensity + 1)) {
-        true => intensity + 1,
-        false => one(SIGMA, &sigmas)?,
+    let sigma = match of_intensity[..] {
+        [only] => only,
+        _ if of_intensity.contains(&(intensity + 1)) => intensity + 1,
+        _ if best(&read, SIGMA, &sigmas).len() > 1 && sigmas.contains(&(intensity + 1)) => intensity + 1,
+        _ => one(SIGMA, &sigmas)?,
     };
     let flag = read.iter().position(|(name, _)| FLAGS.contains(&name.as_str()));
     let unit = &read[velocity].1;
@@ -165,6 +143,12 @@ pub(super) fn columns(names: &[Name]) -> Result<Columns, String> {
         true => Ok(Columns { count: names.len(), velocity, intensity, sigma, flag }),
         false => Err(format!("the velocity is in {unit}, km/s is due")),
     }
+}
+
+/// Whether a name is that of the sigma of the intensity.
+fn is_sigma_of_intensity(name: &str) -> bool {
+    let rest = |word: &&str| [name.strip_prefix(*word), name.strip_suffix(*word)];
+    SIGMA_OF.iter().flat_map(rest).flatten().any(|rest| INTENSITY.1.contains(&rest))
 }
 
 /// Those of the places that have the first of the known names that is there.
@@ -199,6 +183,8 @@ mod tests {
         assert_eq!(places("v,I,sigma,V,sigma,N,sigma", 7), [0, 1, 2]);
         assert_eq!(places("V,sigV,I,sigI,RV", 5), [4, 2, 3]);
         assert_eq!(places("vel_km_s I/Ic err_I/Ic", 3), [0, 1, 2]);
+        assert_eq!(places("Velocity (km/s),Stokes I,Stokes I error", 3), [0, 1, 2]);
+        assert_eq!(places("v,flux,flux_err", 3), [0, 1, 2]);
         assert_eq!(places("N;Velocity (km/s);Stokes I;error", 4), [1, 2, 3]);
         let two = columns(&readings("v,I,I,sigma", 4).remove(0)).unwrap_err();
         assert_eq!(two, "columns 2 and 3 are both named as the intensity");
