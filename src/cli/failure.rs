@@ -69,6 +69,11 @@ impl Failure {
         Failure { code: FAILED, message: message.to_string() }
     }
 
+    /// The same with what is to be said after it.
+    pub fn with(self, more: &str) -> Self {
+        Failure { message: self.message + more, ..self }
+    }
+
     /// A signal stopped it.
     pub fn interrupted(code: u8, message: impl std::fmt::Display) -> Self {
         Failure { code, message: message.to_string() }

@@ -50,7 +50,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let spinner = progress::bar(global, None, "a first look, and a map to try it out");
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
-    let proposal = proposal.map_err(|error| args.known.failure(error))?;
+    let proposal = proposal.map_err(|error| args.known.failure(error, &args.input))?;
     args.output.check(Some(&list))?;
     // the list first, so that where the config is its observations are
     atomic::write(&list, import.list.as_bytes())?;

@@ -69,6 +69,9 @@ pub struct KnownArgs {
     /// Resolving power of the spectrograph
     #[arg(long, value_name = "R")]
     resolving_power: Option<f64>,
+    /// Velocities (km/s, after VRAD) to be used: what lies outside is not looked at, bad bins at the ends say
+    #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
+    velocity_range: Option<Vec<f64>>,
     /// What a reconstruction is judged by: all maps of a star that may change, or the map with the fewest spots
     #[arg(long, value_name = "NAME", value_parser = ["marginal-likelihood", "spottedness"])]
     objective: Option<String>,
@@ -113,6 +116,13 @@ impl KnownArgs {
                 *slot(&mut known) = Some(Given { value, by: name.to_owned() });
             }
         }
+        if let Some([from, to]) = self.velocity_range.as_deref() {
+            if !(from.is_finite() && to.is_finite() && from < to) {
+                return Err(Failure::input(format!("--velocity-range: {from} must be below {to}, both finite")));
+            }
+            known.velocity_range_kms = Some(Given { value: (*from, *to), by: "--velocity-range".to_owned() });
+            known.only_within_range = true;
+        }
         if let Some(name) = &self.objective {
             let kinds = [ObjectiveKind::MarginalLikelihood, ObjectiveKind::Spottedness];
             let value = kinds.into_iter().find(|kind| kind.name() == name);
@@ -129,8 +139,9 @@ impl KnownArgs {
         Ok(known)
     }
 
-    /// Why there is no proposal; by its option where a value is at fault that was given by one.
-    pub fn failure(&self, error: ProposalError) -> Failure {
+    /// Why there is no proposal; by its option where a value is at fault that was given by one, and by the `list` where
+    /// it was measured: the config has not been written.
+    pub fn failure(&self, error: ProposalError, list: &Path) -> Failure {
         if let ProposalError::Scene(SceneError::Config(ConfigError::Key { key, problem, .. })) = &error {
             let at_fault =
                 |given: &str| key == given || key.strip_prefix(given).is_some_and(|rest| rest.starts_with('.'));
@@ -139,6 +150,8 @@ impl KnownArgs {
             if let Some(name) = option.map(|(name, ..)| name).or(pixels) {
                 return Failure::input(format!("{name}: {key}: {problem}"));
             }
+            let profiles = shown(list);
+            return Failure::input(format!("{profiles}: no config can be made of these profiles: {key}: {problem}"));
         }
         error.into()
     }
@@ -161,7 +174,7 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     let spinner = progress::bar(global, None, "a first look, and a map to try it out");
     let proposal = propose(&place, &known, &|note| spinner.println(format!("note: {note}")));
     spinner.finish_and_clear();
-    let proposal = proposal.map_err(|error| args.known.failure(error))?;
+    let proposal = proposal.map_err(|error| args.known.failure(error, list))?;
     args.output.check(None)?;
     atomic::write(args.output.path(), proposal.json.as_bytes())?;
     console::print(format_args!("{}\nwritten: {}\n", proposal.table(), shown(args.output.path())));

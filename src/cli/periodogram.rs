@@ -5,7 +5,8 @@ use super::{Failure, Global, console, progress};
 use crate::data::config::Config;
 use crate::numerics::text::shown;
 use crate::planets::periodogram::{FrequencySettings, SearchSettings};
-use crate::runs::blind_search::{BlindSearch, BlindSearchOptions, FILES};
+use crate::runs::blind_search::{BlindSearch, BlindSearchError, BlindSearchOptions, FILES};
+use crate::runs::maps;
 use std::path::PathBuf;
 
 /// Search for a planet at every period, the star's spots marginalised out
@@ -61,8 +62,14 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     args.output.spare(&scene.files(), |name| FILES.contains(&name))?;
     let spinner = progress::bar(global, None, "reconstructing");
     let found = BlindSearch::of(&scene, &options(args), &|what| spinner.set_message(what.to_owned()));
+    let found = found.map_err(|error| {
+        let is_of_maps = matches!(error, BlindSearchError::Detection(_));
+        spinner.set_message("looking for the reason");
+        let reason = if is_of_maps { maps::reason(&scene) } else { String::new() };
+        Failure::blind_search(&args.config, error).with(&reason)
+    });
     spinner.finish_and_clear();
-    let found = found.map_err(|error| Failure::blind_search(&args.config, error))?;
+    let found = found?;
     let folder = args.output.create()?;
     found.write(folder)?;
     let (table, files) = (found.table(), found.files().join(", "));

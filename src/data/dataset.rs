@@ -96,7 +96,7 @@ pub fn in_memory(observations: Observations, name: impl Fn(usize) -> String) -> 
 /// The profiles of a data `set`, read or simulated.
 fn profiles(settings: &Settings, set: &DataSetSettings) -> Result<ProfileSet, SceneError> {
     match &set.source {
-        ObservationSource::Files { path, .. } => Ok(lsd::read(path)?),
+        ObservationSource::Files { path, velocity_range_kms, .. } => Ok(lsd::read_around(path, *velocity_range_kms)?),
         ObservationSource::Simulate(simulation) => {
             settings.check_velocity_grid(&set.star, &simulation.truth, simulation.step_kms)?;
             let of = if settings.sets.len() > 1 { format!(" of {}", set.name) } else { String::new() };

@@ -114,6 +114,13 @@ impl<'a> Maps<'a> {
     }
 }
 
+/// Why no map of `scene` fits, as [`Maps`] has it: `; ` and the likely reason, or nothing.
+pub fn reason(scene: &Scene) -> String {
+    let evolves = scene.settings.imaging.objective.evolves();
+    let told = diagnosis(scene).filter(|diagnosis| !evolves || diagnosis.reason != Reason::Errors);
+    told.map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text))
+}
+
 /// Why no map of `scene` fits, by trying.
 fn diagnosis(scene: &Scene) -> Option<Diagnosis> {
     Diagnosis::of(scene)

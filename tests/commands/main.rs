@@ -29,6 +29,7 @@ mod orbit_quantities;
 mod periodogram;
 mod plan;
 mod plot;
+mod profile_files;
 mod report;
 mod sample;
 mod shared;

@@ -113,28 +113,34 @@ fn faults_of_the_list_name_its_line() {
 #[test]
 fn faults_of_a_profile_name_its_line() {
     let cases: [(&str, &str, &str); 10] = [
-        ("-9.0 0.90 0.001", "-9.0 0.90", "b.prof:3: 2 columns instead of 3"),
+        ("-9.0 0.90 0.001", "-9.0 0.90", "b.prof:3: 2 columns instead of 3: velocity, I and sigma are due"),
         ("-9.0 0.90 0.001", "-9.0 0.9O 0.001", "b.prof:3: \"0.9O\" is not a number"),
-        ("-9.0 0.90 0.001", "-9.0 NaN 0.001", "b.prof:3: intensity is NaN, not a finite number"),
-        ("-9.0 0.90 0.001", "-9.0 0.9 inf", "b.prof:3: sigma is inf, not a finite number"),
-        ("-9.0 0.90 0.001", "-9.0 0.9 0", "b.prof:3: sigma is 0, it must be above 0"),
-        ("-9.0 0.90 0.001", "-9.0 0.9 -0.001", "b.prof:3: sigma is -0.001, it must be above 0"),
+        ("0.0 0.95 0.001", "0.0 NaN 0.001", "b.prof:8: intensity is NaN, not a finite number"),
+        ("0.0 0.95 0.001", "0.0 0.9 inf", "b.prof:8: sigma is inf, not a finite number"),
+        ("0.0 0.95 0.001", "0.0 0.9 0", "b.prof:8: sigma is 0, it must be above 0"),
+        ("0.0 0.95 0.001", "0.0 0.9 -0.001", "b.prof:8: sigma is -0.001, it must be above 0"),
         (" 11 2", " 12 2", "b.prof:2: announces 12 points, but 11 rows follow"),
         (" 11 2", " 10 2", "b.prof:13: more rows than the 10 points announced"),
         (" 11 2", " 11 4", "b.prof:2: announces 4 columns after the velocity, not 2, 6 or 8"),
         ("-7.2 ", "-9.2 ", "b.prof:4: velocity -9.2 km/s does not increase from -9"),
     ];
     for (old, new, expected) in cases {
-        assert_eq!(message("b.prof", |text| text.replacen(old, new, 1)), expected);
+        let message = message("b.prof", |text| text.replacen(old, new, 1));
+        let rest = message.strip_prefix(expected).unwrap_or_else(|| panic!("{message}"));
+        assert!(matches!(rest, "" | ": a bad bin may only lie outside of the velocity range in use"), "{message}");
     }
     let bent = message("b.prof", |text| text.replacen("-5.4 ", "-5.3 ", 1));
     assert!(bent.starts_with("b.prof:5: velocity axis is not uniform: a step of 1.9"), "{bent}");
     assert_eq!(message("b.prof", |_| String::new()), "b.prof: holds 0 points, at least 5 are needed");
+    let finer: String = (0..12).map(|j| format!("{:.1} 0.9 0.001\n", -9.0 + 1.7 * f64::from(j))).collect();
     assert_eq!(
-        message("b.prof", |_| profile(12)),
-        "b.prof: velocity axis (12 bins from -9.000 km/s in steps of 1.8000) differs from that of a.prof \
-         (11 bins from -9.000 km/s in steps of 1.8000)"
+        message("b.prof", |_| finer.clone()),
+        "b.prof: velocity axis (12 bins from -9.000 km/s in steps of 1.7000) differs from that of a.prof \
+         (11 bins from -9.000 km/s in steps of 1.8000), in the width of the bins: resample the profiles onto one axis"
     );
+    let shifted: String = (0..11).map(|j| format!("{:.2} 0.9 0.001\n", -8.37 + 1.8 * f64::from(j))).collect();
+    let message = message("b.prof", |_| shifted.clone());
+    assert!(message.contains("by 0.35 of a bin") && message.contains("its velocity (0.6300 km/s here) in the third"));
 }
 
 #[test]
@@ -293,16 +299,145 @@ fn every_format_gives_the_same_profile() {
         ("CSV, order", format!("name;sig;Flux;v\n{}", line(|v, i, _| format!("x;1e-3;{i:.5e};{v}\n")))),
         ("blanks, order", format!("sigma v I\n{}", line(|v, i, _| format!("1e-3 {v} {i:.5e}\n")))),
         ("tabs and CRLF", format!("star\n41\t2\n{}", two()).replace(' ', "\t").replace('\n', "\r\n")),
+        ("units in a comment", format!("# velocity (km/s)  I/Ic  sigma\n{}", two())),
+        ("Stokes V", format!("velocity,I,sigma_I,V,sigma_V,N,sigma_N\n{}", csv().replace('\n', ",0.1,2e-4,0,2e-4\n"))),
+        ("rdb", format!("vrad\tflux\terr\n----\t---\t---\n{}", line(|v, i, _| format!("{v}\t{i:.5e}\t1e-3\n")))),
+        ("units below", format!("velocity;I;sigma\nkm/s;;\n{}", csv().replace(',', ";"))),
+        ("four columns", line(|v, i, _| format!("{v} {i:.5e} 1e-3 0\n"))),
+        ("Fortran", line(|v, i, _| format!("{v:.1}D+00 {} 1.0d-03\n", format!("{i:.5e}").replace('e', "D")))),
+        ("descending", two().lines().rev().map(|row| format!("{row}\n")).collect()),
+        ("minus of print", csv().replace("-4", "\u{2212}4").replace("-2", "\u{2212}2")),
+        ("bad end", format!("v I sigma\n-46 nan nan\n-44 1 0\n-42 -- --\n{}42 1e9 1\nnan nan nan\n", two())),
+        ("zeros at the ends", format!("v I sigma\n-44 0 1e-3\n-42 0 0.1\n{}42 -1 1e-3\n", two())),
+        ("weightless end", format!("{}42 0.9 1e5\n", two())),
     ];
     for (name, text) in formats {
         let data = read_text(text).unwrap_or_else(|message| panic!("{name}: {message}"));
-        assert_eq!(data.observations, expected.observations, "{name}");
-        assert!(data.remarks.is_empty(), "{name}: {:?}", data.remarks);
+        let (read, due) = (&data.observations.profiles[0], &expected.observations.profiles[0]);
+        assert_eq!((&read.intensity, &read.sigma), (&due.intensity, &due.sigma), "{name}");
+        assert!((read.first_velocity_kms - due.first_velocity_kms).abs() < 1e-9, "{name}");
+        assert!((read.step_kms - due.step_kms).abs() < 1e-12, "{name}");
+        let left_out = data.remarks
+            == ["all of them: bins without data (no number, no or a huge sigma, zeros) at the ends left out"];
+        assert_eq!(left_out, name.contains("end") && name != "descending", "{name}: {:?}", data.remarks);
+        assert!(left_out || data.remarks.is_empty(), "{name}: {:?}", data.remarks);
     }
     let several = format!("    41     2   1000 1.0E+00\n{}    900 1.0E+00\n{}", ilsd(), ilsd().replace("E-03", "E-02"));
     let data = read_text(several).unwrap();
     assert_eq!(data.observations, expected.observations);
     assert_eq!(data.remarks, ["all of them: the first of 2 mean profiles in the file is used"]);
+}
+
+/// The second of two profiles, its text changed, read where a range of velocities is used.
+fn second(list: &str, text: impl AsRef<[u8]>, range: Range) -> Result<Profile, String> {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("LO Peg")).unwrap();
+    std::fs::write(dir.path().join("a.lsd"), line(|v, i, _| format!("{v:.2} {i:.5e} 1.0e-3\n"))).unwrap();
+    for name in ["b.lsd", "LO Peg/b.lsd"] {
+        std::fs::write(dir.path().join(name), text.as_ref()).unwrap();
+    }
+    let path = dir.path().join("observations.txt");
+    std::fs::write(&path, list).unwrap();
+    let read = lsd::read_around(&path, range).and_then(|all| all.within(range, 1.0));
+    read.map(|mut all| all.profiles.remove(1))
+        .map_err(|e| e.to_string().replace(&format!("{}/", dir.path().display()), ""))
+}
+
+const LIST: &str = "a.lsd 0\nb.lsd 1\n";
+
+#[test]
+fn bad_bins_do_no_harm_outside_of_the_range_in_use() {
+    let good = line(|v, i, _| format!("{v:.2} {i:.5e} 1.0e-3\n"));
+    for (row, bad) in [("nan nan", "intensity is NaN"), ("1.0 0", "sigma is 0"), ("-9e9 1", "not in units")] {
+        let text =
+            line(|v, i, _| if v == -30.0 { format!("{v:.2} {row}\n") } else { format!("{v:.2} {i:.5e} 1.0e-3\n") });
+        let range = Some((-28.0, 40.0));
+        assert_eq!(second(LIST, &text, range), second(LIST, &good, range));
+        let message = second(LIST, &text, Some((-30.0, 40.0))).unwrap_err();
+        assert!(message.starts_with("b.lsd:6: ") && message.contains(bad), "{message}");
+        assert!(message.ends_with("a bad bin may only lie outside of the velocity range in use"), "{message}");
+        // with VRAD the range is of the star
+        let list = "a.lsd 0\nb.lsd 1 4\n";
+        assert!(second(list, &text, Some((-34.0, 36.0))).is_err());
+        assert_eq!(second(list, &text, Some((-32.0, 36.0))).unwrap().first_velocity_kms, -32.0);
+    }
+}
+
+#[test]
+fn profiles_may_begin_and_end_elsewhere_on_the_same_bins() {
+    let good = second(LIST, line(|v, i, _| format!("{v:.2} {i:.5e} 1.0e-3\n")), Some((-36.0, 36.0))).unwrap();
+    let longer = line(|v, i, _| {
+        let before = if v == -40.0 { "-44 1 1e-3\n-42 1 1e-3\n" } else { "" };
+        format!("{before}{v:.2} {i:.5e} 1.0e-3\n")
+    });
+    assert_eq!(second(LIST, longer, Some((-36.0, 36.0))).unwrap(), good);
+    let shifted = |by: f64| line(|v, i, _| format!("{:.2} {i:.5e} 1.0e-3\n", v + by));
+    // VRAD makes the axes equal
+    let moved = second("a.lsd 0\nb.lsd 1 13.7\n", shifted(13.7), Some((-36.0, 36.0))).unwrap();
+    assert_eq!((moved.intensity, moved.first_velocity_kms), (good.intensity.clone(), -36.0));
+    let message = second(LIST, shifted(0.7), None).unwrap_err();
+    assert!(message.contains("by 0.35 of a bin") && message.contains("third column"), "{message}");
+}
+
+#[test]
+fn velocities_may_be_rounded_in_print() {
+    let rows = |digits: usize| line(|v, i, _| format!("{:.digits$} {i:.5e} 1.0e-3\n", 0.4117 * v));
+    let [exact, rounded] = [4, 1].map(|digits| read_text(rows(digits)).unwrap().observations);
+    assert!((exact.step_kms() / rounded.step_kms() - 1.0).abs() < 2e-3);
+    assert!((exact.profiles[0].first_velocity_kms - rounded.profiles[0].first_velocity_kms).abs() < 0.05);
+}
+
+#[test]
+fn lists_as_people_write_them() {
+    let text = line(|v, i, _| format!("{v:.2} {i:.5e} 1.0e-3\n"));
+    let due = second("a.lsd 0\nb.lsd 1.5 -2\n", &text, None).unwrap();
+    for list in [
+        "\u{feff}a.lsd 0\r\nb.lsd 1.5 -2\r\n",
+        "a.lsd 0\n\"LO Peg/b.lsd\" 1.5 -2\n",
+        "a.lsd 0\n'LO Peg/b.lsd' 1.5 \u{2212}2 # cloudy\n",
+        "a.lsd\t0\nLO Peg/b.lsd\t1.5\t-2\n",
+        "a.lsd,0\nb.lsd, 1.5, -2\n",
+        "file;time;vrad\na.lsd;0;0\nb.lsd;1.5D0;-2.0\n",
+        "# list\nTime (d), Filename, VRAD (km/s)\n0, a.lsd, 0\n1.5, \"LO Peg/b.lsd\", -2\n",
+    ] {
+        assert_eq!(second(list, &text, None).as_ref(), Ok(&due), "{list:?}");
+    }
+    for (list, cure) in [
+        ("a.lsd 0\nLO Peg/b.lsd 1.5\n", "observations.txt:2: time \"Peg/b.lsd\" is not a finite number; the name of a"),
+        ("a.lsd 0\nb.lsd 1,5\n", "observations.txt:2: time \"1,5\" has a decimal comma"),
+        ("SIMPLE  =      T", "observations.txt: is a FITS file; a list of profiles is text"),
+    ] {
+        let message = second(list, &text, None).unwrap_err();
+        assert!(message.starts_with(cure), "{message}");
+    }
+}
+
+#[test]
+fn a_wild_bin_is_named_with_its_profile() {
+    let dir = tempfile::tempdir().unwrap();
+    let list: String = (0..6).map(|k| format!("{k}.lsd {k}.5\n")).collect();
+    for k in 0..6 {
+        let noise = |v: f64| 1e-3 * (v * v * 3.7 + f64::from(k)).sin();
+        let cosmic = |v: f64| if k == 4 && v == 12.0 { 0.1 } else { 0.0 };
+        let text = line(|v, i, _| format!("{v} {:.6} 1e-3\n", i + noise(v) + cosmic(v)));
+        std::fs::write(dir.path().join(format!("{k}.lsd")), text).unwrap();
+    }
+    std::fs::write(dir.path().join("observations.txt"), list).unwrap();
+    let remarks = lsd::read(&dir.path().join("observations.txt")).unwrap().remarks;
+    assert!(remarks.len() == 1, "{remarks:?}");
+    assert!(remarks[0].starts_with("profile 5 (\"4.lsd\", 4.5000 d): the bin at 12.00 km/s is "), "{remarks:?}");
+}
+
+#[test]
+fn files_that_are_no_text_are_named_with_the_cure() {
+    let fits = format!("SIMPLE  = {:>20}{}", "T", " ".repeat(2850));
+    let message = second(LIST, fits, None).unwrap_err();
+    assert!(message.starts_with("b.lsd: is a FITS file; a profile is text"), "{message}");
+    assert!(message.contains("`Table.read(\"b.lsd\").write(\"profile.csv\")`"), "{message}");
+    assert!(second(LIST, b"\x1f\x8b\x08\0", None).unwrap_err().contains("is a compressed file"));
+    let decimal = line(|v, i, _| format!("{v:.1} {i:.4} 0.001\n").replace('.', ","));
+    let message = second(LIST, decimal, None).unwrap_err();
+    assert!(message.starts_with("b.lsd:1: \"-40,0\" has a decimal comma"), "{message}");
 }
 
 #[test]
@@ -343,7 +478,7 @@ fn faults_of_other_formats_name_their_line() {
         (format!("v,I,sigma\n{}", csv().replace("1e-3", "1e-3,0")), "a.lsd:2: 4 columns instead of 3"),
         (
             line(|v, i, _| format!("{v};{};0,001\n", format!("{i:.4}").replace('.', ","))),
-            "a.lsd:1: no row of numbers (with decimal points) here or below: \"-40;",
+            "a.lsd:1: \"0,9999\" has a decimal comma: write numbers with decimal points",
         ),
         (format!(" 41 1 1000 1.0\n{}", csv().replace(',', " ").repeat(2)), "a.lsd:43: more rows than the 41 points"),
         (format!(" 42 1 1000 1.0\n{}", csv().replace(',', " ")), "a.lsd:1: announces 42 points, but 41 rows follow"),

@@ -36,6 +36,9 @@ pub struct Known {
     pub equivalent_width: Option<Given<EquivalentWidth>>,
     pub resolving_power: Option<Given<f64>>,
     pub velocity_range_kms: Option<Given<(f64, f64)>>,
+    /// Whether nothing beyond that range is looked at, as an option asks for it; the range of another program's file is
+    /// that of its map.
+    pub only_within_range: bool,
     pub sigma_scale: Option<Given<f64>>,
     pub objective: Option<Given<ObjectiveKind>>,
     pub brightness: Option<Given<BrightnessModel>>,
@@ -44,6 +47,11 @@ pub struct Known {
 }
 
 impl Known {
+    /// First and last velocity (km/s) that are used, where they are given.
+    pub(super) fn range_kms(&self) -> Option<(f64, f64)> {
+        self.velocity_range_kms.as_ref().map(|given| given.value)
+    }
+
     /// What reconstructions are judged by: what is right for most stars, if nothing else is given.
     pub(super) fn objective(&self) -> ObjectiveKind {
         self.objective.as_ref().map_or(ObjectiveKind::MarginalLikelihood, |given| given.value)

@@ -29,8 +29,11 @@ use values::Values;
 /// # Errors
 /// Profiles that cannot be read or show no line, given values that make no sense or are far from what the profiles say.
 pub fn propose(place: &Place, known: &Known, say: &dyn Fn(&str)) -> Result<Proposal, ProposalError> {
-    let profiles = lsd::read_listed(place.list, place.list_bytes).map_err(SceneError::from)?;
-    let mut whole = profiles.observations.clone();
+    let profiles = lsd::read_listed(place.list, place.list_bytes, known.range_kms()).map_err(SceneError::from)?;
+    let mut whole = match &known.velocity_range_kms {
+        Some(given) if known.only_within_range => profiles.within(Some(given.value), 1.0).map_err(SceneError::from)?,
+        _ => profiles.observations.clone(),
+    };
     let mut ledger = Ledger::default();
     let look = |error| ProposalError::Look { list: place.list.into(), error };
     let values = Values::measure(&mut whole, known, &mut ledger).map_err(look)?;

@@ -47,6 +47,9 @@ const ANOTHER_STAR: f64 = 5.0;
 const SOLAR_DOMEGA_RAD_D: f64 = 0.055;
 const SHEAR_RAD: f64 = 0.2;
 
+/// A vsini below this (km/s) rounds to none.
+const NARROWEST_KMS: f64 = 0.05;
+
 /// Profiles that show an orbit.
 const FEWEST_FOR_AN_ORBIT: usize = 3;
 
@@ -88,6 +91,10 @@ impl Values {
             is_guess: known.line_sigma_kms.is_none(),
         };
         let mut look = FirstLook::at(whole, model)?;
+        if known.vsini_kms.is_none() && look.unspotted.vsini_kms < NARROWEST_KMS {
+            let (sigma_kms, instrumental_kms) = (look.unspotted.line_sigma_kms, model.instrumental_sigma_kms);
+            return Err(LookError::Unresolved { sigma_kms, instrumental_kms });
+        }
         let mut continuum_level = None;
         if let Some(continuum) = look.continuum.filter(Continuum::is_off) {
             let level = rounded(continuum.level, 4);

@@ -2,7 +2,8 @@
 //! the LSD profiles it names, relative to its folder (`layout` has their formats).
 //!
 //! Times are days of one count (`times`). VRAD is subtracted from the velocity axis; profiles are read in their whole
-//! width, errors as quoted. Stokes V and nulls are not used.
+//! width but for bad bins, which may lie beside the velocities that are used, errors as quoted. All are on the bins of
+//! the first, before or after VRAD is subtracted; they may begin and end elsewhere. Stokes V and nulls are not used.
 
 mod axis;
 mod error;
@@ -13,6 +14,7 @@ mod names;
 mod row;
 mod text;
 mod times;
+mod wild;
 mod writing;
 
 pub use error::LsdError;
@@ -21,11 +23,12 @@ pub use times::LONGEST_D;
 pub use writing::{is_written, write, write_as, write_numbers};
 
 use crate::data::io::FileError;
+use crate::data::io::table::{self, NotText};
 use crate::star::observation::{Observations, Profile};
 use axis::Axis;
 use level::Given;
 use list::{Entry, list_bytes, parse_list};
-use row::shown;
+use row::{Fault, shown};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -61,25 +64,36 @@ impl ProfileSet {
     }
 }
 
+/// First and last velocity (km/s, after VRAD) that are used.
+type Range = (f64, f64);
+
 /// Reads the list at `list` and all profiles it names.
 ///
 /// # Errors
 /// A file that cannot be read, a line that makes no sense, a list of one profile, or profiles on different velocity
 /// axes.
 pub fn read(list: &Path) -> Result<ProfileSet, LsdError> {
-    read_listed(list, &list_bytes(list)?)
+    read_around(list, None)
+}
+
+/// The same where the velocities between two (km/s, after VRAD) are used: bad bins outside do no harm.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_around(list: &Path, range_kms: Option<Range>) -> Result<ProfileSet, LsdError> {
+    read_listed(list, &list_bytes(list)?, range_kms)
 }
 
 /// Reads all profiles that a list of the content `bytes` names, which is or will be at `list`.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_listed(list: &Path, bytes: &[u8]) -> Result<ProfileSet, LsdError> {
-    let entries = parse_list(list, &String::from_utf8_lossy(bytes))?;
+pub fn read_listed(list: &Path, bytes: &[u8], range_kms: Option<Range>) -> Result<ProfileSet, LsdError> {
+    let entries = parse_list(list, bytes)?;
     // a list that is none, a profile for one, is told of by what it names
     entries.iter().filter(|entry| !entry.path.exists()).try_for_each(|entry| read_profile(list, entry).map(drop))?;
     times::check(&entries).map_err(|(line, problem)| FileError::Line { path: list.into(), line, problem })?;
-    read_entries(list, bytes, entries)
+    read_entries(list, bytes, entries, range_kms)
 }
 
 /// Reads the list at `list`, which [`write()`] wrote, and all profiles it names: of a simulation, whatever its times
@@ -89,49 +103,115 @@ pub fn read_listed(list: &Path, bytes: &[u8]) -> Result<ProfileSet, LsdError> {
 /// As [`read`], but for the times.
 pub fn read_written(list: &Path) -> Result<ProfileSet, LsdError> {
     let bytes = list_bytes(list)?;
-    read_entries(list, &bytes, parse_list(list, &String::from_utf8_lossy(&bytes))?)
+    read_entries(list, &bytes, parse_list(list, &bytes)?, None)
 }
 
-fn read_entries(list: &Path, bytes: &[u8], entries: Vec<Entry>) -> Result<ProfileSet, LsdError> {
+fn read_entries(
+    list: &Path,
+    bytes: &[u8],
+    entries: Vec<Entry>,
+    range_kms: Option<Range>,
+) -> Result<ProfileSet, LsdError> {
     let mut hash = Sha256::new();
     hash.update(bytes);
-    let mut first: Option<(&Path, Axis)> = None;
+    let mut first: Option<(&Entry, Axis)> = None;
     let mut profiles = Vec::with_capacity(entries.len());
     let mut found = Found::default();
     for entry in &entries {
         let bytes = read_profile(list, entry)?;
         hash.update(&bytes);
-        let raw = text::parse(&String::from_utf8_lossy(&bytes)).map_err(|fault| match fault.line {
+        let fail = |fault: Fault| match fault.line {
             0 => FileError::of(&entry.path, fault.problem),
             line => FileError::Line { path: entry.path.clone(), line, problem: fault.problem },
-        })?;
-        let (first_path, axis) = *first.get_or_insert((&entry.path, raw.axis));
-        if !axis.agrees_with(&raw.axis) {
-            return Err(LsdError::Axis {
-                path: entry.path.clone(),
-                axis: raw.axis.to_string(),
-                first: first_path.into(),
-                expected: axis.to_string(),
-            });
-        }
-        found.note(entry, &raw);
+        };
+        let text = table::text(&bytes).map_err(|what| FileError::of(&entry.path, no_text(what, entry)))?;
+        let raw = text::parse(&text).map_err(fail)?;
+        let (first, axis) = *first.get_or_insert((entry, raw.axis));
+        // within rounding of a bin a range is what it is
+        let slack = 1e-6 * axis.step;
+        let in_file = |(from, to): Range| (from + entry.vrad_kms - slack, to + entry.vrad_kms + slack);
+        let used = raw.usable(range_kms.map(in_file)).map_err(fail)?;
+        found.note(entry, &raw, range_kms.is_none() && used.len() < raw.axis.bins);
         profiles.push(Profile {
             time_d: entry.time_d,
-            first_velocity_kms: axis.first - entry.vrad_kms,
+            first_velocity_kms: begins((first, axis), (entry, raw.axis), used.start)?,
             step_kms: axis.step,
-            intensity: raw.intensity,
-            sigma: raw.sigma,
+            intensity: raw.intensity[used.clone()].to_vec(),
+            sigma: raw.sigma[used].to_vec(),
         });
     }
     match profiles.is_empty() {
         true => Err(FileError::of(list, "lists no profile").into()),
         false => Ok(ProfileSet {
+            remarks: [found.remarks(entries.len()), wild(&entries, &profiles)].concat(),
             observations: Observations { profiles },
             sha256: Some(format!("{:x}", hash.finalize())),
-            remarks: found.remarks(entries.len()),
             labels: entries.into_iter().map(Label::from).collect(),
         }),
     }
+}
+
+/// Velocity (km/s, after VRAD) of bin `start` of a profile, on the bins of the first one: as the files have them, or
+/// after VRAD.
+fn begins((first, axis): (&Entry, Axis), (entry, own): (&Entry, Axis), start: usize) -> Result<f64, LsdError> {
+    let star = axis.moved(-first.vrad_kms);
+    let at = |first: f64, bin: i64| first + (bin + start as i64) as f64 * axis.step;
+    if let Some(bin) = axis.bin_of(&own) {
+        return Ok(at(axis.first, bin) - entry.vrad_kms);
+    }
+    if let Some(bin) = star.bin_of(&own.moved(-entry.vrad_kms)) {
+        return Ok(at(star.first, bin));
+    }
+    let cure = match axis.place(&own) {
+        Some(place) => {
+            let part = place - place.round();
+            format!(
+                ", by {:.2} of a bin: resample the profiles onto one axis; where each was shifted together with its \
+                 line, its velocity ({:.4} km/s here) in the third column of the list brings them together",
+                part.abs(),
+                part * axis.step
+            )
+        }
+        None => ", in the width of the bins: resample the profiles onto one axis".to_owned(),
+    };
+    Err(LsdError::Axis {
+        path: entry.path.clone(),
+        axis: own.to_string(),
+        first: first.path.clone(),
+        expected: axis.to_string(),
+        cure,
+    })
+}
+
+/// What to do with a profile that is no text.
+fn no_text(what: NotText, Entry { path, .. }: &Entry) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let cure = match what {
+        NotText::Fits => format!(
+            "; in Python `from astropy.table import Table` and `Table.read({name:?}).write(\"profile.csv\")` make text \
+             of its table; name the columns velocity, I and sigma"
+        ),
+        NotText::Compressed => "; unpack it".to_owned(),
+        _ => String::new(),
+    };
+    format!("is {what}; a profile is text, rows of velocity (km/s), I and sigma{cure}")
+}
+
+/// The profiles with a wild bin, a line each.
+fn wild(entries: &[Entry], profiles: &[Profile]) -> Vec<String> {
+    let remark = |wild: wild::Wild| {
+        let (entry, profile) = (&entries[wild.profile], &profiles[wild.profile]);
+        format!(
+            "profile {} ({}, {:.4} d): the bin at {:.2} km/s is {:.0} errors away from its neighbours, a cosmic ray? \
+             Repair it, or leave the profile out",
+            wild.profile + 1,
+            shown(&entry.file),
+            entry.time_d,
+            profile.velocity_kms(wild.bin),
+            wild.errors
+        )
+    };
+    wild::bins(profiles).into_iter().map(remark).collect()
 }
 
 /// Profiles by what is to be said of them.
@@ -142,13 +222,17 @@ struct Found(BTreeMap<Finding, Vec<String>>);
 enum Finding {
     Given(Given),
     FirstOf(usize),
+    BadEnds,
+    Flags,
 }
 
 impl Found {
-    fn note(&mut self, Entry { file, .. }: &Entry, raw: &RawProfile) {
+    fn note(&mut self, Entry { file, .. }: &Entry, raw: &RawProfile, is_cut: bool) {
         let given = Some(Finding::Given(raw.given)).filter(|_| raw.given != Given::Intensity);
         let several = Some(Finding::FirstOf(raw.profiles)).filter(|_| raw.profiles > 1);
-        for finding in given.into_iter().chain(several) {
+        let ends = is_cut.then_some(Finding::BadEnds);
+        let flags = raw.is_flagged.then_some(Finding::Flags);
+        for finding in given.into_iter().chain(several).chain(ends).chain(flags) {
             self.0.entry(finding).or_default().push(file.clone());
         }
     }
@@ -165,6 +249,10 @@ impl Found {
                 Finding::FirstOf(profiles) => {
                     format!("{which}: the first of {profiles} mean profiles in the file is used")
                 }
+                Finding::BadEnds => {
+                    format!("{which}: bins without data (no number, no or a huge sigma, zeros) at the ends left out")
+                }
+                Finding::Flags => format!("{which}: flags of bins are not used, their errors are"),
             }
         };
         self.0.iter().map(remark).collect()

@@ -73,11 +73,31 @@ pub(super) fn figure(lines: &[Line]) -> Figure {
     figure
 }
 
-/// Mean observed profile of those on the bins of `own`.
+/// Mean observed profile of the data set of `own` in its bins. Profiles whose bins lie elsewhere, because each has a
+/// velocity of its own subtracted, are interpolated linearly.
 fn mean(lines: &[Line], own: &Line) -> Vec<f64> {
-    let alike: Vec<&Line> = lines.iter().filter(|line| line.velocity_kms == own.velocity_kms).collect();
-    let mean = |k: usize| alike.iter().map(|line| line.observed[k]).sum::<f64>() / alike.len() as f64;
+    let of_set: Vec<&Line> = lines.iter().filter(|line| line.data_set == own.data_set).collect();
+    let mean = |k: usize| {
+        let there = of_set.iter().filter_map(|line| match line.velocity_kms == own.velocity_kms {
+            true => Some(line.observed[k]),
+            false => observed_at(line, own.velocity_kms[k]),
+        });
+        let (sum, count) = there.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+        sum / count
+    };
     (0..own.observed.len()).map(mean).collect()
+}
+
+/// What a profile has at a velocity (km/s); `None` beyond its bins.
+fn observed_at(line: &Line, velocity_kms: f64) -> Option<f64> {
+    let above = line.velocity_kms.partition_point(|v| *v < velocity_kms);
+    if line.velocity_kms.get(above) == Some(&velocity_kms) {
+        return Some(line.observed[above]);
+    }
+    let below = above.checked_sub(1)?;
+    let [from, to] = [line.velocity_kms[below], *line.velocity_kms.get(above)?];
+    let part = (velocity_kms - from) / (to - from);
+    Some(line.observed[below] + part * (line.observed[above] - line.observed[below]))
 }
 
 /// Borders of bins around their centres.
@@ -111,6 +131,26 @@ fn rows(lines: &[Line]) -> Vec<Vec<[f64; 2]>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A line that does not change shows no change, wherever its bins lie: `1 - v^2` is that of all profiles.
+    #[test]
+    fn the_mean_is_of_all_profiles_of_a_set() {
+        let line = |shift: f64, data_set: usize| {
+            let velocity_kms: Vec<f64> = (0..41).map(|j| -2.0 + 0.1 * f64::from(j) + shift).collect();
+            let observed = velocity_kms.iter().map(|v| 1.0 - v * v - data_set as f64).collect();
+            Line { velocity_kms, observed, data_set: Some(data_set), ..Line::default() }
+        };
+        let lines = [line(0.0, 1), line(0.03, 1), line(-0.05, 1), line(0.0, 2)];
+        for own in &lines {
+            let change = mean(&lines, own).into_iter().zip(&own.observed).map(|(mean, x)| (x - mean).abs());
+            assert!(change.fold(0.0, f64::max) < 0.01);
+        }
+        assert_eq!(mean(&lines[..2], &lines[0])[0], lines[0].observed[0]);
+        let changed = Line { observed: vec![1.0; 41], ..line(0.03, 1) };
+        let lines = [line(0.0, 1), changed];
+        let change = (mean(&lines, &lines[0])[10] - lines[0].observed[10]).abs();
+        assert!((change - 0.5).abs() < 0.05, "{change}");
+    }
 
     #[test]
     fn rows_meet_half_way_and_go_around() {

@@ -23,7 +23,7 @@ pub enum LsdError {
         source: std::io::Error,
     },
     /// Two profiles differ in their velocity axes.
-    #[error("{}: velocity axis ({axis}) differs from that of {} ({expected})", .path.display(), .first.display())]
+    #[error("{}: velocity axis ({axis}) differs from that of {} ({expected}){cure}", .path.display(), .first.display())]
     Axis {
         /// The profile that differs.
         path: PathBuf,
@@ -33,6 +33,8 @@ pub enum LsdError {
         first: PathBuf,
         /// The axis of that one.
         expected: String,
+        /// By how much, and what to do.
+        cure: String,
     },
     /// A file could not be written.
     #[error(transparent)]

@@ -6,42 +6,15 @@
 //!   (2: I, sigma; 6: V, sigma, null, sigma as well; 8: another null, sigma).
 //! - iLSD (Kochukhov et al. 2010, A&A 524, A5; README of <https://github.com/okochukhov/iLSD>): a line `bins profiles
 //!   S/N chi2`; rows of velocity, profile, sigma; before each further profile a line of its own `S/N chi2`.
-//! - CSV: a line that names the columns, in any order; rows with commas or semicolons.
+//! - CSV and other tables (`data::io::table`): a line that names the columns, in any order and perhaps with units; rules
+//!   of dashes or units below it, as in an `.rdb`; rows with commas, semicolons, tabs or blanks.
 //!
-//! Comments and titles before the rows are passed over, and so may be any of these lines.
+//! Comments and titles before the rows are passed over, and so may be any of these lines. A fourth column without a
+//! name is a flag.
 
 use super::names::{self, Columns};
 use super::row::{Fault, fault, shown};
-
-/// What separates the fields of a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Separator {
-    Blanks,
-    Comma,
-    Semicolon,
-}
-
-impl Separator {
-    /// The one that a row is written with.
-    fn of(line: &str) -> Self {
-        match () {
-            () if line.contains(';') => Separator::Semicolon,
-            () if line.contains(',') => Separator::Comma,
-            () => Separator::Blanks,
-        }
-    }
-
-    /// The fields of a line; one separator at its end is none too many.
-    pub fn fields(self, line: &str) -> Vec<&str> {
-        let mark = match self {
-            Separator::Blanks => return line.split_whitespace().collect(),
-            Separator::Comma => ',',
-            Separator::Semicolon => ';',
-        };
-        let line = line.trim();
-        line.strip_suffix(mark).unwrap_or(line).split(mark).map(str::trim).collect()
-    }
-}
+use crate::data::io::table::{Line, Lines, Separator, add_units, is_below_names, number, readings};
 
 /// How many rows a line before them announces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,15 +36,15 @@ pub(super) struct Layout {
     pub first_row: usize,
 }
 
-/// Columns of a row, the velocity among them, in files that do not name them.
-const USUAL: [usize; 3] = [3, 7, 9];
+/// Columns of a row, the velocity among them, in files that do not name them; four hold a flag.
+const USUAL: [usize; 4] = [3, 4, 7, 9];
 
 impl Layout {
-    /// Of the numbered lines of a file that are neither blank nor comments. `comments` are those at its beginning.
-    pub fn of(lines: &[(usize, &str)], comments: &[&str]) -> Result<Self, Fault> {
+    /// Of the lines of a file, and of the comments at its beginning.
+    pub fn of(Lines { lines, comments }: &Lines) -> Result<Self, Fault> {
         let (mut at, mut announced, mut count, mut named) = (0, None, None, None);
-        while let Some((line, text)) = lines.get(at).copied() {
-            let counts_follow = lines.get(at + 1).is_some_and(|(_, next)| donati_counts(next).is_some());
+        while let Some(Line { number: line, text }) = lines.get(at).copied() {
+            let counts_follow = lines.get(at + 1).is_some_and(|next| donati_counts(next.text).is_some());
             if let Some((points, columns)) = donati_counts(text) {
                 if !USUAL.contains(&columns.saturating_add(1)) {
                     let problem = format!("announces {columns} columns after the velocity, not 2, 6 or 8");
@@ -89,58 +62,83 @@ impl Layout {
             if !counts_follow && !is_title(text) {
                 break;
             }
-            named = Some((line, text));
-            at += 1;
-            if !counts_follow && names::columns(&Separator::of(text).fields(text)).is_ok() {
-                break;
+            // what is below the names, dashes or units, names nothing
+            let below = named.is_some_and(|names| is_named(names) && is_below_names(&cells(text)));
+            if !below {
+                named = Some(Line { number: line, text });
             }
+            at += 1;
         }
-        let first = lines.get(at).map_or("", |(_, text)| text);
-        let separator = Separator::of(first);
-        let fields = separator.fields(first).len();
-        let columns = match names_before(named, comments, separator)? {
+        let rows = &lines[at..];
+        let separator = Separator::of(named.map(|line| line.text), rows.iter().map(|line| line.text));
+        let first = rows.first().map_or_else(Vec::new, |line| separator.cells(line.text));
+        let below = named.and_then(|names| lines[..at].iter().find(|line| line.number > names.number));
+        let columns = match names_before(named, below, comments, (separator, first.len()))? {
             Some(columns) => columns,
-            None => Columns::usual(count.unwrap_or(if USUAL.contains(&fields) { fields } else { 3 })),
+            None => Columns::usual(count.unwrap_or(if is_usual(&first) { first.len() } else { 3 })),
         };
         Ok(Layout { separator, columns, announced, first_row: at })
     }
 }
 
-/// The columns by the line that names them: the last title, which must where rows have commas, or the last comment.
+/// The cells of a line by itself.
+fn cells(line: &str) -> Vec<&str> {
+    Separator::of(None, std::iter::once(line)).cells(line)
+}
+
+/// Whether a row has as many cells as rows without names have. The last of four is a flag only where it may be one: a
+/// whole number, or a word.
+fn is_usual(cells: &[&str]) -> bool {
+    USUAL.contains(&cells.len()) && (cells.len() != 4 || !number(cells[3]).is_ok_and(|flag| flag.fract() != 0.0))
+}
+
+/// Whether a line names the columns.
+fn is_named(Line { text, .. }: Line) -> bool {
+    let all = (3..=cells(text).len().max(3)).flat_map(|count| readings(text, count));
+    all.into_iter().any(|names| names::columns(&names).is_ok())
+}
+
+/// The columns of rows of so many cells by the line that names them: the last title, which must where a mark parts
+/// them, or the last comment. Units may stand `below`.
 fn names_before(
-    title: Option<(usize, &str)>,
+    title: Option<Line>,
+    below: Option<&Line>,
     comments: &[&str],
-    separator: Separator,
+    (separator, count): (Separator, usize),
 ) -> Result<Option<Columns>, Fault> {
-    let by_comment = || comments.last().and_then(|text| names::columns(&separator.fields(uncommented(text))).ok());
-    let Some((line, text)) = title else { return Ok(by_comment()) };
-    match names::columns(&separator.fields(text)) {
-        Ok(columns) => Ok(Some(columns)),
-        // blanks separate the words of any title
-        Err(_) if separator == Separator::Blanks => Ok(by_comment()),
-        Err(problem) => fault(line, problem),
+    let by_comment = || {
+        let readings = comments.last().map_or_else(Vec::new, |text| readings(text, count));
+        readings.iter().find_map(|names| names::columns(names).ok())
+    };
+    let Some(Line { number: line, text }) = title else { return Ok(by_comment()) };
+    let mut all = readings(text, count);
+    if all.is_empty() {
+        // as many as there are, so that it is the row that is at fault
+        all = readings(text, separator.cells(text).len());
     }
-}
-
-/// Marks that begin a comment.
-const COMMENT: [char; 4] = ['#', '*', '!', '%'];
-
-/// Whether a line is a comment.
-pub(super) fn is_comment(line: &str) -> bool {
-    line.trim_start().starts_with(COMMENT)
-}
-
-fn uncommented(line: &str) -> &str {
-    line.trim_start().trim_start_matches(COMMENT).trim_start()
+    if let Some(below) = below {
+        all.iter_mut().for_each(|names| add_units(names, &separator.cells(below.text)));
+    }
+    let mut problem = None;
+    for names in &all {
+        match names::columns(names) {
+            Ok(columns) => return Ok(Some(columns)),
+            Err(error) => problem = problem.or(Some(error)),
+        }
+    }
+    match problem {
+        // blanks separate the words of any title
+        Some(problem) if separator != Separator::Blanks => fault(line, problem),
+        _ => Ok(by_comment()),
+    }
 }
 
 /// A line before the rows is a title unless it reads as numbers; one with the columns of a row and a single bad number
 /// is a bad row.
 fn is_title(line: &str) -> bool {
-    let separator = Separator::of(line);
-    let fields = separator.fields(line);
-    let bad = fields.iter().filter(|f| f.parse::<f64>().is_err()).count();
-    bad > if USUAL.contains(&fields.len()) { 1 } else { 0 }
+    let cells = cells(line);
+    let bad = cells.iter().filter(|cell| number(cell).is_err()).count();
+    is_below_names(&cells) || bad > if USUAL.contains(&cells.len()) { 1 } else { 0 }
 }
 
 /// The two whole numbers of a line `npoints ncolumns`.
@@ -168,6 +166,13 @@ pub(super) fn wrong_count(layout: &Layout, fields: &[&str]) -> String {
     let (found, due) = (fields.len(), layout.columns.count);
     match fields {
         [] | [""] => "no numbers".into(),
+        _ if layout.separator == Separator::Comma && found == 2 * due => {
+            format!("{found} columns instead of {due}: decimal commas? write numbers with decimal points")
+        }
+        _ if found == 4 && layout.columns.flag.is_none() => {
+            format!("{found} columns instead of {due}: name them in a line before the rows (velocity, I, sigma, ...)")
+        }
+        [_, _] if due == 3 => "2 columns instead of 3: velocity, I and sigma are due".into(),
         [one] if found < due => format!("{found} columns instead of {due}: {}", shown(one)),
         _ => format!("{found} columns instead of {due}"),
     }

@@ -2,6 +2,8 @@
 //! LSD solves for it) or `I - 1`. It is told by the continuum at both ends, which is near 1 or near 0, and by the sign
 //! of the line.
 
+use std::ops::Range;
+
 /// What the column of intensities holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Given {
@@ -24,16 +26,39 @@ const SMOOTHED: f64 = 0.05;
 /// above.
 const ONE_SIDED: f64 = 0.5;
 
+/// Which of these numbers are data: those between zeros, and numbers below, that fill the ends of a profile of I. A
+/// profile of `1 - I` or `I - 1` ends at 0 by right: there the line, not the continuum, is away from it.
+pub(super) fn filled(numbers: &[f64]) -> Range<usize> {
+    let fill = |value: &&f64| **value <= 0.0;
+    let first = numbers.iter().take_while(fill).count();
+    let last = numbers.len() - numbers.iter().rev().take_while(fill).count();
+    if last < first + FEWEST || last - first == numbers.len() {
+        return 0..numbers.len();
+    }
+    let inner = &numbers[first..last];
+    let (continuum, mean) = (at_the_ends(inner), inner.iter().sum::<f64>() / inner.len() as f64);
+    if continuum > NEAR_ZERO && continuum >= mean { first..last } else { 0..numbers.len() }
+}
+
+/// Fewest numbers that are a profile with filled ends.
+const FEWEST: usize = 5;
+
+/// Median of the numbers at both ends.
+pub(super) fn at_the_ends(numbers: &[f64]) -> f64 {
+    let bins = numbers.len();
+    let end = ((ENDS * bins as f64) as usize).max(2).min(bins);
+    let mut ends: Vec<f64> = numbers[..end].iter().chain(&numbers[bins - end..]).copied().collect();
+    ends.sort_by(f64::total_cmp);
+    0.5 * (ends[(ends.len() - 1) / 2] + ends[ends.len() / 2])
+}
+
 /// What a profile of these numbers is given as.
 ///
 /// # Errors
 /// A continuum at 0 with as much above as below it.
 pub(super) fn given_as(numbers: &[f64]) -> Result<Given, String> {
     let bins = numbers.len();
-    let end = ((ENDS * bins as f64) as usize).max(2).min(bins);
-    let mut ends: Vec<f64> = numbers[..end].iter().chain(&numbers[bins - end..]).copied().collect();
-    ends.sort_by(f64::total_cmp);
-    let continuum = 0.5 * (ends[(ends.len() - 1) / 2] + ends[ends.len() / 2]);
+    let continuum = at_the_ends(numbers);
     if continuum.abs() > NEAR_ZERO {
         return match continuum > 0.0 {
             true => Ok(Given::Intensity),
@@ -69,5 +94,23 @@ impl Given {
             Given::Depth => "given as 1 - I (continuum at 0, line above it), turned into I",
             Given::Excess => "given as I - 1 (continuum at 0, line below it), turned into I",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_are_data_of_depths_alone() {
+        let line = |j: usize| 0.4 * (-((j as f64 - 20.0) / 6.0).powi(2)).exp();
+        let with_zeros = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (0..41).map(|j| if (3..38).contains(&j) { value(j) } else { 0.0 }).collect()
+        };
+        assert_eq!(filled(&with_zeros(&|j| 1.0 - line(j))), 3..38);
+        assert_eq!(filled(&with_zeros(&|j| 100.0 - 100.0 * line(j))), 3..38);
+        assert_eq!(filled(&with_zeros(&line)), 0..41);
+        assert_eq!(filled(&with_zeros(&|j| -line(j))), 0..41);
+        assert_eq!(filled(&(0..41).map(|j| 1.0 - line(j)).collect::<Vec<_>>()), 0..41);
     }
 }

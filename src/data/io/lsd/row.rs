@@ -1,15 +1,44 @@
 //! A row of a profile, and what can be wrong with a line.
 
+pub(super) use crate::data::io::table::shown;
+
 /// What is used of a row.
 pub(super) struct Row {
     pub line: usize,
     pub velocity: f64,
     pub intensity: f64,
     pub sigma: f64,
+    /// How finely the velocity is printed.
+    pub digits: Digits,
+    /// What the column of flags says of it, where there is one.
+    pub flag: Option<String>,
+    /// Why the bin holds nothing that can be used, if it does not.
+    pub bad: Option<String>,
+}
+
+/// The digits that a number is printed with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Digits {
+    /// Behind the point; negative where zeros stand before it.
+    pub decimals: i32,
+    /// From the first that is not 0.
+    pub significant: i32,
+}
+
+impl Digits {
+    /// Those of a number as it stands in its file.
+    pub fn of(cell: &str) -> Self {
+        let (mantissa, exponent) = cell.split_once(['e', 'E', 'd', 'D']).unwrap_or((cell, "0"));
+        let exponent: i32 = exponent.parse().unwrap_or(0);
+        let decimals = mantissa.split_once('.').map_or(0, |(_, behind)| behind.len() as i32);
+        let digits = mantissa.chars().filter(char::is_ascii_digit);
+        let significant = digits.skip_while(|digit| *digit == '0').count() as i32;
+        Digits { decimals: decimals - exponent, significant }
+    }
 }
 
 /// What is wrong with a line (counted from 1), or with the file as a whole (line 0).
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fault {
     pub line: usize,
     pub problem: String,
@@ -17,10 +46,4 @@ pub(super) struct Fault {
 
 pub(super) fn fault<T>(line: usize, problem: String) -> Result<T, Fault> {
     Err(Fault { line, problem })
-}
-
-/// A piece of the user's text, quoted, escaped and cut to a length that keeps a message on one line.
-pub(super) fn shown(text: &str) -> String {
-    let short: String = text.chars().take(40).collect();
-    format!("{short:?}")
 }

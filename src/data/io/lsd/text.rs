@@ -2,9 +2,11 @@
 //! others that are not used. What is given as `1 - I` or `I - 1` becomes I (`level`).
 
 use super::axis::Axis;
-use super::layout::{Announced, Layout, Separator, is_comment, wrong_count};
+use super::layout::{Announced, Layout, wrong_count};
 use super::level::{self, Given};
-use super::row::{Fault, Row, fault, shown};
+use super::row::{Digits, Fault, Row, fault, shown};
+use crate::data::io::table::{Line, Lines, Separator, has_decimal_comma, number};
+use std::ops::Range;
 
 /// A profile as it stands in its file, on a uniform velocity axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,87 +19,176 @@ pub(super) struct RawProfile {
     pub given: Given,
     /// Mean profiles in the file, of which this is the first.
     pub profiles: usize,
+    /// Whether a column of flags marks some of the bins.
+    pub is_flagged: bool,
+    /// The bins that hold nothing that can be used.
+    bad: Vec<(usize, Fault)>,
+    /// What is left between ends that weigh nothing, their errors being out of all proportion.
+    weighty: Range<usize>,
 }
 
 /// Smallest standard error and largest numbers that a profile in units of the continuum can have.
 const SMALLEST_SIGMA: f64 = 1e-9;
 const LARGEST: f64 = 1e6;
 
+/// Errors larger than the usual one by this mark the ends of a profile as no data.
+const WEIGHTLESS: f64 = 100.0;
+
 /// Fewest bins that make a profile.
 pub(super) const MIN_BINS: usize = 5;
 
+impl RawProfile {
+    /// The bins that can be used: those around a range of velocities (km/s, in the file), or those between bad ends.
+    ///
+    /// # Errors
+    /// A bad bin within the range, or in the middle half of the profile where no range is given.
+    pub fn usable(&self, range_kms: Option<(f64, f64)>) -> Result<Range<usize>, Fault> {
+        let bins = self.axis.bins;
+        let middle = match range_kms {
+            None => bins / 4..bins - bins / 4,
+            Some((from, to)) => {
+                let inside = |j: &usize| (from..=to).contains(&self.axis.at(*j));
+                let first = (0..bins).find(inside).unwrap_or(bins / 2);
+                first..(first..bins).take_while(inside).last().map_or(first, |last| last + 1)
+            }
+        };
+        if let Some((_, bad)) = self.bad.iter().find(|(bin, _)| middle.contains(bin)) {
+            let problem = format!("{}: a bad bin may only lie outside of the velocity range in use", bad.problem);
+            return fault(bad.line, problem);
+        }
+        let start = self.bad.iter().map(|(bin, _)| bin + 1).filter(|bin| *bin <= middle.start).max().unwrap_or(0);
+        let end = self.bad.iter().map(|(bin, _)| *bin).filter(|bin| *bin >= middle.end).min().unwrap_or(bins);
+        let weighty = if range_kms.is_none() { self.weighty.clone() } else { 0..bins };
+        let (from, to) = (start.max(weighty.start), end.min(weighty.end));
+        Ok(if from + MIN_BINS <= to { from..to } else { start..end })
+    }
+}
+
 /// Reads the text of a profile.
 pub(super) fn parse(text: &str) -> Result<RawProfile, Fault> {
-    let text = text.trim_start_matches('\u{feff}');
-    let filled = text.lines().enumerate().map(|(k, l)| (k + 1, l)).filter(|(_, l)| !l.trim().is_empty());
-    let comments: Vec<&str> = filled.clone().map(|(_, l)| l).take_while(|l| is_comment(l)).collect();
-    let lines: Vec<(usize, &str)> = filled.filter(|(_, l)| !is_comment(l)).collect();
-    let layout = Layout::of(&lines, &comments)?;
-    if let Some((line, text)) = lines.first().filter(|_| layout.first_row == lines.len()) {
-        return fault(*line, format!("no row of numbers (with decimal points) here or below: {}", shown(text)));
+    let lines = Lines::of(text);
+    let layout = Layout::of(&lines)?;
+    if let Some(first) = lines.lines.first().filter(|_| layout.first_row == lines.lines.len()) {
+        return no_row(&lines, first.number, first.text);
     }
-    let rows = rows(&lines[layout.first_row..], &layout)?;
+    let mut rows = rows(&lines.lines[layout.first_row..], &layout)?;
+    if rows.windows(2).all(|pair| pair[1].velocity < pair[0].velocity) {
+        rows.reverse();
+    }
+    let axis = Axis::through(&rows)?;
+    let flags: Vec<&str> = rows.iter().filter_map(|row| row.flag.as_deref()).collect();
     let mut profile = RawProfile {
-        axis: Axis::through(&rows)?,
+        axis,
         intensity: rows.iter().map(|r| r.intensity).collect(),
         sigma: rows.iter().map(|r| r.sigma).collect(),
         given: Given::Intensity,
         profiles: layout.announced.map_or(1, |announced| announced.profiles),
+        is_flagged: flags.windows(2).any(|pair| pair[0] != pair[1]),
+        bad: Vec::new(),
+        weighty: 0..rows.len(),
     };
-    profile.given = level::given_as(&profile.intensity).or_else(|problem| fault(0, problem))?;
+    let good: Vec<usize> = (0..rows.len()).filter(|j| rows[*j].bad.is_none()).collect();
+    if good.len() < MIN_BINS {
+        let (line, problem) = rows.iter().find_map(|row| Some((row.line, row.bad.clone()?))).unwrap_or_default();
+        return fault(line, problem);
+    }
+    let numbers: Vec<f64> = good.iter().map(|j| rows[*j].intensity).collect();
+    let filled = level::filled(&numbers);
+    profile.given = level::given_as(&numbers[filled.clone()]).or_else(|problem| fault(0, problem))?;
     profile.intensity.iter_mut().for_each(|value| *value = profile.given.intensity(*value));
+    let is_fill = |j: usize| good.binary_search(&j).is_ok_and(|k| !filled.contains(&k));
+    for (j, row) in rows.iter().enumerate() {
+        let fill = is_fill(j).then(|| format!("intensity is {} at the end of the profile, no data", row.intensity));
+        profile.bad.extend(row.bad.clone().or(fill).map(|problem| (j, Fault { line: row.line, problem })));
+    }
+    let mut sigmas: Vec<f64> = good.iter().map(|j| rows[*j].sigma).collect();
+    sigmas.sort_by(f64::total_cmp);
+    let most = WEIGHTLESS * sigmas[sigmas.len() / 2];
+    let weightless = |row: &&Row| row.bad.is_some() || row.sigma > most;
+    let start = rows.iter().take_while(weightless).count();
+    profile.weighty = start..rows.len() - rows[start..].iter().rev().take_while(weightless).count();
     Ok(profile)
 }
 
-/// The rows of the first profile, as many as are announced.
-fn rows(lines: &[(usize, &str)], layout: &Layout) -> Result<Vec<Row>, Fault> {
+/// Why no line is a row.
+fn no_row(lines: &Lines, line: usize, text: &str) -> Result<RawProfile, Fault> {
+    let commas = lines.lines.iter().find_map(|line| {
+        let by = [Separator::Blanks, Separator::Semicolon].map(|separator| separator.cells(line.text));
+        let cell = by.into_iter().filter(|cells| cells.len() > 1).flatten().find(|cell| has_decimal_comma(cell))?;
+        Some((line.number, number(cell).err()?))
+    });
+    match commas {
+        Some((line, problem)) => fault(line, problem),
+        None => fault(line, format!("no row of numbers (with decimal points) here or below: {}", shown(text))),
+    }
+}
+
+/// The rows of the first profile, as many as are announced; those at its ends that say no velocity are left out.
+fn rows(lines: &[Line], layout: &Layout) -> Result<Vec<Row>, Fault> {
     let mut rows: Vec<Row> = Vec::new();
-    for (line, text) in lines.iter().copied() {
+    for line in lines {
         match layout.announced {
             Some(Announced { points, profiles, .. }) if rows.len() == points => match profiles {
-                1 => return fault(line, format!("more rows than the {points} points announced")),
+                1 => return fault(line.number, format!("more rows than the {points} points announced")),
                 _ => break,
             },
-            _ => rows.push(parse_row(line, &layout.separator.fields(text), layout)?),
+            _ => rows.push(parse_row(line.number, &layout.separator.cells(line.text), layout)?),
         }
     }
-    match layout.announced {
-        Some(Announced { line, points, .. }) if rows.len() < points => {
-            fault(line, format!("announces {points} points, but {} rows follow", rows.len()))
-        }
+    if let Some(Announced { line, points, .. }) = layout.announced.filter(|announced| rows.len() < announced.points) {
+        return fault(line, format!("announces {points} points, but {} rows follow", rows.len()));
+    }
+    let nowhere = |row: &&Row| row.velocity.is_nan();
+    let first = rows.iter().take_while(nowhere).count();
+    let last = rows[first..].iter().rev().take_while(nowhere).count();
+    let rows: Vec<Row> = rows.drain(first..rows.len() - last).collect();
+    match rows.iter().find(|row| !row.velocity.is_finite()) {
+        Some(row) => fault(row.line, format!("velocity is {}, not a finite number", row.velocity)),
         _ if rows.len() < MIN_BINS => fault(0, format!("holds {} points, at least {MIN_BINS} are needed", rows.len())),
         _ => Ok(rows),
     }
 }
 
-fn parse_row(line: usize, fields: &[&str], layout: &Layout) -> Result<Row, Fault> {
+fn parse_row(line: usize, cells: &[&str], layout: &Layout) -> Result<Row, Fault> {
     let columns = layout.columns;
-    if fields.len() != columns.count {
-        return fault(line, wrong_count(layout, fields));
+    if cells.len() != columns.count {
+        return fault(line, wrong_count(layout, cells));
     }
-    let number = |field: &str| match field.parse::<f64>() {
-        Ok(value) => Ok(value),
-        Err(_) => fault(line, format!("{} is not a number", shown(field))),
-    };
+    let read = |cell: &str| number(cell).or_else(|problem| fault(line, problem));
     if layout.separator == Separator::Blanks {
         // what is not used need only be numbers
-        fields.iter().try_for_each(|field| number(field).map(drop))?;
+        let unused = cells.iter().enumerate().filter(|(column, _)| columns.flag != Some(*column));
+        unused.into_iter().try_for_each(|(_, cell)| read(cell).map(drop))?;
     }
-    let velocity = number(fields[columns.velocity])?;
-    let intensity = number(fields[columns.intensity])?;
-    let sigma = number(fields[columns.sigma])?;
-    for (name, value) in [("velocity", velocity), ("intensity", intensity), ("sigma", sigma)] {
+    let velocity = read(cells[columns.velocity])?;
+    let intensity = read(cells[columns.intensity])?;
+    let sigma = read(cells[columns.sigma])?;
+    Ok(Row {
+        line,
+        velocity,
+        intensity,
+        sigma,
+        digits: Digits::of(cells[columns.velocity]),
+        flag: columns.flag.map(|column| cells[column].to_owned()),
+        bad: bad(intensity, sigma),
+    })
+}
+
+/// Why numbers of a bin cannot be used.
+fn bad(intensity: f64, sigma: f64) -> Option<String> {
+    for (name, value) in [("intensity", intensity), ("sigma", sigma)] {
         if !value.is_finite() {
-            return fault(line, format!("{name} is {value}, not a finite number"));
+            return Some(format!("{name} is {value}, not a finite number"));
         }
     }
     if sigma <= 0.0 {
-        return fault(line, format!("sigma is {sigma}, it must be above 0"));
+        return Some(format!("sigma is {sigma}, it must be above 0"));
     }
     if !(SMALLEST_SIGMA..=LARGEST).contains(&sigma) || intensity.abs() > LARGEST {
-        return fault(line, format!("intensity {intensity:e} with sigma {sigma:e} is not in units of the continuum"));
+        let due = "is not in units of the continuum: divide both by it";
+        return Some(format!("intensity {intensity:e} with sigma {sigma:e} {due}"));
     }
-    Ok(Row { line, velocity, intensity, sigma })
+    None
 }
 
 #[cfg(test)]

@@ -108,6 +108,11 @@ impl MeanProfile {
         0.5 * (super::median(first.to_vec()) + super::median(last.to_vec()))
     }
 
+    /// Level of the continuum, or of the last of the line.
+    pub fn level(&self) -> f64 {
+        1.0 - self.at_its_ends()
+    }
+
     /// Error (km/s) of the middle of two crossings by the noise of the mean profile alone.
     pub fn centre_error_kms(&self, half_depth: HalfDepth) -> f64 {
         let deepest = self.depth.iter().copied().fold(0.0, f64::max);

@@ -27,6 +27,10 @@ const CENTRE: f64 = 0.004;
 /// wrong.
 const DOUBT: (f64, f64) = (0.15, 0.2);
 
+/// A continuum outside of these levels is in another unit, within the second ones in percent.
+const LEVELS: std::ops::RangeInclusive<f64> = 0.2..=3.0;
+const PERCENT: std::ops::RangeInclusive<f64> = 50.0..=200.0;
+
 /// The local line as far as it is assumed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineModel {
@@ -69,6 +73,30 @@ pub enum LookError {
     /// The velocity ranges of the profiles do not overlap.
     #[error("the velocity ranges of the profiles have fewer than 5 bins in common: is VRAD right?")]
     NothingInCommon,
+    /// The numbers are in another unit.
+    #[error(
+        "the continuum of the profiles is at {level:.4}, and I in units of the continuum is due: {}",
+        if *is_percent { "these look like percent, divide I and sigma by 100" }
+        else { "divide I and sigma of each profile by its continuum, a straight line through the ends, say" }
+    )]
+    Unit {
+        /// Level of the continuum.
+        level: f64,
+        /// Whether it is near 100.
+        is_percent: bool,
+    },
+    /// The line shows no rotation.
+    #[error(
+        "the line is no wider than that of a star that does not rotate (a local line of {sigma_kms:.1} km/s and \
+        {instrumental_kms:.1} km/s of the spectrograph, standard deviations): vsini is not resolved. If it is known, \
+        give --vsini; if the line is narrower, --line-sigma; if the spectrograph is better, --resolving-power"
+    )]
+    Unresolved {
+        /// Standard deviation of the local line (km/s).
+        sigma_kms: f64,
+        /// Standard deviation that the spectrograph adds (km/s).
+        instrumental_kms: f64,
+    },
     /// Nothing stands out of the noise.
     #[error("no absorption line in the mean profile: its largest depth is {depth:.5}, with errors of {sigma:.5}")]
     NoLine {
@@ -119,6 +147,10 @@ impl FirstLook {
     /// [`LookError`].
     pub fn at(observations: &Observations, line: LineModel) -> Result<Self, LookError> {
         let mean = MeanProfile::of(observations)?;
+        let level = mean.level();
+        if !LEVELS.contains(&level) {
+            return Err(LookError::Unit { level, is_percent: PERCENT.contains(&level) });
+        }
         line.check(&mean)?;
         let half_depth = mean.half_depth()?;
         let fit = |line| Unspotted::fit(&mean, half_depth, line);
