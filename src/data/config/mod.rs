@@ -34,7 +34,7 @@ pub use draft::{Draft, Sought};
 pub use error::ConfigError;
 pub use identity::{Difference, first_difference, jitter_difference, section_difference};
 pub use number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
-pub use photometry::SimulatedLight;
+pub use photometry::{OutlierTreatment, SimulatedLight};
 pub use raw_parts::PlanSection;
 pub use resolve_grid::MOST_NODES;
 pub use settings::{

@@ -45,6 +45,7 @@ pub(super) fn resolve_photometry(raw: &Config, config: &Path) -> Result<Vec<Ligh
             segment_gap_d: section.segment_gap_d,
             sigma_scale: section.sigma_scale,
             exclude: section.exclude.clone(),
+            outliers: section.outliers,
             key,
         });
     }

@@ -1,7 +1,7 @@
 //! The resolved settings: validated, in the units of the parts they are for, nothing left to decide.
 
 use super::number_or::{Automatic, EquivalentWidth, Hyperparameter, OfField, VelocityJitter, ZeroPoint};
-use super::{ConfigError, PlanSection, SamplerSettings, SimulatedLight};
+use super::{ConfigError, OutlierTreatment, PlanSection, SamplerSettings, SimulatedLight};
 use crate::data::simulate::Simulation;
 use crate::field::Lifetime;
 use crate::maxent::entropy::Entropy;
@@ -108,6 +108,8 @@ pub struct LightCurveSettings {
     pub sigma_scale: f64,
     /// Windows `[start, end]` (d) whose measurements are left out.
     pub exclude: Vec<[f64; 2]>,
+    /// What becomes of measurements that no spot explains.
+    pub outliers: OutlierTreatment,
 }
 
 /// Where a light curve comes from.
