@@ -284,3 +284,105 @@ impl Parabola {
         self.coefficients.dot(&Vector3::new(1.0, x, x * x))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const PERIOD_D: f64 = 3.0;
+    const SIGMA: f64 = 3e-4;
+
+    /// A spotted star for twelve days, with noise, and what is added to its flux.
+    fn seen(cadence_d: f64, added: impl Fn(f64) -> f64) -> Vec<Flux> {
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+        };
+        let flux = |k: usize| {
+            let time_d = 2_459_000.5 + k as f64 * cadence_d;
+            let turn = TAU * k as f64 * cadence_d / PERIOD_D;
+            let spots = 0.97 + 0.02 * turn.cos() + 0.008 * (2.0 * turn + 1.0).cos() + 0.003 * (3.0 * turn).sin();
+            let noise = (-2.0 * uniform().ln()).sqrt() * (TAU * uniform()).cos();
+            Flux { time_d, flux: spots + SIGMA * noise + added(time_d - 2_459_000.5), sigma: SIGMA }
+        };
+        (0..(12.0 / cadence_d) as usize).map(flux).collect()
+    }
+
+    fn wild(measured: &[Flux]) -> Vec<usize> {
+        outliers(measured, PERIOD_D, 3.0).wild.into_iter().map(|(k, _)| k).collect()
+    }
+
+    #[test]
+    fn a_spotted_star_has_none() {
+        for cadence_d in [0.002, 0.02, 0.05, 0.1, 0.3, 1.0] {
+            let mut measured = seen(cadence_d, |_| 0.0);
+            assert_eq!(outliers(&measured, PERIOD_D, 3.0), Outliers::default(), "every {cadence_d} d");
+            // nor with a gap of a day and errors that are three times too small
+            measured.retain(|one| !(2_459_004.0..2_459_005.0).contains(&one.time_d));
+            measured.iter_mut().for_each(|one| one.sigma /= 3.0);
+            assert_eq!(outliers(&measured, PERIOD_D, 3.0), Outliers::default(), "every {cadence_d} d");
+        }
+        // nor where it pulsates
+        let pulsating = seen(0.02, |t| 30.0 * SIGMA * (TAU * t / 0.13).sin());
+        assert_eq!(outliers(&pulsating, PERIOD_D, 3.0), Outliers::default());
+    }
+
+    #[test]
+    fn single_ones_are_found_wherever_they_are() {
+        let clean = seen(0.02, |_| 0.0);
+        for k in [0, 1, 185, 300, clean.len() - 1] {
+            for factor in [0.0, 0.01, 0.95, 1.05, 1.2, 3.0] {
+                let mut measured = clean.clone();
+                measured[k].flux *= factor;
+                assert_eq!(wild(&measured), [k], "measurement {k}, times {factor}");
+            }
+        }
+        let mut two = clean.clone();
+        two[200].flux = 1e-3;
+        two[201].flux = 2e-3;
+        assert_eq!(wild(&two), [200, 201]);
+        // ten of bad pointing, which are too deep for a transit
+        let mut ten = clean;
+        ten[200..210].iter_mut().for_each(|one| one.flux *= 0.1);
+        assert_eq!(wild(&ten), (200..210).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn what_neighbours_expect_is_told() {
+        let mut measured = seen(0.02, |_| 0.0);
+        let before = measured[185].flux;
+        measured[185].flux *= 3.0;
+        let found = outliers(&measured, PERIOD_D, 3.0).wild[0].1;
+        assert!((found - before).abs() < 5.0 * SIGMA, "{found}, not {before}");
+    }
+
+    #[test]
+    fn flares_are_left_out_down_to_their_tails() {
+        for height in [0.02, 0.2] {
+            let flare = |t: f64| if t < 5.55 { 0.0 } else { height * (-(t - 5.55) / 0.06).exp() };
+            let measured = seen(0.02, flare);
+            let found = wild(&measured);
+            let above = |k: usize| flare(measured[k].time_d - 2_459_000.5);
+            // all that is well above the noise, and not much else
+            assert!((0..measured.len()).all(|k| above(k) < 10.0 * SIGMA || found.contains(&k)), "{height}: {found:?}");
+            assert!(found.iter().all(|k| above(*k) > 0.2 * SIGMA), "{height}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_transit_is_told_of_and_kept() {
+        let measured = seen(0.02, |t| if (5.0..5.15).contains(&t) { -0.01 } else { 0.0 });
+        let Outliers { wild, dips } = outliers(&measured, PERIOD_D, 3.0);
+        assert_eq!((wild.len(), dips), (0, vec![250..258]));
+    }
+
+    #[test]
+    fn measurements_without_neighbours_are_wild_if_no_spots_do_that() {
+        let mut measured = seen(1.0, |_| 0.0);
+        measured[4].flux *= 3.0;
+        measured[7].flux *= 0.01;
+        assert_eq!(wild(&measured), [4, 7]);
+    }
+}

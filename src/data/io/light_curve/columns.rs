@@ -119,6 +119,9 @@ const DAYS: [&str; 11] = ["", "d", "day", "days", "jd", "bjd", "hjd", "bjdtdb", 
 /// What flags say of good rows in words.
 const GOOD: [&str; 5] = ["g", "good", "ok", "a", "pass"];
 
+/// The line of names is looked for among so many.
+const MOST_LINES: usize = 100;
+
 /// The columns of a light curve by their numbers.
 #[derive(Clone, Debug)]
 pub(super) struct Columns {
@@ -143,12 +146,13 @@ impl Columns {
     /// # Errors
     /// What is missing.
     pub fn of(table: &Table, text: &str) -> Result<Self, String> {
-        let count = table.rows.first().map_or(0, |row| row.cells.len());
-        // rows without flux may come first, and are no names
+        let count = table.rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
+        // rows without a flux may come first, which are no names, and rows whose last cell is empty look shorter
         let Lines { lines, comments } = Lines::of(text);
         let lines = lines.iter().map(|line| line.text).chain(comments);
-        let others = lines.filter(|line| line.contains(char::is_alphabetic)).take(100);
-        let others = others.flat_map(|line| readings(line, count)).collect::<Vec<_>>();
+        let named = lines.filter(|line| line.contains(char::is_alphabetic)).take(MOST_LINES);
+        let of_line = |line| [count, count + 1].into_iter().flat_map(move |count| readings(line, count));
+        let others: Vec<Vec<Name>> = named.flat_map(of_line).collect();
         let mut first_problem = None;
         for names in table.names.iter().chain(&others) {
             match Columns::named(names) {
