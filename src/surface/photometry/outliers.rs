@@ -103,8 +103,8 @@ impl Segment<'_> {
             let mut now = vec![true; self.measured.len()];
             for flare in found.wild.chunk_by(|a, b| a.0 + 1 == b.0) {
                 // nor does the tail of a flare, which takes as long as what is seen of it
-                let (first, last) =
-                    (flare[0].0, flare[flare.len() - 1].0 + if flare.len() > 2 { flare.len() } else { 0 });
+                let tail = if flare.len() > LONGEST_DIP { flare.len() } else { 0 };
+                let (first, last) = (flare[0].0, flare[flare.len() - 1].0 + tail);
                 now[first..=last.min(self.measured.len() - 1)].fill(false);
             }
             found.dips.iter().for_each(|dip| now[dip.clone()].fill(false));
