@@ -26,10 +26,14 @@ pub fn note_objective(configs: &[Config]) {
     }
 }
 
-/// Says on standard error what was made of the profiles of `scene` on reading, for commands whose report does not.
+/// Says on standard error what was made of the profiles and light curves of `scene` on reading, for commands whose
+/// report does not.
 pub fn remarks(scene: &Scene) {
     for remark in &scene.measured.profiles {
         console::note(format_args!("profiles: {remark}"));
+    }
+    for note in &scene.measured.light_curve_notes {
+        console::note(format_args!("light curve: {note}"));
     }
 }
 

@@ -3,11 +3,11 @@
 //! [`calibrated`](super::calibrated) makes of them what enters the model.
 
 use crate::data::config::{ConfigError, DataSetSettings, LightCurveSettings, LightSource, ObservationSource, Settings};
+use crate::data::io::FileError;
+use crate::data::io::light_curve::{self, Measurements};
 use crate::data::io::lsd::{self, Label, LsdError};
-use crate::data::io::{FileError, light_curve};
 use crate::data::simulate::Simulation;
 use crate::star::observation::Observations;
-use crate::surface::photometry::Flux;
 use std::path::PathBuf;
 
 pub use crate::data::io::lsd::ProfileSet;
@@ -20,8 +20,8 @@ const MOST_SIMULATED: f64 = 50_000.0;
 pub struct Dataset {
     /// The profiles of each data set, those of excluded times left out.
     pub sets: Vec<ProfileSet>,
-    /// The measurements of each light curve in the order of time.
-    pub light_curves: Vec<Vec<Flux>>,
+    /// The light curves.
+    pub light_curves: Vec<Measurements>,
     /// The files that they come from.
     pub files: Vec<PathBuf>,
 }
@@ -68,7 +68,7 @@ impl Dataset {
         Dataset::of(settings, vec![profiles], light_curves)
     }
 
-    fn of(settings: &Settings, all: Vec<ProfileSet>, light_curves: Vec<Vec<Flux>>) -> Result<Self, SceneError> {
+    fn of(settings: &Settings, all: Vec<ProfileSet>, mut light_curves: Vec<Measurements>) -> Result<Self, SceneError> {
         let (mut files, mut sets) = (Vec::new(), Vec::new());
         for (set, profiles) in settings.sets.iter().zip(all) {
             if let ObservationSource::Files { path, .. } = &set.source {
@@ -82,6 +82,8 @@ impl Dataset {
             LightSource::Simulate(_) => None,
         }));
         one_day_count(settings, &sets)?;
+        let times_d: Vec<f64> = sets.iter().flat_map(|set: &ProfileSet| set.observations.times_d()).collect();
+        light_curves.iter_mut().for_each(|curve| curve.count_as(&times_d));
         Ok(Dataset { sets, light_curves, files })
     }
 }
@@ -152,7 +154,7 @@ fn one_day_count(settings: &Settings, sets: &[ProfileSet]) -> Result<(), ConfigE
 }
 
 /// The measurements of all light curves, read or simulated.
-fn light_curves(settings: &Settings) -> Result<Vec<Vec<Flux>>, SceneError> {
+fn light_curves(settings: &Settings) -> Result<Vec<Measurements>, SceneError> {
     let of = |curve: &LightCurveSettings| match &curve.source {
         LightSource::File(path) => Ok(light_curve::read(path)?),
         LightSource::Simulate(light) => {
@@ -165,7 +167,8 @@ fn light_curves(settings: &Settings) -> Result<Vec<Vec<Flux>>, SceneError> {
                 return Err(settings.fault(&format!("{}.simulate.cadence_d", curve.key), &problem).into());
             }
             let times_d: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * light.cadence_d).collect();
-            Ok(simulations[0].fluxes(&settings.star, &curve.band, &times_d, (light.sigma, light.seed)))
+            let fluxes = simulations[0].fluxes(&settings.star, &curve.band, &times_d, (light.sigma, light.seed));
+            Ok(Measurements { fluxes, ..Measurements::default() })
         }
     };
     settings.light_curves.iter().map(of).collect()

@@ -116,8 +116,8 @@ impl<'a> Maps<'a> {
 
 /// Why no map of `scene` fits, as [`Maps`] has it: `; ` and the likely reason, or nothing.
 pub fn reason(scene: &Scene) -> String {
-    let evolves = scene.settings.imaging.objective.evolves();
-    let told = diagnosis(scene).filter(|diagnosis| !evolves || diagnosis.reason != Reason::Errors);
+    let map_changes = scene.settings.imaging.objective.properties().map_changes;
+    let told = diagnosis(scene).filter(|diagnosis| !map_changes || diagnosis.reason != Reason::Errors);
     told.map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text))
 }
 

@@ -2,7 +2,7 @@
 
 use crate::data::config::{Config, ConfigError, DataSetSettings, LightCurveSettings, LightSource};
 use crate::data::io::atomic::WriteError;
-use crate::data::io::light_curve;
+use crate::data::io::light_curve::{self, Measurements};
 use crate::data::io::lsd::{self, LsdError};
 use crate::data::io::truth::{self, Truth};
 use crate::data::scene::{Scene, SceneError};
@@ -95,7 +95,7 @@ impl Simulated {
         }
         let scene = Scene::new(config)?;
         let light =
-            |(curve, measured): (&LightCurveSettings, &Vec<Flux>)| (format!("{}.csv", curve.name), measured.clone());
+            |(curve, of): (&LightCurveSettings, &Measurements)| (format!("{}.csv", curve.name), of.fluxes.clone());
         let light_curves = settings.light_curves.iter().zip(&scene.data.light_curves).map(light).collect();
         let set = |(s, simulation): (usize, Simulation)| SimulatedSet {
             name: settings.sets[s].name.clone(),

@@ -1,7 +1,11 @@
 //! Light curves: measurements of the star's flux, brought to few bins and to segments of a level and slope of their
 //! own, in units of the mean flux of a segment (`docs/method.md` section 9).
 
+mod outliers;
+
 use crate::star::Band;
+
+pub use outliers::{Outliers, outliers};
 
 /// A measurement of the flux.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,17 +59,28 @@ pub const MOST_BINS: usize = 200;
 /// of a rotation, or wider where there would be too many bins.
 pub fn bin_width_d(times_d: &[Vec<f64>], rotation_period_d: f64) -> f64 {
     let widths = BINS_OF_A_ROTATION.map(|bins| rotation_period_d / bins);
-    let count = |width: f64| times_d.iter().map(|times_d| cells(times_d, width)).sum::<usize>();
+    let count = |width: f64| times_d.iter().map(|times_d| filled(times_d, width)).sum::<usize>();
     widths.into_iter().find(|width| count(*width) <= MOST_BINS).unwrap_or(widths[widths.len() - 1])
 }
 
 /// Number of cells of a width (d), counted from the first of these times (d), that hold any of them.
-fn cells(times_d: &[f64], width_d: f64) -> usize {
+fn filled(times_d: &[f64], width_d: f64) -> usize {
     times_d.chunk_by(|a, b| cell(*a, times_d[0], width_d) == cell(*b, times_d[0], width_d)).count()
 }
 
 fn cell(time_d: f64, first_d: f64, width_d: f64) -> f64 {
     ((time_d - first_d) / width_d).floor()
+}
+
+/// Measurements in the order of time, parted where a gap is longer than `gap_d` (d).
+fn segments(measured: &[Flux], gap_d: f64) -> impl Iterator<Item = &[Flux]> {
+    measured.chunk_by(move |a, b| b.time_d - a.time_d <= gap_d)
+}
+
+/// The measurements of a segment in cells of a width (d), counted from the first.
+fn cells(segment: &[Flux], width_d: f64) -> impl Iterator<Item = &[Flux]> {
+    let of = move |one: &Flux| cell(one.time_d, segment[0].time_d, width_d);
+    segment.chunk_by(move |a, b| of(a) == of(b))
 }
 
 impl LightCurve {
@@ -74,11 +89,8 @@ impl LightCurve {
     pub fn new(name: &str, band: Band, measured: &[Flux], width_d: f64, gap_d: f64) -> Self {
         let mut bins = Vec::new();
         let mut segments = 0;
-        for segment in measured.chunk_by(|a, b| b.time_d - a.time_d <= gap_d) {
-            let of_cells = segment.chunk_by(|a, b| {
-                cell(a.time_d, segment[0].time_d, width_d) == cell(b.time_d, segment[0].time_d, width_d)
-            });
-            let mut own: Vec<FluxBin> = of_cells.map(|measured| mean(measured, segments)).collect();
+        for segment in self::segments(measured, gap_d) {
+            let mut own: Vec<FluxBin> = cells(segment, width_d).map(|measured| mean(measured, segments)).collect();
             let total: f64 = own.iter().map(|bin| bin.sigma.powi(-2)).sum();
             let level = own.iter().map(|bin| bin.flux * bin.sigma.powi(-2)).sum::<f64>() / total;
             let (first, last) = (own[0].time_d, own[own.len() - 1].time_d);

@@ -80,6 +80,84 @@ fn a_light_curve_from_its_table_to_a_figure() {
     says(&desk.read("map/fit.json"), &["light_curves"]);
 }
 
+/// A planet and its star, for two rotations.
+fn with_planet() -> Value {
+    let mut config = star();
+    config["planet"] = json!({ "k_kms": 0.3, "porb_over_prot": 1.3, "phi": 0.2 });
+    config["imaging"]["spot_break_degree"] = json!(0);
+    let cycles: Vec<f64> = (0..9).map(|k| 0.27 * f64::from(k)).collect();
+    config["observations"]["simulate"]["cycles"] = json!(cycles);
+    config["parameters"] = json!({
+        "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
+        "porb_over_prot": { "prior": "uniform", "min": 0.5, "max": 4.0 },
+        "phi": { "prior": "periodic" }
+    });
+    config
+}
+
+/// One of 122 fluxes that is 5 % too high made a signal more significant by a factor of 1e23, and its period another.
+#[test]
+fn a_wild_point_is_named_and_moves_no_planet() {
+    let desk = Desk::new(with_planet());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let mut config = with_planet();
+    config["observations"] = from_files()["observations"].clone();
+    config["photometry"] = from_files()["photometry"].clone();
+    desk.write("star.json", &config.to_string());
+    let signal = |out: &str, parts: &[&str]| {
+        says(&desk.succeed(&["periodogram", "star.json", "--out", out]), parts);
+        let file: Value = serde_json::from_str(&desk.read(&format!("{out}/periodogram.json"))).unwrap();
+        let verdict = &file["verdict"];
+        let of = |key: &str| verdict["signal"][key].as_f64().unwrap();
+        let ln_fap = verdict["false_alarm_probability"].as_f64().unwrap().ln();
+        [of("k_kms"), of("sigma_k_kms"), of("period_d"), ln_fap]
+    };
+    let good = signal("good", &["light curve: tess: "]);
+    let table = desk.read("data/tess.csv");
+    let high = |(k, line): (usize, &str)| match line.split(',').collect::<Vec<_>>()[..] {
+        [time, flux, sigma] if k == 60 => format!("{time},{},{sigma}\n", 1.05 * flux.parse::<f64>().unwrap()),
+        _ => format!("{line}\n"),
+    };
+    desk.write("data/tess.csv", &table.lines().enumerate().map(high).collect::<String>());
+    let note = "1 wild point left out, which photometry.outliers \"keep\" brings back: 2.950 d (flux 1.0";
+    let wild = signal("wild", &["light curve: tess: ", note]);
+    let sigma = good[1];
+    assert!((wild[0] - good[0]).abs() < 0.1 * sigma && (wild[1] / sigma - 1.0).abs() < 0.03, "{good:?} {wild:?}");
+    assert!((wild[2] - good[2]).abs() < 0.01 && (wild[3] - good[3]).abs() < f64::ln(3.0), "{good:?} {wild:?}");
+    // kept, it is named where it is in the way
+    config["photometry"]["outliers"] = json!("keep");
+    desk.write("star.json", &config.to_string());
+    let said = desk.succeed(&["map", "star.json", "--out", "kept"]);
+    assert!(!said.contains("wild point"), "{said}");
+    let fit: Value = serde_json::from_str(&desk.read("kept/fit.json")).unwrap();
+    says(&fit["warnings"].to_string(), &["light curve tess", "2.9", "sigma", "photometry.exclude"]);
+    let fit: Value = serde_json::from_str(&desk.read("wild/periodogram.json")).unwrap();
+    says(&fit["measured"]["light_curve_notes"].to_string(), &["1 wild point"]);
+}
+
+#[test]
+fn what_was_left_out_and_converted_is_told() {
+    let mut config = star();
+    config["star"]["epoch_d"] = json!(2_459_000.5);
+    let desk = Desk::new(config.clone());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let btjd = |(k, line): (usize, &str)| match line.split(',').map(str::parse::<f64>).collect::<Result<Vec<_>, _>>() {
+        Ok(row) if k == 30 => format!("{};;;G\n", row[0] - 2_457_000.0),
+        Ok(row) => format!("{};{};{};{}\n", row[0] - 2_457_000.0, row[1], row[2], if k == 40 { "B" } else { "G" }),
+        Err(_) => "# sector 12\nBTJD;flux;flux_err;quality\n".into(),
+    };
+    let table = desk.read("data/tess.csv").lines().enumerate().map(btjd).collect::<String>();
+    desk.write("data/tess.csv", &table);
+    config["observations"] = from_files()["observations"].clone();
+    config["photometry"] = from_files()["photometry"].clone();
+    desk.write("star.json", &config.to_string());
+    let notes =
+        ["1 of 134 rows left out, whose numbers", "1 of 134 rows left out that the column quality", "2457000 added"];
+    says(&desk.succeed(&["map", "star.json", "--out", "map"]), &notes);
+    let first = desk.read("map/lightcurve.csv").lines().nth(1).unwrap().split(',').next().unwrap().to_owned();
+    assert!((first.parse::<f64>().unwrap() - 2_459_000.5).abs() < 0.1, "{first}");
+}
+
 #[test]
 fn what_is_no_light_curve_is_refused_by_key_file_or_line() {
     let refused = |edit: &dyn Fn(&mut Value), parts: &[&str]| {
@@ -117,9 +195,11 @@ fn what_is_no_light_curve_is_refused_by_key_file_or_line() {
     };
     table("time,flux\n1,2\n", &["tess.csv", "no column sigma", "time, flux, sigma"]);
     table("time,flux,sigma\n1,-2,0.1\n", &["tess.csv:2", "flux: -2 must be above 0"]);
-    table("time,flux,sigma\n1,2,0.1\n2,2,0\n", &["tess.csv:3", "sigma"]);
+    table("time,flux,sigma\n1,2,0\n2,2,0\n", &["tess.csv:2", "sigma: 0 must be above 0"]);
     table("time,flux,sigma\n1,nan,0.1\n", &["tess.csv:2", "flux"]);
     table("time,flux,sigma\nnoon,2,0.1\n", &["tess.csv:2", "noon"]);
-    table("time,flux,sigma\n2457000,2,0.1\n", &["photometry", "from any profile", "zero point"]);
+    table("time,flux,sigma\n2457000,2,0.1\n", &["photometry", "from any profile", "zero point", "BTJD"]);
+    table("time,flux,sigma\n1,11.2,0.01\n2,11.3,0.01\n", &["tess.csv", "magnitudes", "mag"]);
+    table("SIMPLE  =                    T", &["tess.csv", "a FITS file", "to_csv"]);
     says(&desk.refusal(&["simulate", "star.json", "--out", "x"]), &["observations.simulate"]);
 }

@@ -1,12 +1,14 @@
 //! The light curves of a config, brought to bins.
 
-use crate::data::config::{ConfigError, LightCurveSettings, Settings};
+use crate::data::config::{ConfigError, LightCurveSettings, OutlierTreatment, Settings};
 use crate::data::dataset::is_within;
+use crate::data::io::light_curve::{Measurements, fitting};
 use crate::field::Lifetime;
 use crate::model::Parameter;
 use crate::star::observation::Observations;
-use crate::surface::photometry::{Flux, FluxBin, LightCurve, bin_width_d};
+use crate::surface::photometry::{Flux, FluxBin, LightCurve, bin_width_d, outliers};
 use sha2::{Digest, Sha256};
+use std::ops::Range;
 
 /// Spots know nothing of themselves after so many lifetimes.
 const FORGOTTEN: f64 = 5.0;
@@ -14,39 +16,112 @@ const FORGOTTEN: f64 = 5.0;
 /// Fewest measurements of a light curve.
 const FEWEST: usize = 3;
 
+/// As many outliers are named.
+const NAMED: usize = 8;
+
 /// A light curve in bins.
 pub(super) struct Binned {
     pub curve: LightCurve,
     /// How many measurements lie within its excluded windows.
     left_out: usize,
+    /// What was made of it on reading, and what is wild in it.
+    notes: Vec<String>,
+}
+
+/// What of a light curve goes into its bins.
+struct Kept {
+    fluxes: Vec<Flux>,
+    excluded: usize,
+    notes: Vec<String>,
 }
 
 /// The light curves of `settings`, of which this was `measured`.
 ///
 /// # Errors
 /// One of which nothing is left.
-pub(super) fn binned(settings: &Settings, measured: &[Vec<Flux>]) -> Result<Vec<Binned>, ConfigError> {
-    let curves = || settings.light_curves.iter().zip(measured);
-    let kept = curves().map(|(curve, all)| kept(settings, curve, all)).collect::<Result<Vec<_>, _>>()?;
-    let times_d: Vec<Vec<f64>> = kept.iter().map(|one| one.iter().map(|flux| flux.time_d).collect()).collect();
+pub(super) fn binned(settings: &Settings, measured: &[Measurements]) -> Result<Vec<Binned>, ConfigError> {
+    let curves = || settings.light_curves.iter();
+    let kept = curves().zip(measured).map(|(curve, all)| kept(settings, curve, all)).collect::<Result<Vec<_>, _>>()?;
+    let times_d: Vec<Vec<f64>> = kept.iter().map(|one| one.fluxes.iter().map(|flux| flux.time_d).collect()).collect();
     let width_d = bin_width_d(&times_d, settings.star.rotation_period_d);
-    let in_bins = |((of, all), kept): ((&LightCurveSettings, &Vec<Flux>), Vec<Flux>)| Binned {
-        curve: LightCurve::new(&of.name, of.band, &kept, width_d, of.segment_gap_d),
-        left_out: all.len() - kept.len(),
+    let in_bins = |(of, Kept { fluxes, excluded, notes }): (&LightCurveSettings, Kept)| Binned {
+        curve: LightCurve::new(&of.name, of.band, &fluxes, width_d, of.segment_gap_d),
+        left_out: excluded,
+        notes,
     };
     Ok(curves().zip(kept).map(in_bins).collect())
 }
 
-/// What lies outside of the excluded windows, errors scaled.
-fn kept(settings: &Settings, curve: &LightCurveSettings, all: &[Flux]) -> Result<Vec<Flux>, ConfigError> {
-    let mut kept: Vec<Flux> = all.iter().filter(|one| !is_within(&curve.exclude, one.time_d)).copied().collect();
-    if kept.len() < FEWEST.min(all.len()) {
-        let (left, before) = (kept.len(), all.len());
-        let problem = format!("leaves {left} of {before} measurements, at least {FEWEST} are needed");
-        return Err(settings.fault(&format!("{}.exclude", curve.key), &problem));
+/// What lies outside of the excluded windows and is not wild, errors scaled.
+fn kept(settings: &Settings, curve: &LightCurveSettings, all: &Measurements) -> Result<Kept, ConfigError> {
+    let is_kept = |one: &&Flux| !is_within(&curve.exclude, one.time_d);
+    let mut fluxes: Vec<Flux> = all.fluxes.iter().filter(is_kept).copied().collect();
+    let enough = |left: usize, key: &str| match left < FEWEST.min(all.fluxes.len()) {
+        false => Ok(()),
+        true => {
+            let before = all.fluxes.len();
+            let problem = format!("leaves {left} of {before} measurements, at least {FEWEST} are needed");
+            Err(settings.fault(&format!("{}.{key}", curve.key), &problem))
+        }
+    };
+    enough(fluxes.len(), "exclude")?;
+    let excluded = all.fluxes.len() - fluxes.len();
+    fluxes.iter_mut().for_each(|one| one.sigma *= curve.sigma_scale);
+    let mut notes = all.remarks.clone();
+    if curve.outliers == OutlierTreatment::LeaveOut {
+        let found = outliers(&fluxes, settings.star.rotation_period_d, curve.segment_gap_d);
+        notes.extend(wild_note(&fluxes, &found.wild, &curve.key));
+        notes.extend(dips_note(&fluxes, &found.dips, &curve.key));
+        let mut wild = vec![false; fluxes.len()];
+        found.wild.iter().for_each(|(k, _)| wild[*k] = true);
+        let mut wild = wild.into_iter();
+        fluxes.retain(|_| wild.next() == Some(false));
+        enough(fluxes.len(), "outliers")?;
     }
-    kept.iter_mut().for_each(|one| one.sigma *= curve.sigma_scale);
-    Ok(kept)
+    let notes = notes.into_iter().map(|note| format!("{}: {note}", curve.name)).collect();
+    Ok(Kept { fluxes, excluded, notes })
+}
+
+/// Which measurements are left out as wild, and what their neighbours let expect.
+fn wild_note(fluxes: &[Flux], wild: &[(usize, f64)], key: &str) -> Option<String> {
+    let runs: Vec<&[(usize, f64)]> = wild.chunk_by(|a, b| a.0 + 1 == b.0).collect();
+    let off = |(k, expected): (usize, f64)| (fluxes[k].flux - expected).abs();
+    let named = |run: &&[(usize, f64)]| {
+        let worst = run.iter().copied().max_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(run[0]);
+        let (flux, expected) = (fluxes[worst.0].flux, worst.1);
+        let digits = if expected.abs() < 100.0 { 4 } else { 0 };
+        let [first, last] = [run[0].0, run[run.len() - 1].0].map(|k| fluxes[k].time_d);
+        match run.len() {
+            1 => format!("{first:.3} d (flux {flux:.digits$}, by its neighbours {expected:.digits$})"),
+            all => format!(
+                "{all} from {first:.3} to {last:.3} d (flux {flux:.digits$}, by their neighbours {expected:.digits$})"
+            ),
+        }
+    };
+    let mut all: Vec<String> = runs.iter().take(NAMED).map(named).collect();
+    if runs.len() > NAMED {
+        all.push(format!("and at {} more times", runs.len() - NAMED));
+    }
+    let points = if wild.len() == 1 { "point" } else { "points" };
+    let (count, all) = (wild.len(), all.join("; "));
+    (count > 0).then(|| format!("{count} wild {points} left out, which {key}.outliers \"keep\" brings back: {all}"))
+}
+
+/// Dips that may be transits.
+fn dips_note(fluxes: &[Flux], dips: &[Range<usize>], key: &str) -> Option<String> {
+    let named = |dip: &Range<usize>| {
+        let [first, last] = [dip.start, dip.end - 1].map(|k| fluxes[k].time_d);
+        format!("{first:.3} to {last:.3} d")
+    };
+    let mut all: Vec<String> = dips.iter().take(NAMED).map(named).collect();
+    if dips.len() > NAMED {
+        all.push(format!("and {} more", dips.len() - NAMED));
+    }
+    let all = all.join(", ");
+    let text = format!(
+        "dips of several points are kept, which no spots make; if they are transits, list them in {key}.exclude: {all}"
+    );
+    (!dips.is_empty()).then_some(text)
 }
 
 /// The bins of all light curves, which must tell something of the spots that the profiles see.
@@ -69,9 +144,17 @@ pub(super) fn near(
         let nearest = binned.bins.iter().map(away).fold(f64::INFINITY, f64::min);
         if nearest > FORGOTTEN * lifetime_d {
             let [first, last] = [binned.bins[0].time_d, binned.bins[binned.bins.len() - 1].time_d];
+            let of_bins: Vec<f64> = binned.bins.iter().map(|bin| bin.time_d).collect();
+            let cure = match fitting(&of_bins, &times_d, FORGOTTEN * lifetime_d) {
+                Some(([own, other], add)) => format!(
+                    ". They fit if they are {own} and those of the profiles {other}: then add {add} to them, or give \
+                     the column of times its name"
+                ),
+                None => String::new(),
+            };
             let problem = format!(
                 "its times, {first:.2} to {last:.2} d, are {nearest:.0} d or more from any profile, and spots do not \
-                 live that long; both must count days from one zero point"
+                 live that long; both must count days from one zero point{cure}"
             );
             return Err(settings.fault(&curve.key, &problem));
         }
@@ -80,6 +163,11 @@ pub(super) fn near(
 }
 
 impl Binned {
+    /// What was left out and converted, a sentence each.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// What was made of it, in a line.
     pub fn line(&self) -> String {
         let LightCurve { name, bins, segments, .. } = &self.curve;

@@ -78,6 +78,7 @@ impl Calibrated {
             velocity_jitter,
             seasons: if seasons.len() > 1 { seasons } else { Vec::new() },
             light_curves: light_curves.iter().map(Binned::line).collect(),
+            light_curve_notes: light_curves.iter().flat_map(Binned::notes).cloned().collect(),
             chi2_target: chosen,
             ..Measured::default()
         };

@@ -44,6 +44,9 @@ pub struct Measured {
     /// What was made of the light curves, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub light_curves: Vec<String>,
+    /// What was left out of the light curves and converted, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub light_curve_notes: Vec<String>,
     /// `imaging.chi2_target`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chi2_target: Option<ChosenTarget>,
@@ -121,7 +124,8 @@ impl Measured {
             ("season", format!("{first_d:.3} to {last_d:.3} d: {profiles} profiles, with a map of their own"))
         };
         let seasons = self.seasons.iter().map(season);
-        let light = self.light_curves.iter().map(|remark| ("light curve", remark.clone()));
+        let light =
+            self.light_curves.iter().chain(&self.light_curve_notes).map(|remark| ("light curve", remark.clone()));
         profiles.chain(sets).chain(seasons).chain(light).chain(errors).chain(jitter).chain(target).collect()
     }
 }

@@ -96,6 +96,51 @@ impl Light {
     }
 }
 
+/// A bin so many standard deviations from the maps is no noise,
+const BEYOND_NOISE: f64 = 5.0;
+
+/// and neither is a light curve of a larger chi2 per bin.
+const WORST_CHI2: f64 = 2.0;
+
+/// As many bins are named.
+const NAMED: usize = 5;
+
+/// What of light curves is not as noise would have it: chi2 per bin, and single bins.
+pub(super) fn misfits(imager: &Imager, fits: &[FluxFit]) -> Vec<String> {
+    let mut all = Vec::new();
+    for (c, curve) in imager.light_curves.iter().enumerate() {
+        let scaled = |fit: &FluxFit| (fit.bin.flux - fit.model) / fit.bin.sigma;
+        let of_curve: Vec<(f64, f64)> =
+            fits.iter().filter(|fit| fit.curve == c).map(|fit| (fit.bin.time_d, scaled(fit))).collect();
+        let chi2 = of_curve.iter().map(|(_, off)| off * off).sum::<f64>() / of_curve.len() as f64;
+        let name = &curve.name;
+        // a few wild bins do not hide each other
+        let mut deviations: Vec<f64> = of_curve.iter().map(|(_, off)| off.abs()).collect();
+        deviations.sort_by(f64::total_cmp);
+        let scatter = (1.4826 * deviations[deviations.len() / 2]).max(1.0);
+        let wild: Vec<&(f64, f64)> = of_curve.iter().filter(|(_, off)| off.abs() > BEYOND_NOISE * scatter).collect();
+        if !wild.is_empty() {
+            let mut named: Vec<String> =
+                wild.iter().take(NAMED).map(|(time_d, off)| format!("{time_d:.3} d ({off:+.1} sigma)")).collect();
+            if wild.len() > NAMED {
+                named.push(format!("and {} more", wild.len() - NAMED));
+            }
+            all.push(format!(
+                "light curve {name}: no noise puts bins as far from the maps as at {}: flares, transits or bad \
+                 measurements, whose times photometry.exclude leaves out",
+                named.join(", ")
+            ));
+        } else if chi2 > WORST_CHI2 {
+            let factor = chi2.sqrt();
+            all.push(format!(
+                "light curve {name}: chi2 is {chi2:.1} per bin: it has what neither spots nor its errors explain; \
+                 photometry.sigma_scale {factor:.1} makes the errors as large"
+            ));
+        }
+    }
+    all
+}
+
 impl Marginal {
     /// How the flux of each bin changes with a velocity, which is not at all, and with the star's parameters, at the
     /// most probable maps (1, 1 + parameters).

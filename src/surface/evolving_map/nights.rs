@@ -1,6 +1,7 @@
 //! The maps of an evolving star held against the data: the field fitted, its most probable map and standard deviation
 //! at any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
 
+use super::light::misfits;
 use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
 use crate::model::ParameterValues;
@@ -78,13 +79,15 @@ impl SurfaceMaps {
                 summary.chi2_per_datum
             ));
         }
+        let light = marginal.light_curves(imager);
+        warnings.extend(misfits(imager, &light));
         let counted = |counted: bool| modelled.estimates.iter().filter(move |_| counted);
         let nuisances = &imager.data.nuisances;
         Ok(SurfaceMaps {
             maps: times_d.iter().enumerate().map(map).collect(),
             nuisances: counted(nuisances.has_line_and_continuum()).map(|found| found.line_and_continuum).collect(),
             zero_points_kms: counted(marginal.assumed.jitter_kms > 0.0).map(|found| found.zero_point_kms).collect(),
-            light: marginal.light_curves(imager),
+            light,
             trade_off: Vec::new(),
             field: Some(SpotField::of(&fitted)),
             model: modelled.intensities(),
@@ -103,11 +106,9 @@ pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &F
     let modelled = Modelled::of(imager, &Basis::new(&imager.grid), marginal, &marginal.settled.coefficients);
     let against = Against::new(imager, observations, marginal.values, &modelled.depths());
     let sets = imager.profiles_of_sets();
-    Explained {
-        chi2_per_datum: against.chi2() / observations.len() as f64,
-        misfit: Checks::of_flexible(&against.residuals, &sets, imager.data.correlated_bins).warnings,
-        velocities: against.moments,
-    }
+    let mut misfit = Checks::of_flexible(&against.residuals, &sets, imager.data.correlated_bins).warnings;
+    misfit.extend(misfits(imager, &marginal.light_curves(imager)));
+    Explained { chi2_per_datum: against.chi2() / observations.len() as f64, misfit, velocities: against.moments }
 }
 
 /// What is to be said of bounds that the field reached.

@@ -3,7 +3,7 @@
 use super::checks::{check_size, check_windows, most, names, positive};
 use super::star::{contrast, limb_darkening};
 use crate::data::config::error::Fault;
-use crate::data::config::written::{Config, PhotometrySection, SimulatedLight};
+use crate::data::config::written::{Config, OutlierTreatment, PhotometrySection, SimulatedLight};
 use crate::star::Band;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +27,8 @@ pub struct LightCurveSettings {
     pub sigma_scale: f64,
     /// Windows `[start, end]` (d) whose measurements are left out.
     pub exclude: Vec<[f64; 2]>,
+    /// What becomes of measurements that no spot explains.
+    pub outliers: OutlierTreatment,
 }
 
 /// Where a light curve comes from.
@@ -70,6 +72,7 @@ pub(super) fn resolve_photometry(written: &Config, config: &Path) -> Result<Vec<
             segment_gap_d: section.segment_gap_d,
             sigma_scale: section.sigma_scale,
             exclude: section.exclude.clone(),
+            outliers: section.outliers,
             key,
         });
     }

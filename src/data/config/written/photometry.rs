@@ -15,10 +15,10 @@ pub struct PhotometrySection {
     /// `_` and `.`. "photometry" if not given, of several "photometry1", "photometry2", ...
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// A table of comma-separated numbers, relative to the folder of this config, whose first line has the names of the
-    /// columns, `time`, `flux` and `sigma` among them. Times are days, counted as those of the profiles; flux and its
-    /// standard error are in any unit of brightness (not magnitudes). Flares and transits must be cut out, here or by
-    /// `exclude`.
+    /// A table as text, relative to the folder of this config, with a line of names of the columns: time (d), flux (or
+    /// magnitude) and its error, as `time,flux,sigma` or by the usual other names, such as BTJD, PDCSAP_FLUX, mag_err.
+    /// Days are counted as those of the profiles, unless the name has their zero point. Transits must be cut out, here
+    /// or by `exclude`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
     /// Brightness of a spot over that of the photosphere in this band, from 0 and below 1; that of the star if not
@@ -42,9 +42,30 @@ pub struct PhotometrySection {
     /// Windows of time `[start, end]` (d) whose measurements are left out: transits, flares.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<[f64; 2]>,
+    /// What becomes of wild measurements: those more than 5 standard deviations from their neighbours within 1/12 of a
+    /// rotation, and flares. Dips of three and more are kept.
+    #[serde(default, skip_serializing_if = "OutlierTreatment::is_default")]
+    pub outliers: OutlierTreatment,
     /// A simulated light curve of the star that `observations.simulate` has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulate: Option<SimulatedLight>,
+}
+
+/// What becomes of wild measurements.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OutlierTreatment {
+    /// They are left out, counted and named.
+    #[default]
+    LeaveOut,
+    /// They are kept as the others.
+    Keep,
+}
+
+impl OutlierTreatment {
+    fn is_default(&self) -> bool {
+        *self == OutlierTreatment::default()
+    }
 }
 
 /// A simulated light curve, from the first profile to the last.

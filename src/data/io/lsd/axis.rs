@@ -1,5 +1,5 @@
-//! The velocity axis of a profile: uniform, in km/s, and on the bins of the first profile of a star, though it may begin
-//! and end elsewhere.
+//! The velocity axis of a profile: uniform, in km/s, and on the bins of the first profile of a star, though it may
+//! begin and end elsewhere.
 
 use super::row::{Digits, Fault, Row, fault};
 

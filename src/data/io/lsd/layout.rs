@@ -6,8 +6,8 @@
 //!   (2: I, sigma; 6: V, sigma, null, sigma as well; 8: another null, sigma).
 //! - iLSD (Kochukhov et al. 2010, A&A 524, A5; README of <https://github.com/okochukhov/iLSD>): a line `bins profiles
 //!   S/N chi2`; rows of velocity, profile, sigma; before each further profile a line of its own `S/N chi2`.
-//! - CSV and other tables (`data::io::table`): a line that names the columns, in any order and perhaps with units; rules
-//!   of dashes or units below it, as in an `.rdb`; rows with commas, semicolons, tabs or blanks.
+//! - CSV and other tables (`data::io::table`): a line that names the columns, in any order and perhaps with units;
+//!   rules of dashes or units below it, as in an `.rdb`; rows with commas, semicolons, tabs or blanks.
 //!
 //! Comments and titles before the rows are passed over, and so may be any of these lines. A fourth column without a
 //! name is a flag.

@@ -1,0 +1,285 @@
+//! Which columns of a table are those of a light curve, by the names that observers and archives give them.
+
+use crate::data::io::table::{self, Lines, Name, Table, readings};
+
+/// What a column of brightness holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Brightness {
+    Flux,
+    Magnitude,
+}
+
+/// Names of times that are Julian dates, or days of whatever count; those before others are taken first.
+const TIMES: [&str; 14] =
+    ["time", "times", "bjd", "bjdtdb", "bjdutc", "hjd", "hjdutc", "jd", "jdutc", "t", "tmid", "midtime", "days", "day"];
+
+/// Names of days from another zero point, and it.
+const ZERO_POINTS: [(&str, f64); 12] = [
+    ("btjd", BTJD),
+    ("tjd", BTJD),
+    ("bkjd", BKJD),
+    ("kjd", BKJD),
+    ("mjd", MJD),
+    ("bmjd", MJD),
+    ("hmjd", MJD),
+    ("mjdtdb", MJD),
+    ("bmjdtdb", MJD),
+    ("mjdutc", MJD),
+    ("rjd", RJD),
+    ("rbjd", RJD),
+];
+
+/// Zero points of days as Julian dates.
+pub const BTJD: f64 = 2_457_000.0;
+pub const BKJD: f64 = 2_454_833.0;
+pub const MJD: f64 = 2_400_000.5;
+pub const RJD: f64 = 2_400_000.0;
+
+/// Names of fluxes; those before others are taken first.
+const FLUXES: [&str; 19] = [
+    "flux",
+    "fluxes",
+    "f",
+    "normflux",
+    "normalizedflux",
+    "normalisedflux",
+    "fluxnorm",
+    "relativeflux",
+    "relflux",
+    "correctedflux",
+    "fluxcorr",
+    "fcor",
+    "pdcsapflux",
+    "kspsapflux",
+    "sapflux",
+    "detflux",
+    "counts",
+    "intensity",
+    "brightness",
+];
+
+/// Names of magnitudes.
+const MAGNITUDES: [&str; 13] = [
+    "mag",
+    "mags",
+    "magnitude",
+    "magnitudes",
+    "vmag",
+    "bmag",
+    "gmag",
+    "rmag",
+    "imag",
+    "zmag",
+    "tmag",
+    "kpmag",
+    "magcorr",
+];
+
+/// What stands before or after the name of a column in that of its error.
+const OF_ERRORS: [&str; 11] =
+    ["err", "error", "errors", "sigma", "sig", "uncertainty", "unc", "e", "d", "std", "stddev"];
+
+/// Names of errors of whatever there is.
+const ERRORS: [&str; 14] = [
+    "sigma",
+    "fluxerr",
+    "fluxerror",
+    "err",
+    "error",
+    "errors",
+    "eflux",
+    "e",
+    "sig",
+    "uncertainty",
+    "unc",
+    "std",
+    "magerr",
+    "merr",
+];
+
+/// Names of flags, and of bands.
+const FLAGS: [&str; 11] = [
+    "quality",
+    "sapquality",
+    "qualityflag",
+    "qualityflags",
+    "dquality",
+    "flag",
+    "flags",
+    "catflags",
+    "qflag",
+    "qual",
+    "q",
+];
+const BANDS: [&str; 6] = ["filter", "filt", "filtercode", "band", "passband", "bandpass"];
+
+/// Units of time that are days.
+const DAYS: [&str; 11] = ["", "d", "day", "days", "jd", "bjd", "hjd", "bjdtdb", "tdb", "utc", "jdutc"];
+
+/// What flags say of good rows in words.
+const GOOD: [&str; 5] = ["g", "good", "ok", "a", "pass"];
+
+/// The line of names is looked for among so many.
+const MOST_LINES: usize = 100;
+
+/// The columns of a light curve by their numbers.
+#[derive(Clone, Debug)]
+pub(super) struct Columns {
+    names: Vec<Name>,
+    pub time: usize,
+    pub value: usize,
+    pub sigma: usize,
+    pub flag: Option<usize>,
+    pub band: Option<usize>,
+    pub brightness: Brightness,
+    /// Whether the brightness has a unit, in brackets or in its name.
+    pub has_unit: bool,
+    /// From where days are counted (JD), where that is said and is not 0.
+    pub zero_jd: Option<f64>,
+    /// What has to be known of the choice.
+    pub remarks: Vec<String>,
+}
+
+impl Columns {
+    /// Those of a table with this text.
+    ///
+    /// # Errors
+    /// What is missing.
+    pub fn of(table: &Table, text: &str) -> Result<Self, String> {
+        let count = table.rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
+        // rows without a flux may come first, which are no names, and rows whose last cell is empty look shorter
+        let Lines { lines, comments } = Lines::of(text);
+        let lines = lines.iter().map(|line| line.text).chain(comments);
+        let named = lines.filter(|line| line.contains(char::is_alphabetic)).take(MOST_LINES);
+        let of_line = |line| [count, count + 1].into_iter().flat_map(move |count| readings(line, count));
+        let others: Vec<Vec<Name>> = named.flat_map(of_line).collect();
+        let mut first_problem = None;
+        for names in table.names.iter().chain(&others) {
+            match Columns::named(names) {
+                Ok(columns) => return Ok(columns),
+                Err(problem) => drop(first_problem.get_or_insert(problem)),
+            }
+        }
+        match first_problem {
+            None if count == 3 => Ok(Columns::unnamed()),
+            Some(problem) if table.names.iter().flatten().any(|name| !name.bare.is_empty()) => Err(problem),
+            _ => Err("no line of names: the first line must name the columns, time, flux, sigma among them".into()),
+        }
+    }
+
+    /// The three of a table without names.
+    fn unnamed() -> Self {
+        let name = |bare: &str| Name { written: bare.into(), bare: bare.into(), unit: String::new() };
+        Columns {
+            names: ["time", "flux", "sigma"].map(name).to_vec(),
+            time: 0,
+            value: 1,
+            sigma: 2,
+            flag: None,
+            band: None,
+            brightness: Brightness::Flux,
+            has_unit: false,
+            zero_jd: None,
+            remarks: vec!["no line of names: the columns are taken for time, flux, sigma".into()],
+        }
+    }
+
+    fn named(names: &[Name]) -> Result<Self, String> {
+        let first_of = |of: &[&str]| of.iter().find_map(|one| names.iter().position(|name| name.bare == *one));
+        let missing = |what: &str| {
+            let written: Vec<&str> = names.iter().map(|name| name.written.as_str()).collect();
+            format!(
+                "no column {what} among {}: the first line must name the columns, time, flux, sigma among them",
+                written.join(", ")
+            )
+        };
+        let time = time(names).ok_or_else(|| missing("time"))?;
+        let zero_jd = zero_jd(&names[time].bare).or_else(|| zero_jd(&names[time].unit));
+        if zero_jd.is_none() && !DAYS.contains(&names[time].unit.as_str()) {
+            return Err(format!("column {}: times must be in days", names[time].written));
+        }
+        let with_unit = |of: &str| names.iter().position(|name| name.bare.starts_with(of) && is_value(&name.bare, of));
+        let flux = first_of(&FLUXES).or_else(|| with_unit("flux")).filter(|k| !names[*k].unit.contains("mag"));
+        let magnitude = first_of(&MAGNITUDES).or_else(|| names.iter().position(|name| name.unit == "mag"));
+        let (value, brightness) = match (flux, magnitude) {
+            (Some(flux), _) => (flux, Brightness::Flux),
+            (None, Some(magnitude)) => (magnitude, Brightness::Magnitude),
+            (None, None) => return Err(missing("flux")),
+        };
+        let bare = names[value].bare.as_str();
+        let own = OF_ERRORS.iter().flat_map(|error| [format!("{bare}{error}"), format!("{error}{bare}")]);
+        let own: Vec<String> = own.collect();
+        let of_other = |name: &str| match brightness {
+            Brightness::Flux => name.contains("mag"),
+            Brightness::Magnitude => name.contains("flux"),
+        };
+        let usual: Vec<&str> = ERRORS.into_iter().filter(|name| !of_other(name)).collect();
+        let own = own.iter().map(String::as_str).collect::<Vec<_>>();
+        let sigma = first_of(&own).or_else(|| first_of(&usual)).filter(|k| *k != value && *k != time);
+        let sigma = sigma.ok_or_else(|| missing(&format!("sigma (the error of {})", names[value].written)))?;
+        let mut remarks = Vec::new();
+        let others: Vec<&Name> = names
+            .iter()
+            .enumerate()
+            .filter(|(k, one)| *k != value && FLUXES.contains(&&*one.bare))
+            .map(|(_, n)| n)
+            .collect();
+        if brightness == Brightness::Flux && !others.is_empty() {
+            let others: Vec<&str> = others.iter().map(|name| name.written.as_str()).collect();
+            remarks.push(format!("its flux is the column {}, not {}", names[value].written, others.join(", ")));
+        }
+        Ok(Columns {
+            has_unit: !names[value].unit.is_empty() || !FLUXES.contains(&bare),
+            names: names.to_vec(),
+            time,
+            value,
+            sigma,
+            flag: first_of(&FLAGS),
+            band: first_of(&BANDS),
+            brightness,
+            zero_jd,
+            remarks,
+        })
+    }
+
+    /// The name of a column, as it is written.
+    pub fn name(&self, column: usize) -> &str {
+        &self.names[column].written
+    }
+}
+
+/// The column of times.
+fn time(names: &[Name]) -> Option<usize> {
+    // "time_bjd" is as "bjd"
+    let is = |name: &Name, due: &str| name.bare == due || name.bare.strip_prefix("time") == Some(due);
+    let plain = TIMES.iter().find_map(|due| names.iter().position(|name| is(name, due)));
+    plain.or_else(|| names.iter().position(|name| zero_jd(&name.bare).is_some()))
+}
+
+/// The zero point (JD) that the name of a time has: that of "BTJD", "BJD - 2457000", "time_mjd".
+fn zero_jd(bare: &str) -> Option<f64> {
+    let name = bare.strip_prefix("time").filter(|rest| !rest.is_empty()).unwrap_or(bare);
+    if let Some((_, zero)) = ZERO_POINTS.iter().find(|(one, _)| *one == name) {
+        return Some(*zero);
+    }
+    let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    match (letters.contains("jd") || letters.is_empty(), &name[letters.len()..]) {
+        (true, "24000005") => Some(MJD),
+        (true, digits) if digits.len() == 7 && digits.starts_with("24") => digits.parse().ok(),
+        _ => None,
+    }
+}
+
+/// Whether a name that begins as one of brightness is that, and not its error: `flux_mjy`, not `flux_err`.
+fn is_value(bare: &str, of: &str) -> bool {
+    let rest = &bare[of.len()..];
+    ["mjy", "jy", "e/s", "adu", "counts", "erg"].iter().any(|unit| rest.starts_with(unit)) && !rest.ends_with("err")
+}
+
+/// Whether the flag of a row says that it is bad: a number other than 0, or a word that is none for good.
+pub(super) fn is_flagged(cell: &str) -> bool {
+    match table::number(cell) {
+        Ok(number) => number != 0.0 && !number.is_nan(),
+        Err(_) => !GOOD.contains(&cell.trim().to_lowercase().as_str()),
+    }
+}
