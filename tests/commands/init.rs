@@ -5,6 +5,8 @@ use crate::desk::{Desk, dimcmc, says, text};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
+const PROFILES: usize = 11;
+
 /// A small star with a planet of 0.3 km/s, with continuum beside the line.
 fn simulated() -> Value {
     json!({
@@ -17,9 +19,9 @@ fn simulated() -> Value {
         "planet": { "k_kms": 0.3, "porb_over_prot": 1.7, "phi": 0.5 },
         "observations": { "simulate": {
             "spots": [[30, 40, 25, 0.8], [200, 10, 15, 0.9]],
-            "cycles": [0.0, 0.11, 0.23, 0.37, 0.52, 0.66, 0.79, 0.91, 1.05, 1.18, 1.33, 1.46, 1.61, 1.77, 1.9, 2.04],
-            "velocity_kms": { "min": -75.6, "max": 75.6, "step": 1.8 },
-            "snr": 300, "seed": 7, "pixels": 3000
+            "cycles": [0.0, 0.19, 0.37, 0.56, 0.79, 1.01, 1.18, 1.37, 1.61, 1.86, 2.04],
+            "velocity_kms": { "min": -64.8, "max": 64.8, "step": 2.7 },
+            "snr": 300, "seed": 7, "pixels": 2000
         } }
     })
 }
@@ -32,7 +34,7 @@ fn desk() -> Desk {
 
 /// Few pixels, for the sake of time.
 const INIT: [&str; 8] =
-    ["init", "data/observations.txt", "--rotation-period", "3", "--inclination", "50", "--pixels", "500"];
+    ["init", "data/observations.txt", "--rotation-period", "3", "--inclination", "50", "--pixels", "300"];
 
 fn number(config: &Value, pointer: &str) -> f64 {
     config.pointer(pointer).unwrap_or_else(|| panic!("{pointer}")).as_f64().unwrap_or_else(|| panic!("{pointer}"))
@@ -46,7 +48,7 @@ fn the_config_is_taken_as_it_is() {
     says(
         &table,
         &[
-            "16 profiles of 85 bins of 1.800 km/s, from 100.000 to 106.120 (6.120 d); S/N 300 a bin",
+            "11 profiles of 49 bins of 2.700 km/s, from 100.000 to 106.120 (6.120 d); S/N 300 a bin",
             "from the profiles\n",
             "given\n",
             "--rotation-period",
@@ -65,7 +67,7 @@ fn the_config_is_taken_as_it_is() {
     assert_eq!(config["star"]["line"]["equivalent_width_kms"], "auto");
     let range = &config["observations"]["velocity_range_kms"];
     // vsini, three sigmas of a line of 3.2 km/s (R = 65000 included) and six bins of continuum, around vsys
-    assert!((range[0].as_f64().unwrap() - (1.7 - 45.4)).abs() < 3.0 && (range[1].as_f64().unwrap() - 47.1).abs() < 3.0);
+    assert!((range[0].as_f64().unwrap() - (1.7 - 50.8)).abs() < 3.0 && (range[1].as_f64().unwrap() - 52.5).abs() < 3.0);
     assert_eq!(config["observations"]["sigma_scale"], "auto");
     says(&table, &["measured by every command: ", "times the quoted ones (continuum "]);
     assert!(config["observations"].get("continuum_level").is_none(), "it is at 1");
@@ -77,15 +79,14 @@ fn the_config_is_taken_as_it_is() {
     desk.succeed(&["map", "star.json", "--out", "map"]);
     desk.succeed(&["periodogram", "star.json", "--out", "search"]);
     let found = desk.json("search/periodogram.json");
-    println!("{}", found["best"]);
-    let short = json!({ "ensembles": 2, "walkers": 14, "steps": 10 });
-    let mut config = desk.json("star.json");
-    config["sampler"] = short;
+    let (k, sigma) = (number(&found, "/best/k_kms"), number(&found, "/best/sigma_k_kms"));
+    assert!((k - 0.3).abs() < 2.0 * sigma && sigma < 0.3, "{}", found["best"]);
+    // a step from the prior: that a search leads to the orbit is a truth of others
+    let mut config = config;
+    config["sampler"] = json!({ "ensembles": 2, "walkers": 14, "steps": 1 });
     desk.write("star.json", &config.to_string());
-    desk.succeed(&["sample", "star.json", "--out", "run"]);
-    let summary = desk.json("run/summary.json");
-    let k = summary["parameters"]["k_kms"]["median"].as_f64().unwrap();
-    assert!((k - 0.3).abs() < 0.15, "{k}");
+    desk.succeed(&["sample", "star.json", "--out", "run", "--start", "prior"]);
+    assert_eq!(desk.lines("run/chain.jsonl"), 2 * 14);
 }
 
 /// What is written does not depend on threads or on when and how often it is asked for.
@@ -145,7 +146,7 @@ fn options_replace_what_is_measured() {
 fn wrong_errors_are_scaled() {
     for (scale, expected) in [(5.0, 0.2), (0.2, 5.0)] {
         let desk = desk();
-        for k in 0..16 {
+        for k in 0..PROFILES {
             let scaled = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
                 [v, i, s] => format!("{v} {i} {:e}\n", s.parse::<f64>().unwrap() * scale),
                 _ => format!("{line}\n"),
@@ -168,14 +169,14 @@ fn wrong_errors_are_scaled() {
         assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
         desk.succeed(&["map", "star.json", "--out", "map"]);
         let found = number(&desk.json("map/fit.json"), "/measured/errors/sigma_scale");
-        // the scatter of 480 bins is good to 3 %, and the larger of two such numbers counts
+        // the scatter of some 120 bins is good to 6 %, and the larger of two such numbers counts
         assert!((found / expected - 1.0).abs() < 0.15, "{found}");
     }
 }
 
 /// Intensities of profile `k` become `change(k, intensity)`, times and errors stay.
 fn with_intensities(desk: &Desk, change: impl Fn(usize, f64) -> f64) {
-    for k in 0..16 {
+    for k in 0..PROFILES {
         let changed = |line: &str| match line.split_whitespace().collect::<Vec<_>>()[..] {
             [v, i, s] => format!("{v} {} {s}\n", change(k, i.parse::<f64>().unwrap())),
             _ => format!("{line}\n"),
@@ -201,7 +202,7 @@ fn a_continuum_that_is_not_at_one_is_recognised() {
         ],
     );
     let config = desk.json("star.json");
-    // 16 profiles of some 40 bins of S/N 300: good to 1e-4
+    // 11 profiles of some 11 bins of S/N 300: good to 3e-4
     assert!((number(&config, "/observations/continuum_level") - 0.977).abs() < 6e-4);
     assert!((number(&config, "/star/vsini_kms") - 25.0).abs() < 1.2);
     desk.succeed(&["map", "star.json", "--out", "map"]);

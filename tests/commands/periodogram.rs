@@ -175,7 +175,7 @@ fn changing(objective: Value) -> Desk {
     let mut config: Value = serde_json::from_slice(&std::fs::read(folder.join("config.json")).unwrap()).unwrap();
     config["observations"]["path"] = json!(folder.join("observations.txt"));
     config["imaging"]["objective"] = objective;
-    config["imaging"]["pixels"] = json!(1000);
+    config["imaging"]["pixels"] = json!(400);
     Desk::new(config)
 }
 
