@@ -98,14 +98,21 @@ fn figures_say_what_the_files_do(desk: &Desk) {
     // the highest place of a smooth curve is the highest peak, whose period is written beside it; the day is marked
     let svg = desk.read("periodogram/figures/periodogram.svg");
     let peak = &desk.json("periodogram/periodogram.json")["peaks"][0];
-    let period = format!("highest: {:.4} d", peak["period_d"].as_f64().unwrap());
+    let [period_d, sigma_d] = ["period_d", "sigma_period_d"].map(|key| peak[key].as_f64().unwrap());
+    let digits = (1.0 - sigma_d.log10().floor()) as usize;
+    let period = format!("highest: {period_d:.digits$} d");
     assert!(texts(&svg).contains(&period.as_str()) && texts(&svg).contains(&"1 d"), "{period}: {:?}", texts(&svg));
     let curve = svg.split("<path class=\"delta-ln-l\" d=\"").nth(1).unwrap().split('"').next().unwrap();
     assert!(curve.contains('C'), "straight lines from period to period");
     let (points, marker) = (paths(&svg, "delta-ln-l"), middle(&paths(&svg, "highest")[0]));
     let top = points[0].iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
-    // the curve goes from trial period to trial period, and the summit lies between two
-    assert!((top[0] - marker[0]).abs() < 1.0 && near(top[1], marker[1]), "{top:?} {marker:?}");
+    // the curve goes from trial period to trial period, the summit lies between two, and the spots of the best orbit are
+    // those beside the planet, which moves its period by a part of its error
+    let [low, high] = extent(&points[0])[0];
+    let range = |key: &str| desk.json("periodogram/periodogram.json")["search"][key].as_f64().unwrap();
+    let error = (high - low) * (sigma_d / period_d) / (range("max_period_d") / range("min_period_d")).ln();
+    let apart = (top[0] - marker[0]).abs();
+    assert!(apart < 0.5 * error && near(top[1], marker[1]), "{top:?} {marker:?} {error}");
     // what the program does not judge by is not drawn; what it judges by is said
     let svg = desk.read("sample/figures/autocorrelation.svg");
     assert!(!texts(&svg).contains(&"steps/50"));

@@ -11,6 +11,7 @@ use crate::figures::drawing::{
     width_pt,
 };
 use crate::model::Parameter;
+use crate::planets::verdict::decimals;
 use crate::runs::blind_search::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 use crate::runs::origin;
 use crate::star::Orbit;
@@ -197,7 +198,8 @@ fn marks(figure: &mut Figure, panels: [&Panel; 3], rotation: f64, found: &Marks)
 
 /// A marker on the highest peak, with its period beside it.
 fn highest(figure: &mut Figure, panel: &Panel, peak: &OrbitRecord) {
-    let text = format!("highest: {:.PERIOD_DIGITS$} d", peak.period_d);
+    let digits = peak.sigma_period_d.map_or(PERIOD_DIGITS, decimals);
+    let text = format!("highest: {:.digits$} d", peak.period_d);
     let [x, y] = panel.place(peak.period_d, peak.delta_ln_l);
     panel.points(figure, "highest", &[[peak.period_d, peak.delta_ln_l]], (Marker::Disc, 3.6, BLUE));
     let width = width_pt(&text, Font::SMALL.size);
