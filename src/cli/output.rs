@@ -60,17 +60,27 @@ impl Output {
         let wrong = |problem: String| Err(Failure::input(format!("--out {folder}: {problem}")));
         match std::fs::read_dir(&self.folder) {
             Ok(mut entries) => match entries.next() {
-                None => Ok(()),
-                _ if self.replaces() => Ok(()),
+                None => self.is_writable(&self.folder),
+                _ if self.replaces() => self.is_writable(&self.folder),
                 _ => wrong("the folder is not empty; give another one, or --force to replace the files in it".into()),
             },
             Err(e) => match obstacle(&self.folder) {
                 Some(file) if file == self.folder => wrong("is not a folder".into()),
                 Some(file) => wrong(format!("{} is not a folder", file.display())),
-                None if e.kind() == ErrorKind::NotFound => Ok(()),
+                None if e.kind() == ErrorKind::NotFound => self.is_writable(existing(&self.folder)),
                 None => Err(Failure::system(&e, format!("--out {folder}: cannot be used: {e}"))),
             },
         }
+    }
+
+    /// That something can be written into `folder`, by trying: permissions alone do not say it.
+    fn is_writable(&self, folder: &Path) -> Result<(), Failure> {
+        let probe = folder.join(format!(".dimcmc-{}", std::process::id()));
+        let tried = std::fs::create_dir(&probe).and_then(|()| std::fs::remove_dir(&probe));
+        tried.map_err(|e| {
+            let (out, folder) = (self.folder.display(), folder.display());
+            Failure::system(&e, format!("--out {out}: nothing can be written into {folder}: {e}"))
+        })
     }
 
     /// Whether what is in the folder is to be replaced: by the user's will, or because it is what a run or a landscape
@@ -113,6 +123,12 @@ impl Output {
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
         Ok(&self.folder)
     }
+}
+
+/// The folder that is there, of those on the way to one that may not be.
+fn existing(folder: &Path) -> &Path {
+    let mut way = folder.ancestors().filter(|folder| !folder.as_os_str().is_empty());
+    way.find(|folder| folder.is_dir()).unwrap_or(Path::new("."))
 }
 
 /// Options of every command that writes a config.

@@ -58,11 +58,33 @@ pub struct OptimumRecord {
     pub log_prob: f64,
 }
 
+/// Files by which the folder of a command is known.
+const KINDS: [(&str, &str); 10] = [
+    ("manifest.json", "sample"),
+    ("periodogram.json", "periodogram"),
+    ("limits.json", "limits"),
+    ("optimum.json", "optimise"),
+    ("landscape.json", "grid"),
+    ("comparison.json", "compare"),
+    ("map.json", "map"),
+    ("plan.json", "plan"),
+    ("batch.json", "batch"),
+    ("truth.json", "simulate"),
+];
+
+/// What a folder is instead of what was looked for.
+fn instead(folder: &Path) -> String {
+    match KINDS.iter().find(|(file, _)| folder.join(file).is_file()) {
+        Some((file, command)) => format!("this folder is of `dimcmc {command}` ({file} is there)"),
+        None => "nothing was begun in this folder, or it ended before its first result".to_owned(),
+    }
+}
+
 /// What was begun cannot be used, or not be gone on with: one line naming file or folder.
 #[derive(Debug, thiserror::Error)]
 pub enum OriginError {
     /// Nothing was begun there.
-    #[error("{}: no {file}: nothing was begun in this folder, or it ended before its first result", folder.display())]
+    #[error("{}: no {file}: {}", folder.display(), instead(folder))]
     Missing {
         /// The folder.
         folder: PathBuf,

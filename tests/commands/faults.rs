@@ -231,6 +231,8 @@ fn a_missing_permission_is_a_failure() {
         }
         assert_eq!(output.status.code(), Some(1), "{args:?}: {message}");
         says(&message, &["error: ", "Permission denied"]);
+        // before the work
+        assert!(!args[3].starts_with("locked") || message.contains("--out locked"), "{args:?}: {message}");
     }
 }
 

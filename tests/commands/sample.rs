@@ -156,6 +156,10 @@ fn what_is_no_run_is_neither_resumed_nor_analysed() {
         says(&desk.refusal(&["analyse", folder]), &[parts]);
     }
     desk.refusal(&["sample", CONFIG, "--out", "run"]);
+    desk.write("empty/map.json", "{}");
+    for command in [&["analyse", "empty"][..], &["export", "empty", "--format", "csv"]] {
+        says(&desk.refusal(command), &["empty: no manifest.json: this folder is of `dimcmc map`"]);
+    }
 
     copy(&desk, "run", "corrupt");
     desk.edit("corrupt/chain.jsonl", |chain| crate::desk::with_line(&chain, 100, "{\"ensemble\":0,\"st"));

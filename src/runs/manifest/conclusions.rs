@@ -24,13 +24,6 @@ const UNCONSTRAINED: f64 = 0.7;
 /// Modes of the period that are shown.
 const MODES_SHOWN: usize = 6;
 
-/// What follows from the orbit means nothing where one of these is not constrained.
-const DERIVED: [(OrbitQuantity, &[Parameter]); 3] = [
-    (OrbitQuantity::Period, &[Parameter::PorbOverProt]),
-    (OrbitQuantity::Maximum, &[Parameter::PorbOverProt, Parameter::Phi]),
-    (OrbitQuantity::Conjunction, &[Parameter::PorbOverProt, Parameter::Phi]),
-];
-
 /// Draws of a prior by which its width is known, to 2 %.
 const PRIOR_DRAWS: usize = 4001;
 
@@ -117,10 +110,18 @@ impl RunSummary {
                 one.unconstrained = !(few && is_period) && is_as_wide(one, f);
             }
         }
-        for (name, of) in DERIVED {
-            let open = of.iter().any(|p| of_the_chain.parameters.get(p.name()).is_some_and(|one| one.unconstrained));
-            if let Some(one) = of_the_chain.derived.get_mut(name.name()) {
-                one.unconstrained = open;
+        let is_open = |p: Parameter| of_the_chain.parameters.get(p.name()).is_some_and(|one| one.unconstrained);
+        let period_is_open = is_open(Parameter::PorbOverProt);
+        let period_d = of_the_chain.derived.get(OrbitQuantity::Period.name()).map(|one| one.median);
+        let fixed_d = settings.star.rotation_period_d * settings.values[Parameter::PorbOverProt];
+        let turn_d = period_d.unwrap_or(fixed_d);
+        for quantity in [OrbitQuantity::Period, OrbitQuantity::Maximum, OrbitQuantity::Conjunction] {
+            if let Some(one) = of_the_chain.derived.get_mut(quantity.name()) {
+                one.unconstrained = match quantity {
+                    OrbitQuantity::Period => period_is_open,
+                    // however far away the phase is counted from
+                    _ => fills_turn(one, turn_d),
+                };
             }
         }
         let is_planet_sampled = summary.parameters.contains_key(Parameter::K.name());
@@ -188,7 +189,12 @@ fn modes(chain: &Chain, discarded: usize, settings: &Settings, rotation: &Rotati
     Some(period_modes(&draws.collect::<Vec<_>>(), rotation, rotation_period_d))
 }
 
-/// Whether the posterior is about as wide as the prior.
+/// Whether a time may be any of an orbit's turn (d).
+fn fills_turn(one: &ParameterSummary, turn_d: f64) -> bool {
+    one.ci68[1] - one.ci68[0] > UNCONSTRAINED * 0.68 * turn_d
+}
+
+/// Whether the posterior is about as wide as the prior, which says nothing itself: a normal one does.
 fn is_as_wide(one: &ParameterSummary, f: &FreeParameter) -> bool {
     let width = |[low, high]: [f64; 2]| match f.prior {
         Prior::LogUniform { .. } => (high / low).ln(),
@@ -197,6 +203,7 @@ fn is_as_wide(one: &ParameterSummary, f: &FreeParameter) -> bool {
     match f.prior {
         // how much there is of an amplitude is said by its limit
         _ if f.parameter.is_amplitude() => false,
+        Prior::Normal { .. } => false,
         Prior::Periodic => width(one.hdi68) > UNCONSTRAINED * 0.68,
         prior => width(one.ci68) > UNCONSTRAINED * width(interval68(&prior)),
     }
@@ -207,4 +214,41 @@ fn interval68(prior: &Prior) -> [f64; 2] {
     let mut draws: Vec<f64> = (0..PRIOR_DRAWS).map(|_| prior.sample(&mut rng)).collect();
     draws.sort_unstable_by(f64::total_cmp);
     [quantile(&draws, 0.16), quantile(&draws, 0.84)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary(ci68: [f64; 2]) -> ParameterSummary {
+        let [low, high] = ci68;
+        let middle = 0.5 * (low + high);
+        ParameterSummary {
+            median: middle,
+            mean: middle,
+            sd: 0.5 * (high - low),
+            mode: middle,
+            ci68,
+            ci95: ci68,
+            hdi68: ci68,
+            hdi95: ci68,
+            rhat: None,
+            ess: None,
+            tau: None,
+            unconstrained: false,
+            upper95: None,
+        }
+    }
+
+    /// A phase that is counted from long before the data may be any, and the time of an event in the data known; a
+    /// period that a transit tells is no better known by the profiles, and is known.
+    #[test]
+    fn a_quantity_is_asked_whether_it_is_open() {
+        assert!(!fills_turn(&summary([2459000.0, 2459000.15]), 5.0));
+        assert!(fills_turn(&summary([2459000.0, 2459003.2]), 5.0));
+        let of = |prior| FreeParameter { parameter: Parameter::PorbOverProt, prior };
+        let known = summary([1.699, 1.701]);
+        assert!(!is_as_wide(&known, &of(Prior::Normal { mean: 1.7, sd: 0.001, min: 1.0, max: 3.0 })));
+        assert!(is_as_wide(&known, &of(Prior::Uniform { min: 1.6985, max: 1.7015 })));
+    }
 }
