@@ -19,13 +19,16 @@ const TICK: Duration = Duration::from_millis(50);
 /// After Ctrl-C the computation is left to end by itself if it does not within this time.
 const PATIENCE: Duration = Duration::from_millis(700);
 
+/// Share of the work that is done, where it is known, and what is under way.
+type News = (Option<f64>, String);
+
 /// What a computation says of itself, and is told.
 #[derive(Clone, Default)]
 pub struct Job {
     stop: Arc<AtomicBool>,
     /// Whether something is being written, which nobody leaves alone.
     writing: Arc<AtomicBool>,
-    news: Arc<Mutex<Option<(Option<f64>, String)>>>,
+    news: Arc<Mutex<Option<News>>>,
 }
 
 /// What a computation unwinds with where it was told to stop.
