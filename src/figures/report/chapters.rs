@@ -319,7 +319,7 @@ mod tests {
         // spots are nowhere, aliases are
         let peaks = chapter.tables[1].1.without_empty_columns();
         assert_eq!(peaks.head, ["period (d)", "*K* (km/s)", "*σ*_{K}", "Δ ln *L*", "false alarm", "alias"]);
-        assert_eq!(peaks.rows[1], ["1.3300", "0.100", "0.010", "20.00", "1.0e-5", "of the first, by 1.003/d"]);
+        assert_eq!(peaks.rows[1], ["1.33", "0.100", "0.010", "20.00", "1.0e-5", "of the first, by 1.003/d"]);
     }
 
     #[test]
