@@ -106,8 +106,8 @@ fn figures_say_what_the_files_do(desk: &Desk) {
     assert!(curve.contains('C'), "straight lines from period to period");
     let (points, marker) = (paths(&svg, "delta-ln-l"), middle(&paths(&svg, "highest")[0]));
     let top = points[0].iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
-    // the curve goes from trial period to trial period, the summit lies between two, and the spots of the best orbit are
-    // those beside the planet, which moves its period by a part of its error
+    // the curve goes from trial period to trial period, the summit lies between two, and the spots of the best orbit
+    // are those beside the planet, which moves its period by a part of its error
     let [low, high] = extent(&points[0])[0];
     let range = |key: &str| desk.json("periodogram/periodogram.json")["search"][key].as_f64().unwrap();
     let error = (high - low) * (sigma_d / period_d) / (range("max_period_d") / range("min_period_d")).ln();
