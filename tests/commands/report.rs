@@ -97,9 +97,11 @@ fn every_folder_has_a_page_that_a_browser_shows() {
         assert!(first.starts_with(&sentence[..40]), "{folder}: {first}");
     }
     // the same period as in the figure
-    let period = desk.json("periodogram/periodogram.json")["peaks"][0]["period_d"].as_f64().unwrap();
-    let page = desk.read("periodogram.html");
-    assert!(page.contains(&format!("<tr><td>{period:.4}</td>")) && page.contains(&format!("highest: {period:.4} d")));
+    let peak = &desk.json("periodogram/periodogram.json")["peaks"][0];
+    let [period, sigma] = ["period_d", "sigma_period_d"].map(|key| peak[key].as_f64().unwrap());
+    let digits = (1.0 - sigma.log10().floor()) as usize;
+    let (page, period) = (desk.read("periodogram.html"), format!("{period:.digits$}"));
+    assert!(page.contains(&format!("<tr><td>{period}</td>")) && page.contains(&format!("highest: {period} d")));
     let Some(browser) = browser() else {
         assert!(std::env::var_os("CI").is_none(), "no chromium to look at pages with");
         // past the test's capture, so that it is seen
