@@ -1,7 +1,7 @@
 //! The periodogram: how much better the data fit with an orbit of each period, what chance does, what the times of
 //! observation alone do, and how well K is known.
 
-use super::symbols::PERIOD_DIGITS;
+use super::symbols::{PERIOD_DIGITS, decimals};
 use super::{POSITIVE, PlotError, velocities};
 use crate::data::io::csv::Columns;
 use crate::figures::drawing::colour::{BLACK, BLUE, GREEN, GREY, PURPLE, VERMILION, WHITE};
@@ -11,7 +11,6 @@ use crate::figures::drawing::{
     width_pt,
 };
 use crate::model::Parameter;
-use crate::planets::verdict::decimals;
 use crate::runs::blind_search::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 use crate::runs::origin;
 use crate::star::Orbit;

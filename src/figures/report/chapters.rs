@@ -82,7 +82,7 @@ fn search(file: &PeriodogramFile) -> Chapter {
     let peak = |peak: &PeakRecord| {
         let alias = peak.alias.as_ref().map(|alias| format!("of the first, by {:.3}/d", alias.window_frequency_per_d));
         vec![
-            number(peak.orbit.period_d, peak.orbit.sigma_period_d.map_or(PERIOD_DIGITS, decimals)),
+            number(peak.orbit.period_d, digits_of(peak.orbit.sigma_period_d, PERIOD_DIGITS)),
             number(peak.orbit.k_kms, 3),
             number(peak.orbit.sigma_k_kms, 3),
             number(peak.orbit.delta_ln_l, 2),
