@@ -114,6 +114,11 @@ pub trait Gradient: LogDensity {
 pub trait Evaluator {
     /// One evaluation a vector; or fewer, those of the first vectors, where it was told to stop meanwhile.
     fn evaluate(&self, batch: &[Vec<f64>]) -> Vec<Evaluation>;
+
+    /// Counts evaluations that are made elsewhere: before they are, whether to go on.
+    fn goes_on(&self, _evaluations: usize) -> bool {
+        true
+    }
 }
 
 /// Threads of this machine: one reconstruction is serial, a batch is spread over rayon's current pool.

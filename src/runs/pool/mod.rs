@@ -168,4 +168,9 @@ impl Evaluator for Evaluations<'_> {
         self.count.fetch_add(batch.len(), Relaxed);
         self.pool.answers(&self.brief, batch, |theta| self.target.evaluate(theta))
     }
+
+    fn goes_on(&self, evaluations: usize) -> bool {
+        self.count.fetch_add(evaluations, Relaxed);
+        !self.pool.stopped()
+    }
 }

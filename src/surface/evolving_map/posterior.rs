@@ -135,7 +135,7 @@ impl MarginalPosterior {
         let harmonics = self.basis.degrees.len() as u32;
         let (ln_evidence, model_applications) = match self.anew {
             Anew::Nothing => (Ok(self.velocities.log_likelihood_at(&values)), 0),
-            Anew::Maps => (self.with_maps_anew(&values), SLOPES),
+            Anew::Maps => (self.with_maps_anew(&values).map(|here| here.log_likelihood_at(&values)), SLOPES),
             Anew::Star => {
                 let here = self.marginal_at(values, true);
                 (here.and_then(|here| here.ln_evidence_of_sets(&self.imager, &self.basis)), harmonics)
@@ -152,9 +152,19 @@ impl MarginalPosterior {
         }
     }
 
-    fn with_maps_anew(&self, values: &ParameterValues) -> Result<f64, FieldError> {
+    /// Whether an evaluation finds maps, but leaves the profiles of the star as they are.
+    pub(super) fn finds_only_maps_anew(&self) -> bool {
+        self.anew == Anew::Maps
+    }
+
+    /// In the velocities, with maps found for the field of `theta`.
+    pub(super) fn expansion_at(&self, theta: &[f64]) -> Result<Expansion, FieldError> {
+        self.with_maps_anew(&self.space.values_at(theta))
+    }
+
+    fn with_maps_anew(&self, values: &ParameterValues) -> Result<Expansion, FieldError> {
         let here = self.marginal_at(self.at_reference_velocities(*values), false)?;
-        Ok(here.expansion(&self.imager, &self.basis, &[])?.log_likelihood_at(values))
+        here.expansion(&self.imager, &self.basis, &[])
     }
 }
 

@@ -4,6 +4,7 @@
 //! parameters) and T's first columns the velocities of unit orbits (`planet`): of a circle the cosine and sine of its
 //! angle. Then `ln L = c + b y - y A y / 2`.
 
+use super::interpolation::Interpolation;
 use super::planet::{Nonlinear, Planet};
 use crate::model::{Elements, Parameter, ParameterSpace, Prior};
 use crate::surface::expansion::Expansion;
@@ -14,18 +15,42 @@ use rand_distr::{ChiSquared, StandardNormal};
 /// Degrees of freedom of the distribution that the linear coordinates are drawn from.
 const DEGREES: f64 = 8.0;
 
+/// What a quadratic in the linear coordinates is made for.
+#[derive(Clone, Debug)]
+pub(super) struct Given {
+    /// What of each planet the velocities are not linear in.
+    pub planets: Vec<Nonlinear>,
+    /// The sampling coordinates that expansions are interpolated over; empty where there is one expansion.
+    pub field: DVector<f64>,
+}
+
+/// ln L without orbits: `constant + gradient x - x information x / 2`.
+#[derive(Clone, Debug)]
+pub(super) struct Pieces {
+    pub constant: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+    /// The information times the columns of T that are not orbits.
+    pub informed: DMatrix<f64>,
+}
+
+/// Where the pieces come from.
+#[derive(Clone, Debug)]
+enum Source {
+    /// One expansion.
+    One(Pieces),
+    /// Several, between which they are interpolated, with the positions of the coordinates.
+    Several(Interpolation, Vec<usize>),
+}
+
 /// What the quadratics of all periods have in common.
 #[derive(Clone, Debug)]
 pub(super) struct LinearModel {
     /// Rotation cycles from mid-time.
     cycles: Vec<f64>,
-    information: DMatrix<f64>,
-    /// Gradient of ln L and ln L itself at `y = 0`.
-    gradient: DVector<f64>,
-    constant: f64,
-    /// Columns of T but for those of orbits, and the information times these.
+    source: Source,
+    /// Columns of T but for those of orbits.
     columns: DMatrix<f64>,
-    informed: DMatrix<f64>,
     /// The planets, whose columns come first, in this order.
     planets: Vec<Planet>,
     /// Positions of the other linear coordinates in a vector of internal ones: those of `columns`.
@@ -62,6 +87,18 @@ impl LinearModel {
     /// Of an expansion whose stellar coordinates are those that `space` leaves free; `None` where no planet's
     /// velocities are linear in some of its free parameters.
     pub fn new(expansion: &Expansion, space: &ParameterSpace, mid_cycle: f64) -> Option<Self> {
+        LinearModel::of(&[(DVector::zeros(0), expansion)], &[], space, mid_cycle)
+    }
+
+    /// Of expansions in the velocities at some places, between which they are interpolated: values of the coordinates
+    /// at these `positions`. `None` also where the places are too few.
+    pub fn of(
+        expansions: &[(DVector<f64>, &Expansion)],
+        positions: &[usize],
+        space: &ParameterSpace,
+        mid_cycle: f64,
+    ) -> Option<Self> {
+        let (_, expansion) = expansions.first()?;
         let (n, all) = (expansion.profiles(), expansion.centre.len());
         let is_free = |of: &Elements| space.free().iter().any(|f| of.all().contains(&f.parameter));
         let free = Elements::PLANETS.iter().filter(|of| is_free(of));
@@ -71,7 +108,8 @@ impl LinearModel {
         }
         let fixed = space.values_at(&space.start());
         let of_planets: Vec<usize> = planets.iter().flat_map(Planet::positions).collect();
-        let others: Vec<usize> = (0..space.dimension()).filter(|i| !of_planets.contains(i)).collect();
+        let is_other = |i: &usize| !of_planets.contains(i) && !positions.contains(i);
+        let others: Vec<usize> = (0..space.dimension()).filter(is_other).collect();
         let mut columns = DMatrix::zeros(all, others.len());
         let mut offset = -&expansion.centre;
         for (mut column, &i) in columns.column_iter_mut().zip(&others) {
@@ -98,13 +136,25 @@ impl LinearModel {
         };
         let of_orbits = planets.iter().flat_map(|planet| vec![planet.ray(); planet.columns()]);
         let normals: Vec<(f64, f64)> = of_orbits.chain(others.iter().copied().map(Some)).map(normal).collect();
-        let pushed = &expansion.information * &offset;
+        let pieces = |of: &Expansion| {
+            let pushed = &of.information * &offset;
+            Pieces {
+                constant: of.log_likelihood + of.gradient.dot(&offset) - 0.5 * offset.dot(&pushed),
+                gradient: &of.gradient - &pushed,
+                informed: &of.information * &columns,
+                information: of.information.clone(),
+            }
+        };
+        let source = match positions {
+            [] => Source::One(pieces(expansion)),
+            _ => {
+                let places: Vec<(&DVector<f64>, Pieces)> = expansions.iter().map(|(at, of)| (at, pieces(of))).collect();
+                Source::Several(Interpolation::new(&places)?, positions.to_vec())
+            }
+        };
         Some(LinearModel {
             cycles: expansion.cycles.iter().map(|e| e - mid_cycle).collect(),
-            gradient: &expansion.gradient - &pushed,
-            constant: expansion.log_likelihood + expansion.gradient.dot(&offset) - 0.5 * offset.dot(&pushed),
-            informed: &expansion.information * &columns,
-            information: expansion.information.clone(),
+            source,
             columns,
             dimension: space.dimension(),
             correction: None,
@@ -139,18 +189,37 @@ impl LinearModel {
         self.planets[..planet].iter().map(Planet::columns).sum()
     }
 
-    /// What of a position is not linear, planet by planet, and what is.
-    pub fn split(&self, position: &[f64]) -> (Vec<Nonlinear>, DVector<f64>) {
-        let (nonlinear, linear): (Vec<_>, Vec<_>) = self.planets.iter().map(|planet| planet.split(position)).unzip();
+    /// Circles of these periods, in the middle of the places that expansions are interpolated between.
+    pub fn circles(&self, period: impl Fn(usize) -> f64) -> Given {
+        let planets = self.planets.iter().enumerate().map(|(i, planet)| planet.circle(period(i))).collect();
+        Given { planets, field: self.interpolation().map_or(DVector::zeros(0), |(between, _)| between.centre()) }
+    }
+
+    /// What expansions are interpolated with, and the positions of its coordinates.
+    pub fn interpolation(&self) -> Option<(&Interpolation, &[usize])> {
+        match &self.source {
+            Source::One(_) => None,
+            Source::Several(between, positions) => Some((between, positions)),
+        }
+    }
+
+    /// What of a position is not linear, and what is.
+    pub fn split(&self, position: &[f64]) -> (Given, DVector<f64>) {
+        let (planets, linear): (Vec<_>, Vec<_>) = self.planets.iter().map(|planet| planet.split(position)).unzip();
         let linear = linear.into_iter().flatten().chain(self.others.iter().map(|&i| position[i]));
-        (nonlinear, DVector::from_vec(linear.collect()))
+        let positions = self.interpolation().map_or(&[][..], |(_, positions)| positions);
+        let field = DVector::from_iterator(positions.len(), positions.iter().map(|&i| position[i]));
+        (Given { planets, field }, DVector::from_vec(linear.collect()))
     }
 
     /// Internal coordinates of both.
-    pub fn position(&self, nonlinear: &[Nonlinear], linear: &DVector<f64>) -> Vec<f64> {
+    pub fn position(&self, given: &Given, linear: &DVector<f64>) -> Vec<f64> {
         let mut position = vec![0.0; self.dimension];
+        if let Some((_, positions)) = self.interpolation() {
+            positions.iter().zip(given.field.iter()).for_each(|(&i, x)| position[i] = *x);
+        }
         let mut first = 0;
-        for (planet, at) in self.planets.iter().zip(nonlinear) {
+        for (planet, at) in self.planets.iter().zip(&given.planets) {
             planet.write(at, &linear.as_slice()[first..first + planet.columns()], &mut position);
             first += planet.columns();
         }
@@ -158,29 +227,36 @@ impl LinearModel {
         position
     }
 
-    /// The quadratic at these periods and shapes, drawn from as if ln L were divided by `temperature`; `None` where it
-    /// has no maximum.
-    pub fn at(&self, nonlinear: &[Nonlinear], temperature: f64) -> Option<Conditional> {
-        let (all, count, orbits) = (self.gradient.len(), self.linear_count(), self.orbit_count());
+    /// The quadratic for what is given, drawn from as if ln L were divided by `temperature`; `None` where it has no
+    /// maximum.
+    pub fn at(&self, given: &Given, temperature: f64) -> Option<Conditional> {
+        match &self.source {
+            Source::One(pieces) => self.of_pieces(pieces, given, temperature),
+            Source::Several(between, _) => self.of_pieces(&between.at(&given.field), given, temperature),
+        }
+    }
+
+    fn of_pieces(&self, pieces: &Pieces, given: &Given, temperature: f64) -> Option<Conditional> {
+        let (all, count, orbits) = (pieces.gradient.len(), self.linear_count(), self.orbit_count());
         let mut orbit = DMatrix::zeros(all, orbits);
         let mut first = 0;
-        for (planet, at) in self.planets.iter().zip(nonlinear) {
+        for (planet, at) in self.planets.iter().zip(&given.planets) {
             planet.fill(at, &self.cycles, &mut orbit, first);
             first += planet.columns();
         }
-        let informed_orbit = &self.information * &orbit;
+        let informed_orbit = &pieces.information * &orbit;
         let mut information = DMatrix::zeros(count, count);
         information.view_mut((0, 0), (orbits, orbits)).copy_from(&orbit.tr_mul(&informed_orbit));
-        let across = orbit.tr_mul(&self.informed);
+        let across = orbit.tr_mul(&pieces.informed);
         information.view_mut((0, orbits), (orbits, count - orbits)).copy_from(&across);
         information.view_mut((orbits, 0), (count - orbits, orbits)).copy_from(&across.transpose());
         information
             .view_mut((orbits, orbits), (count - orbits, count - orbits))
-            .copy_from(&self.columns.tr_mul(&self.informed));
+            .copy_from(&self.columns.tr_mul(&pieces.informed));
         let mut gradient = DVector::zeros(count);
-        gradient.rows_mut(0, orbits).copy_from(&orbit.tr_mul(&self.gradient));
-        gradient.rows_mut(orbits, count - orbits).copy_from(&self.columns.tr_mul(&self.gradient));
-        let mut constant = self.constant;
+        gradient.rows_mut(0, orbits).copy_from(&orbit.tr_mul(&pieces.gradient));
+        gradient.rows_mut(orbits, count - orbits).copy_from(&self.columns.tr_mul(&pieces.gradient));
+        let mut constant = pieces.constant;
         if let Some(Correction { centre, constant: at_centre, gradient: slope, information: bend }) = &self.correction {
             let bent = bend * centre;
             constant += at_centre - slope.dot(centre) - 0.5 * centre.dot(&bent);

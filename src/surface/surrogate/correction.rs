@@ -29,6 +29,9 @@ const GOOD: f64 = 0.6;
 /// Draws on which the surrogate is tried.
 const TRIALS: usize = 64;
 
+/// A draw: internal and physical coordinates, and log-probability.
+pub(super) type Drawn = (Vec<f64>, Vec<f64>, f64);
+
 impl Surrogate {
     /// The surrogate fitted to `density`, if that is better than as it was, and the share of its proposals that are
     /// accepted.
@@ -63,8 +66,8 @@ impl Surrogate {
             .iter()
             .filter(|(.., log_prob)| *log_prob > highest - REACH)
             .filter_map(|(position, theta, log_prob)| {
-                let (nonlinear, linear) = self.model.split(position);
-                let model = self.model.at(&nonlinear, 1.0)?.log_likelihood(&linear);
+                let (given, linear) = self.model.split(position);
+                let model = self.model.at(&given, 1.0)?.log_likelihood(&linear);
                 let beyond = log_prob - self.space.log_prior(theta) - model;
                 beyond.is_finite().then_some((linear, beyond))
             })
@@ -76,11 +79,14 @@ impl Surrogate {
         Surrogate::of(model, self.space.clone(), self.time_base_cycles, self.temperature)
     }
 
+    fn acceptance(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> f64 {
+        self.acceptance_of(&self.evaluated(TRIALS, density, evaluator), density)
+    }
+
     /// Share of the surrogate's proposals that `density` accepts from where a chain is: its draws, each with the weight
     /// that `density` has over the surrogate there. Without the weights the few draws where the surrogate is far too
     /// low, and a chain stays for long, would hardly count.
-    fn acceptance(&self, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> f64 {
-        let draws = self.evaluated(TRIALS, density, evaluator);
+    pub(super) fn acceptance_of(&self, draws: &[Drawn], density: &dyn LogDensity) -> f64 {
         let beyond: Vec<f64> = draws
             .iter()
             .map(|(position, theta, log_prob)| log_prob + density.log_jacobian(theta) - self.log_density(position))
@@ -89,7 +95,8 @@ impl Surrogate {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let moves =
             |position: &Vec<f64>| self.place(position).is_some_and(|at| self.walk(at, &mut rng).position != *position);
-        let moved = draws.iter().map(|draw| &draw.0).map(moves).filter(|moved| *moved).count() as f64 / TRIALS as f64;
+        let moved =
+            draws.iter().map(|draw| &draw.0).map(moves).filter(|moved| *moved).count() as f64 / draws.len() as f64;
         // what has no log-probability is never accepted, and neither is what cannot be drawn
         let highest = beyond.iter().copied().filter(|beyond| beyond.is_finite()).fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> =
@@ -97,16 +104,11 @@ impl Surrogate {
         // from x to y: w_x min(1, w_y / w_x)
         let pairs = weights.iter().flat_map(|from| weights.iter().map(move |to| from.min(*to)));
         let total = weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        moved * pairs.sum::<f64>() / (total * TRIALS as f64)
+        moved * pairs.sum::<f64>() / (total * draws.len() as f64)
     }
 
-    /// So many draws: internal and physical coordinates, and log-probability.
-    fn evaluated(
-        &self,
-        draws: usize,
-        density: &dyn LogDensity,
-        evaluator: &dyn Evaluator,
-    ) -> Vec<(Vec<f64>, Vec<f64>, f64)> {
+    /// So many draws.
+    fn evaluated(&self, draws: usize, density: &dyn LogDensity, evaluator: &dyn Evaluator) -> Vec<Drawn> {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let positions: Vec<Vec<f64>> = (0..draws).filter_map(|_| self.draw(&mut rng)).collect();
         let thetas: Vec<Vec<f64>> = positions.iter().map(|x| density.to_physical(x)).collect();

@@ -3,23 +3,25 @@
 //!
 //! Given the period, the quadratic is a Gaussian in K cos, K sin, the systemic velocity and the stellar parameters;
 //! over the periods it is tabulated. Of eccentric orbits it is one given the shape as well, which is drawn from its
-//! prior; of two planets, given both periods, each tabulated with the other at its best. Its tails are those of a t
-//! distribution, so that nothing it calls improbable is out of reach.
+//! prior; of two planets, given both periods, each tabulated with the other at its best. Where maps are found anew for
+//! each field of spots, the quadratics of some fields are interpolated between (`interpolation`). Its tails are those
+//! of a t distribution, so that nothing it calls improbable is out of reach.
 
 mod conditional;
 mod correction;
+mod interpolation;
 mod periods;
 mod planet;
 mod proposal;
+mod refinement;
 
 use crate::model::{Elements, Parameter, ParameterSpace};
 use crate::surface::expansion::{Expansion, free_stellar};
 use crate::surface::imaging::Imager;
 use crate::surface::static_map::Reference;
-use conditional::{Conditional, LinearModel};
+use conditional::{Conditional, Given, LinearModel};
 use nalgebra::DVector;
 use periods::{PeriodTable, Scale};
-use planet::Nonlinear;
 use rand::{Rng, RngCore};
 
 pub use proposal::SurrogateMove;
@@ -30,7 +32,7 @@ const TAIL: f64 = 60.0;
 /// Steps of the walk on the surrogate that make one draw of it.
 const WALK: usize = 16;
 
-/// The same where shapes are drawn from their priors, or periods of two planets each by itself.
+/// The same where shapes are drawn from their priors, or periods of two planets and fields each by itself.
 const LONG_WALK: usize = 96;
 
 /// The surrogate posterior of a parameter space in which K of a planet is free, with phi or the time of a conjunction.
@@ -94,9 +96,7 @@ impl Surrogate {
         // every planet with the others on circles of these periods
         let table = |which: usize, beside: &[f64]| {
             let at = |period: f64, temperature: f64| {
-                let period_of = |i: usize| if i == which { period } else { beside[i] };
-                let circles = planets.iter().enumerate().map(|(i, planet)| planet.circle(period_of(i)));
-                model.at(&circles.collect::<Vec<_>>(), temperature)
+                model.at(&model.circles(|i| if i == which { period } else { beside[i] }), temperature)
             };
             PeriodTable::new(&at, model.column_of(which), planets[which].period(), scale)
         };
@@ -104,9 +104,7 @@ impl Surrogate {
         let tabulated: Vec<usize> = (0..planets.len()).filter(|i| planets[*i].has_table()).collect();
         let (best, tables) = match tabulated[..] {
             [] => {
-                let circles: Vec<Nonlinear> =
-                    planets.iter().zip(&centre).map(|(p, period)| p.circle(*period)).collect();
-                let conditional = model.at(&circles, 1.0)?;
+                let conditional = model.at(&model.circles(|i| centre[i]), 1.0)?;
                 (conditional.log_likelihood(&conditional.mode()), Vec::new())
             }
             [only] => {
@@ -117,7 +115,7 @@ impl Surrogate {
         };
         let mut periods: Vec<Option<PeriodTable>> = planets.iter().map(|_| None).collect();
         tables.into_iter().for_each(|(which, table)| periods[which] = Some(table));
-        let is_plain = matches!(planets, [planet] if planet.plain().is_some());
+        let is_plain = matches!(planets, [planet] if planet.plain().is_some()) && model.interpolation().is_none();
         let walk = if is_plain { WALK } else { LONG_WALK };
         Some(Surrogate { space, time_base_cycles, model, periods, walk, best, temperature })
     }
@@ -129,8 +127,8 @@ impl Surrogate {
 
     /// ln of the density at sampling coordinates, up to a constant; minus infinity outside the priors.
     pub fn log_density(&self, position: &[f64]) -> f64 {
-        let (nonlinear, linear) = self.model.split(position);
-        match self.model.at(&nonlinear, self.temperature) {
+        let (given, linear) = self.model.split(position);
+        match self.model.at(&given, self.temperature) {
             Some(conditional) => self.density(&conditional, &linear, position),
             None => f64::NEG_INFINITY,
         }
@@ -155,26 +153,31 @@ impl Surrogate {
     /// A place drawn from the tables of periods, the priors of shapes, and the Gaussian (with heavier tails) there.
     fn propose(&self, rng: &mut dyn RngCore) -> Option<Place> {
         let mut log_proposal = 0.0;
-        let mut nonlinear = Vec::with_capacity(self.periods.len());
+        let mut planets = Vec::with_capacity(self.periods.len());
         for (planet, table) in self.model.planets().iter().zip(&self.periods) {
             let drawn = table.as_ref().map(|table| table.draw(rng));
             let (at, log_shape) = planet.draw(drawn.map(|drawn| drawn.0), rng);
             log_proposal += drawn.map_or(0.0, |drawn| drawn.1) + log_shape;
-            nonlinear.push(at);
+            planets.push(at);
         }
-        let conditional = self.model.at(&nonlinear, self.temperature)?;
+        let between = self.model.interpolation().map(|(between, _)| between);
+        let (field, log_field) = between.map_or((DVector::zeros(0), 0.0), |b| b.draw(self.temperature, rng));
+        log_proposal += log_field;
+        let given = Given { planets, field };
+        let conditional = self.model.at(&given, self.temperature)?;
         let (linear, log_linear) = conditional.draw(rng);
-        let position = self.model.position(&nonlinear, &linear);
+        let position = self.model.position(&given, &linear);
         let log_density = self.density(&conditional, &linear, &position);
         Some(Place { position, log_density, log_proposal: log_proposal + log_linear })
     }
 
     /// The place at `position`.
     fn place(&self, position: &[f64]) -> Option<Place> {
-        let (nonlinear, linear) = self.model.split(position);
-        let conditional = self.model.at(&nonlinear, self.temperature)?;
-        let mut log_proposal = 0.0;
-        for ((planet, table), at) in self.model.planets().iter().zip(&self.periods).zip(&nonlinear) {
+        let (given, linear) = self.model.split(position);
+        let conditional = self.model.at(&given, self.temperature)?;
+        let between = self.model.interpolation().map(|(between, _)| between);
+        let mut log_proposal = between.map_or(0.0, |between| between.log_draw(&given.field, self.temperature));
+        for ((planet, table), at) in self.model.planets().iter().zip(&self.periods).zip(&given.planets) {
             log_proposal += table.as_ref().map_or(0.0, |table| table.log_density(at.period));
             log_proposal += planet.log_draw(at, table.is_none());
         }
@@ -230,19 +233,18 @@ impl Surrogate {
     /// planet after the other.
     fn shaped(&self, periods: &[f64]) -> Option<(Vec<f64>, f64)> {
         let planets = self.model.planets();
-        let mut at: Vec<Nonlinear> =
-            planets.iter().zip(periods).map(|(planet, period)| planet.circle(*period)).collect();
+        let mut at = self.model.circles(|i| periods[i]);
         let mut best: Option<(f64, DVector<f64>)> = None;
         for i in 0..planets.len() {
             let tried = planets[i].ellipses(periods[i]).into_iter().filter_map(|ellipse| {
                 let mut here = at.clone();
-                here[i] = ellipse;
+                here.planets[i] = ellipse;
                 let conditional = self.model.at(&here, 1.0)?;
                 let mode = conditional.mode();
                 Some((conditional.log_likelihood(&mode), mode, ellipse))
             });
             let (height, mode, ellipse) = tried.max_by(|a, b| a.0.total_cmp(&b.0))?;
-            at[i] = ellipse;
+            at.planets[i] = ellipse;
             best = Some((height, mode));
         }
         best.map(|(height, mode)| (self.model.position(&at, &mode), height))

@@ -85,11 +85,11 @@ fn its_likelihood_is_that_of_the_expansion() {
         for _ in 0..50 {
             let theta = space.sample_prior(&mut rng);
             let position = space.to_sampling(&theta);
-            let (nonlinear, linear) = surrogate.model.split(&position);
-            let found = surrogate.model.at(&nonlinear, 1.0).unwrap().log_likelihood(&linear);
+            let (given, linear) = surrogate.model.split(&position);
+            let found = surrogate.model.at(&given, 1.0).unwrap().log_likelihood(&linear);
             let wanted = expansion.log_likelihood_at(&space.values_at(&theta));
             assert!((found - wanted).abs() < 1e-6 * (1.0 + wanted.abs()), "{kind:?}: {found} {wanted}");
-            let back = surrogate.model.position(&nonlinear, &linear);
+            let back = surrogate.model.position(&given, &linear);
             assert!(back.iter().zip(&position).all(|(a, b)| (a - b).abs() < 1e-9), "{kind:?}");
         }
     }

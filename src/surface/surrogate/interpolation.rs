@@ -1,0 +1,112 @@
+//! Quadratics between places at which they are known: sums of them, with weights that depend on the place.
+//!
+//! A cubic radial basis with a quadratic tail (Wendland 2005, *Scattered Data Approximation*, section 8.2), in
+//! coordinates in which the places scatter alike in all directions. It is exact at the places, and everywhere for
+//! quadratics.
+
+use super::conditional::Pieces;
+use nalgebra::{DMatrix, DVector};
+use rand::{Rng, RngCore};
+use rand_distr::{ChiSquared, StandardNormal};
+
+/// Degrees of freedom of the distribution that places are drawn from.
+const DEGREES: f64 = 8.0;
+
+/// Pieces between places.
+#[derive(Clone, Debug)]
+pub(super) struct Interpolation {
+    /// Mean of the places, and the factor of their covariance.
+    centre: DVector<f64>,
+    factor: DMatrix<f64>,
+    /// The places in units of their scatter.
+    places: Vec<DVector<f64>>,
+    /// From the basis at a place to the weights of all places.
+    weights: DMatrix<f64>,
+    /// Pieces of each place (columns), one below the other.
+    pieces: DMatrix<f64>,
+    /// Number of velocities and of other linear coordinates.
+    shape: (usize, usize),
+}
+
+impl Interpolation {
+    /// Between these places; `None` where they are too few, or on a plane.
+    pub fn new(places: &[(&DVector<f64>, Pieces)]) -> Option<Self> {
+        let (first, pieces) = places.first()?;
+        let (count, dimension) = (places.len(), first.len());
+        let centre = places.iter().fold(DVector::zeros(dimension), |sum, (at, _)| sum + *at) / count as f64;
+        let scatter = places.iter().fold(DMatrix::zeros(dimension, dimension), |sum, (at, _)| {
+            let off = *at - &centre;
+            sum + &off * off.transpose()
+        });
+        let factor = (scatter / count as f64).cholesky()?.unpack();
+        let shape = (pieces.gradient.len(), pieces.informed.ncols());
+        let stacked = |(_, p): &(&DVector<f64>, Pieces)| {
+            let numbers = std::iter::once(&p.constant).chain(&p.gradient).chain(&p.information).chain(&p.informed);
+            DVector::from_iterator(1 + shape.0 * (1 + shape.0 + shape.1), numbers.copied())
+        };
+        let pieces = DMatrix::from_columns(&places.iter().map(stacked).collect::<Vec<_>>());
+        let mut this =
+            Interpolation { centre, factor, places: Vec::new(), weights: DMatrix::zeros(0, 0), pieces, shape };
+        this.places = places.iter().map(|(at, _)| this.in_units(at)).collect::<Option<_>>()?;
+        let rows: Vec<DVector<f64>> = this.places.iter().map(|at| this.basis(at)).collect();
+        let size = rows[0].len();
+        let system = DMatrix::from_fn(size, size, |i, j| match (i < count, j < count) {
+            (true, _) => rows[i][j],
+            (_, true) => rows[j][i],
+            _ => 0.0,
+        });
+        this.weights = system.try_inverse()?.rows(0, count).into_owned();
+        this.weights.iter().all(|w| w.is_finite()).then_some(this)
+    }
+
+    /// Mean of the places.
+    pub fn centre(&self) -> DVector<f64> {
+        self.centre.clone()
+    }
+
+    /// The pieces at a place.
+    pub fn at(&self, place: &DVector<f64>) -> Pieces {
+        let ((n, others), at) = (self.shape, self.in_units(place));
+        let weights = &self.weights * self.basis(&at.expect("a factor has no zero on its diagonal"));
+        let numbers = &self.pieces * weights;
+        let matrix = |first: usize, columns: usize| {
+            DMatrix::from_column_slice(n, columns, numbers.rows(first, n * columns).as_slice())
+        };
+        Pieces {
+            constant: numbers[0],
+            gradient: numbers.rows(1, n).into_owned(),
+            information: matrix(1 + n, n),
+            informed: matrix(1 + n + n * n, others),
+        }
+    }
+
+    /// A place from a t distribution with mean and covariance of the places, times `temperature`, and ln of its
+    /// density.
+    pub fn draw(&self, temperature: f64, rng: &mut dyn RngCore) -> (DVector<f64>, f64) {
+        let normal = DVector::from_fn(self.centre.len(), |_, _| rng.sample::<f64, _>(StandardNormal));
+        let chi2: f64 = rng.sample(ChiSquared::new(DEGREES).expect("positive"));
+        let at = normal * (DEGREES / chi2).sqrt();
+        (&self.centre + &self.factor * &at * temperature.sqrt(), log_t(&at))
+    }
+
+    /// ln of the density with which [`Interpolation::draw`] gives `place`.
+    pub fn log_draw(&self, place: &DVector<f64>, temperature: f64) -> f64 {
+        log_t(&(self.in_units(place).expect("a factor has no zero on its diagonal") / temperature.sqrt()))
+    }
+
+    fn in_units(&self, place: &DVector<f64>) -> Option<DVector<f64>> {
+        self.factor.solve_lower_triangular(&(place - &self.centre))
+    }
+
+    /// Cubes of the distances from all places, and the monomials up to the second degree.
+    fn basis(&self, at: &DVector<f64>) -> DVector<f64> {
+        let cubes = self.places.iter().map(|place| (at - place).norm().powi(3));
+        let squares = (0..at.len()).flat_map(|i| (0..=i).map(move |j| at[i] * at[j]));
+        DVector::from_vec(cubes.chain([1.0]).chain(at.iter().copied()).chain(squares).collect())
+    }
+}
+
+/// ln of the density, but for a constant.
+fn log_t(at: &DVector<f64>) -> f64 {
+    -0.5 * (DEGREES + at.len() as f64) * (at.norm_squared() / DEGREES).ln_1p()
+}
