@@ -3,11 +3,11 @@
 use super::output::{Output, remarks, scene};
 use super::search::search;
 use super::signals::Signals;
-use super::{Failure, Global, analyse, cluster, progress};
+use super::{Failure, Global, analyse, cluster, console, progress};
 use crate::data::config::Config;
 use crate::data::io::effort::EFFORT;
 use crate::runs::manifest;
-use crate::runs::run::{CHAIN, Meter, Pace, Run, RunError, SUMMARY, StartFrom};
+use crate::runs::run::{CHAIN, Cost, Meter, Pace, Run, RunError, SUMMARY, StartFrom};
 use crate::sampling::ensemble::{MOST_STEPS, StopReason};
 use indicatif::{HumanDuration, ProgressBar};
 use std::path::PathBuf;
@@ -95,6 +95,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         run.map_err(failed)?
     };
     signals.defer();
+    if !resume {
+        console::note(cost(&Cost::of(&run)));
+    }
     let bar = progress::bar(global, Some(BAR), "first step");
     let mut meter = Meter::new(&run);
     let reason = run.go(&pool, |records, convergence| show(&bar, &meter.step(records, convergence)));
@@ -114,6 +117,18 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
             analyse::report(folder, &run.manifest, &run.chain)
         }
     }
+}
+
+/// What a chain will cost, in words.
+fn cost(cost: &Cost) -> String {
+    let Cost { steps, is_limit, evaluations, of_a_step } = *cost;
+    let time = HumanDuration(of_a_step.mul_f64(steps as f64));
+    let each = of_a_step.as_secs_f64() / evaluations as f64;
+    let bound = if is_limit { "at most" } else { "some" };
+    format!(
+        "the chain takes {bound} {steps} steps of {evaluations} evaluations, {each:.2} s each with all threads: {time:#}; \
+        it ends when every parameter has reached its goals"
+    )
 }
 
 /// Divisions of the bar.

@@ -27,7 +27,9 @@ use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel, SurfaceSettings, WithoutJitter};
+use crate::surface::{
+    At, Change, Linearised, NoFit, OtherRotation, SpotField, SurfaceError, SurfaceModel, SurfaceSettings, WithoutJitter,
+};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +83,8 @@ pub struct Detection {
     pub frequencies: Frequencies,
     /// Whether the star changes, where that was looked into: of spots that are taken for unchanging.
     pub change: Option<Result<Change, NoFit>>,
+    /// Another rotation period with which the profiles are far more probable.
+    pub other_rotation: Option<OtherRotation>,
     /// Without a planet.
     pub planet_free: Linearised,
     /// The same without its jitter, where the profiles say how large that is: what `blind` is of.
@@ -113,6 +117,8 @@ pub enum Stage {
     PlanetFree,
     /// Whether the star changes.
     Change,
+    /// Whether the rotation period is wrong.
+    Rotation,
     /// Periods, draws.
     Search,
     /// The image at the best orbit, for that many times.
@@ -194,6 +200,8 @@ impl Detection {
         let offset = offset(&planet_free.quadratic, &frequencies.per_cycle, best);
         report(Stage::Change);
         let change = surface.evolution(at, &frequencies);
+        report(Stage::Rotation);
+        let other_rotation = surface.other_rotation(at, &planet_free);
         let mut found = Detection {
             best: *blind.best(),
             planet_free,
@@ -201,6 +209,7 @@ impl Detection {
             blind,
             frequencies,
             change,
+            other_rotation,
             at_best: None,
             rounds: 0,
             closed: false,
@@ -244,6 +253,13 @@ impl Detection {
     pub fn changes(&self) -> Option<String> {
         let Some(Ok(change)) = &self.change else { return None };
         change.is_changing().then(|| change.sentence())
+    }
+
+    /// Why no planet can be judged, whatever the search shows: the star is not as it is taken to be.
+    pub fn not_judged(&self) -> Option<String> {
+        let of_bound = self.planet_free.field.as_ref().and_then(SpotField::absorbs);
+        let other = self.other_rotation.as_ref().filter(|other| other.is_far());
+        self.changes().or(other.map(OtherRotation::sentence)).or(of_bound)
     }
 
     /// The number that verdicts rest on: how often stars without a planet show as high a peak in the blind search.

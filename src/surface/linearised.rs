@@ -4,6 +4,7 @@ use super::evolving_map::NoFit;
 use super::expansion::Expansion;
 use super::static_map::ReferenceError;
 use crate::field::FieldError;
+use crate::model::Parameter;
 use crate::planets::periodogram::{CircularOrbit, Jitters, Unbounded};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::star::observation::RadialVelocity;
@@ -91,6 +92,20 @@ impl SpotField {
     /// Shape of the spectrum in words.
     pub fn spectrum(&self) -> &'static str {
         if self.spot_break_degree > 0.0 { "flat at low degrees" } else { "a power law" }
+    }
+
+    /// That spots absorb anything, where they live as short as the search allows, and what may be wrong.
+    pub fn absorbs(&self) -> Option<String> {
+        let name = Parameter::SpotLifetime.name();
+        let lifetime_d = self.spot_lifetime_d.filter(|days| *days < Parameter::SpotLifetime.usual())?;
+        self.at_bounds.iter().any(|reached| reached == name).then(|| {
+            format!(
+                "{name} falls to the lower bound of its search, {lifetime_d:.2} d: maps that change from profile to \
+                profile explain anything, a planet as well. Likely causes: star.rotation_period_d; errors that are too \
+                small (observations.sigma_scale \"auto\" measures them); a continuum or a line that differs from \
+                profile to profile (imaging.nuisances)"
+            )
+        })
     }
 
     /// It in a line.

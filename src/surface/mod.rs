@@ -35,7 +35,7 @@ pub mod planned {
     pub use super::evolving_map::{Assumed, Basis, Marginal, Planned, fit};
 }
 
-pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit};
+pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit, OtherRotation};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};
 pub use model::{At, OrbitOf, Properties, SurfaceModel};

@@ -39,7 +39,7 @@ impl Detection {
             k_kms: self.best.orbit.k_kms,
             sigma_k_kms: self.best.orbit.sigma_k_kms,
         };
-        match self.changes() {
+        match self.not_judged() {
             Some(sentence) => Verdict::not_judged(sentence),
             None => Verdict::new(self.false_alarm_probability(), signal, remarks),
         }
@@ -65,6 +65,8 @@ impl Detection {
         remarks.extend(evidence.misfit.iter().map(misfit));
         remarks.extend(self.of_the_data(evidence));
         remarks.extend(self.of_the_change());
+        let near = self.other_rotation.as_ref().filter(|other| !other.is_far());
+        remarks.extend(near.map(|other| Remark::note(other.sentence())));
         if self.is_candidate() {
             remarks.extend(self.of_the_period());
         }

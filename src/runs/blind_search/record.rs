@@ -11,7 +11,7 @@ use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{CircularOrbit, KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::surface::{AtTarget, Change, SpotField};
+use crate::surface::{AtTarget, Change, OtherRotation, SpotField};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -49,6 +49,9 @@ pub struct PeriodogramFile {
     /// Whether the star changes, where spots are taken for unchanging.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub change: Option<Change>,
+    /// Another rotation period with which the profiles are far more probable.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_rotation: Option<OtherRotation>,
     /// The quadratic that it was searched in.
     pub expansion: ExpansionRecord,
     /// A constant velocity left free beside the orbit.
@@ -341,6 +344,7 @@ impl PeriodogramFile {
             },
             field: found.last().field.clone(),
             change: found.change.and_then(Result::ok),
+            other_rotation: found.other_rotation,
             expansion: ExpansionRecord {
                 marginalised: settings.nuisances.iter().map(|n| n.parameter.name().to_owned()).collect(),
                 unresolved_spots: [&found.planet_free, found.last()].map(|here| here.unresolved_spots),

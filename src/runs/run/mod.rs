@@ -10,6 +10,7 @@ mod start;
 
 pub use conclusion::Conclusion;
 pub use error::RunError;
+use pace::Cost;
 pub use pace::{Meter, Pace};
 
 use crate::data::config::Settings;
@@ -29,6 +30,7 @@ use crate::sampling::ensemble::{
 use crate::sampling::log_density::LogDensity as _;
 use crate::surface::surrogate::{Surrogate, SurrogateMove};
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// Name of the chain in a run's folder.
 pub const CHAIN: &str = "chain.jsonl";
@@ -62,6 +64,8 @@ pub struct Run {
     /// Reconstructions before its first step: to fit and try the surrogate, and for the start.
     #[doc(hidden)]
     pub preparation: usize,
+    /// How long the first step took: as long as others do.
+    first_step: Duration,
     target: Target,
     task: Task,
     kinds: Vec<ParameterKind>,
@@ -153,7 +157,9 @@ impl Run {
             StartFrom::Prior => start::over_prior(&evaluator, scene),
         };
         let preparation = evaluator.count();
+        let began = Instant::now();
         let begun = start.and_then(|start| Ok((first_step(scene, &target, &evaluator, &start)?, start)));
+        let took = began.elapsed();
         // what was not evaluated looks like a start that is none
         let (first, start) = if pool.stopped() { Err(RunError::Interrupted) } else { begun }?;
         let blind_search = BlindSearch::summary_of(scene, found.detection.as_deref());
@@ -161,7 +167,7 @@ impl Run {
         let mut chain = Chain::new(manifest.shape());
         chain.push_step(&first)?;
         let run = Run::of(scene, manifest, (target, task), surrogate, (None, chain));
-        Ok(Run { preparation, ..run })
+        Ok(Run { preparation, first_step: took, ..run })
     }
 
     /// The same in `folder`, which is made: its steps so far are written with the manifest. A run that is there already
@@ -233,7 +239,19 @@ impl Run {
             Some(step) => StopPolicy { steps: step, least: step, ..policy },
             None => policy,
         };
-        Run { policy, manifest, target, task, chain, preparation: 0, kinds, settings, surrogate, journal }
+        Run {
+            policy,
+            manifest,
+            target,
+            task,
+            chain,
+            preparation: 0,
+            first_step: Duration::ZERO,
+            kinds,
+            settings,
+            surrogate,
+            journal,
+        }
     }
 
     /// The step at which the run ends if its goals are not reached before.

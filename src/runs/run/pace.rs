@@ -6,6 +6,39 @@ use crate::sampling::chain::{Convergence, Goals, Record};
 use crate::sampling::log_density::Status;
 use std::time::{Duration, Instant};
 
+/// What a chain will cost, guessed before its second step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// Steps until every parameter should have reached its goals; where one cannot tell, the step limit.
+    pub steps: usize,
+    /// Whether that is the limit.
+    pub is_limit: bool,
+    /// Evaluations of a step.
+    pub evaluations: usize,
+    /// How long they took in the first step.
+    pub of_a_step: Duration,
+}
+
+/// A surrogate of which a smaller share is accepted does not tell how long a chain takes.
+const TELLING: f64 = 0.3;
+
+/// Steps that are left out at the beginning, and effective samples of an evaluation over the square of the share
+/// accepted, as chains of simulated stars had them.
+const LEFT_OUT: f64 = 10.0;
+const EFFICIENCY: f64 = 0.7;
+
+impl Cost {
+    /// Of a run that has made its first step.
+    pub fn of(run: &Run) -> Self {
+        let evaluations = run.chain.shape().size();
+        let accepted = run.surrogate.as_ref().map_or(0.0, |(_, accepted)| *accepted);
+        let of_goals = run.policy.goals.ess / (EFFICIENCY * accepted.powi(2) * evaluations as f64);
+        let (needed, limit) = ((LEFT_OUT + of_goals).ceil(), run.policy.steps);
+        let is_limit = accepted < TELLING || needed > limit as f64;
+        Cost { steps: if is_limit { limit } else { needed as usize }, is_limit, evaluations, of_a_step: run.first_step }
+    }
+}
+
 /// Watches a chain grow.
 pub struct Meter {
     names: Vec<String>,

@@ -19,8 +19,7 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
                 .to_owned(),
         );
     }
-    let diagnostics = chain.names().iter().zip(&convergence.diagnostics);
-    advice.extend(diagnostics.filter_map(|(name, one)| parameter_advice(name, one, convergence.kept, goals)));
+    advice.extend(steps_needed(chain.names(), convergence, goals));
     if !convergence.stuck.is_empty() {
         let which = convergence.stuck.iter().take(5).map(|(e, w)| format!("ensemble {e} walker {w}"));
         let which = which.collect::<Vec<_>>().join(", ");
@@ -43,28 +42,25 @@ pub fn advice(chain: &Chain, convergence: &Convergence, goals: &Goals) -> Vec<St
     advice
 }
 
-/// What one parameter lacks.
-fn parameter_advice(name: &str, one: &Diagnostic, kept: usize, goals: &Goals) -> Option<String> {
-    let (Some(rhat), Some(ess)) = (one.rhat, one.ess) else {
-        return Some(format!(
-            "{name}: too few steps to tell, or it never moved: run `--extend {}`",
-            round_up(kept as f64)
-        ));
+/// What parameters lack, in one piece of advice: each with its numbers, and how many steps all of them need.
+fn steps_needed(names: &[String], convergence: &Convergence, goals: &Goals) -> Option<String> {
+    let lacks = |(name, one): (&String, &Diagnostic)| {
+        let (Some(rhat), Some(ess)) = (one.rhat, one.ess) else {
+            return Some(format!("{name}: too few steps to tell, or it never moved"));
+        };
+        let rhat = (rhat > goals.rhat).then(|| format!("R-hat {rhat:.3} > {}", goals.rhat));
+        let ess = (ess < goals.ess).then(|| format!("ESS {ess:.0} < {}", goals.ess));
+        let lacks: Vec<String> = rhat.into_iter().chain(ess).collect();
+        (!lacks.is_empty()).then(|| format!("{name}: {}", lacks.join(", ")))
     };
-    let mut lacks = Vec::new();
-    if rhat > goals.rhat {
-        lacks.push(format!("R-hat {rhat:.3} > {}", goals.rhat));
-    }
-    if ess < goals.ess {
-        lacks.push(format!("ESS {ess:.0} < {}", goals.ess));
-    }
-    if lacks.is_empty() {
+    let lacking: Vec<String> = names.iter().zip(&convergence.diagnostics).filter_map(lacks).collect();
+    if lacking.is_empty() {
         return None;
     }
-    let growth = growth(one, goals)?;
-    let more = round_up(kept as f64 * (growth - 1.0).min(MOST));
+    let growth = growth_needed(convergence, goals).unwrap_or(2.0);
+    let more = round_up(convergence.kept as f64 * (growth - 1.0).min(MOST));
     let bound = if growth - 1.0 > MOST { "at least" } else { "about" };
-    Some(format!("{name}: {}: run `--extend {more}` ({bound} {more} steps more needed)", lacks.join(", ")))
+    Some(format!("{}: run `--extend {more}` ({bound} {more} steps more needed)", lacking.join("; ")))
 }
 
 /// Factor by which the chain must still grow for every parameter to reach the goals; `None` if one cannot tell yet.

@@ -26,7 +26,11 @@ pub struct Basis {
 impl Basis {
     /// On the pixels of `grid`, maps exact enough for ln Z to some 0.03.
     pub fn new(grid: &SurfaceGrid) -> Self {
-        let harmonics = Harmonics::new(DEGREE);
+        Basis::up_to(grid, DEGREE)
+    }
+
+    fn up_to(grid: &SurfaceGrid, degree: usize) -> Self {
+        let harmonics = Harmonics::new(degree);
         let on_pixels = harmonics.at(&grid.longitude, &grid.latitude);
         let each = (grid.len() / WATCHED).max(1);
         let watched: Vec<usize> = (0..grid.len()).step_by(each).collect();
@@ -48,6 +52,11 @@ impl Basis {
     /// The same where differences of ln Z need be good to a few tenths only.
     pub fn rough(grid: &SurfaceGrid) -> Self {
         Basis::new(grid).roughly()
+    }
+
+    /// The same with harmonics up to a lower degree, which tell of large spots only.
+    pub(super) fn coarse(grid: &SurfaceGrid, degree: usize) -> Self {
+        Basis::up_to(grid, degree).roughly()
     }
 
     /// These harmonics, differences of ln Z good to a few tenths.

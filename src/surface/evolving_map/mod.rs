@@ -30,6 +30,7 @@ mod nights;
 mod optimum;
 mod planned;
 mod posterior;
+mod rotation;
 mod surface;
 
 pub use basis::Basis;
@@ -42,6 +43,7 @@ pub use light::{FluxFit, LEVEL};
 pub use maps::Maps;
 pub use planned::Planned;
 pub use posterior::{LN_EVIDENCE, MarginalPosterior};
+pub use rotation::OtherRotation;
 pub use surface::EvolvingMap;
 
 use crate::field::{Field, FieldError, Kernel, Lifetime, Settled, Sought, Spectrum, settle};

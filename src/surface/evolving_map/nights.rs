@@ -2,9 +2,9 @@
 //! at any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
 
 use super::light::misfits;
-use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
+use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, OtherRotation, fit};
 use crate::field::{Field, FieldError, Kernel, Lifetime};
-use crate::model::ParameterValues;
+use crate::model::{Parameter, ParameterValues};
 use crate::numerics::vector::{self, Instructions, Task};
 use crate::sampling::log_density::Status;
 use crate::star::observation::Observations;
@@ -79,6 +79,8 @@ impl SurfaceMaps {
                 summary.chi2_per_datum
             ));
         }
+        let other = OtherRotation::of(imager, values, &fitted, known);
+        warnings.extend(other.iter().map(OtherRotation::sentence));
         let light = marginal.light_curves(imager);
         warnings.extend(misfits(imager, &light));
         let counted = |counted: bool| modelled.estimates.iter().filter(move |_| counted);
@@ -113,8 +115,10 @@ pub(super) fn explained(imager: &Imager, observations: &Observations, fitted: &F
 
 /// What is to be said of bounds that the field reached.
 fn reached(fitted: &Fitted) -> Vec<String> {
-    let said = |name: &&str| {
-        format!("{name} lies on the bound of its search: the profiles do not tell it, or something else is wrong")
+    let absorbs = SpotField::of(fitted).absorbs();
+    let said = |name: &&str| match &absorbs {
+        Some(absorbs) if *name == Parameter::SpotLifetime.name() => absorbs.clone(),
+        _ => format!("{name} lies on the bound of its search: the profiles do not tell it, or something else is wrong"),
     };
     fitted.at_bounds.iter().map(said).collect()
 }

@@ -1,6 +1,6 @@
 //! The evolving map behind the interface of all surface models.
 
-use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, fit, nights, optimum};
+use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, OtherRotation, fit, nights, optimum};
 use crate::field::{Field, Lifetime};
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies};
@@ -107,6 +107,10 @@ impl SurfaceModel for EvolvingMap {
         known.map(|known| Change::of(at.imager, at.values, frequencies, at.nuisances, known))
     }
 
+    fn other_rotation(&self, at: At, here: &Linearised) -> Option<OtherRotation> {
+        OtherRotation::of(at.imager, at.values, here.kept(), self.known)
+    }
+
     fn imitates_at_fractions(&self) -> bool {
         false
     }
@@ -138,12 +142,14 @@ impl SurfaceModel for EvolvingMap {
     /// What has to be known of the field.
     fn remarks(&self, _: &Imager, here: &Linearised) -> Vec<Remark> {
         let field: &Fitted = here.kept();
-        let faint = field.too_faint();
+        let (faint, absorbs) = (field.too_faint(), SpotField::of(field).absorbs());
         let reached = |name: &&str| {
-            Remark::note(match faint {
-                Some(amplitude) if *name == Parameter::SpotAmplitude.name() => format!(
+            let is_of = |parameter: Parameter| *name == parameter.name();
+            Remark::note(match (faint, &absorbs) {
+                (Some(amplitude), _) if is_of(Parameter::SpotAmplitude) => format!(
                     "the profiles show no spots: their amplitude falls to the lower bound of its search, {amplitude:.2}"
                 ),
+                (_, Some(absorbs)) if is_of(Parameter::SpotLifetime) => absorbs.clone(),
                 _ => format!("{name} lies on the bound of its search: the profiles do not tell it, or it is wrong"),
             })
         };
