@@ -183,3 +183,27 @@ impl From<FieldError> for SurfaceError {
         SurfaceError::Field(error.into())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spots_that_live_as_short_as_they_may_absorb_anything() {
+        let name = Parameter::SpotLifetime.name().to_owned();
+        let field = |days: Option<f64>, at_bounds: Vec<String>| SpotField {
+            spot_amplitude: 0.2,
+            spot_slope: 1.0,
+            spot_break_degree: 7.0,
+            spot_lifetime_d: days,
+            velocity_jitter_kms: 0.0,
+            ln_evidence: 0.0,
+            at_bounds,
+        };
+        let shortest = field(Some(0.3), vec![name.clone()]).absorbs().unwrap();
+        assert!(shortest.contains("0.30 d") && shortest.contains("star.rotation_period_d"), "{shortest}");
+        assert_eq!(field(Some(3000.0), vec![name]).absorbs(), None, "the longest");
+        assert_eq!(field(Some(0.3), Vec::new()).absorbs(), None, "within the bounds");
+        assert_eq!(field(None, Vec::new()).absorbs(), None, "for ever");
+    }
+}

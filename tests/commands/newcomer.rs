@@ -241,6 +241,35 @@ fn one_star() {
     says(&alone.texts[3], &["porb_over_prot is not constrained", "phi is not constrained", "touches zero"]);
 }
 
+/// A rotation period that is off by a tenth is named, with the right one, and no planet is claimed; the right one is not
+/// doubted.
+#[test]
+fn a_wrong_rotation_period_is_named() {
+    let star = Star { spots: few(), vsini_kms: 20.0, nights: (8, 2), ..PLAIN };
+    let desk = Desk::new(star.config(0.0, 5));
+    desk.succeed(&["simulate", "config.json", "--out", "data"]);
+    let config = |rotation_period_d: f64| {
+        let mut config = star.config(0.0, 5);
+        config["star"]["rotation_period_d"] = json!(rotation_period_d);
+        config["observations"] = json!({ "path": "data/observations.txt", "velocity_jitter_kms": "fitted" });
+        config["imaging"] = json!({ "pixels": 300, "objective": "marginal-likelihood" });
+        config["planet"]["k_kms"] = json!(0.0);
+        config
+    };
+    desk.write("right.json", &config(2.3).to_string());
+    desk.write("wrong.json", &config(2.53).to_string());
+    let right = desk.succeed(&["periodogram", "right.json", "--out", "right", "--draws", "1000"]);
+    assert!(!right.contains("star.rotation_period_d"), "{right}");
+    for args in [&["periodogram", "--draws", "1000"][..], &["map"]] {
+        let told = desk.succeed(&[&[args[0], "wrong.json", "--out", args[0]], &args[1..]].concat());
+        says(&told, &["the star turns in 2.", "rather than in 2.530", "set star.rotation_period_d"]);
+    }
+    let found = desk.json("periodogram/periodogram.json");
+    assert_eq!(found["verdict"]["finding"], "not-judged");
+    let period_d = found["other_rotation"]["rotation_period_d"].as_f64().unwrap();
+    assert!((period_d / 2.3 - 1.0).abs() < 0.01, "{period_d}");
+}
+
 /// A quarter of an hour: the table of `results/newcomer.md`.
 #[test]
 #[ignore = "by hand: a quarter of an hour"]

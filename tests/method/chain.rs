@@ -240,6 +240,17 @@ fn a_displaced_ensemble_and_a_stuck_walker_are_not_converged() {
     let last = text.lines().last().unwrap();
     assert!(last.starts_with("the chain has NOT converged: k_kms: R-hat 1.") && last.contains("--extend"), "{last}");
 
+    // of several parameters one number of steps, that of the worst
+    let slow = chain(&["a", "b", "c"], [4, 8, 400], &mut |rng, [ensemble, ..]| {
+        vec![ensemble as f64 + normal(rng), 0.5 * ensemble as f64 + normal(rng), normal(rng)]
+    });
+    let advice = summarise(&slow, &[ParameterKind::Linear; 3], &GOALS).unwrap().advice;
+    assert_eq!(advice.concat().matches("--extend").count(), 1, "{advice:?}");
+    assert!(
+        advice[0].contains("a: R-hat") && advice[0].contains("b: R-hat") && !advice[0].contains("c: R-hat"),
+        "{advice:?}"
+    );
+
     let good = chain(&["k_kms"], [4, 8, 400], &mut |rng, _| vec![normal(rng)]);
     let mut stuck = Chain::new(good.shape().clone());
     for step in 0..good.steps() {

@@ -10,8 +10,7 @@ mod start;
 
 pub use conclusion::Conclusion;
 pub use error::RunError;
-use pace::Cost;
-pub use pace::{Meter, Pace};
+pub use pace::{Cost, Meter, Pace};
 
 use crate::data::config::Settings;
 use crate::data::io::effort::Effort;

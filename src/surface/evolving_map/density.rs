@@ -69,7 +69,9 @@ impl SurfaceDensity for MarginalPosterior {
     /// It is the density's own expansion.
     fn fitted(&self, surrogate: Surrogate, evaluator: &dyn Evaluator) -> (Surrogate, f64) {
         match self.finds_only_maps_anew() {
-            true => surrogate.refined(self.imager(), self, &|theta| self.expansion_at(theta).ok(), evaluator),
+            true => {
+                surrogate.refined(self.imager().mid_cycle(), self, &|theta| self.expansion_at(theta).ok(), evaluator)
+            }
             false => surrogate.fitted_if_poor(self, evaluator),
         }
     }

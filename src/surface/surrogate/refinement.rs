@@ -10,7 +10,6 @@ use super::correction::Drawn;
 use crate::model::Parameter;
 use crate::sampling::log_density::{Evaluator, LogDensity};
 use crate::surface::expansion::Expansion;
-use crate::surface::imaging::Imager;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -47,7 +46,7 @@ struct Expanded {
 impl Surrogate {
     /// With expansions `at` fields of spots, and the share of its proposals that are accepted. As it is fitted
     /// otherwise where that leads to nothing.
-    pub fn refined(self, imager: &Imager, density: &dyn LogDensity, at: &AtField, by: &dyn Evaluator) -> (Self, f64) {
+    pub fn refined(self, mid_cycle: f64, density: &dyn LogDensity, at: &AtField, by: &dyn Evaluator) -> (Self, f64) {
         let free = self.space.free();
         let positions: Vec<usize> =
             (0..free.len()).filter(|&i| Parameter::FIELD.contains(&free[i].parameter)).collect();
@@ -68,7 +67,7 @@ impl Surrogate {
             known.extend(draws);
             let places: Vec<(DVector<f64>, &Expansion)> =
                 known.iter().map(|of| (of.field(&positions), &of.expansion)).collect();
-            let model = LinearModel::of(&places, &positions, &self.space, imager.mid_cycle());
+            let model = LinearModel::of(&places, &positions, &self.space, mid_cycle);
             let next = model.and_then(|model| Surrogate::of(model, self.space.clone(), self.time_base_cycles, 1.0));
             match next {
                 Some(next) => best = Some((next, 0.0)),

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::model::{FreeParameter, ParameterValues, Prior};
-use crate::sampling::log_density::LogDensity as _;
+use crate::sampling::log_density::{Evaluation, LogDensity, Status, Threads};
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -156,4 +156,117 @@ fn peaks_lie_at_the_orbits_that_are_there() {
         let highest = forecast.evaluate(&start).log_prob;
         assert!(end.evaluation.log_prob > highest - 0.5, "{kind:?}: {} {highest}", end.evaluation.log_prob);
     }
+}
+
+/// A density whose velocities are the better known the longer the spots live, as those of stars are; its expansion at
+/// one lifetime does not know that.
+struct Living {
+    space: ParameterSpace,
+    observed: DVector<f64>,
+    plain: Expansion,
+}
+
+impl Living {
+    fn new() -> Self {
+        let values = space(&[K, PorbOverProt, Phi, Vsys]).values_at(&space(&[K, PorbOverProt, Phi, Vsys]).start());
+        let mut values = values;
+        values.field = Some(crate::model::FieldValues { amplitude: 0.2, slope: 1.0, lifetime_d: Some(20.0) });
+        let kinds = [K, PorbOverProt, Phi, Vsys].map(free).into_iter();
+        let of_field = [
+            (Parameter::SpotAmplitude, Prior::LogUniform { min: 0.05, max: 0.8 }),
+            (Parameter::SpotLifetime, Prior::LogUniform { min: 1.0, max: 400.0 }),
+        ];
+        let of_field = of_field.map(|(parameter, prior)| FreeParameter { parameter, prior });
+        let space = ParameterSpace::new(kinds.chain(of_field).collect(), values, MID, SPAN, 3.0).of_star(1000.0, None);
+        let plain = expansion(0.06, Some(&values));
+        let observed = DVector::from_iterator(plain.profiles(), values.motion().velocities_kms(&plain.cycles));
+        Living { space, observed, plain }
+    }
+
+    /// The expansion in the velocities at a field.
+    fn at(&self, theta: &[f64]) -> Expansion {
+        let values = self.space.values_at(theta);
+        let [a, t] = [Parameter::SpotAmplitude, Parameter::SpotLifetime].map(|p| values[p].ln());
+        let (a, t) = ((a - 0.2f64.ln()) / 0.2, (t - 20.0f64.ln()) / 0.5);
+        let information = &self.plain.information * (0.8 * t - 0.3 * a).exp();
+        let gradient = &information * &self.observed;
+        // as high at the best orbit, whatever the errors
+        let field = -0.5 * (a * a + t * t - 0.8 * a * t) - 0.1 * t.powi(3).max(-8.0) / (1.0 + t * t);
+        let log_likelihood = field - 0.5 * self.observed.dot(&gradient);
+        Expansion { log_likelihood, gradient, noise: information.clone(), information, ..self.plain.clone() }
+    }
+
+    /// To second order in the field as well.
+    fn expanded(&self) -> Expansion {
+        let here = self.at(&self.space.start());
+        let n = here.profiles();
+        let mut information = DMatrix::zeros(n + 2, n + 2);
+        information.view_mut((0, 0), (n, n)).copy_from(&here.information);
+        let (a, t) = (1.0 / 0.2, 1.0 / 0.5);
+        information.view_mut((n, n), (2, 2)).copy_from(&DMatrix::from_row_slice(
+            2,
+            2,
+            &[a * a, -0.4 * a * t, -0.4 * a * t, t * t],
+        ));
+        let field = [0.2f64.ln(), 20.0f64.ln()];
+        Expansion {
+            stellar: vec![Parameter::SpotAmplitude, Parameter::SpotLifetime],
+            centre: DVector::from_iterator(n + 2, here.centre.iter().copied().chain(field)),
+            gradient: DVector::from_iterator(n + 2, here.gradient.iter().copied().chain([0.0, 0.0])),
+            noise: information.clone(),
+            information,
+            ..here
+        }
+    }
+}
+
+impl LogDensity for Living {
+    fn names(&self) -> &[String] {
+        self.space.names()
+    }
+
+    fn evaluate(&self, theta: &[f64]) -> Evaluation {
+        let log_prior = self.space.log_prior(theta);
+        if !log_prior.is_finite() {
+            return Evaluation::rejected(Status::OutsidePrior);
+        }
+        Evaluation::of(self.at(theta).log_likelihood_at(&self.space.values_at(theta)) + log_prior)
+    }
+
+    fn to_sampling(&self, theta: &[f64]) -> Vec<f64> {
+        self.space.to_sampling(theta)
+    }
+
+    fn to_physical(&self, internal: &[f64]) -> Vec<f64> {
+        self.space.to_physical(internal)
+    }
+
+    fn log_jacobian(&self, theta: &[f64]) -> f64 {
+        self.space.log_jacobian(theta)
+    }
+}
+
+#[test]
+fn expansions_at_other_fields_make_its_proposals_good() {
+    let living = Living::new();
+    let model = LinearModel::new(&living.expanded(), &living.space, MID).unwrap();
+    let plain = Surrogate::of(model, living.space.clone(), SPAN, 1.0).unwrap();
+    let (_, of_one) = plain.clone().fitted_if_poor(&living, &Threads(&living));
+    let at = |theta: &[f64]| Some(living.at(theta));
+    let (refined, of_many) = plain.refined(MID, &living, &at, &Threads(&living));
+    assert!(of_many > 0.9 && of_one < 0.8, "{of_one} {of_many}");
+    // at places that it has not seen, too
+    let mut rng = ChaCha8Rng::seed_from_u64(77);
+    let mut off = Vec::new();
+    for _ in 0..40 {
+        let position = refined.draw(&mut rng).unwrap();
+        let theta = living.space.to_physical(&position);
+        let (given, linear) = refined.model.split(&position);
+        let found = refined.model.at(&given, 1.0).unwrap().log_likelihood(&linear);
+        let wanted = living.at(&theta).log_likelihood_at(&living.space.values_at(&theta));
+        off.push((found - wanted).abs());
+        assert_eq!(refined.model.position(&given, &linear), position);
+    }
+    off.sort_by(f64::total_cmp);
+    assert!(off[20] < 0.05 && off[36] < 0.3, "{off:?}");
 }
