@@ -39,6 +39,7 @@ pub mod planet;
 pub mod response;
 pub mod rotation;
 mod seen;
+pub mod size;
 mod sorting;
 pub mod spots;
 pub mod stability;
@@ -54,6 +55,7 @@ pub use orbit::{Eccentric, Motion, Orbit, Shape};
 pub use photometry::Band;
 pub use rotation::Rotation;
 pub use seen::{OwnMap, Sampling, Seen};
+pub use size::Size;
 pub use spots::{Disc, Facula, Life, Spot};
 pub use stacked::Response;
 

@@ -34,4 +34,5 @@ mod report;
 mod sample;
 mod shared;
 mod stopped;
+mod story;
 mod zero_points;

@@ -115,6 +115,13 @@ impl Detection {
                 ),
             ));
         }
+        let turns = imager.time_base_cycles();
+        if turns < 1.0 {
+            remarks.push(Remark::note(format!(
+                "the star does not turn once while it is observed ({turns:.2} rotations of star.rotation_period_d, in \
+                days): parts of it are not seen, or the period is wrong"
+            )));
+        }
         let profiles = imager.profiles().count();
         if profiles < FEW {
             remarks.push(Remark::against(
