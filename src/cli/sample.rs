@@ -11,7 +11,7 @@ use crate::runs::run::{CHAIN, Cost, Meter, Pace, Run, RunError, SUMMARY, StartFr
 use crate::sampling::ensemble::{MOST_STEPS, StopReason};
 use indicatif::{HumanDuration, ProgressBar};
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Sample the posterior of the free parameters
 ///
@@ -95,8 +95,9 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
         run.map_err(failed)?
     };
     signals.defer();
-    if !resume {
-        console::note(cost(&Cost::of(&run)));
+    let cost = Cost::of(&run);
+    if !resume && cost.time() > WORTH_SAYING {
+        console::note(words(&cost));
     }
     let bar = progress::bar(global, Some(BAR), "first step");
     let mut meter = Meter::new(&run);
@@ -119,10 +120,13 @@ pub fn run(args: &Args, global: &Global) -> Result<(), Failure> {
     }
 }
 
+/// Chains that take longer are announced.
+const WORTH_SAYING: Duration = Duration::from_secs(20);
+
 /// What a chain will cost, in words.
-fn cost(cost: &Cost) -> String {
+fn words(cost: &Cost) -> String {
     let Cost { steps, is_limit, evaluations, of_a_step } = *cost;
-    let time = HumanDuration(of_a_step.mul_f64(steps as f64));
+    let time = HumanDuration(cost.time());
     let each = of_a_step.as_secs_f64() / evaluations as f64;
     let bound = if is_limit { "at most" } else { "some" };
     format!(

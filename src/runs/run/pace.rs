@@ -37,6 +37,11 @@ impl Cost {
         let is_limit = accepted < TELLING || needed > limit as f64;
         Cost { steps: if is_limit { limit } else { needed as usize }, is_limit, evaluations, of_a_step: run.first_step }
     }
+
+    /// How long all of it takes.
+    pub fn time(&self) -> Duration {
+        self.of_a_step.mul_f64(self.steps as f64)
+    }
 }
 
 /// Watches a chain grow.
