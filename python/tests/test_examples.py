@@ -50,7 +50,7 @@ def test_the_notebook_runs(capsys: pytest.CaptureFixture[str]) -> None:
             for how in ("_repr_html_", "_repr_png_"):
                 assert not hasattr(shown, how) or getattr(shown, how)()
     printed = capsys.readouterr().out
-    assert "Detection" in printed and "the chain has converged" in printed and "phi') True" in printed
+    assert "Detection" in printed and "Chain converged" in printed and "phi') True" in printed
 
 
 def blocks(page: str) -> list[str]:

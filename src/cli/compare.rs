@@ -10,7 +10,7 @@ use crate::runs::grid_scan::PARABOLOID;
 use crate::runs::run::CHAIN;
 use std::path::PathBuf;
 
-/// Compare a chain with a landscape of the same data
+/// Compare a chain with a likelihood grid of the same data
 ///
 /// Parameter by parameter: the chain's median and 68 % interval; vertex and error bar of the paraboloid; median and 68
 /// % interval of the whole landscape under the chain's prior; how far they are apart, and what each took. The two must

@@ -5,7 +5,7 @@ use crate::numerics::text::shown;
 use crate::runs::export::{self, Contents};
 use std::path::PathBuf;
 
-/// Write a run's chain, or the velocities of a search, for other programs
+/// Export a chain, or the RVs of a search, to other programs
 ///
 /// Without --out it goes beside the chain in the run's folder: chain.zarr, chain.h5, chain.csv, or chain_1.txt,
 /// chain.paramnames, ... The warm-up is told apart as `analyse` does it. A run may be exported while it grows.

@@ -14,7 +14,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Compute the landscape: a reconstruction at every node of a grid
+/// Compute a likelihood grid: a map at every node
 ///
 /// The axes are those under `grid` in the config, one to three parameters; all others are fixed at the config's values.
 /// ln L is the log-probability of `sample` without the prior, relative to the same reference: the best parameters along

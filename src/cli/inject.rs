@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Name of the config that is written beside the profiles.
 const CONFIG: &str = "config.json";
 
-/// Put the orbit of a planet into observed profiles
+/// Inject a planetary signal into observed profiles
 ///
 /// Each profile is shifted by the orbit's velocity at its time and resampled on its own velocity axis, in its whole
 /// width; errors travel along, times and VRAD stay. The interpolation is band-limited and leaves white noise nearly

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 /// What limits that are interrupted have not come to.
 const LIMIT: &str = "limit";
 
-/// Find out which planets would be found: injection and recovery over period, K and phase
+/// Detection limits from injection-recovery tests in period, K and phase
 ///
 /// Orbits are put into the profiles, and `periodogram` looks for them: recovered is what has a false-alarm probability
 /// below 1 % and the right period. It takes the linear shortcut, in which an orbit is a shift of the velocities around

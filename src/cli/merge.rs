@@ -6,7 +6,7 @@ use crate::numerics::text::shown;
 use crate::runs::merge::{MergeError, merge};
 use std::path::PathBuf;
 
-/// Join runs of the same config but for the seed into one
+/// Merge runs that differ only in their seed
 ///
 /// For chains that an array of jobs has sampled. The runs must be of the same config, data and program and have the
 /// same reference; their seeds must differ. The joined run has the ensembles of all, as many steps as the shortest, and

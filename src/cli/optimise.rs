@@ -7,7 +7,7 @@ use crate::data::config::Config;
 use crate::runs::optimum::{self, OptimumFile};
 use std::path::PathBuf;
 
-/// Find the best parameters and their error bars
+/// Find the maximum of the posterior, with uncertainties
 ///
 /// Climbs from the config's values and from other orbits of the prior, with the gradient of the log-probability; the
 /// error bars are those of its curvature. Writes optimum.json.

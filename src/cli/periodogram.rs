@@ -9,7 +9,7 @@ use crate::runs::blind_search::{BlindSearch, BlindSearchError, BlindSearchOption
 use crate::runs::maps;
 use std::path::PathBuf;
 
-/// Search for a planet at every period, the star's spots marginalised out
+/// Blind search for a planet over period, marginalised over the star's spots
 ///
 /// The star is imaged without a planet, and how much better the profiles fit with an orbit of each period follows in
 /// closed form, together with radial velocities that are free of spots. K at the best period is given for a target chi2
@@ -46,7 +46,7 @@ pub struct Args {
     /// Hold them at the config's values
     #[arg(long)]
     fixed: bool,
-    /// Number of stars without a planet
+    /// Number of planet-free Monte Carlo realisations for the FAP
     #[arg(long, value_name = "N", default_value_t = SearchSettings::DRAWS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1_000..=10_000_000))]
     draws: u32,

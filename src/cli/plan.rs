@@ -8,7 +8,7 @@ use crate::planets::periodogram::FrequencySettings;
 use crate::runs::plan::{CSV, Forecast, JSON, PlanSettings};
 use std::path::PathBuf;
 
-/// Forecast which planets a schedule would show, before any profile is taken
+/// Forecast the detection limits of an observing schedule
 ///
 /// Of a star that is not yet observed the config says when and how well it will be: `observations.simulate` with its
 /// schedule (or cycles), velocity bins and S/N, and what its spots are like (`imaging.spot_amplitude`, `spot_slope`,

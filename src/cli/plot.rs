@@ -7,7 +7,7 @@ use crate::figures::plot::{self, DPI};
 use crate::runs::grid_scan::HEADER;
 use std::path::PathBuf;
 
-/// Draw whatever a folder holds, as SVG and PNG
+/// Plot the results in FOLDER as SVG and PNG
 ///
 /// From saved files alone, nothing is computed anew: the map in flattened polar and Mollweide projection, profiles,
 /// residuals and radial velocities of `map`; periodogram and velocities of `periodogram`; corner plot, traces and

@@ -6,7 +6,7 @@ use crate::data::io::atomic;
 use crate::figures::report;
 use std::path::PathBuf;
 
-/// Write one HTML page of whatever a folder holds
+/// Write one HTML page of the results in FOLDER
 ///
 /// Tables, the verdict in plain words, notes, figures, the config and how to cite, in a single file that needs nothing
 /// else and can be sent to others.

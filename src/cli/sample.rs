@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 /// Sample the posterior of the free parameters
 ///
 /// Searches for the best parameters, then runs independent ensembles until every parameter has reached the R-hat and
-/// effective sample size of the config, or the step limit. Writes manifest.json, chain.jsonl and summary.json. A run
-/// that was stopped, by whatever, goes on with --resume and comes to the same bytes as one that was not.
+/// effective sample size of the config, or the step limit. Writes manifest.json, chain.jsonl and summary.json.
+/// Interrupted runs can be resumed with `--resume`; the result is bit-identical to an uninterrupted run.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  dimcmc sample configs/demo.json --out runs/demo\n  \
                         dimcmc sample configs/demo.json --out runs/demo --extend 500\n  \

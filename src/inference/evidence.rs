@@ -78,7 +78,7 @@ impl EvidenceRecord {
         let second = if same { String::new() } else { format!("; second planet: {}", two.words(rotation_period_d)) };
         let priors = format!("{}{second}", one.words(rotation_period_d));
         let number = |bayes: &LnBayes| match bayes.sd {
-            Some(sd) => format!("{:.2} +- {sd:.2}", bayes.ln_bayes),
+            Some(sd) => format!("{:.2} ± {sd:.2}", bayes.ln_bayes),
             None => format!("{:.2}", bayes.ln_bayes),
         };
         let Evidence { circle, ellipse, two_circles, .. } = found;
@@ -89,19 +89,19 @@ impl EvidenceRecord {
             let ends = cycles.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
             let time_base_d = rotation_period_d * (ends[1] - ends[0]);
             let digits = decimals(0.5 * best.period_d.powi(2) / time_base_d);
-            format!("; false inclusion probability {chance} at {:.digits$} d", best.period_d)
+            format!("; false inclusion probability {chance} at P = {:.digits$} d", best.period_d)
         });
         let wide = (one.k.1[1] > WIDE * error_kms).then(|| {
             let most = one.k.1[1];
             format!(
-                "the prior of K, up to {most} km/s, reaches far beyond what the profiles measure (some \
-                 {error_kms:.3} km/s), and Bayes factors fall in proportion: "
+                "The prior of K reaches to {most} km/s, far beyond σ_K ≈ {error_kms:.3} km/s, and lowers all Bayes factors \
+                in proportion. "
             )
         });
-        let jitter = if !jitters.is_none() { ", the velocity jitter marginalised in each" } else { "" };
+        let jitter = if !jitters.is_none() { ", RV jitter marginalised" } else { "" };
         let sentence = format!(
-            "{}ln of the Bayes factor over no planet: one on a circle {}, one on an ellipse {}, two on circles {} \
-             (priors: {priors}; spots as fitted without a planet{jitter}){}",
+            "{}ln Bayes factor relative to no planet: 1 circular {}, 1 Keplerian {}, 2 circular {}{} (priors: \
+            {priors}; spots fixed at the planet-free fit{jitter})",
             wide.unwrap_or_default(),
             number(&circle),
             number(&ellipse),

@@ -71,13 +71,13 @@ pub fn are_few(modes: &[PeriodMode], rotation: &RotationPeriods) -> bool {
 pub fn doubts(modes: &[PeriodMode]) -> Vec<Remark> {
     let Some(heaviest) = modes.first() else { return Vec::new() };
     let of_the_star = heaviest.rotation.as_ref().map(|words| {
-        let text = format!("the chain's period is {words}: spots may imitate an orbit there");
-        Remark::against(format!("the period is {words}"), text)
+        let text = format!("The period {words}: degenerate with spot modulation.");
+        Remark::against(format!("P {words}"), text)
     });
     let share = 100.0 * heaviest.weight;
     let rivals = (heaviest.weight < ALONE).then(|| {
-        let text = format!("the period is ambiguous: the heaviest mode of the chain holds {share:.0} % of its draws");
-        Remark::against("the period is ambiguous", text)
+        let text = format!("Period ambiguous: the main mode holds {share:.0} % of the posterior.");
+        Remark::against("period ambiguous", text)
     });
     of_the_star.into_iter().chain(rivals).collect()
 }

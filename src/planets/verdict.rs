@@ -77,9 +77,17 @@ impl Signal {
     /// The period with its error.
     pub fn period(&self) -> String {
         match self.sigma_period_d {
-            Some(sigma) => format!("{:.2$} +- {:.2$} d", self.period_d, sigma, decimals(sigma)),
+            Some(sigma) => format!("{:.2$} ± {:.2$} d", self.period_d, sigma, decimals(sigma)),
             None => format!("{:.4} d", self.period_d),
         }
+    }
+
+    /// Period and K with their uncertainties; K in m/s below 1 km/s.
+    pub fn words(&self) -> String {
+        let (factor, unit) = if self.k_kms.abs() < 1.0 { (1e3, "m/s") } else { (1.0, "km/s") };
+        let [k, sigma] = [self.k_kms, self.sigma_k_kms].map(|kms| factor * kms);
+        let digits = decimals(sigma);
+        format!("P = {}, K = {k:.digits$} ± {sigma:.digits$} {unit}", self.period())
     }
 }
 
@@ -182,7 +190,7 @@ impl Verdict {
     pub fn not_judged(why: impl std::fmt::Display) -> Self {
         Verdict {
             finding: Finding::NotJudged,
-            sentence: format!("Whether there is a planet is not judged: {why}."),
+            sentence: format!("No verdict: {why}."),
             false_alarm_probability: None,
             signal: None,
             against: Vec::new(),
@@ -192,49 +200,62 @@ impl Verdict {
 }
 
 fn sentence_of_known(finding: Finding, chance: f64, signal: &Signal, known: &Known, against: &[String]) -> String {
-    let Signal { k_kms, sigma_k_kms, .. } = *signal;
     let Known { significance, k_upper95_kms } = *known;
-    let digits = decimals(sigma_k_kms);
     let head = match finding {
-        Finding::NoPlanetNeeded => "The known planet is not seen",
-        Finding::Candidate => "The known planet is indicated, not detected",
-        Finding::Detection => "The known planet is detected",
+        Finding::NoPlanetNeeded => "not detected",
+        Finding::Candidate if against.is_empty() => "marginal (FAP < 1 %)",
+        Finding::Candidate => "marginal",
+        Finding::Detection => "detected (FAP < 0.1 %)",
         Finding::NotJudged => return String::new(),
     };
-    let against = if against.is_empty() { String::new() } else { format!(" Against it: {}.", against.join("; ")) };
     format!(
-        "{head}: {}, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s; against no planet \
-         {significance:.1} sigma (one-sided; false-alarm probability of this one period {}); K is below \
-         {k_upper95_kms:.digits$} km/s (95 %).{against}",
-        signal.period(),
-        probability(chance)
+        "Known planet: {head}. {}; K > 0 at {significance:.1}σ (one-sided p = {}); K < {} (95 % upper limit).{}",
+        signal.words(),
+        probability(chance),
+        speed(k_upper95_kms, signal.sigma_k_kms),
+        caveats(against)
     )
 }
 
 fn sentence(finding: Finding, false_alarm_probability: f64, signal: &Signal, against: &[String]) -> String {
-    let Signal { k_kms, sigma_k_kms, .. } = *signal;
-    let digits = decimals(sigma_k_kms);
-    let orbit = format!("{}, K = {k_kms:.digits$} +- {sigma_k_kms:.digits$} km/s", signal.period());
-    let chance = format!("false-alarm probability {}", probability(false_alarm_probability));
+    let (orbit, chance) = (signal.words(), false_alarm(false_alarm_probability));
+    let percent = |share: f64| 100.0 * share;
     match finding {
         Finding::NoPlanetNeeded => {
-            let share = 100.0 * CANDIDATE_FAP;
-            format!(
-                "No planet is needed: stars without one show a peak as high as the best ({orbit}) too often ({chance}, \
-                     above {share} %)."
-            )
+            let threshold = percent(CANDIDATE_FAP);
+            format!("No significant signal. Highest peak: {orbit}, {chance} (threshold {threshold} %).")
         }
         Finding::Candidate if against.is_empty() => {
-            let share = 100.0 * DETECTION_FAP;
-            format!("Candidate, not a detection: {orbit}; {chance}, and a detection needs less than {share} %.")
+            let threshold = percent(DETECTION_FAP);
+            format!("Candidate: {orbit}, {chance} (a detection requires < {threshold} %).")
         }
-        Finding::Candidate => {
-            let against = against.join("; ");
-            format!("Candidate, not a detection: {orbit}; {chance}. Against it: {against}.")
-        }
-        Finding::Detection => format!("Detection: {orbit}; {chance}, and no check speaks against it."),
+        Finding::Candidate => format!("Candidate: {orbit}, {chance}.{}", caveats(against)),
+        Finding::Detection => format!("Detection: {orbit}, {chance}; all diagnostics passed."),
         Finding::NotJudged => String::new(),
     }
+}
+
+fn caveats(against: &[String]) -> String {
+    if against.is_empty() { String::new() } else { format!(" Caveats: {}.", against.join("; ")) }
+}
+
+/// Below this a false-alarm probability is extrapolated beyond the simulations that it rests on.
+const SIMULATED_FAP: f64 = 1e-4;
+
+/// A false-alarm probability in words; where it is extrapolated, an upper limit with the extrapolation.
+pub fn false_alarm(p: f64) -> String {
+    match p {
+        0.0 => "FAP < 1e-300".to_owned(),
+        p if p < SIMULATED_FAP => format!("FAP < {SIMULATED_FAP:e} (extrapolated: {p:.0e})"),
+        p => format!("FAP = {}", probability(p)),
+    }
+}
+
+/// A velocity (km/s) with as many digits as its uncertainty allows, in m/s below 1 km/s.
+pub fn speed(kms: f64, sigma_kms: f64) -> String {
+    let (factor, unit) = if kms.abs() < 1.0 { (1e3, "m/s") } else { (1.0, "km/s") };
+    let digits = decimals(factor * sigma_kms);
+    format!("{:.digits$} {unit}", factor * kms)
 }
 
 /// A probability as it is written everywhere.
@@ -259,10 +280,10 @@ mod tests {
         assert!((one_sided(1.6449) - 0.05).abs() < 1e-5);
         let verdict = Verdict::of_known([0.1, 0.01], SIGNAL, 0.12, &[]);
         assert_eq!(verdict.finding, Finding::Detection);
-        assert!(verdict.sentence.contains("10.0 sigma"), "{}", verdict.sentence);
-        let less = verdict.with(&[Remark::against("one night decides", "")]);
+        assert!(verdict.sentence.contains("K > 0 at 10.0σ"), "{}", verdict.sentence);
+        let less = verdict.with(&[Remark::against("driven by a single night", "")]);
         assert_eq!(less.finding, Finding::Candidate);
-        assert!(less.sentence.ends_with("Against it: one night decides."), "{}", less.sentence);
+        assert!(less.sentence.ends_with("Caveats: driven by a single night."), "{}", less.sentence);
         assert_eq!(Verdict::of_known([0.01, 0.01], SIGNAL, 0.12, &[]).finding, Finding::NoPlanetNeeded);
         assert_eq!(Verdict::of_known([0.0, 0.0], SIGNAL, 0.12, &[]).finding, Finding::NotJudged);
     }
@@ -275,17 +296,21 @@ mod tests {
         assert_eq!(verdict(0.01, &[]).finding, Finding::NoPlanetNeeded);
         assert_eq!(verdict(f64::NAN, &[]).finding, Finding::NotJudged);
         assert_eq!(verdict(1e-14, &[Remark::note("few profiles")]).finding, Finding::Detection);
-        let doubted = verdict(1e-14, &[Remark::against("the period is close to 2 Prot", "long")]);
+        let doubted = verdict(1e-14, &[Remark::against("P consistent with 2 P_rot", "long")]);
         assert_eq!(doubted.finding, Finding::Candidate);
         assert_eq!(
             doubted.sentence,
-            "Candidate, not a detection: 5.069 +- 0.021 d, K = 0.103 +- 0.011 km/s; false-alarm probability 1.0e-14. \
-             Against it: the period is close to 2 Prot."
+            "Candidate: P = 5.069 ± 0.021 d, K = 103 ± 11 m/s, FAP < 1e-4 (extrapolated: 1e-14). Caveats: P consistent \
+            with 2 P_rot."
         );
         assert_eq!(
-            verdict(1e-14, &[]).with(&[Remark::against("one night decides", "")]).against,
-            ["one night decides"]
+            verdict(1e-14, &[]).with(&[Remark::against("driven by a single night", "")]).against,
+            ["driven by a single night"]
         );
-        assert!(verdict(0.71, &[]).sentence.starts_with("No planet is needed: "), "{}", verdict(0.71, &[]).sentence);
+        assert!(
+            verdict(0.71, &[]).sentence.starts_with("No significant signal. Highest peak: P = "),
+            "{}",
+            verdict(0.71, &[]).sentence
+        );
     }
 }

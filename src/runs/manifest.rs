@@ -70,9 +70,7 @@ impl Manifest {
             let values: Vec<String> = self.names.iter().map(|n| format!("{n} {:.4}", rival.parameters[n])).collect();
             values.join(", ")
         };
-        let line = |rival: &OptimumRecord| {
-            format!("another maximum, not much lower, where walkers started too: {}", place(rival))
-        };
+        let line = |rival: &OptimumRecord| format!("Secondary maximum, also used as a start: {}", place(rival));
         let measured = self.origin.measured.lines().into_iter().map(|(label, text)| format!("{label}: {text}"));
         self.origin.rivals.iter().map(line).chain(self.origin.reference.warnings(&self.names)).chain(measured).collect()
     }
@@ -93,9 +91,8 @@ impl Manifest {
         })?;
         let rotation = if fraction == 1 { "Prot".to_owned() } else { format!("Prot/{fraction}") };
         Some(format!(
-            "the period is within {:.0} % of {rotation}, where spots imitate an orbit: K is less certain than its \
-            interval \
-             says; see what `dimcmc periodogram` or imaging.unresolved_spots \"fitted\" makes of it",
+            "The period lies within {:.0} % of {rotation}, where it is degenerate with spot modulation: the interval of K \
+            is too narrow; compare with `dimcmc periodogram` or imaging.unresolved_spots: \"fitted\".",
             100.0 * NEAR_ROTATION
         ))
     }

@@ -102,7 +102,7 @@ impl<'a> Maps<'a> {
         let text = diagnosis.as_ref().map(|diagnosis| diagnosis.text.clone());
         let misfit = match (&maps.field, text) {
             (Some(_), text) => text,
-            (None, Some(text)) => Some(format!("the model does not fit as well as the continuum promises: {text}")),
+            (None, Some(text)) => Some(format!("The model does not fit to the continuum noise: {text}")),
             // of several data sets the reason is not looked for
             (None, None) => scene.measured.misfit_text(),
         };
@@ -131,15 +131,13 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     let SurfaceMaps { summary: fit, field, light, nuisances, zero_points_kms, .. } = maps;
     let MapSummary { chi2, chi2_per_datum, data, profiles, .. } = fit;
     let mut lines = field.as_ref().map_or_else(Vec::new, of_field);
-    lines.push(("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles ({chi2_per_datum:.4} per datum)")));
+    lines.push(("chi2", format!("{chi2:.2} for {data} data in {profiles} profiles (χ²/N = {chi2_per_datum:.4})")));
     let of_static = fit.chi2_per_datum_unchanging;
-    lines.extend(
-        of_static.map(|chi2| ("unchanging", format!("{chi2:.4} per datum, had the same spots lived for ever"))),
-    );
+    lines.extend(of_static.map(|chi2| ("static spots", format!("χ²/N = {chi2:.4}"))));
     if !light.is_empty() {
         let squares: f64 = light.iter().map(|fit| ((fit.bin.flux - fit.model) / fit.bin.sigma).powi(2)).sum();
         let bins = light.len();
-        lines.push(("flux", format!("chi2 {squares:.2} for {bins} bins ({:.4} per bin)", squares / bins as f64)));
+        lines.push(("flux", format!("chi2 {squares:.2} for {bins} bins (χ²/N = {:.4})", squares / bins as f64)));
     }
     lines.extend(fit.image.as_ref().map_or_else(Vec::new, of_image));
     lines.push(("residuals", format!("{:.3e} rms, {:.3e} in the line core", fit.residual_rms, fit.residual_rms_core)));
@@ -147,19 +145,19 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
     if let Some(filtered) = fit.filtered_rv_rms_kms {
         let filtered = match (nuisances.is_empty(), zero_points_kms.is_empty()) {
             (true, true) => format!("{filtered:.4} km/s rms"),
-            (true, false) => "not told: first moments follow the zero points that were fitted".to_owned(),
-            (false, _) => "not told: first moments follow the continuum that was fitted".to_owned(),
+            (true, false) => "n/a (degenerate with the fitted RV offsets)".to_owned(),
+            (false, _) => "n/a (degenerate with the fitted continuum)".to_owned(),
         };
         lines.push(("RV filtered", filtered));
         lines.push(("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms)));
     }
     if let Some((rms, error)) = fit.rv_rms_kms.zip(fit.rv_error_kms) {
-        lines.push(("RV, no spots", format!("{rms:.4} km/s rms, error {error:.4} km/s")));
+        lines.push(("RV, no spots", format!("{rms:.4} km/s rms, uncertainty {error:.4} km/s")));
     }
     let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
     if !zero_points_kms.is_empty() {
         let squares = zero_points_kms.iter().map(|v| v * v).sum();
-        lines.push(("zero points", format!("{:.4} km/s rms", rms(squares, zero_points_kms.len()))));
+        lines.push(("RV offsets", format!("{:.4} km/s rms", rms(squares, zero_points_kms.len()))));
     }
     if !nuisances.is_empty() {
         let [offset, slope, width] =
@@ -177,16 +175,16 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
 /// Those of a field.
 fn of_field(field: &SpotField) -> Vec<(&'static str, String)> {
     let bound = |name: &str| match field.at_bounds.iter().any(|reached| reached == name) {
-        true => ", at the bound of its search",
+        true => ", at its search bound",
         false => "",
     };
-    let lifetime = field.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2} d"));
+    let lifetime = field.spot_lifetime_d.map_or("infinite (static)".to_owned(), |days| format!("{days:.2} d"));
     vec![
-        ("amplitude", format!("{:.4} (of the spot filling factor)", field.spot_amplitude)),
-        ("slope", format!("{:.3} ({}){}", field.spot_slope, field.spectrum(), bound("spot_slope"))),
+        ("amplitude", format!("{:.4} (SD of the spot filling factor)", field.spot_amplitude)),
+        ("power-law index", format!("{:.3} ({}){}", field.spot_slope, field.spectrum(), bound("spot_slope"))),
         ("lifetime", format!("{lifetime}{}", bound("spot_lifetime_d"))),
-        ("jitter", format!("{:.4} km/s", field.velocity_jitter_kms)),
-        ("ln evidence", format!("{:.2}", field.ln_evidence)),
+        ("RV jitter", format!("{:.4} km/s", field.velocity_jitter_kms)),
+        ("ln Z", format!("{:.2}", field.ln_evidence)),
     ]
 }
 

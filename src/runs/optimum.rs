@@ -143,9 +143,9 @@ impl OptimumFile {
         }
         table += &self.derived_table();
         let maximum = match (self.well_defined, self.converged) {
-            (true, true) => "a well-defined maximum",
-            (true, false) => "the search ran out of steps; the values may be improved from there",
-            (false, _) => "no well-defined maximum: on the edge of a prior, or the data leave some direction open",
+            (true, true) => "Well-defined maximum",
+            (true, false) => "Step limit reached: the maximum may be improved from here",
+            (false, _) => "No well-defined maximum: at a prior boundary, or a degenerate direction",
         };
         let _ = writeln!(table, "{maximum}; ln P = {:.3}{}", self.optimum.log_prob, listed(&self.numbers));
         let remarks = self.blind_search.iter().flat_map(|search| &search.remarks).map(|remark| remark.text.clone());

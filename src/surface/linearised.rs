@@ -100,10 +100,9 @@ impl SpotField {
         let lifetime_d = self.spot_lifetime_d.filter(|days| *days < Parameter::SpotLifetime.usual())?;
         self.at_bounds.iter().any(|reached| reached == name).then(|| {
             format!(
-                "{name} falls to the lower bound of its search, {lifetime_d:.2} d: maps that change from profile to \
-                profile explain anything, a planet as well. Likely causes: star.rotation_period_d; errors that are too \
-                small (observations.sigma_scale \"auto\" measures them); a continuum or a line that differs from \
-                profile to profile (imaging.nuisances)"
+                "{name} is at its lower search bound, {lifetime_d:.2} d: maps that vary between profiles absorb any signal, \
+                planets included. Likely causes: star.rotation_period_d; underestimated uncertainties \
+                (observations.sigma_scale: \"auto\"); a variable continuum or line (imaging.nuisances)"
             )
         })
     }
@@ -111,10 +110,10 @@ impl SpotField {
     /// It in a line.
     pub fn line(&self) -> String {
         let SpotField { spot_amplitude, spot_slope, velocity_jitter_kms, ln_evidence, .. } = self;
-        let life = self.spot_lifetime_d.map_or("for ever".to_owned(), |days| format!("{days:.2} d"));
+        let life = self.spot_lifetime_d.map_or("infinite (static)".to_owned(), |days| format!("{days:.2} d"));
         format!(
-            "spots, integrated over: amplitude {spot_amplitude:.3}, slope {spot_slope:.2} ({}), lifetime {life}; \
-            velocity jitter {velocity_jitter_kms:.3} km/s; ln of the evidence {ln_evidence:.1}\n",
+            "spots (marginalised): amplitude {spot_amplitude:.3}, power-law index {spot_slope:.2} ({}), lifetime {life}; \
+            RV jitter {velocity_jitter_kms:.3} km/s; ln Z = {ln_evidence:.1}\n",
             self.spectrum()
         )
     }

@@ -388,7 +388,7 @@ fn an_edited_manifest_is_an_error() {
     let mut manifest = good.clone();
     manifest["rivals"] = json!([rival]);
     desk.write("run/manifest.json", &manifest.to_string());
-    says(&desk.succeed(&["analyse", "run"]), &["another maximum"]);
+    says(&desk.succeed(&["analyse", "run"]), &["Secondary maximum"]);
 }
 
 #[test]

@@ -69,7 +69,7 @@ fn the_config_is_taken_as_it_is() {
     // vsini, three sigmas of a line of 3.2 km/s (R = 65000 included) and six bins of continuum, around vsys
     assert!((range[0].as_f64().unwrap() - (1.7 - 50.8)).abs() < 3.0 && (range[1].as_f64().unwrap() - 52.5).abs() < 3.0);
     assert_eq!(config["observations"]["sigma_scale"], "auto");
-    says(&table, &["measured by every command: ", "times the quoted ones (continuum "]);
+    says(&table, &["measured by every command: ", "rescaled by ", "(continuum rms "]);
     assert!(config["observations"].get("continuum_level").is_none(), "it is at 1");
     assert!(config["imaging"].get("nuisances").is_none(), "and stays there");
     let orbits = &config["parameters"]["porb_over_prot"];
@@ -160,12 +160,7 @@ fn wrong_errors_are_scaled() {
         let table = desk.succeed(&INIT);
         says(
             &table,
-            &[
-                "observations.sigma_scale",
-                "auto",
-                "times the quoted ones",
-                "note: tried out: a brightness that varies by ",
-            ],
+            &["observations.sigma_scale", "auto", "rescaled by", "note: tried out: a brightness that varies by "],
         );
         assert_eq!(desk.json("star.json")["observations"]["sigma_scale"], "auto");
         desk.succeed(&["map", "star.json", "--out", "map"]);

@@ -49,7 +49,7 @@ fn errors_quoted_too_large_are_put_right() {
         }
     });
     let table = desk.succeed(&["map", "config.json", "--out", "map"]);
-    says(&table, &["errors", "times the quoted ones", "residuals of a map"]);
+    says(&table, &["errors", "rescaled by", "map residuals"]);
     let fit = desk.json("map/fit.json");
     let errors = &fit["measured"]["errors"];
     // 20 profiles of some 24 bins of continuum know it to 1/sqrt(2 * 440), 3.4 %; a map of 620 bins to 2.8 %, and 0.97

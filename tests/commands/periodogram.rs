@@ -34,11 +34,8 @@ fn number(value: &Value) -> f64 {
 fn the_planet_of_the_demo_is_found() {
     let desk = demo();
     let table = desk.succeed(&["periodogram", "config.json", "--out", "a", "--eccentric", "--planets", "2"]);
-    says(&table, &["k_kms", "truth", "false-alarm probability", "delta_ln_l", "eccentric orbit", "second planet"]);
-    says(
-        &table,
-        &["at Porb = Prot", "a: rv.csv, covariance.csv, periodogram.csv, periodogram_2.csv, periodogram.json"],
-    );
+    says(&table, &["k_kms", "truth", "FAP", "delta_ln_l", "eccentric orbit", "second planet"]);
+    says(&table, &["At P = P_rot", "a: rv.csv, covariance.csv, periodogram.csv, periodogram_2.csv, periodogram.json"]);
     says(&table, &["t_conjunction_d: ", "(planet in front) nearest to the middle of the data"]);
 
     let found = desk.json("a/periodogram.json");
@@ -183,7 +180,7 @@ fn changing(objective: Value) -> Desk {
 fn a_star_that_changes_is_not_judged_by_one_map() {
     let desk = changing(json!("spottedness"));
     let table = desk.succeed(&["periodogram", "config.json", "--out", "a"]);
-    says(&table, &["Whether there is a planet is not judged: the star changes", "marginal-likelihood"]);
+    says(&table, &["No verdict: significant spot evolution", "marginal-likelihood"]);
     let found = desk.json("a/periodogram.json");
     assert_eq!(found["verdict"]["finding"], "not-judged");
     assert!(found["verdict"]["false_alarm_probability"].is_null());

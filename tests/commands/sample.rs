@@ -217,7 +217,7 @@ fn optimise_finds_the_injected_planet_with_error_bars() {
     let table = desk.succeed(&["optimise", CONFIG, "--out", "a", "--threads", "1"]);
     desk.succeed(&["optimize", CONFIG, "--out", "b", "--threads", "2"]);
     assert_eq!(desk.read("a/optimum.json"), desk.read("b/optimum.json"));
-    says(&table, &["k_kms", "phi", "injected", "well-defined maximum"]);
+    says(&table, &["k_kms", "phi", "injected", "Well-defined maximum"]);
     let optimum = desk.json("a/optimum.json");
     assert_eq!(optimum["names"], json!(["k_kms", "phi"]));
     for (i, (name, truth)) in [("k_kms", 0.2), ("phi", 0.5)].into_iter().enumerate() {

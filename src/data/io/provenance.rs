@@ -117,7 +117,7 @@ impl Measured {
         let profiles = self.profiles.iter().map(|remark| ("profiles", remark.clone()));
         let errors = self.errors.as_ref().map(|errors| ("errors", errors.line()));
         let target = self.chi2_target.as_ref().map(|target| ("target chi2", target.line()));
-        let jitter = self.velocity_jitter.as_ref().map(|jitter| ("velocity jitter", jitter.line()));
+        let jitter = self.velocity_jitter.as_ref().map(|jitter| ("RV jitter", jitter.line()));
         let sets = self.sets.iter().map(|set| ("data set", set.line()));
         let season = |season: &Season| {
             let Season { first_d, last_d, profiles, .. } = season;

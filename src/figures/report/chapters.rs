@@ -181,7 +181,7 @@ fn best(file: &OptimumFile) -> Chapter {
     let sentence = match (file.well_defined, file.converged) {
         (true, true) => "A well-defined maximum.",
         (true, false) => "The search ran out of steps; the values may be improved from there.",
-        (false, _) => "No well-defined maximum: on the edge of a prior, or the data leave some direction open.",
+        (false, _) => "No well-defined maximum: at a prior boundary, or a degenerate direction.",
     };
     let search = file.blind_search.as_ref();
     let mut verdicts: Vec<(Tone, String)> = search.map(|search| verdicts::of(&search.verdict)).into_iter().collect();

@@ -50,18 +50,18 @@ impl Detection {
         match self.co_rotation_penalty {
             Some(ratio) if ratio > 1.1 => {
                 format!(
-                    "at Porb = Prot spots imitate an orbit: sigma_K is {ratio:.1} times its median at other periods"
+                    "At P = P_rot the signal is degenerate with spot modulation: σ_K is {ratio:.1} times its median."
                 )
             }
-            Some(ratio) => format!("at Porb = Prot sigma_K is {ratio:.2} times its median at other periods"),
-            None => "at Porb = Prot spots imitate an orbit, and the data do not bound K there".to_owned(),
+            Some(ratio) => format!("At P = P_rot σ_K is {ratio:.2} times its median."),
+            None => "At P = P_rot the signal is degenerate with spot modulation, and K is unbounded.".to_owned(),
         }
     }
 
     /// All that has to be said, what speaks against a planet with the rest.
     pub fn remarks(&self, evidence: &Evidence) -> Vec<Remark> {
         let mut remarks = evidence.settings.surface.model().remarks(evidence.imager, self.last());
-        let misfit = |text: &String| Remark::against("the residuals are not like noise", text);
+        let misfit = |text: &String| Remark::against("residuals inconsistent with noise", text);
         remarks.extend(evidence.misfit.iter().map(misfit));
         remarks.extend(self.of_the_data(evidence));
         remarks.extend(self.of_the_change());
@@ -73,28 +73,28 @@ impl Detection {
         remarks.extend(self.of_choices(evidence.robustness));
         if self.best.on_edge {
             remarks.push(Remark::against(
-                "the period lies on the edge of the search",
-                "the best period lies on the edge of the search: look beyond it before believing it",
+                "P at the edge of the search",
+                "The best period lies at the edge of the search: extend it (--min-period-d, --max-period-d).",
             ));
         } else if !self.closed {
             let rounds = self.rounds;
             remarks.push(Remark::against(
-                "K is not settled",
-                format!("K still moves after {rounds} images at the best orbit: its value is not settled"),
+                "K not converged",
+                format!("K has not converged after {rounds} re-linearisations."),
             ));
         }
         let shortest = self.frequencies.rotation_period_d / self.frequencies.range().1;
         if shortest > self.frequencies.rotation_period_d {
             remarks.push(Remark::note(format!(
-                "the search begins at {shortest:.3} d, above the rotation period of {:.3} d: signals of the spots at \
-                Prot and its \
-                 fractions can only appear as their aliases; --min-period-d searches further",
+                "The search starts at {shortest:.3} d, above P_rot = {:.3} d: spot signals at P_rot and its harmonics appear \
+                only as aliases; use --min-period-d.",
                 self.frequencies.rotation_period_d
             )));
         }
         if self.last().quadratic.radial_velocities().is_err() {
-            remarks
-                .push(Remark::note("the data do not bound all velocities: rv.csv and covariance.csv hold no numbers"));
+            remarks.push(Remark::note(
+                "The RVs are not all constrained by the data: rv.csv and covariance.csv contain no values.",
+            ));
         }
         remarks
     }
@@ -107,29 +107,27 @@ impl Detection {
         if let Some(offset) = self.offset.filter(|offset| fixed && offset.gain > OFFSET_GAIN) {
             let Offset { velocity_kms, sigma_kms, gain } = offset;
             remarks.push(Remark::against(
-                "the systemic velocity may be wrong",
+                "systemic velocity may be wrong",
                 format!(
-                    "with a constant velocity of {velocity_kms:+.3} +- {sigma_kms:.3} km/s beside an orbit ln L is \
-                    {gain:.0} \
-                     higher: star.vsys_kms may be wrong, which makes false peaks; make it free under parameters"
+                    "An RV offset of {velocity_kms:+.3} ± {sigma_kms:.3} km/s raises ln L by {gain:.0}: star.vsys_kms may be \
+                    wrong, which produces spurious peaks; free vsys_kms under parameters."
                 ),
             ));
         }
         let turns = imager.time_base_cycles();
         if turns < 1.0 {
             remarks.push(Remark::note(format!(
-                "the star does not turn once while it is observed ({turns:.2} rotations of star.rotation_period_d, in \
-                days): parts of it are not seen, or the period is wrong"
+                "The data span only {turns:.2} rotations: parts of the surface are unseen, or star.rotation_period_d (days) \
+                is wrong."
             )));
         }
         let profiles = imager.profiles().count();
         if profiles < FEW {
             remarks.push(Remark::against(
-                "there are few profiles",
+                "few profiles",
                 format!(
-                    "{profiles} profiles hardly tell how large the spots are that the map does not resolve: planets \
-                    are missed, \
-                     and errors are rough"
+                    "Only {profiles} profiles: the unresolved-spot noise is poorly constrained; expect reduced sensitivity \
+                    and approximate uncertainties."
                 ),
             ));
         }
@@ -139,10 +137,10 @@ impl Detection {
     /// Whether the star changes though it is taken for one that does not.
     fn of_the_change(&self) -> Option<Remark> {
         match self.change.as_ref()? {
-            Ok(change) => change.is_changing().then(|| Remark::against("the star changes", change.sentence())),
+            Ok(change) => change.is_changing().then(|| Remark::against("spot evolution", change.sentence())),
             Err(error) => Some(Remark::against(
-                "whether the star changes is not known",
-                format!("whether the star changes while it is observed is not known: {error}"),
+                "spot evolution not tested",
+                format!("Spot evolution could not be tested: {error}."),
             )),
         }
     }
@@ -153,14 +151,14 @@ impl Detection {
         if let Some(imitation) = self.best.imitation {
             let words = imitation.words(self.frequencies.rotation_period_d);
             let what = match imitation.alias {
-                None => format!("the best period is not told from {}", imitation.period()),
+                None => format!("The best period is consistent with {}", imitation.period()),
                 Some(_) => {
-                    format!("with this sampling the best period is not told from {} ({words})", imitation.period())
+                    format!("With this sampling the best period is consistent with {} ({words})", imitation.period())
                 }
             };
-            let text = format!("{what}, where spots imitate orbits: look at the other peaks before believing it");
+            let text = format!("{what} (rotational harmonic): inspect the other peaks.");
             remarks.push(match imitation.is_likely() {
-                true => Remark::against(format!("the period is {words}"), text),
+                true => Remark::against(format!("P {words}"), text),
                 false => Remark::note(text),
             });
         }
@@ -168,12 +166,9 @@ impl Detection {
         if !rivals.is_empty() {
             let mut named: Vec<String> = rivals.iter().take(RIVALS_NAMED).map(|peak| self.rival(peak)).collect();
             if rivals.len() > RIVALS_NAMED {
-                named.push(format!("one of {} more", rivals.len() - RIVALS_NAMED));
+                named.push(format!("and {} more", rivals.len() - RIVALS_NAMED));
             }
-            remarks.push(Remark::against(
-                "the period is ambiguous",
-                format!("the period is ambiguous: it may as well be {}", named.join(", or ")),
-            ));
+            remarks.push(Remark::against("period ambiguous", format!("Period ambiguous: {}.", named.join("; "))));
         }
         remarks
     }
@@ -190,8 +185,8 @@ impl Detection {
         let sigma = peak.sigma_porb_over_prot.map(|sigma| self.frequencies.rotation_period_d * sigma);
         let digits = decimals(sigma.unwrap_or(f64::NAN));
         let below = self.blind.best().orbit.delta_ln_l - peak.orbit.delta_ln_l;
-        let alias = if peak.alias.is_some() { ", an alias by the sampling" } else { "" };
-        format!("{period_d:.digits$} d{alias} (ln L lower by {below:.1})")
+        let alias = if peak.alias.is_some() { " (sampling alias)" } else { "" };
+        format!("P = {period_d:.digits$} d{alias} is worse by only Δln L = {below:.1}")
     }
 
     /// Whether the result depends on a choice.
@@ -200,19 +195,16 @@ impl Detection {
         let mut remarks = Vec::new();
         if let Some(errors) = robustness.target_matters() {
             remarks.push(Remark::against(
-                "K depends on the target chi2",
-                format!(
-                    "K moves by {errors:.1} of its errors when the target chi2 is changed by 3 %: it depends on \
-                     imaging.chi2_target"
-                ),
+                "K depends on the target χ²",
+                format!("K shifts by {errors:.1}σ when imaging.chi2_target changes by 3 %: quote the range."),
             ));
         }
         let level = self.blind.false_alarm.level(CANDIDATE_FAP);
         for night in robustness.decisive_nights(level) {
             remarks.push(Remark::against(
-                "one night decides",
+                "driven by a single night",
                 format!(
-                    "the night of {:.2} ({} profiles) makes the result: see K without it",
+                    "The signal depends on the night of {:.2} ({} profiles): see the leave-one-night-out K.",
                     night.span_d.0, night.profiles
                 ),
             ));

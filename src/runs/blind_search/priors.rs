@@ -17,10 +17,10 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
         let digits = decimals(found.best.sigma_porb_over_prot.map_or(f64::NAN, |sigma| prot * sigma));
         let period_d = prot * found.best.porb_over_prot;
         remarks.push(Remark::against(
-            "the highest peak lies at a period that the config does not allow",
+            "highest peak outside the period prior",
             format!(
-                "the highest peak of the blind search, {period_d:.digits$} d, lies at a period that the config does \
-                not allow: it may look like an orbit of another one"
+                "The highest peak, P = {period_d:.digits$} d, lies outside the period prior and may alias into it: widen \
+                the prior."
             ),
         ));
         if verdict.finding != Finding::NotJudged {
@@ -32,8 +32,8 @@ pub fn within_priors(scene: &Scene, found: &Detection, mut verdict: Verdict, rem
     {
         let (low, high) = prior.bounds();
         let outside = Remark::against(
-            "its K lies outside of the prior",
-            format!("K of the blind search, {k_kms:.3} km/s, lies outside of the prior of k_kms, {low} to {high}"),
+            "K outside its prior",
+            format!("K = {k_kms:.3} km/s of the blind search lies outside the prior of k_kms ({low} to {high})."),
         );
         verdict = verdict.with(std::slice::from_ref(&outside));
         remarks.push(outside);
@@ -76,10 +76,10 @@ fn highest(periods: &Periods, found: &Detection, remarks: &[Remark]) -> Verdict 
     let highest = || places.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l));
     let sigma_period_d = peak.and_then(|peak| peak.sigma_porb_over_prot).map(|sigma| rotation_period_d * sigma);
     let Some((porb_over_prot, orbit)) = peak.map(|peak| (peak.porb_over_prot, peak.orbit)).or_else(highest) else {
-        return Verdict::not_judged("the blind search has none of the periods that the config allows");
+        return Verdict::not_judged("the blind search covers none of the periods that the prior allows");
     };
     let imitation = peak.and_then(|peak| peak.imitation).filter(Imitation::is_likely);
-    let words = imitation.map(|imitation| format!("the period is {}", imitation.words(rotation_period_d)));
+    let words = imitation.map(|imitation| format!("P {}", imitation.words(rotation_period_d)));
     let remarks: Vec<Remark> = remarks.iter().cloned().chain(words.map(|words| Remark::against(words, ""))).collect();
     let CircularOrbit { k_kms, sigma_k_kms, delta_ln_l, .. } = orbit;
     let signal = Signal { period_d: rotation_period_d * porb_over_prot, sigma_period_d, k_kms, sigma_k_kms };

@@ -93,10 +93,10 @@ impl<'a> BlindSearch<'a> {
         for KnownPlanet { is_first, verdict: known } in known_planets(scene, &settings, &detection, &of_the_star) {
             if is_first {
                 remarks = of_the_star.clone();
-                remarks.push(Remark::note(format!("the blind search, beside the known planet: {blind}")));
+                remarks.push(Remark::note(format!("Blind search, with the known planet in the model: {blind}")));
                 verdict = known;
             } else {
-                remarks.push(Remark::note(format!("the planet of known ephemeris: {}", known.sentence)));
+                remarks.push(Remark::note(known.sentence.clone()));
             }
         }
         let evidence = scene.evidence(&detection.jitters());

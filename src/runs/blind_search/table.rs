@@ -8,7 +8,7 @@ use super::record::{
 };
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
-use crate::planets::verdict::{decimals, probability};
+use crate::planets::verdict::{decimals, false_alarm, probability};
 
 /// Peaks shown; the file has the others.
 const SHOWN: usize = 6;
@@ -136,7 +136,7 @@ fn robustness(found: &RobustnessRecord) -> String {
     let row = |what: String, orbit: &QuickRecord| {
         vec![what, shown(orbit.k_kms, 4), shown(orbit.sigma_k_kms, 4), shown(orbit.delta_ln_l, 2)]
     };
-    let mut rows = vec![["at the best period", "k_kms", "sigma", "delta_ln_l"].map(str::to_owned).to_vec()];
+    let mut rows = vec![["K at the best period", "k_kms", "sigma", "delta_ln_l"].map(str::to_owned).to_vec()];
     rows.extend(found.targets.iter().map(|at| {
         let short = if at.reached { "" } else { " (not reached)" };
         row(format!("target chi2 {:.4}{short}", at.chi2_target), &at.orbit)
@@ -150,15 +150,15 @@ fn chance(alarm: &FalseAlarmRecord) -> String {
     let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
     format!(
-        "Delta ln L {delta_ln_l:.2}, false-alarm probability {} by {used} ({draws} draws, some \
-         {independent_periods:.0} independent periods)\nDelta ln L of 10, 1, 0.1 % false alarms: {}",
-        probability(*p),
+        "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations, N_ind ≈ {independent_periods:.0}). Thresholds at \
+        FAP = 10, 1, 0.1 %: {}",
+        false_alarm(*p),
         levels.join(", ")
     )
 }
 
 fn peaks(peaks: &[PeakRecord]) -> String {
-    let head = ["peak", "period_d", "porb_over_prot", "k_kms", "sigma", "delta_ln_l", "false alarm", ""];
+    let head = ["peak", "period_d", "porb_over_prot", "k_kms", "sigma", "delta_ln_l", "FAP", ""];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for (k, peak) in peaks.iter().enumerate().take(SHOWN) {
         let OrbitRecord { period_d, porb_over_prot, k_kms, sigma_k_kms, delta_ln_l, on_edge, .. } = peak.orbit;
@@ -167,7 +167,7 @@ fn peaks(peaks: &[PeakRecord]) -> String {
         let of_ratio = decimals(peak.orbit.sigma_porb_over_prot.unwrap_or(f64::NAN));
         let note = match &peak.alias {
             Some(alias) => Some(format!("alias of 1 at {:.3}/d", alias.window_frequency_per_d)),
-            None if on_edge => Some("on the edge".to_owned()),
+            None if on_edge => Some("at the edge".to_owned()),
             None => None,
         };
         let notes: Vec<String> = note.into_iter().chain(peak.rotation.clone()).collect();

@@ -133,7 +133,7 @@ impl RunSummary {
                 summary.remarks = all.filter(|text| !text.is_empty()).cloned().collect();
             }
             None if is_planet_sampled => {
-                let why = "this run was begun by a version that made no blind search";
+                let why = "this run was started by a version without a blind search";
                 summary.verdict = Some(Verdict::not_judged(why));
             }
             None => {}
@@ -147,12 +147,11 @@ impl RunSummary {
         let (is_found, rotation_period_d) = (search.verdict.finding.is_signal(), settings.star.rotation_period_d);
         match (is_found, self.parameters[Parameter::K.name()].upper95) {
             (true, Some(_)) => remarks.push(Remark::against(
-                "K of the chain is compatible with zero",
-                "the blind search finds a signal, but K of the chain is compatible with zero",
+                "posterior K consistent with zero",
+                "The blind search finds a signal, but the posterior of K is consistent with zero.",
             )),
             (false, None) => remarks.push(Remark::note(
-                "the chain takes a planet for granted: its K, which is away from zero, means something only if there \
-                is one",
+                "The MCMC assumes a planet: K > 0 is meaningful only if the blind search finds a significant signal.",
             )),
             _ => {}
         }
@@ -163,15 +162,15 @@ impl RunSummary {
             remarks.extend(search.of_another_orbit(period, rotation_period_d));
         }
         if !self.converged {
-            let text = "the chain has not converged: its intervals are not to be quoted";
-            remarks.push(Remark::against("the chain has not converged", text));
+            let text = "Chain not converged: do not quote its intervals.";
+            remarks.push(Remark::against("chain not converged", text));
         }
         let clock = Clock { rotation_period_d, epoch_d: settings.star.epoch_d };
         let period = period_prior(&settings.free, &Elements::PLANETS[0], clock);
         if let Some(shortest) = period.map(|prior| prior.bounds().0).filter(|shortest| *shortest > 1.0) {
             remarks.push(Remark::note(format!(
-                "the prior of the period begins at {shortest:.4} Prot, above the rotation period: signals of the \
-                spots at Prot and its fractions can only appear as their aliases"
+                "The period prior starts at {shortest:.4} P_rot: spot signals at P_rot and its harmonics appear only as \
+                aliases."
             )));
         }
         remarks

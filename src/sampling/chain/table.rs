@@ -29,9 +29,8 @@ pub fn parameters(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> S
     for (name, one) in summary.parameters.iter().filter(|(_, one)| one.unconstrained) {
         let [low, high] = one.ci95;
         let digits = decimals(one);
-        text += &format!(
-            "{name} is not constrained: anything from {low:.digits$} to {high:.digits$}, as its prior has it\n"
-        );
+        text +=
+            &format!("{name} is unconstrained: the posterior equals the prior, {low:.digits$} to {high:.digits$}\n");
     }
     text
 }
@@ -41,7 +40,7 @@ pub fn rest(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String 
     let mut text = String::new();
     for name in &summary.names {
         if let Some((one, upper)) = summary.parameters.get(name).and_then(|one| Some((one, one.upper95?))) {
-            text += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
+            text += &format!("{name} is consistent with zero: < {} (95 % upper limit)\n", number(upper, decimals(one)));
         }
     }
     text += &derived(summary, truth);
@@ -76,7 +75,8 @@ fn derived(summary: &Summary, truth: Option<&BTreeMap<String, f64>>) -> String {
         row.truncate(head.len());
         rows.push(row);
         if let Some(upper) = one.upper95 {
-            limits += &format!("{name} touches zero: below {} at 95 %\n", number(upper, decimals(one)));
+            limits +=
+                &format!("{name} is consistent with zero: < {} (95 % upper limit)\n", number(upper, decimals(one)));
         }
     }
     let table = if rows.len() > 1 { aligned(&rows) } else { String::new() };
@@ -102,9 +102,9 @@ fn moves(summary: &Summary) -> String {
 fn convergence(summary: &Summary) -> String {
     let advice = summary.advice.join("; ");
     match (summary.converged, advice.is_empty()) {
-        (true, true) => "the chain has converged".to_owned(),
-        (true, false) => format!("the chain has converged, but {advice}"),
-        (false, _) => format!("the chain has NOT converged: {advice}"),
+        (true, true) => "Chain converged".to_owned(),
+        (true, false) => format!("Chain converged, but {advice}"),
+        (false, _) => format!("Chain NOT converged: {advice}"),
     }
 }
 

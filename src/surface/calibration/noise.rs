@@ -215,10 +215,10 @@ impl MeasuredErrors {
     /// That in a sentence, where it is so.
     pub fn misfit_text(&self) -> Option<String> {
         let text = match self.misfit() {
-            Some(misfit) => format!("maps leave {misfit:.1} times the scatter of the continuum"),
-            None => format!("maps leave {:.1} times the quoted errors", self.residual?),
+            Some(misfit) => format!("Residual rms is {misfit:.1} times the continuum rms"),
+            None => format!("Residual rms is {:.1} times the quoted uncertainties", self.residual?),
         };
-        self.is_misfit().then(|| format!("{text}: the model of star or line is not right"))
+        self.is_misfit().then(|| format!("{text}: check vsini, line profile and continuum"))
     }
 
     /// Multiplies the errors of `observations` by all that was measured.
@@ -232,20 +232,17 @@ impl MeasuredErrors {
     /// It in a line.
     pub fn line(&self) -> String {
         let share = |x: Option<f64>| x.map_or_else(|| "unknown".to_owned(), |x| x.to_string());
-        let mut line = format!("continuum {}", share(self.continuum));
+        let mut line = format!("continuum rms {}", share(self.continuum));
         if let Some(scale) = self.sigma_scale {
             let together = match self.correlated_bins {
                 1.0 => String::new(),
-                bins => format!(", noise correlated over {bins} bins"),
+                bins => format!(", noise correlation length {bins} bins"),
             };
-            line = format!(
-                "{scale} times the quoted ones ({line}, residuals of a map {}{together})",
-                share(self.residual)
-            );
+            line = format!("rescaled by {scale} ({line}, map residuals {}{together})", share(self.residual));
         }
         let extreme = |f: fn(f64, f64) -> f64| self.profiles.iter().copied().reduce(f).unwrap_or(1.0);
         if !self.profiles.is_empty() {
-            line += &format!("; from profile to profile {} to {} times that", extreme(f64::min), extreme(f64::max));
+            line += &format!("; per profile {} to {} times that", extreme(f64::min), extreme(f64::max));
         }
         line
     }

@@ -125,10 +125,9 @@ impl Change {
     /// What is to be said of it where it does.
     pub fn sentence(&self) -> String {
         format!(
-            "the star changes while it is observed (spots that live some {:.2} d rather than for ever gain {:.0} in \
-            ln of the evidence), which this objective does not allow for; dimcmc periodogram does with \
-            imaging.objective set to \"marginal-likelihood\"",
-            self.spot_lifetime_d, self.ln_evidence_gain
+            "significant spot evolution (Δln Z = {:.0}, spot lifetime ≈ {:.2} d) invalidates the static-map model: use \
+            imaging.objective: \"marginal-likelihood\"",
+            self.ln_evidence_gain, self.spot_lifetime_d
         )
     }
 }

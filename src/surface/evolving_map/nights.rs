@@ -74,8 +74,8 @@ impl SurfaceMaps {
         };
         if summary.chi2_per_datum > WORST_CHI2 {
             warnings.push(format!(
-                "the maps do not explain the profiles: chi2 is {:.2} per datum. star.vsini_kms, star.line or the \
-                errors are wrong; observations.sigma_scale \"auto\" measures these",
+                "The maps do not reproduce the profiles (χ²/N = {:.2}): check star.vsini_kms, star.line and the \
+                uncertainties (observations.sigma_scale: \"auto\").",
                 summary.chi2_per_datum
             ));
         }
@@ -118,7 +118,7 @@ fn reached(fitted: &Fitted) -> Vec<String> {
     let absorbs = SpotField::of(fitted).absorbs();
     let said = |name: &&str| match &absorbs {
         Some(absorbs) if *name == Parameter::SpotLifetime.name() => absorbs.clone(),
-        _ => format!("{name} lies on the bound of its search: the profiles do not tell it, or something else is wrong"),
+        _ => format!("{name} is at its search bound: unconstrained by the data, or the model is misspecified."),
     };
     fitted.at_bounds.iter().map(said).collect()
 }

@@ -112,9 +112,8 @@ impl OtherRotation {
         let OtherRotation { rotation_period_d, given_period_d, ln_evidence_gain, spot_lifetime_d: [there, here] } =
             self;
         format!(
-            "the star turns in {rotation_period_d:.3} d rather than in {given_period_d:.3}: ln of the evidence is \
-            {ln_evidence_gain:.0} higher, and its spots live {there:.1} d instead of {here:.2}; set \
-            star.rotation_period_d"
+            "the rotation period is {rotation_period_d:.3} d rather than {given_period_d:.3} d (Δln Z = \
+            {ln_evidence_gain:.0}, spot lifetime {there:.1} instead of {here:.2} d): set star.rotation_period_d"
         )
     }
 }

@@ -146,11 +146,11 @@ impl SurfaceModel for EvolvingMap {
         let reached = |name: &&str| {
             let is_of = |parameter: Parameter| *name == parameter.name();
             Remark::note(match (faint, &absorbs) {
-                (Some(amplitude), _) if is_of(Parameter::SpotAmplitude) => format!(
-                    "the profiles show no spots: their amplitude falls to the lower bound of its search, {amplitude:.2}"
-                ),
+                (Some(amplitude), _) if is_of(Parameter::SpotAmplitude) => {
+                    format!("The profiles show no spots: spot_amplitude is at its lower search bound, {amplitude:.2}.")
+                }
                 (_, Some(absorbs)) if is_of(Parameter::SpotLifetime) => absorbs.clone(),
-                _ => format!("{name} lies on the bound of its search: the profiles do not tell it, or it is wrong"),
+                _ => format!("{name} is at its search bound: unconstrained by the data, or the model is misspecified."),
             })
         };
         field.at_bounds.iter().map(reached).collect()

@@ -83,19 +83,20 @@ impl MeasuredJitter {
 
     /// It in a line.
     pub fn line(&self) -> String {
-        let scatter = |s: &Scatter| format!("{} +- {} km/s", s.kms, s.error_kms);
+        let scatter = |s: &Scatter| format!("{} ± {} km/s", s.kms, s.error_kms);
         let alone = scatter(&self.without_planet);
-        let Some(orbit) = &self.beside_orbit else { return format!("{alone} without a planet") };
+        let Some(orbit) = &self.beside_orbit else { return format!("{alone} (no planet)") };
         let beside = format!(
-            "{} beside the orbit of {:.4} rotation periods and {:.4} km/s that explains velocities best",
+            "{} with the best orbit (P = {:.4} P_rot, K = {:.4} km/s, ln B = {:.1})",
             scatter(&orbit.scatter),
             orbit.porb_over_prot,
-            orbit.k_kms
+            orbit.k_kms,
+            orbit.ln_odds
         );
-        let odds = format!("ln of the odds for that orbit {:.1}", orbit.ln_odds);
+
         match orbit.counts {
-            true => format!("{beside} ({alone} without a planet; {odds})"),
-            false => format!("{alone} without a planet ({beside}; {odds})"),
+            true => format!("{beside}; {alone} (no planet)"),
+            false => format!("{alone} (no planet); {beside}"),
         }
     }
 }
