@@ -240,7 +240,7 @@ fn caveats(against: &[String]) -> String {
 }
 
 /// Below this a false-alarm probability is extrapolated beyond the simulations that it rests on.
-const SIMULATED_FAP: f64 = 1e-4;
+pub const SIMULATED_FAP: f64 = 1e-4;
 
 /// A false-alarm probability in words; where it is extrapolated, an upper limit with the extrapolation.
 pub fn false_alarm(p: f64) -> String {

@@ -47,7 +47,7 @@ fn a_light_curve_from_its_table_to_a_figure() {
     desk.write("data/tess.csv", &format!("time,flux,sigma\n{rows}"));
     desk.write("star.json", &from_files().to_string());
     let said = desk.succeed(&["map", "star.json", "--out", "map"]);
-    says(&said, &["light curve", "tess: ", "in 2 segments", "flux", "per bin", "lightcurve.csv"]);
+    says(&said, &["light curve", "tess: ", "in 2 segments", "flux", "χ²/N", "lightcurve.csv"]);
     // a transit, which no spot explains
     let deep = |line: &str| match line.split(',').map(str::parse::<f64>).collect::<Result<Vec<_>, _>>() {
         Ok(row) if (4.9..5.1).contains(&row[0]) => format!("{},{},{}", row[0], 0.9 * row[1], row[2]),

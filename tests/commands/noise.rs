@@ -142,7 +142,7 @@ fn noise_that_goes_together_makes_errors_larger() {
     let mut config: Value = serde_json::from_str(&desk.read("config.json")).unwrap();
     config["star"]["line"]["sigma_kms"] = json!(2.5_f64.hypot(1.8 * 0.5_f64.sqrt()));
     desk.write("config.json", &config.to_string());
-    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["noise correlated over"]);
+    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["noise correlation length"]);
     let fit = desk.json("map/fit.json");
     let errors = &fit["measured"]["errors"];
     // the variance of a smoothed bin is 6/16
@@ -167,7 +167,7 @@ fn noisier_profiles_weigh_less() {
         }
     });
     desk.set("/observations", observed("auto", "per-profile"));
-    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["from profile to profile"]);
+    says(&desk.succeed(&["map", "config.json", "--out", "map"]), &["per profile"]);
     let factors = desk.json("map/fit.json")["measured"]["errors"]["profiles"].clone();
     let factors: Vec<f64> = factors.as_array().unwrap().iter().map(number).collect();
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;

@@ -186,14 +186,14 @@ fn a_star_that_changes_is_not_judged_by_one_map() {
     assert!(found["verdict"]["false_alarm_probability"].is_null());
     assert!(number(&found["change"]["ln_evidence_gain"]) > 20.0);
     let table = desk.succeed(&["limits", "config.json", "--out", "b", "--periods", "3", "--phases", "2"]);
-    says(&table, &["these limits do not hold: the star changes"]);
+    says(&table, &["these limits do not hold: significant spot evolution"]);
 }
 
 #[test]
 fn all_maps_of_a_star_that_changes_are_integrated_over() {
     let desk = changing(json!("marginal-likelihood"));
     let table = desk.succeed(&["periodogram", "config.json", "--out", "a"]);
-    says(&table, &["spots, integrated over: amplitude"]);
+    says(&table, &["spots (marginalised): amplitude"]);
     let found = desk.json("a/periodogram.json");
     let (best, field) = (&found["best"], &found["field"]);
     // what was simulated: K of 0.1 km/s at 1.7 rotations

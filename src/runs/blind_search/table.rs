@@ -8,7 +8,7 @@ use super::record::{
 };
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
-use crate::planets::verdict::{decimals, false_alarm, probability};
+use crate::planets::verdict::{SIMULATED_FAP, decimals, false_alarm, probability};
 
 /// Peaks shown; the file has the others.
 const SHOWN: usize = 6;
@@ -150,11 +150,16 @@ fn chance(alarm: &FalseAlarmRecord) -> String {
     let FalseAlarmRecord { delta_ln_l, probability: p, used, draws, independent_periods, .. } = alarm;
     let levels: Vec<String> = alarm.levels.iter().map(|level| format!("{:.1}", level.delta_ln_l)).collect();
     format!(
-        "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations, N_ind ≈ {independent_periods:.0}). Thresholds at \
-        FAP = 10, 1, 0.1 %: {}",
+        "Δln L = {delta_ln_l:.2}, {} by {used} ({draws} simulations, N_ind ≈ {independent_periods:.0})\n\
+        Thresholds at FAP = 10, 1, 0.1 %: {}",
         false_alarm(*p),
         levels.join(", ")
     )
+}
+
+/// A false-alarm probability in a table: beyond the simulations an upper limit.
+fn short(p: f64) -> String {
+    if p < SIMULATED_FAP { format!("< {SIMULATED_FAP:e}") } else { probability(p) }
 }
 
 fn peaks(peaks: &[PeakRecord]) -> String {
@@ -178,7 +183,7 @@ fn peaks(peaks: &[PeakRecord]) -> String {
             format!("{k_kms:.digits$}"),
             format!("{sigma_k_kms:.digits$}"),
             format!("{delta_ln_l:.2}"),
-            probability(peak.false_alarm_probability),
+            short(peak.false_alarm_probability),
             notes.join(", "),
         ]);
     }

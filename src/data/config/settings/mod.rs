@@ -22,7 +22,7 @@ use crate::field::Lifetime;
 use crate::model::{Clock, Elements, FreeParameter, Parameter, ParameterValues, Prior};
 use crate::sampling::ensemble::SamplerSettings;
 use crate::star::response::{self, velocity_grid};
-use crate::star::{BrightnessModel, StarSettings};
+use crate::star::{BrightnessModel, Size, StarSettings};
 use crate::surface::Known;
 use grid::resolve_grid;
 use imaging::{check_imaging, resolve_field};
@@ -75,6 +75,8 @@ const FEW_WALKERS: usize = 16;
 pub(super) fn resolve(mut written: Config, path: &Path) -> Result<Settings, Fault> {
     let star = resolve_star(&mut written.star, &written.instrument)?;
     let mut values = values(&written, &star)?;
+    let size = Size::of(star.rotation_period_d, written.star.vsini_kms, written.star.inclination_deg);
+    size.refused().map_or(Ok(()), |(key, problem)| Err(Fault::new(key, problem)))?;
     written.plan.as_ref().map_or(Ok(()), check_plan)?;
     let sets = resolve_sets(&mut written, &star, &values, path)?;
     let light_curves = resolve_photometry(&written, path)?;

@@ -4,7 +4,7 @@ use super::checks::{automatic, check_size, most, positive};
 use crate::data::config::error::Fault;
 use crate::data::config::written::{Instrument, LimbDarkeningSection, LimbLaw, Line, LineShape, Star};
 use crate::numerics::units::{instrumental_sigma_kms, planck_contrast};
-use crate::star::{LimbDarkening, LocalLine, Size, StarSettings};
+use crate::star::{LimbDarkening, LocalLine, StarSettings};
 use std::f64::consts::TAU;
 
 /// Lightest and heaviest star (solar masses).
@@ -21,10 +21,6 @@ pub(super) fn resolve_star(star: &mut Star, instrument: &Instrument) -> Result<S
         return Err(Fault::new("star.rotation_period_d", problem));
     }
     star.omega_eq_rad_d.get_or_insert(omega);
-    let size = Size::of(star.rotation_period_d, star.vsini_kms, star.inclination_deg);
-    if let Some((key, problem)) = size.refused() {
-        return Err(Fault::new(key, problem));
-    }
     if let Some(mass) = star.mass_msun.filter(|mass| !MASSES_MSUN.contains(mass)) {
         let (least, most) = (MASSES_MSUN.start(), MASSES_MSUN.end());
         let problem = format!("{mass} must be from {least} to {most} solar masses");
