@@ -27,7 +27,9 @@ use crate::planets::verdict::CANDIDATE_FAP;
 use crate::star::Orbit;
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
-use crate::surface::{At, Change, Linearised, NoFit, SurfaceError, SurfaceModel, SurfaceSettings, WithoutJitter};
+use crate::surface::{
+    At, Change, Constants, Linearised, NoFit, SurfaceError, SurfaceModel, SurfaceSettings, WithoutJitter,
+};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -158,6 +160,21 @@ impl PlanetFree {
         report(Stage::PlanetFree);
         at.values.set(Parameter::K, 0.0);
         let here = surface.linearise(at, None)?;
+        PlanetFree::of(surface, at, here, frequencies, settings, report)
+    }
+
+    /// Of the star in `at`, without an orbit, that is linearised `here`.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    pub fn of(
+        surface: &dyn SurfaceModel,
+        at: At,
+        here: Linearised,
+        frequencies: &Frequencies,
+        settings: SearchSettings,
+        report: &dyn Fn(Stage),
+    ) -> Result<Self, SurfaceError> {
         report(Stage::Search);
         let without_jitter = surface.without_jitter(at, &here)?;
         let jitters = jitters(&here, without_jitter.as_ref());
@@ -229,6 +246,11 @@ impl Detection {
     /// The last expansion.
     pub fn last(&self) -> &Linearised {
         self.at_best.as_ref().unwrap_or(&self.planet_free)
+    }
+
+    /// The velocities that profiles have in common, beside the best orbit; `None` where they are not bounded.
+    pub fn constants(&self, imager: &Imager, nuisances: &[Nuisance]) -> Option<Constants> {
+        self.last().constants(imager, nuisances, Some(&self.best))
     }
 
     /// Delta ln L of the best orbit in the regularised likelihood.

@@ -10,6 +10,7 @@ use crate::inference::search::Found;
 use crate::model::ParameterSpace;
 use crate::sampling::optimise::Optimum;
 use crate::surface::density::Density;
+use crate::surface::expansion::nuisances;
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -147,7 +148,11 @@ pub enum OriginError {
 impl Origin {
     /// What begins in `scene` with what the search `found`.
     pub fn of(scene: &Scene, found: &Found) -> Self {
-        let Provenance { version, data_sha256, config_sha256, config, measured } = scene.provenance();
+        let Provenance { version, data_sha256, config_sha256, config, mut measured } = scene.provenance();
+        if let Some(search) = &found.detection {
+            let constants = search.constants(&scene.imager, &nuisances(&scene.settings.free));
+            measured = measured.with_zero_points(&constants.map_or_else(Vec::new, |constants| constants.offsets));
+        }
         let names = found.posterior.space().names();
         Origin {
             version: version.to_string(),

@@ -5,10 +5,10 @@
 use crate::field::{FieldError, Lifetime};
 use crate::model::{Parameter, ParameterValues};
 use crate::planets::periodogram::{Frequencies, orbits};
-use crate::surface::Known;
 use crate::surface::evolving_map::Basis;
 use crate::surface::evolving_map::fit::usual;
 use crate::surface::imaging::{Imager, ZeroPointPrior};
+use crate::surface::{ConstantVelocity, Known};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -21,17 +21,21 @@ const ROUNDS: usize = 3;
 /// Zero points that move by less than this part of their errors stay.
 const STAYS: f64 = 0.1;
 
-/// The most probable zero point of a data set.
+/// The zero point of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldZeroPoint {
-    /// Where it is held (km/s).
-    pub value_kms: f64,
-    /// Its standard error, the spots integrated out and the orbit held (km/s).
-    pub sigma_kms: f64,
+    /// Where it is held in maps (km/s).
+    #[serde(default)]
+    pub held_kms: f64,
+    /// What is found of it beside the orbit that is reported, all that is free integrated out; absent where no model
+    /// was fitted.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub found: Option<ConstantVelocity>,
 }
 
 /// Finds the zero points of those sets of `imager` that have a prior, and holds them there: by the velocity quadratic
-/// of a usual field, with the best orbit at any of the `frequencies` in the model from the second round on.
+/// of a usual field, with the best orbit at any of the `frequencies` in the model from the second round on. It is where
+/// to hold them beside the systemic velocity of `values`, and no measurement of them.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -46,7 +50,6 @@ pub fn hold(
     let known = Known { lifetime: Some(lifetime), ..known };
     let mut values = values;
     values.set(Parameter::K, 0.0);
-    let mut held = vec![HeldZeroPoint { value_kms: 0.0, sigma_kms: PRIOR_KMS }; imager.zero_points.len()];
     let mut near = None;
     for _ in 0..ROUNDS {
         let marginal = usual(imager, &basis, values, known, near.as_ref())?.marginal;
@@ -66,9 +69,7 @@ pub fn hold(
         let gradient = &known_velocities.gradient - &known_velocities.information * step;
         let (moves, sigmas) = most_probable(imager, &gradient, &known_velocities.information)?;
         let mut stays = true;
-        for (z, held) in held.iter_mut().enumerate() {
-            held.value_kms += moves[z];
-            held.sigma_kms = sigmas[z];
+        for z in 0..imager.zero_points.len() {
             stays &= moves[z].abs() < STAYS * sigmas[z];
             imager.move_zero_point(z, moves[z]);
         }
@@ -77,7 +78,7 @@ pub fn hold(
             break;
         }
     }
-    Ok(held)
+    Ok(imager.zero_points.iter().map(|z| HeldZeroPoint { held_kms: z.held_kms(), found: None }).collect())
 }
 
 /// How far the most probable zero points are from where they are held, and their errors (km/s).
