@@ -1,7 +1,7 @@
 //! Radial velocities: first moments with the spots in them, and what is left when these are taken out; over time and
 //! folded with the orbit.
 
-use super::star_map::ephemeris;
+use super::ephemeris::ephemeris;
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::map::{FIT, FitFile};

@@ -39,8 +39,8 @@ impl Marginal {
         Ok([self.with_zero_points_integrated(imager, stellar, quadratic)?, held])
     }
 
-    /// The expansion without each of these groups of profiles (ascending), the maps those of all: what `then` makes of the
-    /// expansion of all others.
+    /// The expansion without each of these groups of profiles (ascending), the maps those of all: what `then` makes of
+    /// the expansion of all others.
     ///
     /// # Errors
     /// [`FieldError`], of all groups or of one.

@@ -2,7 +2,7 @@
 //! at any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
 
 use super::light::misfits;
-use super::surface::linearised;
+use super::linearised::linearised;
 use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, fit};
 use crate::field::{Field, Kernel, Lifetime};
 use crate::numerics::vector::{self, Instructions, Task};

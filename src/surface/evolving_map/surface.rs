@@ -1,20 +1,21 @@
 //! The evolving map behind the interface of all surface models.
 
-use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, fit, nights, optimum};
-use crate::field::{Field, FieldError, Lifetime};
+use super::linearised::linearised;
+use super::{Basis, Change, Fitted, Known, MarginalPosterior, NoFit, fit, nights, optimum};
+use crate::field::Lifetime;
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
 use crate::surface::density::Density;
-use crate::surface::expansion::{Expansion, Nuisance, STELLAR, of_the_star};
+use crate::surface::expansion::{Expansion, Nuisance};
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use crate::surface::{
-    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, Properties, SpotField, SurfaceError, SurfaceMaps,
-    SurfaceModel, WithoutJitter,
+    At, AtTarget, Explained, Linearised, NoMaps, OrbitOf, Properties, SurfaceError, SurfaceMaps, SurfaceModel,
+    WithoutJitter,
 };
 use std::sync::Arc;
 
@@ -157,42 +158,5 @@ impl SurfaceModel for EvolvingMap {
         let posterior = MarginalPosterior::new(imager, &space, record.values(others), then.held())?;
         RebuildError::check("ln of the evidence", then.ln_evidence, posterior.reference_ln_evidence())?;
         Ok(Arc::new(posterior))
-    }
-}
-
-/// The star of a fit.
-pub(super) fn linearised(
-    (imager, basis): (&Imager, &Basis),
-    fitted: Fitted,
-    nuisances: &[Nuisance],
-) -> Result<Linearised, FieldError> {
-    let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
-    let [expansion, held] = fitted.marginal.expansions(imager, basis, &stellar)?;
-    let quadratic = expansion.velocities(nuisances);
-    Ok(Linearised {
-        expansion,
-        held: held.velocities(&of_the_star(nuisances)),
-        regularised: quadratic.clone(),
-        quadratic,
-        unresolved_spots: 1.0,
-        on_target: true,
-        field: Some(SpotField::of(&fitted)),
-        solution: Arc::new(fitted),
-    })
-}
-
-impl SpotField {
-    /// Of a fit.
-    pub(crate) fn of(fitted: &Fitted) -> Self {
-        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
-        SpotField {
-            spot_amplitude: spectrum.amplitude,
-            spot_slope: spectrum.slope,
-            spot_break_degree: spectrum.break_degree,
-            spot_lifetime_d: kernel.lifetime.days(),
-            velocity_jitter_kms: jitter_kms,
-            ln_evidence: fitted.ln_evidence,
-            at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
-        }
     }
 }
