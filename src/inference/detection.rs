@@ -287,6 +287,11 @@ impl Detection {
             at.values.set(Parameter::K, self.best.orbit.k_kms);
             at.values.set(Parameter::PorbOverProt, self.best.porb_over_prot);
             at.values.set(Parameter::Phi, self.best.orbit.phi);
+            // held where it is wrong it would be taken for jitter
+            let constants = self.constants(at.imager, at.nuisances);
+            if let Some(vsys) = constants.and_then(|constants| constants.systemic) {
+                at.values.set(Parameter::Vsys, vsys.value_kms);
+            }
             let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
             let mut next = refined(&here.quadratic, &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);

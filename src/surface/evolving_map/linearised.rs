@@ -9,7 +9,7 @@ use crate::surface::{Linearised, SpotField};
 use std::sync::Arc;
 
 /// The star of a fit.
-pub(super) fn linearised(
+pub(in crate::surface) fn linearised(
     (imager, basis): (&Imager, &Basis),
     fitted: Fitted,
     nuisances: &[Nuisance],

@@ -25,7 +25,7 @@ pub(in crate::surface) mod fit;
 mod forecast;
 mod known;
 mod light;
-mod linearised;
+pub(in crate::surface) mod linearised;
 mod maps;
 mod nights;
 mod optimum;
