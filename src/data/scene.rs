@@ -14,8 +14,9 @@ use crate::planets::periodogram::Jitters;
 use crate::star::Orbit;
 use crate::star::injection::inject;
 use crate::star::observation::Observations;
+use crate::surface::expansion::nuisances;
 use crate::surface::imaging::Imager;
-use crate::surface::{NoMaps, SurfaceMaps, SurfaceSettings};
+use crate::surface::{At, NoMaps, SurfaceMaps, SurfaceSettings};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -161,7 +162,9 @@ impl Scene {
     /// # Errors
     /// [`NoMaps`]: a target chi2 that no map reaches, a field that cannot be fitted, times that make no sense.
     pub fn maps(&self, times_d: Option<&[f64]>) -> Result<SurfaceMaps, NoMaps> {
-        self.surface().model().maps(&self.imager, &self.observations, self.settings.values, times_d)
+        let nuisances = nuisances(&self.settings.free);
+        let at = At { imager: &self.imager, values: self.settings.values, nuisances: &nuisances };
+        self.surface().model().maps(at, &self.observations, times_d)
     }
 
     /// The best parameters, and the posterior with its reference there.

@@ -28,7 +28,8 @@ use crate::star::Orbit;
 use crate::surface::expansion::Nuisance;
 use crate::surface::imaging::Imager;
 use crate::surface::{
-    At, Change, Linearised, NoFit, OtherRotation, SpotField, SurfaceError, SurfaceModel, SurfaceSettings, WithoutJitter,
+    At, Change, Constants, Linearised, NoFit, OtherRotation, SpotField, SurfaceError, SurfaceModel, SurfaceSettings,
+    WithoutJitter,
 };
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -164,6 +165,21 @@ impl PlanetFree {
         report(Stage::PlanetFree);
         at.values.set(Parameter::K, 0.0);
         let here = surface.linearise(at, None)?;
+        PlanetFree::of(surface, at, here, frequencies, settings, report)
+    }
+
+    /// Of the star in `at`, without an orbit, that is linearised `here`.
+    ///
+    /// # Errors
+    /// [`SurfaceError`].
+    pub fn of(
+        surface: &dyn SurfaceModel,
+        at: At,
+        here: Linearised,
+        frequencies: &Frequencies,
+        settings: SearchSettings,
+        report: &dyn Fn(Stage),
+    ) -> Result<Self, SurfaceError> {
         report(Stage::Search);
         let without_jitter = surface.without_jitter(at, &here)?;
         let jitters = jitters(&here, without_jitter.as_ref());
@@ -240,6 +256,11 @@ impl Detection {
         self.at_best.as_ref().unwrap_or(&self.planet_free)
     }
 
+    /// The velocities that profiles have in common, beside the best orbit; `None` where they are not bounded.
+    pub fn constants(&self, imager: &Imager, nuisances: &[Nuisance]) -> Option<Constants> {
+        self.last().constants(imager, nuisances, Some(&self.best))
+    }
+
     /// Delta ln L of the best orbit in the regularised likelihood.
     pub fn regularised_delta_ln_l(&self) -> f64 {
         let CircularOrbit { k_kms, phi, .. } = self.best.orbit;
@@ -281,6 +302,11 @@ impl Detection {
             at.values.set(Parameter::K, self.best.orbit.k_kms);
             at.values.set(Parameter::PorbOverProt, self.best.porb_over_prot);
             at.values.set(Parameter::Phi, self.best.orbit.phi);
+            // held where it is wrong it would be taken for jitter
+            let constants = self.constants(at.imager, at.nuisances);
+            if let Some(vsys) = constants.and_then(|constants| constants.systemic) {
+                at.values.set(Parameter::Vsys, vsys.value_kms);
+            }
             let here = held.as_deref().unwrap_or(surface).linearise(at, Some(self.last()))?;
             let mut next = refined(&here.quadratic, &self.frequencies, &self.best);
             next.imitation = self.blind.rotation.imitated(next.porb_over_prot, next.sigma_porb_over_prot);

@@ -4,10 +4,16 @@
 use crate::data::diagnosis::{Diagnosis, Reason};
 use crate::data::io::atomic::WriteError;
 use crate::data::io::map::{FILES, LIGHT_CURVES, MapResult};
+use crate::data::io::provenance::{Measured, Provenance};
 use crate::data::scene::Scene;
+use crate::inference::detection::PlanetFree;
 use crate::model::Parameter;
+use crate::planets::periodogram::Peak;
+use crate::planets::verdict::{CANDIDATE_FAP, decimals, probability};
+use crate::runs::blind_search::BlindSearchOptions;
+use crate::surface::expansion::{Nuisance, nuisances};
 use crate::surface::maps::{Deviation, ImageSummary};
-use crate::surface::{MapSummary, NoMaps, Properties, SpotField, SurfaceMaps};
+use crate::surface::{At, ConstantVelocity, Linearised, MapSummary, NoMaps, Properties, SpotField, SurfaceMaps};
 use std::path::{Path, PathBuf};
 
 /// The star of a [`Scene`] reconstructed at the values of its config.
@@ -15,6 +21,8 @@ use std::path::{Path, PathBuf};
 pub struct Maps<'a> {
     scene: &'a Scene,
     maps: Box<SurfaceMaps>,
+    /// RV offsets of data sets, where they are fitted.
+    offsets: Vec<ConstantVelocity>,
     /// Why they do not fit as well as the errors promise, or what is likely to be wrong with the model of the star.
     diagnosis: Option<Diagnosis>,
 }
@@ -65,7 +73,18 @@ impl<'a> Maps<'a> {
         let told = |diagnosis: &Diagnosis| !map_changes || diagnosis.reason != Reason::Errors;
         let diagnosis = suspicious.then(|| diagnosis(scene)).flatten().filter(told);
         match found {
-            Ok(maps) => Ok(Maps { scene, maps: Box::new(maps), diagnosis }),
+            Ok(mut maps) => {
+                report("looking at the velocities");
+                let jitter_kms = maps.field.as_ref().map_or(0.0, |field| field.velocity_jitter_kms);
+                let orbit = FreeVelocities::of(scene, &maps);
+                maps.warnings.extend(orbit.as_ref().and_then(|free| free.warning(scene, jitter_kms)));
+                Ok(Maps {
+                    scene,
+                    maps: Box::new(maps),
+                    offsets: orbit.map_or_else(Vec::new, |free| free.offsets),
+                    diagnosis,
+                })
+            }
             Err(NoMaps::Times(error)) => Err(MapError::Times(error.to_owned())),
             Err(error) => {
                 let reason = diagnosis.map_or_else(String::new, |diagnosis| format!("; {}", diagnosis.text));
@@ -85,9 +104,9 @@ impl<'a> Maps<'a> {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
-        let Maps { scene, maps, diagnosis } = self;
+        let Maps { scene, maps, diagnosis, .. } = self;
         let (imager, observations, truth) = (&scene.imager, &scene.observations, scene.truth);
-        let provenance = &scene.provenance();
+        let provenance = &Provenance { measured: self.measured(), ..scene.provenance() };
         // of a map that evolves the truth is another one at each time
         let true_map = maps.summary.image.as_ref().and_then(|_| scene.true_map());
         let true_map = true_map.as_deref();
@@ -98,7 +117,7 @@ impl<'a> Maps<'a> {
 
     /// How good the fit is and what warns of it, label and text a line.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
-        let Maps { scene, maps, diagnosis } = self;
+        let Maps { scene, maps, diagnosis, .. } = self;
         let text = diagnosis.as_ref().map(|diagnosis| diagnosis.text.clone());
         let misfit = match (&maps.field, text) {
             (Some(_), text) => text,
@@ -108,9 +127,66 @@ impl<'a> Maps<'a> {
         };
         let warnings = maps.warnings.iter().chain(&maps.checks.warnings).cloned().chain(misfit);
         let mut lines = numbers(maps);
-        lines.extend(scene.measured.lines());
+        lines.extend(self.measured().lines());
         lines.extend(warnings.map(|text| ("warning", text)));
         lines
+    }
+
+    /// What the config leaves to the observations, with the RV offsets that these maps give.
+    fn measured(&self) -> Measured {
+        self.scene.measured.clone().with_zero_points(&self.offsets)
+    }
+}
+
+/// What the velocities of evolving maps say where no orbit is assumed: as in the blind search of `periodogram`.
+struct FreeVelocities {
+    /// The best orbit, and how often stars without a planet show one as good; `None` where the config assumes an orbit.
+    orbit: Option<(Peak, f64)>,
+    /// RV offsets of data sets that are fitted: beside that orbit if it is significant.
+    offsets: Vec<ConstantVelocity>,
+}
+
+impl FreeVelocities {
+    fn of(scene: &Scene, maps: &SurfaceMaps) -> Option<Self> {
+        let here = maps.here.as_ref()?;
+        let nuisances = nuisances(&scene.settings.free);
+        let orbit = FreeVelocities::orbit(scene, here, &nuisances);
+        let significant = orbit.as_ref().filter(|(_, probability)| *probability < CANDIDATE_FAP);
+        let constants = here.constants(&scene.imager, &nuisances, significant.map(|(peak, _)| peak));
+        Some(FreeVelocities { orbit, offsets: constants.map_or_else(Vec::new, |constants| constants.offsets) })
+    }
+
+    fn orbit(scene: &Scene, here: &Linearised, nuisances: &[Nuisance]) -> Option<(Peak, f64)> {
+        let values = scene.settings.values;
+        if values[Parameter::K] != 0.0 {
+            return None;
+        }
+        let options = BlindSearchOptions::default();
+        let settings = options.detection(scene);
+        let frequencies = options.frequencies(scene).ok()?;
+        let at = At { imager: &scene.imager, values, nuisances };
+        let surface = scene.surface().model();
+        let search = PlanetFree::of(&*surface, at, here.clone(), &frequencies, settings.search, &|_| ()).ok()?.blind;
+        let peak = search.best();
+        Some((*peak, search.false_alarm.probability(peak.orbit.delta_ln_l).value()))
+    }
+
+    /// That the velocities vary as an orbit would, which the jitter of this size has taken up.
+    fn warning(&self, scene: &Scene, jitter_kms: f64) -> Option<String> {
+        let (peak, chance) = self.orbit.as_ref().filter(|(_, chance)| *chance < CANDIDATE_FAP)?;
+        let period_d = scene.imager.star.rotation_period_d * peak.porb_over_prot;
+        let digits = decimals(scene.imager.star.rotation_period_d * peak.sigma_porb_over_prot.unwrap_or(f64::NAN));
+        let absorbed = match jitter_kms {
+            0.0 => String::new(),
+            kms => format!("; the RV jitter of {kms:.3} km/s absorbs it"),
+        };
+        Some(format!(
+            "RVs without spots vary as on a circular orbit (P = {period_d:.digits$} d, K = {:.3} km/s, \
+            false-alarm probability {}){absorbed}; run `dimcmc periodogram {}`",
+            peak.orbit.k_kms,
+            probability(*chance),
+            scene.settings.path.display()
+        ))
     }
 }
 
@@ -152,7 +228,12 @@ fn numbers(maps: &SurfaceMaps) -> Vec<(&'static str, String)> {
         lines.push(("RV error", format!("{:.4} km/s (photon noise)", fit.photon_rv_error_kms)));
     }
     if let Some((rms, error)) = fit.rv_rms_kms.zip(fit.rv_error_kms) {
-        lines.push(("RV, no spots", format!("{rms:.4} km/s rms, uncertainty {error:.4} km/s")));
+        let jitter_kms = field.as_ref().map_or(0.0, |field| field.velocity_jitter_kms);
+        let counted = match jitter_kms {
+            0.0 => String::new(),
+            kms => format!(", RV jitter of {kms:.4} km/s included"),
+        };
+        lines.push(("RV, no spots", format!("{rms:.4} km/s rms, uncertainty {error:.4} km/s{counted}")));
     }
     let rms = |squares: f64, count: usize| (squares / count as f64).sqrt();
     if !zero_points_kms.is_empty() {

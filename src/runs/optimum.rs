@@ -9,7 +9,7 @@ use crate::model::{
 };
 use crate::numerics::text::listed;
 use crate::runs::blind_search::{BlindSearch, SearchSummary};
-use crate::runs::origin::OptimumRecord;
+use crate::runs::origin::{OptimumRecord, provenance};
 use crate::sampling::optimise::Optimum;
 use crate::surface::record::SurfaceRecord;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -111,7 +111,7 @@ impl OptimumFile {
             starts: found.attempts.iter().map(StartRecord::of).collect(),
             profiles: scene.observations.profiles.len(),
             time_span_d: scene.observations.time_span_d(),
-            provenance: scene.provenance(),
+            provenance: provenance(scene, found),
         }
     }
 

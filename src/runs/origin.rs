@@ -10,6 +10,7 @@ use crate::inference::search::Found;
 use crate::model::ParameterSpace;
 use crate::sampling::optimise::Optimum;
 use crate::surface::density::Density;
+use crate::surface::expansion::nuisances;
 use crate::surface::record::{RebuildError, SurfaceRecord};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -144,10 +145,21 @@ pub enum OriginError {
     Reference(RebuildError),
 }
 
+/// Of what begins in `scene` with what the search `found`: zero points of data sets are those beside its best orbit.
+pub fn provenance(scene: &Scene, found: &Found) -> Provenance {
+    let of_scene = scene.provenance();
+    let constants = found.detection.as_ref().and_then(|search| {
+        let nuisances = nuisances(&scene.settings.free);
+        search.constants(&scene.imager, &nuisances)
+    });
+    let offsets = constants.map_or_else(Vec::new, |constants| constants.offsets);
+    Provenance { measured: of_scene.measured.with_zero_points(&offsets), ..of_scene }
+}
+
 impl Origin {
     /// What begins in `scene` with what the search `found`.
     pub fn of(scene: &Scene, found: &Found) -> Self {
-        let Provenance { version, data_sha256, config_sha256, config, measured } = scene.provenance();
+        let Provenance { version, data_sha256, config_sha256, config, measured } = provenance(scene, found);
         let names = found.posterior.space().names();
         Origin {
             version: version.to_string(),

@@ -33,6 +33,13 @@ pub struct ZeroPointPrior {
     pub sd_kms: f64,
 }
 
+impl ZeroPointPrior {
+    /// Where the offset is held (km/s): its prior lies around 0.
+    pub fn held_kms(&self) -> f64 {
+        -self.mean_kms
+    }
+}
+
 /// All that is fixed while parameters are tried: the star's surface and settings, when it was observed, and the data.
 #[derive(Clone, Debug)]
 pub struct Imager {

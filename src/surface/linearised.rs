@@ -20,9 +20,9 @@ pub struct Linearised {
     /// ln L of the orbit's velocities, counted from 0 whatever the orbit at the centre; spots that the map does not
     /// resolve count as noise.
     pub quadratic: VelocityQuadratic,
-    /// The same with those RV offsets of data sets held that are otherwise integrated out, for tables of velocities;
-    /// `None` where there are none.
-    pub offsets_held: Option<VelocityQuadratic>,
+    /// The same with the systemic velocity and the RV offsets of data sets held that are otherwise integrated out: of
+    /// it are tables of velocities, whose errors are then those of each, and [`Constants`](super::Constants).
+    pub held: VelocityQuadratic,
     /// The same without that noise.
     pub regularised: VelocityQuadratic,
     /// How many times larger than the model expects the unresolved spots are, in variance.

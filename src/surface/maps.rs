@@ -7,7 +7,7 @@ use super::evolving_map::{FluxFit, NoFit};
 use super::imaging::Imager;
 use super::nuisances::LineAndContinuum;
 use super::static_map::ReferenceError;
-use super::{FilteredVelocity, SpotField};
+use super::{FilteredVelocity, Linearised, SpotField};
 use crate::model::ParameterValues;
 use crate::numerics::json::{Part, number_or_null, part};
 use crate::sampling::log_density::Status;
@@ -40,6 +40,9 @@ pub struct SurfaceMaps {
     pub trade_off: Vec<TradeOffNode>,
     /// The spots as a field, where they are one.
     pub field: Option<SpotField>,
+    /// The star linearised with these maps, where they evolve.
+    #[doc(hidden)]
+    pub here: Option<Linearised>,
     /// What has to be known of maps and times.
     pub warnings: Vec<String>,
     /// The numbers.

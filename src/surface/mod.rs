@@ -14,6 +14,7 @@
 
 pub mod calibration;
 pub mod checks;
+mod constants;
 pub mod density;
 pub mod evolving_map;
 pub mod expansion;
@@ -35,6 +36,7 @@ pub mod planned {
     pub use super::evolving_map::{Assumed, Basis, Marginal, Planned, fit};
 }
 
+pub use constants::{ConstantVelocity, Constants};
 pub use evolving_map::{Change, FluxFit, Known, MEAN_FILLING, NoFit, OtherRotation};
 pub use linearised::{AtTarget, Explained, FilteredVelocity, Linearised, SpotField, SurfaceError, WithoutJitter};
 pub use maps::{MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots};

@@ -101,17 +101,11 @@ pub trait SurfaceModel: Debug + Send + Sync {
     /// What has to be known of the maps.
     fn remarks(&self, imager: &Imager, here: &Linearised) -> Vec<Remark>;
 
-    /// The maps at `values`, of these times (d) where they are given and the maps evolve.
+    /// The maps at the values of `at`, of these times (d) where they are given and the maps evolve.
     ///
     /// # Errors
     /// [`NoMaps`].
-    fn maps(
-        &self,
-        imager: &Imager,
-        observations: &Observations,
-        values: ParameterValues,
-        times_d: Option<&[f64]>,
-    ) -> Result<SurfaceMaps, NoMaps>;
+    fn maps(&self, at: At, observations: &Observations, times_d: Option<&[f64]>) -> Result<SurfaceMaps, NoMaps>;
 
     /// Whether the search for the best parameters begins with a blind search for the planet.
     fn begins_with_blind_search(&self) -> bool;

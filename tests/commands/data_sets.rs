@@ -1,8 +1,10 @@
 //! Several data sets in one config: two spectrographs in two seasons, a transit left out.
 
 use super::desk::{Desk, dimcmc, says, text};
+use super::svg::texts;
 use dimcmc::Scene;
 use dimcmc::internals::star::observation::Profile;
+use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 
 const CONFIG: &str = "config.json";
@@ -66,6 +68,60 @@ fn two_spectrographs_from_files_to_a_chain() {
     says(&text(&sampled.stderr), &["blue: 1 of 7 left out"]);
     desk.succeed(&["report", "run"]);
     says(&desk.read("run/report.html"), &["blue: 6 profiles", "red: 7 profiles"]);
+}
+
+/// The systemic velocity free and held: what is not known of it is not known of the offset, and is no error of single
+/// velocities.
+#[test]
+fn what_profiles_have_in_common_is_told_apart() {
+    const PRIOR_SD_KMS: f64 = 0.577;
+    let mut simulated = two_sets();
+    simulated["planet"]["k_kms"] = json!(0.4);
+    for set in simulated["observations"].as_array_mut().unwrap() {
+        set["simulate"]["snr"] = json!(1000);
+    }
+    let desk = Desk::new(simulated.clone());
+    desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+    let mut config = from_files(&simulated);
+    desk.write("held.json", &config.to_string());
+    config["parameters"]["vsys_kms"] = json!({ "prior": "uniform", "min": -0.9, "max": 1.1 });
+    desk.write("free.json", &config.to_string());
+    let search = |name: &str| {
+        let table = desk.succeed(&["periodogram", &format!("{name}.json"), "--out", name]);
+        (table, desk.json(&format!("{name}/periodogram.json")))
+    };
+    let [(_, held), (table, free)] = [search("held"), search("free")];
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{value}"));
+    let velocity = |of: &Value| [number(&of["value_kms"]), number(&of["sigma_kms"])];
+    let offset = |found: &Value| velocity(&found["measured"]["sets"][1]["zero_point"]);
+    let [[_, sigma_held], [value, sigma]] = [offset(&held), offset(&free)];
+    assert!((value - 0.3).abs() < 2.0 * sigma && sigma < 0.2, "{value} +- {sigma}");
+    assert!(sigma > 1.2 * sigma_held, "{sigma} {sigma_held}");
+    says(&table, &[&format!("zero point {value:.3} +- {sigma:.3} km/s"), "systemic velocity: "]);
+    assert_eq!(held.get("systemic_velocity"), None);
+    let [vsys, sigma_vsys] = velocity(&free["systemic_velocity"]);
+    assert!(vsys.abs() < 3.0 * sigma_vsys && sigma_vsys < 0.3 * PRIOR_SD_KMS, "{vsys} +- {sigma_vsys}");
+    // velocities and their covariance alone give the orbit, and no error is that of the systemic velocity
+    let rows = |file: &str, head: usize| -> Vec<Vec<f64>> {
+        let text = desk.read(file);
+        text.lines().skip(head).map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect()
+    };
+    let (rv, covariance) = (rows("free/rv.csv", 1), rows("free/covariance.csv", 0).concat());
+    let n = rv.len();
+    assert!(rv.iter().all(|row| row[3] < 0.5 * PRIOR_SD_KMS), "{rv:?}");
+    let factor = DMatrix::from_row_slice(n, n, &covariance).cholesky().unwrap();
+    let angle = |k: usize| std::f64::consts::TAU * rv[k][0] / number(&free["best"]["period_d"]);
+    let x = DMatrix::from_fn(n, 2, |k, c| if c == 0 { angle(k).cos() } else { angle(k).sin() });
+    let kms = DVector::from_fn(n, |k, _| rv[k][2]);
+    let ab = x.tr_mul(&factor.solve(&x)).cholesky().unwrap().solve(&x.tr_mul(&factor.solve(&kms)));
+    assert!((ab.norm() / number(&free["best"]["k_kms"]) - 1.0).abs() < 0.01, "{} {}", ab.norm(), free["best"]);
+    desk.succeed(&["plot", "free"]);
+    let figure = desk.read("free/figures/rv.svg");
+    let period = format!("{:.3} d = ", number(&free["best"]["period_d"]));
+    assert!(figure.contains(&period) && texts(&figure).contains(&"residual (km/s)"), "{period}: {:?}", texts(&figure));
+    desk.succeed(&["export", "free", "--format", "rv"]);
+    says(&desk.read("free/rv/README.txt"), &["leave a constant velocity free", &format!("{vsys:.4} +- ")]);
+    assert_eq!(desk.read("free/rv/radvel.csv").lines().filter(|line| line.ends_with(",red")).count(), 7);
 }
 
 #[test]

@@ -14,6 +14,44 @@ fn config() -> Value {
     config
 }
 
+/// A planet that no orbit is assumed for is taken up by the jitter: the command says so, and what to run. Of a star
+/// without a planet it says nothing of the kind.
+#[test]
+fn velocities_that_vary_as_on_an_orbit_are_told() {
+    let star = |k_kms: f64| {
+        json!({
+            "star": { "rotation_period_d": 2.741, "inclination_deg": 55.0, "vsini_kms": 30.5, "contrast": 0.3,
+                      "line": { "sigma_kms": 3.5, "equivalent_width_kms": 6.0 } },
+            "planet": { "k_kms": k_kms, "porb_over_prot": 2.3, "phi": 0.3 },
+            "imaging": { "pixels": 400, "objective": "marginal-likelihood" },
+            "observations": { "simulate": {
+                "random_spots": { "number": 14, "lifetime_d": 20, "seed": 11 },
+                "schedule": { "nights": 12, "per_night": [2, 2], "night_hours": 8, "seed": 3 },
+                "velocity_kms": { "min": -45, "max": 45, "step": 1.8 }, "snr": 1500, "seed": 1, "pixels": 4000
+            } }
+        })
+    };
+    for k_kms in [0.25, 0.0] {
+        let desk = Desk::new(star(k_kms));
+        desk.succeed(&["simulate", CONFIG, "--out", "data"]);
+        let mut config = star(0.0);
+        config["observations"] = json!({ "path": "data/observations.txt", "velocity_jitter_kms": "fitted" });
+        config["parameters"] = json!({
+            "k_kms": { "prior": "uniform", "min": 0.0, "max": 1.0 },
+            "vsys_kms": { "prior": "uniform", "min": -0.7, "max": 0.7 }
+        });
+        desk.write("star.json", &config.to_string());
+        let said = desk.succeed(&["map", "star.json", "--out", "map"]);
+        let told = "vary as on a circular orbit (P = 6.";
+        assert_eq!(said.contains(told), k_kms > 0.0, "{said}");
+        assert_eq!(desk.read("map/fit.json").contains(told), k_kms > 0.0);
+        assert_eq!(said.contains("run `dimcmc periodogram star.json`"), k_kms > 0.0, "{said}");
+        if k_kms > 0.0 {
+            says(&said, &["; the RV jitter of 0.", " absorbs it", "false-alarm probability"]);
+        }
+    }
+}
+
 #[test]
 fn the_files_are_typed_and_the_figures_are_of_them() {
     let desk = Desk::new(config());

@@ -178,9 +178,11 @@ fn the_misfit_of_maps_has_its_gradient_where_contrasts_differ() {
 #[test]
 fn a_zero_point_that_is_not_known_is_found_and_held() {
     let both = scene(&config());
-    let HeldZeroPoint { value_kms, sigma_kms } = both.measured.sets[1].zero_point.expect("a zero point");
-    println!("{value_kms} +- {sigma_kms}");
-    assert!(sigma_kms < 0.1 && (value_kms - OFFSET_KMS).abs() < 3.0 * sigma_kms, "{value_kms} +- {sigma_kms}");
+    let HeldZeroPoint { held_kms, found } = both.measured.sets[1].zero_point.expect("a zero point");
+    println!("{held_kms}");
+    assert!((held_kms - OFFSET_KMS).abs() < 0.2, "{held_kms}");
+    // how well it is known is said by those who fit a model
+    assert_eq!(found, None);
     assert!(both.measured.sets[0].zero_point.is_none());
     assert_eq!(both.observations.profiles.len(), 16);
     assert_eq!(both.imager.profiles_of(1), 8..16);

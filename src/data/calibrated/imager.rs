@@ -10,6 +10,7 @@ use crate::star::observation::Observations;
 use crate::star::{Sampling, Seen, StarSettings};
 use crate::surface::calibration::offsets;
 use crate::surface::calibration::offsets::HeldZeroPoint;
+use crate::surface::expansion::nuisances;
 use crate::surface::imaging::{Imager, ZeroPointPrior};
 
 /// What the observations `parts` of these data `sets` are imaged with, with a map of each of the `seasons`. An offset
@@ -60,6 +61,7 @@ pub(super) fn hold_offsets(settings: &Settings, imager: &mut Imager) -> Result<V
     let Some(first) = imager.zero_points.first().map(|prior| prior.set) else { return Ok(Vec::new()) };
     let usual = FrequencySettings::default();
     let frequencies = Frequencies::new(&imager.cycles(), imager.star.rotation_period_d, usual).ok();
-    offsets::hold(imager, settings.values, settings.known_field(), frequencies.as_ref())
+    let nuisances = nuisances(&settings.free);
+    offsets::hold(imager, settings.values, &nuisances, settings.known_field(), frequencies.as_ref())
         .map_err(|e| settings.fault(&format!("{}.zero_point_kms", settings.sets[first].key), &e.to_string()))
 }

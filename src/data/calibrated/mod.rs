@@ -113,7 +113,7 @@ impl Calibrated {
         let (zero_points, _) = errors::zero_points(settings, &imager, jitter, self.chi2_target)?;
         let mut imager = zero_points.iter().fold(imager, |imager, points| points.counted_in(imager));
         let held = self.measured.sets.iter().filter_map(|set| set.zero_point);
-        held.enumerate().for_each(|(z, held)| imager.move_zero_point(z, held.value_kms));
+        held.enumerate().for_each(|(z, held)| imager.move_zero_point(z, held.held_kms));
         Ok(Calibrated { sha256: fingerprint(&self.observations), imager, ..self })
     }
 }

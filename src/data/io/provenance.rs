@@ -1,6 +1,7 @@
 //! What every result says of where it came from.
 
 use crate::numerics::json::Part;
+use crate::surface::ConstantVelocity;
 use crate::surface::calibration::jitter::MeasuredJitter;
 use crate::surface::calibration::noise::MeasuredErrors;
 use crate::surface::calibration::offsets::HeldZeroPoint;
@@ -79,7 +80,7 @@ pub struct MeasuredSet {
     /// Its `sigma_scale` and `weights`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<MeasuredErrors>,
-    /// Its `zero_point_kms`: where it is held in maps.
+    /// Its `zero_point_kms`, where it is fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_point: Option<HeldZeroPoint>,
 }
@@ -87,10 +88,12 @@ pub struct MeasuredSet {
 impl MeasuredSet {
     /// It in words.
     pub fn line(&self) -> String {
-        let zero_point = self
-            .zero_point
-            .as_ref()
-            .map(|held| format!(", zero point {:.4} +- {:.4} km/s, integrated out", held.value_kms, held.sigma_kms));
+        let zero_point = self.zero_point.as_ref().map(|of_set| match of_set.found {
+            Some(ConstantVelocity { value_kms, sigma_kms }) => {
+                format!(", zero point {value_kms:.3} +- {sigma_kms:.3} km/s, integrated out")
+            }
+            None => ", zero point integrated out".to_owned(),
+        });
         let errors = self.errors.as_ref().map(|errors| format!(", errors {}", errors.line()));
         let (name, profiles) = (&self.name, self.profiles);
         format!("{name}: {profiles} profiles{}{}", zero_point.unwrap_or_default(), errors.unwrap_or_default())
@@ -101,6 +104,13 @@ impl Measured {
     /// Whether the config leaves nothing to the observations.
     pub fn is_empty(&self) -> bool {
         *self == Measured::default()
+    }
+
+    /// The same with what was `found` of the zero points that are fitted, in the order of the sets.
+    pub fn with_zero_points(mut self, found: &[ConstantVelocity]) -> Self {
+        let fitted = self.sets.iter_mut().filter_map(|set| set.zero_point.as_mut());
+        fitted.zip(found).for_each(|(of_set, found)| of_set.found = Some(*found));
+        self
     }
 
     /// That the model does not fit as well as the continuum promises, where the errors say so.

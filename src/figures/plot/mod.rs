@@ -9,6 +9,7 @@ mod content;
 mod corner;
 mod density;
 mod dynamic;
+mod ephemeris;
 mod injected;
 mod landscape;
 mod light;

@@ -13,7 +13,6 @@ use crate::figures::drawing::{
 use crate::model::Parameter;
 use crate::runs::blind_search::{FILE, LevelRecord, OrbitRecord, PeakRecord, PeriodogramFile};
 use crate::runs::origin;
-use crate::star::Orbit;
 use std::path::Path;
 
 /// What is marked in a periodogram.
@@ -46,9 +45,7 @@ pub(super) fn figures(folder: &Path) -> Result<Vec<Figure>, PlotError> {
         figures.push(beside);
     }
     if folder.join(velocities::FILE).is_file() {
-        let OrbitRecord { k_kms, porb_over_prot, phi, .. } = file.best;
-        let offset = file.offset.as_ref().map_or(0.0, |offset| offset.velocity_kms);
-        figures.push(velocities::of_search(folder, Orbit { k_kms, porb_over_prot, phi }, offset)?);
+        figures.push(velocities::of_search(folder, &file)?);
     }
     Ok(figures)
 }

@@ -1,6 +1,6 @@
 //! Line profiles below each other in the order of their rotation phase, observed and modelled.
 
-use super::star_map::ephemeris;
+use super::ephemeris::ephemeris;
 use super::{ANY, PlotError};
 use crate::data::io::csv::{Columns, DATA_SET};
 use crate::data::io::lsd;

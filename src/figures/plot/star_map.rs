@@ -1,6 +1,7 @@
 //! The map of the star: flattened polar projection and Mollweide's, beside it the injected map where it is known.
 
 use super::content::Content;
+use super::ephemeris::ephemeris;
 use super::injected::Injected;
 use super::projection::Projection;
 use super::surface::{PixelMap, Scale, graticule, outline, paint_discs, photosphere};
@@ -13,7 +14,6 @@ use crate::figures::drawing::colour::{BLACK, BLUE, VERMILION, WHITE};
 use crate::figures::drawing::{Align, Figure, Font, PAGE_MM, Paint, Point, Rect, Stroke, open, width_pt};
 use crate::runs::origin;
 use crate::star::{Brightness, Disc};
-use serde_json::Value;
 use std::path::Path;
 
 /// One star on the page.
@@ -125,12 +125,6 @@ pub(super) fn injected(folder: &Path) -> Result<Option<Figure>, PlotError> {
     let when = if injected.is_changing { ", as large as they are in the middle of the data" } else { "" };
     let text = format!("Map of the injected {what} at cycle 0{when}. {HOW_TO_READ}");
     Ok(Some(draw(&[star], content, &cycles, text)))
-}
-
-/// Rotation period and time of cycle 0 (d) of a resolved config.
-pub(super) fn ephemeris(config: &Value) -> Option<(f64, f64)> {
-    let number = |key: &str| config.pointer(&format!("/star/{key}")).and_then(Value::as_f64);
-    Some((number("rotation_period_d")?, number("epoch_d").unwrap_or(0.0)))
 }
 
 /// How phases and longitudes are to be read.

@@ -1,12 +1,14 @@
 //! Radial velocities: first moments with the spots in them, and what is left when these are taken out; over time and
 //! folded with the orbit.
 
+use super::ephemeris::ephemeris;
 use super::{ANY, PlotError};
 use crate::data::io::csv::Columns;
 use crate::data::io::map::{FIT, FitFile};
 use crate::figures::drawing::colour::{BLACK, BLUE, GREY, VERMILION};
 use crate::figures::drawing::panel::Sides;
 use crate::figures::drawing::{Axis, COLUMN_MM, Figure, Key, Legend, Marker, PAGE_MM, Panel, Rect, Stroke, range_of};
+use crate::runs::blind_search::{OrbitRecord, PeriodogramFile};
 use crate::runs::origin;
 use crate::star::{Eccentric, Motion, Orbit};
 use std::path::Path;
@@ -32,6 +34,8 @@ struct Curves<'a> {
     panels: Vec<(&'a str, Vec<Series<'a>>)>,
     motion: Motion,
     vsys_kms: f64,
+    /// Rotation period of the star (d).
+    rotation_period_d: f64,
     /// What the orbit is called.
     orbit_is: &'static str,
     /// The panel of velocities without spots, where the orbit is drawn and which is folded.
@@ -69,6 +73,7 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
         ],
         motion: state.motion,
         vsys_kms: state.vsys_kms,
+        rotation_period_d: ephemeris(&fit.provenance.config).map_or(f64::NAN, |(period_d, _)| period_d),
         orbit_is: "assumed orbit",
         orbital: 1,
     };
@@ -91,7 +96,14 @@ pub(super) fn of_map(folder: &Path) -> Result<Figure, PlotError> {
 }
 
 /// The velocities of a blind search, with the orbit that it found.
-pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<Figure, PlotError> {
+pub(super) fn of_search(folder: &Path, file: &PeriodogramFile) -> Result<Figure, PlotError> {
+    let OrbitRecord { k_kms, porb_over_prot, phi, period_d, .. } = file.best;
+    let motion = Motion::from(Orbit { k_kms, porb_over_prot, phi });
+    // velocities count from a systemic velocity that is found
+    let offset_kms = match file.systemic_velocity {
+        Some(_) => 0.0,
+        None => file.offset.as_ref().map_or(0.0, |offset| offset.velocity_kms),
+    };
     let table = Columns::read(&folder.join(FILE))?;
     if let Ok(covariance) = std::fs::read_to_string(folder.join(COVARIANCE)) {
         table.check_rows(covariance.lines().count(), &format!("those of {COVARIANCE}"))?;
@@ -105,23 +117,29 @@ pub(super) fn of_search(folder: &Path, orbit: Orbit, offset_kms: f64) -> Result<
             marker,
         })
     };
+    let cycle = table.column_within("cycle", ANY)?;
+    let clean = series("observed", "", "rv_kms", "rv_sigma_kms", POINT)?;
+    let orbit: Vec<f64> = cycle.iter().map(|cycle| offset_kms + motion.velocity_kms(*cycle)).collect();
+    let residual = clean.less(&orbit);
     let curves = Curves {
-        cycle: table.column_within("cycle", ANY)?,
+        cycle,
         panels: vec![
             ("RV (km/s)", vec![series("observed", "", "first_moment_kms", "first_moment_sigma_kms", POINT)?]),
-            ("RV − spots (km/s)", vec![series("observed", "", "rv_kms", "rv_sigma_kms", POINT)?]),
+            ("RV − spots (km/s)", vec![clean]),
+            ("residual (km/s)", vec![residual]),
         ],
-        motion: orbit.into(),
+        motion,
         vsys_kms: offset_kms,
+        rotation_period_d: period_d / porb_over_prot,
         orbit_is: "best orbit",
         orbital: 1,
     };
     let mut figure = curves.draw();
     figure.caption =
-        "Radial velocities. Above: first moments of the profiles. Below: with the spots marginalised out, and the \
-                      best orbit; their errors are correlated, bars are the diagonal of the covariance \
-                      (covariance.csv). To the right: the same folded with the orbital period; phase 0 is the largest \
-                      velocity."
+        "Radial velocities. Above: first moments of the profiles. Middle: with the spots marginalised out, and the \
+        best orbit; their errors are correlated, bars are the diagonal of the covariance (covariance.csv), without the \
+        error of systemic velocity and RV offsets, which shifts all profiles of a data set alike. Below: the best \
+        orbit taken out. To the right: the middle folded with the orbital period; phase 0 is the largest velocity."
             .into();
     Ok(figure)
 }
@@ -195,7 +213,8 @@ impl Curves<'_> {
         series.iter().for_each(|one| one.less(&others).draw(figure, &panel, &phases));
         panel.frame(figure, Sides::BOTH);
         let mut legend = Legend::default();
-        let text = format!("*K* = {k_kms:.3} km/s, *P*_{{orb}} = {porb_over_prot:.3} *P*_{{rot}}");
+        let period_d = porb_over_prot * self.rotation_period_d;
+        let text = format!("*K* = {k_kms:.3} km/s, *P* = {period_d:.3} d = {porb_over_prot:.3} *P*_{{rot}}");
         legend.add(Key::Line(ORBIT), &text);
         legend.draw(figure, frame, [0.5, 0.0]);
     }

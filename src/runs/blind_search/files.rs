@@ -54,18 +54,22 @@ impl BlindSearch<'_> {
 
     /// The table of what was found, and what the config leaves to the observations.
     pub fn table(&self) -> String {
-        let measured = self.scene.measured.lines();
+        let measured = self.measured().lines();
         let measured: String = measured.iter().map(|(label, text)| format!("{label}: {text}\n")).collect();
         PeriodogramFile::of(self).table(self.scene.imager.star.rotation_period_d) + &measured
     }
 
     /// Velocities (km/s) and their covariance (km^2/s^2) in the last expansion; NaN where the data do not bound them.
+    /// What profiles have in common, systemic velocity and RV offsets, is taken out, and held in the covariance.
     fn velocities(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let last = self.detection.last();
-        let quadratic = last.offsets_held.as_ref().unwrap_or(&last.quadratic);
-        let n = quadratic.len();
+        let held = &self.detection.last().held;
+        let n = held.len();
         let missing = |_| (DVector::from_element(n, f64::NAN), DMatrix::from_element(n, n, f64::NAN));
-        quadratic.radial_velocities().unwrap_or_else(missing)
+        let (velocities, covariance) = held.radial_velocities().unwrap_or_else(missing);
+        match &self.constants {
+            Some(constants) => (velocities - &constants.of_each_kms, covariance),
+            None => (velocities, covariance),
+        }
     }
 
     fn rv(&self, velocities: &DVector<f64>, covariance: &DMatrix<f64>) -> Table {

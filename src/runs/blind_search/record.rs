@@ -11,7 +11,7 @@ use crate::planets::periodogram::offset::Offset;
 use crate::planets::periodogram::peaks::Peak;
 use crate::planets::periodogram::{CircularOrbit, KeplerianOrbit, Search};
 use crate::planets::verdict::Verdict;
-use crate::surface::{AtTarget, Change, OtherRotation, SpotField};
+use crate::surface::{AtTarget, Change, ConstantVelocity, OtherRotation, SpotField};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -56,6 +56,10 @@ pub struct PeriodogramFile {
     pub expansion: ExpansionRecord,
     /// A constant velocity left free beside the orbit.
     pub offset: Option<Offset>,
+    /// Systemic velocity beside the best orbit, where it is free: velocities of `rv.csv` count from it, and their
+    /// errors do not have its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub systemic_velocity: Option<ConstantVelocity>,
     /// What is lost where the orbit turns with the star.
     pub co_rotation: CoRotationRecord,
     /// Whether the best orbit hangs on a choice.
@@ -357,6 +361,7 @@ impl PeriodogramFile {
                 chi2_per_datum: search.at_best.chi2_per_datum,
             },
             offset: found.offset,
+            systemic_velocity: search.constants.as_ref().and_then(|constants| constants.systemic),
             co_rotation: CoRotationRecord {
                 sigma_k_over_median: found.co_rotation_penalty,
                 statement: found.co_rotation(),
@@ -364,7 +369,7 @@ impl PeriodogramFile {
             robustness: search.robustness.as_ref().map(RobustnessRecord::of).unwrap_or_default(),
             evidence: search.evidence.clone(),
             warnings: search.remarks.iter().map(|remark| remark.text.clone()).collect(),
-            provenance: scene.provenance(),
+            provenance: Provenance { measured: search.measured(), ..scene.provenance() },
         }
     }
 }

@@ -4,12 +4,13 @@ use super::known_planet::{KnownPlanet, known_planets};
 use super::options::{BlindSearchError, BlindSearchOptions, RobustnessOf};
 use super::priors::within_priors;
 use super::summary::SearchSummary;
+use crate::data::io::provenance::Measured;
 use crate::data::scene::Scene;
 use crate::inference::detection::{Detection, DetectionSettings, Evidence, Robustness, Stage, robustness};
 use crate::inference::evidence::EvidenceRecord;
 use crate::model::{Parameter, for_blind_search};
 use crate::planets::verdict::{Remark, Verdict};
-use crate::surface::{Explained, Linearised};
+use crate::surface::{Constants, Explained, Linearised};
 use std::borrow::Cow;
 
 /// A search of the star of a [`Scene`] for planets of every period, its spots marginalised out.
@@ -24,6 +25,8 @@ pub struct BlindSearch<'a> {
     pub(super) planet_free: Explained,
     /// The same beside the best orbit.
     pub(super) at_best: Explained,
+    /// Systemic velocity and RV offsets of data sets beside the best orbit; `None` where they are not bounded.
+    pub(super) constants: Option<Constants>,
     /// Bayes factors, where the config has priors for them.
     pub(super) evidence: Option<EvidenceRecord>,
     /// What is said of the best orbit, or of a planet of known ephemeris.
@@ -100,7 +103,25 @@ impl<'a> BlindSearch<'a> {
             }
         }
         let evidence = scene.evidence(&detection.jitters());
-        BlindSearch { scene, settings, detection, robustness, planet_free, at_best, evidence, verdict, remarks }
+        let constants = detection.constants(imager, &settings.nuisances);
+        BlindSearch {
+            scene,
+            settings,
+            detection,
+            robustness,
+            planet_free,
+            at_best,
+            constants,
+            evidence,
+            verdict,
+            remarks,
+        }
+    }
+
+    /// What the config leaves to the observations, RV offsets of data sets beside the best orbit.
+    pub(super) fn measured(&self) -> Measured {
+        let offsets = self.constants.as_ref().map_or(&[][..], |constants| &constants.offsets);
+        self.scene.measured.clone().with_zero_points(offsets)
     }
 
     /// The head of it, for results that rest on it.

@@ -9,6 +9,7 @@ use super::record::{
 use crate::model::{OrbitQuantity, Parameter, definition, in_earths};
 use crate::numerics::text::{Align, aligned, columns};
 use crate::planets::verdict::{SIMULATED_FAP, decimals, false_alarm, probability};
+use crate::surface::ConstantVelocity;
 
 /// Peaks shown; the file has the others.
 const SHOWN: usize = 6;
@@ -21,6 +22,13 @@ impl PeriodogramFile {
         text += &meanings(&self.best.quantities);
         if let Some(field) = &self.field {
             text += &field.line();
+        }
+        if let Some(ConstantVelocity { value_kms, sigma_kms }) = self.systemic_velocity {
+            let digits = decimals(sigma_kms);
+            text += &format!(
+                "systemic velocity: {value_kms:.digits$} +- {sigma_kms:.digits$} km/s, from which rv_kms counts; \
+                rv_sigma_kms does not include its error\n"
+            );
         }
         text += &format!("{}\n", chance(&self.false_alarm));
         if let Some(evidence) = &self.evidence {

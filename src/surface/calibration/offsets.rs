@@ -4,12 +4,14 @@
 
 use crate::field::{FieldError, Lifetime};
 use crate::model::{Parameter, ParameterValues};
-use crate::planets::periodogram::{Frequencies, orbits};
-use crate::surface::Known;
-use crate::surface::evolving_map::Basis;
+use crate::planets::periodogram::{Frequencies, Peak, orbits};
+use crate::planets::velocities::VelocityQuadratic;
 use crate::surface::evolving_map::fit::usual;
-use crate::surface::imaging::{Imager, ZeroPointPrior};
-use nalgebra::{DMatrix, DVector};
+use crate::surface::evolving_map::linearised::linearised;
+use crate::surface::evolving_map::{Basis, Fitted};
+use crate::surface::expansion::Nuisance;
+use crate::surface::imaging::Imager;
+use crate::surface::{ConstantVelocity, Known};
 use serde::{Deserialize, Serialize};
 
 /// Standard deviation of the prior (km/s), around 0.
@@ -21,79 +23,77 @@ const ROUNDS: usize = 3;
 /// Zero points that move by less than this part of their errors stay.
 const STAYS: f64 = 0.1;
 
-/// The most probable zero point of a data set.
+/// The zero point of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldZeroPoint {
-    /// Where it is held (km/s).
-    pub value_kms: f64,
-    /// Its standard error, the spots integrated out and the orbit held (km/s).
-    pub sigma_kms: f64,
+    /// Where it is held in maps (km/s).
+    #[serde(default)]
+    pub held_kms: f64,
+    /// What is found of it beside the orbit that is reported, all that is free integrated out; absent where no model
+    /// was fitted.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub found: Option<ConstantVelocity>,
 }
 
 /// Finds the zero points of those sets of `imager` that have a prior, and holds them there: by the velocity quadratic
-/// of a usual field, with the best orbit at any of the `frequencies` in the model from the second round on.
+/// of a usual field, with the best orbit at any of the `frequencies` in the model from the second round on; beside the
+/// systemic velocity, if that is among the `nuisances`. It is where to hold them, and no measurement of them: what they
+/// are off by is taken for jitter.
 ///
 /// # Errors
 /// [`FieldError`].
 pub fn hold(
     imager: &mut Imager,
     values: ParameterValues,
+    nuisances: &[Nuisance],
     known: Known,
     frequencies: Option<&Frequencies>,
 ) -> Result<Vec<HeldZeroPoint>, FieldError> {
     let basis = Basis::rough(&imager.grid);
     let lifetime = known.lifetime.unwrap_or(Lifetime::Days(Parameter::SpotLifetime.usual()));
     let known = Known { lifetime: Some(lifetime), ..known };
+    let systemic: Vec<Nuisance> = nuisances.iter().copied().filter(|n| n.parameter == Parameter::Vsys).collect();
     let mut values = values;
     values.set(Parameter::K, 0.0);
-    let mut held = vec![HeldZeroPoint { value_kms: 0.0, sigma_kms: PRIOR_KMS }; imager.zero_points.len()];
     let mut near = None;
     for _ in 0..ROUNDS {
-        let marginal = usual(imager, &basis, values, known, near.as_ref())?.marginal;
-        let orbit = frequencies.and_then(|frequencies| {
-            let quadratic = marginal.expansion(imager, &basis, &[]).ok()?.velocities(&[]);
-            let trials = orbits::scan(&quadratic, &frequencies.per_cycle);
-            let found = trials.iter().filter_map(|trial| Some((trial.frequency, trial.orbit?)));
-            found.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))
-        });
-        if let Some((frequency, orbit)) = orbit {
+        let here = linearised((imager, &basis), usual(imager, &basis, values, known, near.as_ref())?, &systemic)?;
+        let orbit = frequencies.and_then(|frequencies| best_orbit(&here.quadratic, frequencies));
+        let Some(found) = here.constants(imager, &systemic, orbit.as_ref()) else { break };
+        if let Some(Peak { porb_over_prot, orbit, .. }) = orbit {
             values.set(Parameter::K, orbit.k_kms);
-            values.set(Parameter::PorbOverProt, 1.0 / frequency);
+            values.set(Parameter::PorbOverProt, porb_over_prot);
             values.set(Parameter::Phi, orbit.phi);
         }
-        let known_velocities = marginal.known_zero_points(imager, &basis, &[])?;
-        let step = known_velocities.coordinates(&values) - &known_velocities.centre;
-        let gradient = &known_velocities.gradient - &known_velocities.information * step;
-        let (moves, sigmas) = most_probable(imager, &gradient, &known_velocities.information)?;
-        let mut stays = true;
-        for (z, held) in held.iter_mut().enumerate() {
-            held.value_kms += moves[z];
-            held.sigma_kms = sigmas[z];
-            stays &= moves[z].abs() < STAYS * sigmas[z];
-            imager.move_zero_point(z, moves[z]);
+        if let Some(ConstantVelocity { value_kms, .. }) = found.systemic {
+            values.set(Parameter::Vsys, value_kms);
         }
-        near = Some(marginal);
+        let mut stays = true;
+        for (z, ConstantVelocity { value_kms, sigma_kms }) in found.offsets.into_iter().enumerate() {
+            let moved = value_kms - imager.zero_points[z].held_kms();
+            stays &= moved.abs() < STAYS * sigma_kms;
+            imager.move_zero_point(z, moved);
+        }
+        near = Some(here.kept::<Fitted>().marginal.clone());
         if stays {
             break;
         }
     }
-    Ok(held)
+    Ok(imager.zero_points.iter().map(|z| HeldZeroPoint { held_kms: z.held_kms(), found: None }).collect())
 }
 
-/// How far the most probable zero points are from where they are held, and their errors (km/s).
-fn most_probable(
-    imager: &Imager,
-    gradient: &DVector<f64>,
-    information: &DMatrix<f64>,
-) -> Result<(DVector<f64>, DVector<f64>), FieldError> {
-    let columns = imager.offset_columns(gradient.len());
-    let weight = |prior: &ZeroPointPrior| prior.sd_kms.powi(-2);
-    let mut own = columns.tr_mul(&(information * &columns));
-    let mut pulled = columns.tr_mul(gradient);
-    for (z, prior) in imager.zero_points.iter().enumerate() {
-        own[(z, z)] += weight(prior);
-        pulled[z] += weight(prior) * prior.mean_kms;
-    }
-    let factor = own.cholesky().ok_or(FieldError::NotPositive)?;
-    Ok((factor.solve(&pulled), factor.inverse().diagonal().map(f64::sqrt)))
+/// The best of the orbits of these frequencies, its period held.
+fn best_orbit(quadratic: &VelocityQuadratic, frequencies: &Frequencies) -> Option<Peak> {
+    let trials = orbits::scan(quadratic, &frequencies.per_cycle);
+    let found = trials.iter().filter_map(|trial| Some((trial.frequency, trial.orbit?)));
+    let (frequency, orbit) = found.max_by(|a, b| a.1.delta_ln_l.total_cmp(&b.1.delta_ln_l))?;
+    Some(Peak {
+        porb_over_prot: 1.0 / frequency,
+        sigma_porb_over_prot: None,
+        orbit,
+        covariance: None,
+        on_edge: false,
+        alias: None,
+        imitation: None,
+    })
 }

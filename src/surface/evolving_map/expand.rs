@@ -24,8 +24,23 @@ impl Marginal {
         self.with_zero_points_integrated(imager, stellar, self.quadratic(imager, basis, stellar)?)
     }
 
-    /// The same without each of these groups of profiles (ascending), the maps those of all: what `then` makes of the
-    /// expansion of all others.
+    /// The same, and with those zero points of data sets held that are otherwise integrated out.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn expansions(
+        &self,
+        imager: &Imager,
+        basis: &Basis,
+        stellar: &[Parameter],
+    ) -> Result<[Expansion; 2], FieldError> {
+        let quadratic = self.quadratic(imager, basis, stellar)?;
+        let held = self.expanded(imager, stellar, quadratic.clone());
+        Ok([self.with_zero_points_integrated(imager, stellar, quadratic)?, held])
+    }
+
+    /// The expansion without each of these groups of profiles (ascending), the maps those of all: what `then` makes of
+    /// the expansion of all others.
     ///
     /// # Errors
     /// [`FieldError`], of all groups or of one.

@@ -25,6 +25,7 @@ pub(in crate::surface) mod fit;
 mod forecast;
 mod known;
 mod light;
+pub(in crate::surface) mod linearised;
 mod maps;
 mod nights;
 mod optimum;

@@ -2,17 +2,19 @@
 //! at any time, model profiles, and radial velocities marginalised over maps (`docs/method.md` section 9).
 
 use super::light::misfits;
+use super::linearised::linearised;
 use super::{Assumed, Basis, Fitted, Known, Maps, Marginal, NoFit, OtherRotation, fit};
-use crate::field::{Field, FieldError, Kernel, Lifetime};
-use crate::model::{Parameter, ParameterValues};
+use crate::field::{Field, Kernel, Lifetime};
+use crate::model::Parameter;
 use crate::numerics::vector::{self, Instructions, Task};
+use crate::planets::velocities::VelocityQuadratic;
 use crate::sampling::log_density::Status;
 use crate::star::observation::Observations;
 use crate::surface::checks::Checks;
 use crate::surface::imaging::{Data, Imager};
 use crate::surface::maps::{Against, MapSummary, NoMaps, SurfaceMap, SurfaceMaps, VelocityWithoutSpots, rms, scatter};
 use crate::surface::nuisances::Estimate;
-use crate::surface::{Explained, SpotField};
+use crate::surface::{At, Explained, SpotField};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -23,16 +25,15 @@ const NIGHT_GAP_D: f64 = 0.5;
 const WORST_CHI2: f64 = 2.0;
 
 impl SurfaceMaps {
-    /// Fits the field of the star at `values` to the `observations` that `imager` was made for, but for what is
-    /// `known` of it. Maps are those of `times_d`, by default of each night, or one where the spots are static.
+    /// Fits the field of the star in `at` to the `observations` that its imager was made for, but for what is `known`
+    /// of it. Maps are those of `times_d`, by default of each night, or one where the spots are static.
     ///
     /// # Errors
     /// [`NoMaps`].
     #[doc(hidden)]
     pub fn of_field(
-        imager: &Imager,
+        At { imager, values, nuisances }: At,
         observations: &Observations,
-        values: ParameterValues,
         known: Known,
         times_d: Option<&[f64]>,
     ) -> Result<Self, NoMaps> {
@@ -42,6 +43,8 @@ impl SurfaceMaps {
         if let Some(amplitude) = fitted.too_faint() {
             return Err(NoMaps::TooFaint(amplitude));
         }
+        let here = linearised((imager, &basis), fitted, nuisances).map_err(NoFit::from)?;
+        let fitted: &Fitted = here.kept();
         let marginal = &fitted.marginal;
         let settled = &marginal.settled;
         let modelled = Modelled::of(imager, &basis, marginal, &settled.coefficients);
@@ -56,10 +59,10 @@ impl SurfaceMaps {
             pixels: maps.filling.column(k).iter().copied().collect(),
             sigma: Some(maps.sd.column(k).iter().copied().collect()),
         };
-        let mut warnings = reached(&fitted);
+        let mut warnings = reached(fitted);
         warnings.extend(far(&times_d, observations, &marginal.assumed.field.kernel));
         let against = Against::new(imager, observations, marginal.values, &modelled.depths());
-        let velocities = velocities(imager, &basis, marginal, &against).map_err(NoFit::from)?;
+        let velocities = velocities(&here.held, &against);
         let [rv, sigma] =
             [0, 1].map(|i| velocities.iter().map(move |v| v.marginalised_kms.map_or(f64::NAN, |rv| rv[i])));
         let per_datum = |modelled: &Modelled| {
@@ -91,13 +94,14 @@ impl SurfaceMaps {
             zero_points_kms: counted(marginal.assumed.jitter_kms > 0.0).map(|found| found.zero_point_kms).collect(),
             light,
             trade_off: Vec::new(),
-            field: Some(SpotField::of(&fitted)),
+            field: Some(SpotField::of(fitted)),
             model: modelled.intensities(),
             static_model: of_static.map(|modelled| modelled.intensities()),
             velocities,
             checks: Checks::of_flexible(&against.residuals, &imager.profiles_of_sets(), imager.data.correlated_bins),
             warnings,
             summary,
+            here: Some(here),
         })
     }
 }
@@ -241,16 +245,11 @@ fn of_static(imager: &Imager, basis: &Basis, marginal: &Marginal) -> Option<Mode
 }
 
 /// The velocities of the profiles, marginalised over maps.
-fn velocities(
-    imager: &Imager,
-    basis: &Basis,
-    marginal: &Marginal,
-    against: &Against,
-) -> Result<Vec<VelocityWithoutSpots>, FieldError> {
-    let free = marginal.known_zero_points(imager, basis, &[])?.velocities(&[]).radial_velocities().ok();
+fn velocities(held: &VelocityQuadratic, against: &Against) -> Vec<VelocityWithoutSpots> {
+    let free = held.radial_velocities().ok();
     let velocity = |(k, moments)| {
         let (rv_kms, variance) = free.as_ref().map_or((f64::NAN, f64::NAN), |(v, c)| (v[k], c[(k, k)]));
         VelocityWithoutSpots { moments, marginalised_kms: Some([rv_kms, variance.sqrt()]) }
     };
-    Ok(against.moments.iter().copied().enumerate().map(velocity).collect())
+    against.moments.iter().copied().enumerate().map(velocity).collect()
 }

@@ -1,14 +1,15 @@
 //! The evolving map behind the interface of all surface models.
 
-use super::{Assumed, Basis, Change, Fitted, Known, MarginalPosterior, NoFit, OtherRotation, fit, nights, optimum};
-use crate::field::{Field, Lifetime};
+use super::linearised::linearised;
+use super::{Basis, Change, Fitted, Known, MarginalPosterior, NoFit, OtherRotation, fit, nights, optimum};
+use crate::field::Lifetime;
 use crate::model::{Parameter, ParameterSpace, ParameterValues};
 use crate::planets::periodogram::{CircularOrbit, Frequencies};
 use crate::planets::velocities::VelocityQuadratic;
 use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
 use crate::surface::density::Density;
-use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
+use crate::surface::expansion::{Expansion, Nuisance};
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
@@ -48,26 +49,12 @@ impl EvolvingMap {
 impl SurfaceModel for EvolvingMap {
     fn linearise(&self, at: At, near: Option<&Linearised>) -> Result<Linearised, SurfaceError> {
         let At { imager, values, nuisances } = at;
-        let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
         let basis = Basis::new(&imager.grid);
         let mut fitted = fit(imager, &basis, values, self.known, near.map(|near| near.kept::<Fitted>()))?;
         if let Some(reached) = &self.at_bounds {
             fitted.at_bounds.clone_from(reached);
         }
-        let expansion = fitted.marginal.expansion(imager, &basis, &stellar)?;
-        let quadratic = expansion.velocities(nuisances);
-        let held = || fitted.marginal.known_zero_points(imager, &basis, &stellar);
-        let held = (!imager.zero_points.is_empty()).then(held).transpose()?;
-        Ok(Linearised {
-            expansion,
-            offsets_held: held.map(|held| held.velocities(nuisances)),
-            regularised: quadratic.clone(),
-            quadratic,
-            unresolved_spots: 1.0,
-            on_target: true,
-            field: Some(SpotField::of(&fitted)),
-            solution: Arc::new(fitted),
-        })
+        Ok(linearised((imager, &basis), fitted, nuisances)?)
     }
 
     fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
@@ -85,15 +72,8 @@ impl SurfaceModel for EvolvingMap {
         }
         let basis = Basis::new(&at.imager.grid);
         let marginal = fitted.marginal.without_jitter(at.imager, &basis)?;
-        let expansion = marginal.expansion(at.imager, &basis, &here.expansion.stellar)?;
-        let quadratic = expansion.velocities(at.nuisances);
-        let here = Linearised {
-            expansion,
-            regularised: quadratic.clone(),
-            quadratic,
-            solution: Arc::new(Fitted { marginal, ..fitted.clone() }),
-            ..here.clone()
-        };
+        let without = linearised((at.imager, &basis), Fitted { marginal, ..fitted.clone() }, at.nuisances)?;
+        let here = Linearised { field: here.field.clone(), ..without };
         Ok(Some(WithoutJitter { here, found_kms }))
     }
 
@@ -156,14 +136,8 @@ impl SurfaceModel for EvolvingMap {
         field.at_bounds.iter().map(reached).collect()
     }
 
-    fn maps(
-        &self,
-        imager: &Imager,
-        observations: &Observations,
-        values: ParameterValues,
-        times_d: Option<&[f64]>,
-    ) -> Result<SurfaceMaps, NoMaps> {
-        SurfaceMaps::of_field(imager, observations, values, self.known, times_d)
+    fn maps(&self, at: At, observations: &Observations, times_d: Option<&[f64]>) -> Result<SurfaceMaps, NoMaps> {
+        SurfaceMaps::of_field(at, observations, self.known, times_d)
     }
 
     fn begins_with_blind_search(&self) -> bool {
@@ -190,21 +164,5 @@ impl SurfaceModel for EvolvingMap {
         let posterior = MarginalPosterior::new(imager, &space, record.values(others), then.held())?;
         RebuildError::check("ln of the evidence", then.ln_evidence, posterior.reference_ln_evidence())?;
         Ok(Arc::new(posterior))
-    }
-}
-
-impl SpotField {
-    /// Of a fit.
-    pub(crate) fn of(fitted: &Fitted) -> Self {
-        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
-        SpotField {
-            spot_amplitude: spectrum.amplitude,
-            spot_slope: spectrum.slope,
-            spot_break_degree: spectrum.break_degree,
-            spot_lifetime_d: kernel.lifetime.days(),
-            velocity_jitter_kms: jitter_kms,
-            ln_evidence: fitted.ln_evidence,
-            at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
-        }
     }
 }

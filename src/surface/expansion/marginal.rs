@@ -28,6 +28,11 @@ pub fn nuisances(free: &[FreeParameter]) -> Vec<Nuisance> {
     free.iter().filter(|f| is_nuisance(f.parameter)).map(nuisance).collect()
 }
 
+/// Those that are no velocity: all but the systemic one.
+pub fn of_the_star(nuisances: &[Nuisance]) -> Vec<Nuisance> {
+    nuisances.iter().copied().filter(|nuisance| nuisance.parameter != Parameter::Vsys).collect()
+}
+
 impl Expansion {
     /// The quadratic in the velocities of the orbit alone, relative to the systemic velocity of the centre, with the
     /// `nuisances` integrated out. Stellar ones must be among the coordinates.

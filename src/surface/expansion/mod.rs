@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
-pub use marginal::{Nuisance, nuisances};
+pub use marginal::{Nuisance, nuisances, of_the_star};
 pub use model::{VELOCITY_STEP_KMS, stellar_step, velocity_slopes};
 
 /// The star's own parameters that an expansion may hold beside the velocities, to which the systemic velocity belongs.

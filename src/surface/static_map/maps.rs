@@ -80,6 +80,7 @@ impl SurfaceMaps {
             light: Vec::new(),
             trade_off: reference.tradeoff.nodes().iter().map(node).collect(),
             field: None,
+            here: None,
             warnings: Vec::new(),
             summary,
             checks: Checks::of(&against.residuals, &imager.profiles_of_sets(), imager.data.correlated_bins),

@@ -9,7 +9,7 @@ use crate::planets::verdict::Remark;
 use crate::star::observation::Observations;
 use crate::surface::density::Density;
 use crate::surface::evolving_map::{Change, NoFit};
-use crate::surface::expansion::{Expansion, Nuisance, STELLAR};
+use crate::surface::expansion::{Expansion, Nuisance, STELLAR, of_the_star};
 use crate::surface::imaging::Imager;
 use crate::surface::optimum::{Best, BlindStart, Progress, SearchError, Sought};
 use crate::surface::record::{RebuildError, SurfaceRecord};
@@ -49,9 +49,10 @@ impl SurfaceModel for StaticMap {
         let expansion = Expansion::of(imager, &reference, &stellar);
         let regularised = expansion.velocities(nuisances);
         let unresolved_spots = expansion.unresolved_spots(nuisances).ok_or(Unbounded)?;
-        let quadratic = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?.velocities(nuisances);
-        let (offsets_held, field, solution) = (None, None, Arc::new(reference));
-        Ok(Linearised { expansion, quadratic, offsets_held, regularised, unresolved_spots, on_target, field, solution })
+        let counted = expansion.with_unresolved_spots(unresolved_spots).ok_or(Unbounded)?;
+        let (quadratic, held) = (counted.velocities(nuisances), counted.velocities(&of_the_star(nuisances)));
+        let (field, solution) = (None, Arc::new(reference));
+        Ok(Linearised { expansion, quadratic, held, regularised, unresolved_spots, on_target, field, solution })
     }
 
     fn velocities(&self, expansion: &Expansion, nuisances: &[Nuisance]) -> Option<VelocityQuadratic> {
@@ -146,9 +147,8 @@ impl SurfaceModel for StaticMap {
 
     fn maps(
         &self,
-        imager: &Imager,
+        At { imager, values, .. }: At,
         observations: &Observations,
-        values: ParameterValues,
         times_d: Option<&[f64]>,
     ) -> Result<SurfaceMaps, NoMaps> {
         if times_d.is_some() {

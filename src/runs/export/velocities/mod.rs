@@ -10,9 +10,10 @@ use super::ExportError;
 use super::place::{begins_with, check_folder, check_name, create_parent};
 use crate::data::io::FileError;
 use crate::data::io::atomic::{self, WriteError};
-use crate::data::io::csv::Columns;
+use crate::data::io::csv::{Columns, DATA_SET};
 use crate::runs::blind_search::{FILE, PeriodogramFile};
 use crate::runs::origin;
+use crate::surface::ConstantVelocity;
 use loss::Loss;
 use nalgebra::{DMatrix, DVector};
 use std::fmt::Write as _;
@@ -21,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// Metres in a kilometre.
 const M: f64 = 1000.0;
 
-/// What stands for the instrument in tables that name one.
+/// What stands for the instrument in tables that name one, of one data set.
 const INSTRUMENT: &str = "dimcmc";
 
 const README: &str = "README.txt";
@@ -38,6 +39,8 @@ struct Velocities {
     kms: DVector<f64>,
     /// km^2/s^2.
     covariance: DMatrix<f64>,
+    /// Name of the data set of each; empty where there is only one.
+    sets: Vec<String>,
 }
 
 /// Writes the velocities of the search in `folder` to the folder `out`; an earlier export there is replaced if
@@ -47,7 +50,7 @@ struct Velocities {
 /// [`ExportError`]: no search there, files that are wrong, a folder that cannot be written.
 pub fn write(folder: &Path, out: &Path, replace: bool) -> Result<Vec<PathBuf>, ExportError> {
     let search: PeriodogramFile = origin::read(folder, FILE)?;
-    let velocities = Velocities::read(folder)?;
+    let velocities = Velocities::read(folder, &search)?;
     check_name(out)?;
     check_folder(out, replace, &|folder| begins_with(&folder.join(README), TITLE.as_bytes()))?;
     create_parent(out)?;
@@ -72,7 +75,7 @@ pub fn write(folder: &Path, out: &Path, replace: bool) -> Result<Vec<PathBuf>, E
 }
 
 impl Velocities {
-    fn read(folder: &Path) -> Result<Self, ExportError> {
+    fn read(folder: &Path, search: &PeriodogramFile) -> Result<Self, ExportError> {
         let path = folder.join("rv.csv");
         let table = Columns::read(&path)?;
         let (times_d, kms) = (table.column("time_d")?.to_vec(), table.column("rv_kms")?.to_vec());
@@ -81,7 +84,10 @@ impl Velocities {
             let problem = "the profiles do not bound all velocities: there is nothing to pass on";
             return Err(FileError::of(&path, problem).into());
         }
-        Ok(Velocities { times_d, kms: DVector::from_vec(kms), covariance })
+        let names: Vec<&String> = search.provenance.measured.sets.iter().map(|set| &set.name).collect();
+        let name = |number: &f64| names.get((*number as usize).saturating_sub(1)).map(|name| (*name).clone());
+        let sets = table.column(DATA_SET).ok().and_then(|column| column.iter().map(name).collect());
+        Ok(Velocities { times_d, kms: DVector::from_vec(kms), covariance, sets: sets.unwrap_or_default() })
     }
 
     /// Time, velocity and error in units of the km/s over `unit`, and perhaps the instrument.
@@ -91,7 +97,8 @@ impl Velocities {
             let (velocity, error) = (self.kms[k] * unit, self.covariance[(k, k)].sqrt() * unit);
             let _ = write!(text, "{time_d}{between}{velocity}{between}{error}");
             if instrument {
-                let _ = write!(text, "{between}{INSTRUMENT}");
+                let name = self.sets.get(k).map_or(INSTRUMENT, |name| name);
+                let _ = write!(text, "{between}{name}");
             }
             text.push('\n');
         }
@@ -136,10 +143,16 @@ fn matrix(path: &Path, n: usize) -> Result<DMatrix<f64>, FileError> {
 }
 
 fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>) -> String {
+    let from = match search.systemic_velocity {
+        Some(ConstantVelocity { value_kms, sigma_kms }) => format!("{value_kms:.4} +- {sigma_kms:.4} km/s."),
+        None => "of the config.".to_owned(),
+    };
     let mut text = format!(
         "{TITLE} {}\n\n\
         {} velocities and their covariance, spots marginalised out. Times are days, as in the list of profiles.\n\
-        Velocities count from the systemic velocity of the config.\n\n\
+        Velocities count from the systemic velocity {}\n\
+        Their errors and covariance do not include the error of what all profiles, or those of a data set, have in\n\
+        common: leave a constant velocity free in every fit, for each data set.\n\n\
         radvel.csv           m/s   radvel: time, mnvel, errvel, tel\n\
         juliet.dat           m/s   juliet: time, velocity, error, instrument; no head\n\
         kima.txt             m/s   kima: time, velocity, error; RVData('kima.txt', skip=1)\n\
@@ -147,7 +160,8 @@ fn readme(search: &PeriodogramFile, velocities: &Velocities, loss: Option<&Loss>
         {COVARIANCE}  m2/s2 the full covariance, in the order of the tables; no head\n\
         {LIKELIHOOD}           it as a likelihood of radvel, and as the noise of tinygp\n\n",
         search.provenance.version,
-        velocities.times_d.len()
+        velocities.times_d.len(),
+        from
     );
     text += "What is lost without the covariance\n\n\
         Errors in the tables are the square roots of its diagonal. Velocities of a spotted star are not independent,\n\

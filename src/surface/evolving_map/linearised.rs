@@ -1,0 +1,46 @@
+//! The star of a fit as every surface model gives it: linearised, with its spots as a field.
+
+use super::{Assumed, Basis, Fitted};
+use crate::field::{Field, FieldError};
+use crate::model::Parameter;
+use crate::surface::expansion::{Nuisance, STELLAR, of_the_star};
+use crate::surface::imaging::Imager;
+use crate::surface::{Linearised, SpotField};
+use std::sync::Arc;
+
+/// The star of a fit.
+pub(in crate::surface) fn linearised(
+    (imager, basis): (&Imager, &Basis),
+    fitted: Fitted,
+    nuisances: &[Nuisance],
+) -> Result<Linearised, FieldError> {
+    let stellar: Vec<Parameter> = nuisances.iter().map(|n| n.parameter).filter(|p| STELLAR.contains(p)).collect();
+    let [expansion, held] = fitted.marginal.expansions(imager, basis, &stellar)?;
+    let quadratic = expansion.velocities(nuisances);
+    Ok(Linearised {
+        expansion,
+        held: held.velocities(&of_the_star(nuisances)),
+        regularised: quadratic.clone(),
+        quadratic,
+        unresolved_spots: 1.0,
+        on_target: true,
+        field: Some(SpotField::of(&fitted)),
+        solution: Arc::new(fitted),
+    })
+}
+
+impl SpotField {
+    /// Of a fit.
+    pub(crate) fn of(fitted: &Fitted) -> Self {
+        let Assumed { field: Field { spectrum, kernel }, jitter_kms } = fitted.marginal.assumed;
+        SpotField {
+            spot_amplitude: spectrum.amplitude,
+            spot_slope: spectrum.slope,
+            spot_break_degree: spectrum.break_degree,
+            spot_lifetime_d: kernel.lifetime.days(),
+            velocity_jitter_kms: jitter_kms,
+            ln_evidence: fitted.ln_evidence,
+            at_bounds: fitted.at_bounds.iter().map(|name| (*name).to_owned()).collect(),
+        }
+    }
+}
